@@ -1,0 +1,268 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+// report FOLDER TOPIC...: prints tables of what the benchmarks of these topics left in FOLDER, and leaves the same
+// figures there as summary.json and, for the plots, a .tsv for each table.
+
+namespace {
+
+using Json = nlohmann::json;
+
+/// Medians by topic and name, as "frame/part/solve/vertices:642".
+using Results = std::map<std::string, Json>;
+
+/// One line of a table: a benchmark in all columns.
+struct Row {
+    enum Kind { time, share, gain, rate, each, counter };
+
+    std::string name, benchmark;
+    Kind kind = time;
+    std::string other = {};  ///< share, gain: the benchmark it is set against; each, counter: a counter of its own
+    std::string unit = "s";
+};
+
+struct Table {
+    std::string topic, key, title;
+    std::vector<Row> rows;
+    std::string column = "vertices";
+    std::vector<int> columns = {162, 642, 2562, 10242};
+    std::string scene = {};  ///< what is the same in all columns
+};
+
+Table threshold_table(const std::string& vertices) {
+    return {.topic = "tree",
+            .key = "threshold_" + vertices,
+            .title = "The tree's balance threshold, " + vertices + " vertices",
+            .rows = {{"build", "threshold/build"},
+                     {"closest point", "threshold/closest"},
+                     {"touching sphere", "threshold/sphere"},
+                     {"first hit", "threshold/segment"},
+                     {"refit of the moved", "threshold/refit"},
+                     {"triangles in a leaf", "threshold/build", Row::counter, "leaf", ""}},
+            .column = "threshold",
+            .columns = {1, 2, 4, 8, 16, 32, 64},
+            .scene = "/vertices:" + vertices};
+}
+
+const std::vector<Table> all_tables{
+    {"frame",
+     "frame",
+     "A frame, and where the time goes: the tool presses and slides",
+     {{"frame", "whole"},
+      {"  contact", "part/contact", Row::share, "whole"},
+      {"  solve", "part/solve", Row::share, "whole"},
+      {"  refit", "part/refit", Row::share, "whole"},
+      {"  normals", "part/normals", Row::share, "whole"},
+      {"  force", "part/force", Row::share, "whole"},
+      {"frames in a second", "whole", Row::rate, {}, ""}}},
+    {"solver",
+     "solver",
+     "From a vertex held 0.2 R inside to rest, to the same residual",
+     {{"explicit Euler at its best", "explicit_euler"},
+      {"quasi-static, all layers", "quasi_static/all_layers", Row::gain, "explicit_euler"},
+      {"  with omega 1.9", "quasi_static/omega_1_9", Row::gain, "explicit_euler"},
+      {"quasi-static, 6 layers", "quasi_static/six_layers", Row::gain, "explicit_euler"},
+      {"Euler: best dt", "explicit_euler", Row::counter, "dt"},
+      {"Euler: best viscosity", "explicit_euler", Row::counter, "viscosity", "Ns/m"},
+      {"Euler: steps", "explicit_euler", Row::counter, "steps", ""},
+      {"Euler: a vertex and step", "explicit_euler", Row::each, "visits"},
+      {"quasi-static: a visit", "quasi_static/all_layers", Row::each, "visits"}}},
+    {"tree",
+     "tree",
+     "The tree against trying every triangle",
+     {{"closest point, every one", "all_triangles/closest"},
+      {"closest point, tree", "tree/closest", Row::gain, "all_triangles/closest"},
+      {"touching sphere, every one", "all_triangles/sphere"},
+      {"touching sphere, tree", "tree/sphere", Row::gain, "all_triangles/sphere"},
+      {"first hit, every one", "all_triangles/segment"},
+      {"first hit, tree", "tree/segment", Row::gain, "all_triangles/segment"},
+      {"build", "tree/build"}}},
+    threshold_table("642"),
+    threshold_table("10242"),
+    {"tracker",
+     "tracker",
+     "The contact: asked of the tree in every frame, or followed by the tracker",
+     {{"sphere of 2 mm, tree", "tree/sphere_2mm"},
+      {"sphere of 2 mm, tracker", "tracker/sphere_2mm", Row::gain, "tree/sphere_2mm"},
+      {"sphere of 4 mm, tree", "tree/sphere_4mm"},
+      {"sphere of 4 mm, tracker", "tracker/sphere_4mm", Row::gain, "tree/sphere_4mm"},
+      {"capsule of 2 mm, tree", "tree/capsule_2mm"},
+      {"capsule of 2 mm, tracker", "tracker/capsule_2mm", Row::gain, "tree/capsule_2mm"}}},
+    {"update",
+     "update",
+     "Boxes and normals: of all vertices, or of those that moved",
+     {{"refit, all", "update/refit_all"},
+      {"refit, moved", "update/refit_moved", Row::gain, "update/refit_all"},
+      {"normals, all", "update/normals_all"},
+      {"normals, moved", "update/normals_moved", Row::gain, "update/normals_all"},
+      {"moved vertices", "update/refit_moved", Row::counter, "moved", ""}}}};
+
+/// Reads what Google Benchmark wrote: its medians, or the one figure there is.
+void read(const std::string& folder, const std::string& topic, Results& results, Json& context) {
+    const std::string path = folder + "/" + topic + ".json";
+    std::ifstream file(path);
+    if (!file) throw std::runtime_error("there is no " + path);
+    const Json all = Json::parse(file);
+    context = all.at("context");
+    for (const Json& run : all.at("benchmarks")) {
+        if (run.value("aggregate_name", "median") != "median") continue;
+        const std::string name = run.at("run_name");
+        results[topic + "/" + name.substr(0, name.find("/iterations:"))] = run;
+    }
+}
+
+double time_of(const Json& run) {
+    static const std::map<std::string, double> second{{"ns", 1e-9}, {"us", 1e-6}, {"ms", 1e-3}, {"s", 1.0}};
+    const bool manual = run.at("run_name").get<std::string>().find("/manual_time") != std::string::npos;
+    return run.at(manual ? "real_time" : "cpu_time").get<double>() * second.at(run.at("time_unit"));
+}
+
+std::optional<double> value_in(const Results& results, const Table& table, const Row& row, int column) {
+    const std::string scene = table.scene + "/" + table.column + ":" + std::to_string(column);
+    const auto found = results.find(table.topic + "/" + row.benchmark + scene);
+    if (found == results.end()) return std::nullopt;
+    const Json& run = found->second;
+    switch (row.kind) {
+        case Row::rate: return 1 / time_of(run);
+        case Row::each: return time_of(run) / run.at(row.other).get<double>();
+        case Row::counter: return run.at(row.other).get<double>();
+        default: return time_of(run);
+    }
+}
+
+std::string print(const char* format, double number) {
+    char text[32];
+    std::snprintf(text, sizeof text, format, number);
+    return text;
+}
+
+/// Three digits and the unit: "91.4 us".
+std::string readable(std::optional<double> value, const std::string& unit) {
+    if (!value) return "-";
+    const std::string prefix = "num kM";
+    double number = *value;
+    std::size_t at = 3;
+    for (; !unit.empty() && number < 0.9995 && number > 0 && at > 0; --at) number *= 1000;
+    const std::string digits = print(number < 9.995 ? "%.2f" : number < 99.95 ? "%.1f" : "%.0f", number);
+    if (unit.empty()) return digits;
+    return digits + " " + (at == 3 ? "" : prefix.substr(at, 1)) + unit;
+}
+
+/// How the row stands to the one it is set against: "87 %" of it, or "19 x" as fast.
+std::string comparison(const Results& results, const Table& table, const Row& row, int column) {
+    if (row.kind != Row::share && row.kind != Row::gain) return "";
+    const auto value = value_in(results, table, row, column);
+    const auto other = value_in(results, table, {"", row.other}, column);
+    if (!value || !other) return "";
+    if (row.kind == Row::share) return print("%.0f %%", 100 * *value / *other);
+    return print(*other < 9.95 * *value ? "%.1f x" : "%.0f x", *other / *value);
+}
+
+bool has_results(const Results& results, const Table& table) {
+    return std::any_of(table.rows.begin(), table.rows.end(), [&](const Row& row) {
+        return std::any_of(table.columns.begin(), table.columns.end(),
+                           [&](int column) { return value_in(results, table, row, column).has_value(); });
+    });
+}
+
+/// `text` with spaces before it up to `width`.
+std::string right(std::string text, std::size_t width) {
+    text.insert(0, width - std::min(width, text.size()), ' ');
+    return text;
+}
+
+void print_line(std::string line) {
+    line.erase(line.find_last_not_of(' ') + 1);
+    std::puts(line.c_str());
+}
+
+void print_table(const Results& results, const Table& table) {
+    const auto first = [](std::string name) { return name.append(27 - std::min<std::size_t>(27, name.size()), ' '); };
+    const bool grows = table.column == "vertices";
+    const std::size_t gap = grows ? 8 : 1;  // holds the comparison
+    std::string line = first("  " + table.column);
+    for (const int column : table.columns) line += right(std::to_string(column), 9) + right("", gap);
+    print_line("\n" + table.title);
+    print_line(line + (grows ? "642/162" : ""));
+    for (const Row& row : table.rows) {
+        line = first("  " + row.name);
+        for (const int column : table.columns) {
+            line += right(readable(value_in(results, table, row, column), row.unit), 9) +
+                    right(comparison(results, table, row, column), gap);
+        }
+        const auto small = value_in(results, table, row, 162), large = value_in(results, table, row, 642);
+        print_line(line + (grows && small && large ? print("%7.2f", *large / *small) : ""));
+    }
+}
+
+Json summary_of(const Results& results, const Table& table) {
+    Json rows = Json::array();
+    for (const Row& row : table.rows) {
+        Json values = Json::array();
+        for (const int column : table.columns) {
+            const auto value = value_in(results, table, row, column);
+            values.push_back(value ? Json(*value) : Json());
+        }
+        rows.push_back(
+            {{"name", row.name.substr(row.name.find_first_not_of(' '))}, {"unit", row.unit}, {"values", values}});
+    }
+    return {{"title", table.title}, {table.column, table.columns}, {"rows", rows}};
+}
+
+void write_tsv(const std::string& path, const Results& results, const Table& table) {
+    std::ofstream file(path);
+    file << table.column;
+    for (const Row& row : table.rows) file << '\t' << row.name.substr(row.name.find_first_not_of(' '));
+    file << '\n';
+    for (const int column : table.columns) {
+        file << column;
+        for (const Row& row : table.rows) file << '\t' << value_in(results, table, row, column).value_or(std::nan(""));
+        file << '\n';
+    }
+}
+
+void report(const std::string& folder, const std::vector<std::string>& topics) {
+    Results results;
+    Json summary{{"context", {}}, {"tables", Json::object()}};
+    Json& context = summary["context"];
+    for (const auto& topic : topics) read(folder, topic, results, context);
+    const auto said = [&](const char* name) { return context.at(name).get<std::string>(); };
+    std::printf(
+        "%s at %d MHz\n%s %s\none core, medians of the processor time; %%: of the frame; x: so many times as fast as "
+        "the first "
+        "line of its kind\n",
+        said("processor").c_str(), context.at("mhz_per_cpu").get<int>(), said("compiler").c_str(),
+        said("flags").c_str());
+    for (const Table& table : all_tables) {
+        if (std::find(topics.begin(), topics.end(), table.topic) == topics.end()) continue;
+        if (!has_results(results, table)) continue;
+        print_table(results, table);
+        summary["tables"][table.key] = summary_of(results, table);
+        write_tsv(folder + "/" + table.key + ".tsv", results, table);
+    }
+    std::ofstream(folder + "/summary.json") << summary.dump(2) << '\n';
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        if (argc < 3) throw std::runtime_error("report FOLDER TOPIC...");
+        report(argv[1], {argv + 2, argv + argc});
+        return 0;
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "report: %s\n", error.what());
+        return 2;
+    }
+}

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include <benchmark/benchmark.h>
+
+#include <membrane/membrane.hpp>
+
+/// The scene of all benchmarks: a sphere of springs on its volume springs, and a tool that presses and slides.
+///
+///     Loop loop = pressed(642);
+///     for (auto _ : state) loop.frame();
+///     loop.check();
+namespace bench {
+
+using membrane::Index;
+using Vector3 = membrane::Vector3<double>;
+using Points = membrane::Points<double>;
+
+inline constexpr double radius = 0.01;      // of the sphere [m]
+inline constexpr double stiffness = 40;     // of its springs [N/m]
+inline constexpr double backing = 8;        // stiffness of the volume springs [N/m]
+inline constexpr double depth = 1e-3;       // of the tool's press [m]
+inline constexpr double tick = 1e-3;        // [s]
+inline constexpr Index ticks_around = 600;  // that the tool takes to come round
+
+/// Ends the program: what was about to be measured is wrong.
+inline void require(bool right, const char* what) {
+    if (right) return;
+    std::fprintf(stderr, "error: wrong result: %s\n", what);
+    std::abort();
+}
+
+/// The icosphere with so many vertices.
+[[nodiscard]] inline membrane::TriangleMesh<double> sphere(std::int64_t vertices) {
+    Index subdivisions = 0;
+    while (10 * (std::int64_t{1} << 2 * subdivisions) + 2 < vertices) ++subdivisions;
+    return membrane::icosphere<double>({.radius = radius, .subdivisions = subdivisions});
+}
+
+/// The sizes to measure.
+inline void sizes(benchmark::internal::Benchmark* measured) {
+    measured->ArgName("vertices");
+    for (const int vertices : {162, 642, 2562, 10242}) measured->Arg(vertices);
+}
+
+/// The same for what is measured frame by frame: a third of the way round.
+inline void sizes_around(benchmark::internal::Benchmark* measured) {
+    sizes(measured);
+    measured->Iterations(ticks_around / 3)->UseManualTime();
+}
+
+/// A tool by its shape, and where it is: some ticks straight in, then around and around.
+struct Path {
+    static constexpr Index ticks_in = 100;
+
+    double tool_radius = 2e-3;  ///< [m]
+    double shaft = 0;           ///< its length, zero for a sphere [m]
+
+    friend auto operator<=>(const Path&, const Path&) = default;
+
+    [[nodiscard]] membrane::Tool<double> at(Index t) const {
+        return {.position = position(t),
+                .axis = shaft * pole(),
+                .radius = tool_radius,
+                .velocity = (position(t) - position(t - 1)) / tick,
+                .time = tick * t};
+    }
+
+  private:
+    [[nodiscard]] static Vector3 pole() { return Vector3(0.3, 0.2, 0.93).normalized(); }
+
+    [[nodiscard]] Vector3 position(Index t) const {
+        const double tilt = 0.5, turn = 2 * std::numbers::pi * std::max(t - ticks_in, 0) / ticks_around;
+        const Vector3 u = membrane::cross<double>(pole(), Vector3::UnitX()).normalized();
+        const Vector3 outward = std::cos(turn) * u + std::sin(turn) * membrane::cross(pole(), u);
+        const double above = 1.2 * depth * std::max(ticks_in - t, 0) / ticks_in;
+        return (radius + tool_radius - depth + above) * (std::cos(tilt) * pole() + std::sin(tilt) * outward);
+    }
+};
+
+enum class Stage { contact, solve, refit, normals, force };
+
+/// The loop of the README, its stages one by one.
+struct Loop {
+    explicit Loop(std::int64_t vertices, const Path& way = {}) : path(way), mesh(sphere(vertices)) {
+        while (now < Path::ticks_in + ticks_around) frame();
+    }
+
+    /// One frame.
+    void frame() {
+        frame([](Stage, auto work) { work(); });
+    }
+
+    /// One frame, each stage by the hands of `run(stage, work)`.
+    template <class Run>
+    void frame(Run run) {
+        tool = path.at(now++);
+        run(Stage::contact, [&] { contact = tracker.update(tree, x, tool); });
+        run(Stage::solve, [&] { report = solver.step(x, tick, network, volume, press(tool, contact)); });
+        run(Stage::refit, [&] { tree.refit(x, report.moved); });
+        run(Stage::normals, [&] { normals.update(x, report.moved); });
+        run(Stage::force, [&] { force = feel({tool, contact, report}); });
+        pressing =
+            pressing && report.status == membrane::StepStatus::advanced && (now < Path::ticks_in || contact.touching());
+    }
+
+    /// Requires that the tool has pressed all the way, that nothing lags behind the positions, and that the membrane
+    /// pushes back.
+    void check() const;
+
+    Path path;
+    Index now = 0;  // ticks
+    membrane::TriangleMesh<double> mesh;
+    membrane::MassSpringNetwork<double, membrane::LinearSpring> network{mesh, {}, {.stiffness = stiffness}};
+    membrane::VirtualVolumeSprings<double> volume{mesh, {.stiffness = backing, .damping = 0.02}};
+    membrane::QuasiStaticSolver<double> solver{network, {.layers = 6, .sweeps = 4}};
+    membrane::AabbTree<double> tree{mesh};
+    membrane::ContactTracker<double> tracker{mesh};
+    membrane::VertexNormals<double> normals{mesh};
+    membrane::SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
+    Points x = mesh.positions();
+
+    membrane::Tool<double> tool;
+    membrane::Contact<double> contact;
+    membrane::StepReport<double> report;
+    Vector3 force = Vector3::Zero();
+    bool pressing = true;
+};
+
+/// The loop with the tool pressed in after its first way around; made once.
+[[nodiscard]] inline const Loop& pressed(std::int64_t vertices, const Path& path = {}) {
+    static std::map<std::pair<std::int64_t, Path>, Loop> made;
+    return made.try_emplace({vertices, path}, vertices, path).first->second;
+}
+
+/// Time that `work` takes, less what reading the clocks takes [s]: by the wall clock, or by the processor's own where
+/// somebody else has had the processor meanwhile.
+template <class Work>
+[[nodiscard]] double seconds(Work work) {
+    const auto read = [](clockid_t clock) {
+        std::timespec time;
+        clock_gettime(clock, &time);
+        return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+    };
+    const auto both = [&](const auto& body) {
+        const double cpu = read(CLOCK_THREAD_CPUTIME_ID), wall = read(CLOCK_MONOTONIC);
+        body();
+        benchmark::ClobberMemory();
+        const double wall_end = read(CLOCK_MONOTONIC);
+        return std::pair(wall_end - wall, read(CLOCK_THREAD_CPUTIME_ID) - cpu);
+    };
+    static const auto reading = [&] {
+        std::pair least(1.0, 1.0);
+        for (int i = 0; i < 1000; ++i) {
+            const auto [wall, cpu] = both([] {});
+            least = {std::min(least.first, wall), std::min(least.second, cpu)};
+        }
+        return least;
+    }();
+    const auto [wall, cpu] = both(work);
+    return std::max(std::min(wall - reading.first, cpu - reading.second), 0.0);
+}
+
+/// Measures one stage of the loop, frame by frame.
+inline void measure_stage(benchmark::State& state, Loop loop, Stage part) {
+    for (auto _ : state) {
+        loop.frame([&](Stage stage, auto work) {
+            if (stage == part) {
+                state.SetIterationTime(seconds(work));
+            } else {
+                work();
+            }
+        });
+    }
+    loop.check();
+}
+
+/// Points between half a tool inside the sphere and half a tool outside, the same every time.
+[[nodiscard]] inline std::vector<Vector3> points_near(std::size_t count) {
+    std::mt19937_64 engine(20071101);
+    const auto number = [&](double low, double high) {
+        return low + (high - low) * static_cast<double>(engine() >> 11) * 0x1p-53;
+    };
+    std::vector<Vector3> points;
+    while (points.size() < count) {
+        const double x = number(-1, 1), y = number(-1, 1), z = number(-1, 1);
+        const Vector3 direction(x, y, z);
+        const double length = membrane::norm(direction);
+        if (length > 0.1 && length < 1) points.push_back(radius * number(0.87, 1.13) / length * direction);
+    }
+    return points;
+}
+
+/// The nearest point by trying every triangle.
+[[nodiscard]] inline membrane::TrianglePoint<double> closest_of_all(const membrane::TriangleMesh<double>& mesh,
+                                                                    const Points& x, const Vector3& q) {
+    membrane::TrianglePoint<double> best{{0, 0, 0}, {0, 0, 0}, std::numeric_limits<double>::infinity()};
+    for (Index f = 0; f < mesh.triangle_count(); ++f) {
+        const auto found = membrane::closest_point(membrane::triangle_at(x, mesh.triangles().col(f)), q);
+        if (found.squared_distance < best.squared_distance) best = found;
+    }
+    return best;
+}
+
+inline void Loop::check() const {
+    require(pressing, "the tool has lost the membrane, or a step was refused");
+    require(report.residual < 0.5 * membrane::norm(report.reactions[0]), "the forces must nearly balance");
+    require(report.reactions[0].dot(tool.position) > 0 && force.dot(tool.position) > 0, "the membrane must push back");
+    membrane::VertexNormals<double> anew(mesh);
+    anew.update(x);
+    require(normals.values() == anew.values(), "normals of the moved vertices");
+    for (const auto& q : points_near(16)) {
+        const double squared = closest_of_all(mesh, x, q).squared_distance;
+        const double error = tree.closest_point(x, q).squared_distance - squared;
+        require(std::abs(error) <= 1e-12 * squared, "distance by the refitted tree");
+    }
+}
+
+}  // namespace bench

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+#include "support/scene.hpp"
+
+// What does following the contact save against asking the tree in every frame? The tool presses and slides. The tree is
+// asked for the triangles within reach and the nearest of them; the tracker's time includes side, depth and normal.
+
+namespace {
+
+using namespace bench;
+
+const Path sphere_2mm{.tool_radius = 2e-3}, sphere_4mm{.tool_radius = 4e-3},
+    capsule_2mm{.tool_radius = 2e-3, .shaft = 0.02};
+
+void tracker(benchmark::State& state, const Path& path) {
+    measure_stage(state, pressed(state.range(0), path), Stage::contact);
+}
+BENCHMARK_CAPTURE(tracker, sphere_2mm, sphere_2mm)->Apply(sizes_around);
+BENCHMARK_CAPTURE(tracker, sphere_4mm, sphere_4mm)->Apply(sizes_around);
+BENCHMARK_CAPTURE(tracker, capsule_2mm, capsule_2mm)->Apply(sizes_around);
+
+void tree(benchmark::State& state, const Path& path) {
+    Loop loop = pressed(state.range(0), path);
+    membrane::BoundedList<Index> touched(static_cast<std::size_t>(loop.mesh.triangle_count()));
+    const auto ask = [&] {
+        touched.clear();
+        benchmark::DoNotOptimize(loop.tree.closest_point(loop.x, loop.tool.position));
+        loop.tree.touching_capsule(loop.x, loop.tool.position, loop.tool.position + loop.tool.axis, loop.contact.reach,
+                                   [&](Index f) { touched.push(f); });
+    };
+    for (auto _ : state) {
+        loop.frame();
+        state.SetIterationTime(seconds(ask));
+    }
+    loop.check();
+
+    loop.contact = loop.tracker.update(loop.tree, loop.x, loop.tool);
+    ask();
+    for (const Index f : touched.items()) {
+        const auto is_f = [&](const auto& seen) { return seen.triangle == f; };
+        require(std::any_of(loop.contact.touched.begin(), loop.contact.touched.end(), is_f),
+                "the tracker must see what the tree sees");
+    }
+}
+BENCHMARK_CAPTURE(tree, sphere_2mm, sphere_2mm)->Apply(sizes_around);
+BENCHMARK_CAPTURE(tree, sphere_4mm, sphere_4mm)->Apply(sizes_around);
+BENCHMARK_CAPTURE(tree, capsule_2mm, capsule_2mm)->Apply(sizes_around);
+
+}  // namespace

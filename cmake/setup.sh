@@ -1,0 +1,64 @@
+# Sourced by tests/run, examples/run, bench/run and .ci/run: sets the machine up, configures, builds.
+# Bash; the caller has `set -euo pipefail`. What is said goes to stderr, so that a program's output stays its own.
+
+root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
+
+say() { printf '== %s\n' "$*" >&2; }
+die() { printf 'error: %s\n' "$*" >&2; exit 1; }
+
+# usage FILE: the comment at the top of a script is its help.
+usage() { sed -n '2,/^[^#]/{s/^# \{0,1\}//p}' "$1"; }
+
+# require PACKAGE...: installs what is missing on Debian or Ubuntu, and runs no apt at all where nothing is.
+require() {
+    if ! command -v dpkg-query apt-get > /dev/null; then
+        command -v cmake ninja c++ > /dev/null || die "this needs what Debian and Ubuntu call: $*"
+        return
+    fi
+    local package missing=()
+    for package in "$@"; do
+        [[ $(dpkg-query --show --showformat '${db:Status-Status}' "$package" 2> /dev/null) == installed ]] ||
+            missing+=("$package")
+    done
+    if ((${#missing[@]} == 0)); then return; fi
+
+    local as_root=()
+    if ((EUID != 0)); then
+        command -v sudo > /dev/null || die "packages are missing; as root: apt-get install ${missing[*]}"
+        as_root=(sudo)
+    fi
+    say "installing ${missing[*]}"
+    "${as_root[@]}" apt-get update -qq
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -qq --yes --no-install-recommends "${missing[@]}" > /dev/null
+}
+
+# build PRESET PART... [-- CMAKE ARGUMENT...]: configures build/PRESET with these parts (tests, examples, benchmarks) and
+# builds them. A part that was asked for before stays, so that nothing is built twice.
+build() {
+    local preset=$1 part parts=() options=() targets=()
+    shift
+    while (($# > 0)) && [[ $1 != -- ]]; do parts+=("$1"); shift; done
+    if (($# > 0)); then shift; fi
+    if [[ ! -f $root/build/$preset/CMakeCache.txt ]]; then
+        options+=(-DMEMBRANE_BUILD_{TESTS,EXAMPLES,BENCHMARKS}=OFF)
+    fi
+    for part in "${parts[@]}"; do
+        options+=(-D "MEMBRANE_BUILD_${part^^}=ON")
+        targets+=("membrane_$part")
+    done
+
+    local version log
+    version=$(cmake --version | sed -n '1s/[^0-9]*//p')
+    [[ $(printf '%s\n' 3.25 "$version" | sort --version-sort | head -n 1) == 3.25 ]] ||
+        die "CMake 3.25 or newer is needed (Debian 12, Ubuntu 23.04), this is $version"
+    say "configuring build/$preset"
+    log=$(cd "$root" && cmake --preset "$preset" "${options[@]}" "$@" 2>&1) || die "cmake failed"$'\n'"$log"
+    say "building ${parts[*]}"
+    cmake --build "$root/build/$preset" --parallel "$(nproc)" --target "${targets[@]}" >&2
+}
+
+test_packages=(g++ cmake ninja-build libeigen3-dev catch2 libcgal-dev libseccomp-dev)
+example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json3-dev)
+bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox)
+check_packages=(clang clang-format clang-tidy)

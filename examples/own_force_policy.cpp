@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+//
+// A force policy of one's own: tissue is too soft for a hand to feel and a device has a limit, so the membrane's
+// reaction is magnified and held below what the device can bear.
+#include <cstdio>
+#include <fstream>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <membrane/haptics/script.hpp>
+#include <membrane/membrane.hpp>
+
+#include "support/command_line.hpp"
+
+/// The membrane's reaction times `scale`, in its own direction but never above `limit`.
+struct LimitedReaction {
+    double scale;
+    double limit;  ///< [N]
+
+    Eigen::Vector3d operator()(const membrane::HapticState<double>& state) const noexcept {
+        Eigen::Vector3d force = Eigen::Vector3d::Zero();
+        for (const auto& reaction : state.report.reactions) force += scale * reaction;
+        const double size = force.norm();
+        return size > limit ? Eigen::Vector3d(limit / size * force) : force;
+    }
+};
+static_assert(membrane::ForcePolicy<LimitedReaction, double>);
+
+void play(std::vector<membrane::Waypoint<double>> script, const LimitedReaction& feel) {
+    const double dt = 1e-3;                                                                                 // [s]
+    const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});                     // [m]
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
+    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    membrane::NullDevice<double> device(std::move(script), {.tick = dt, .radius = 2e-3});
+    auto x = mesh.positions();
+
+    std::printf("time [s]   depth [mm]   reaction [mN]   hand feels [N]\n");
+    for (int tick = 0; device.running(); ++tick) {
+        const auto tool = device.read();
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+        tree.refit(x, report.moved);
+        device.write(feel({tool, contact, report}));
+        if (tick % 50 != 0) continue;
+        const double reaction = report.reactions[0].norm();
+        std::printf("%8.2f %12.2f %15.1f %16.2f%s\n", tool.time, 1e3 * contact.depth, 1e3 * reaction,
+                    device.force().norm(), feel.scale * reaction > feel.limit ? "  at the limit" : "");
+    }
+}
+
+int main(int argc, char** argv) {
+    LimitedReaction feel{.scale = 20, .limit = 3.3};
+    std::string file;
+    CLI::App app("Presses a sphere; the hand feels the membrane's reaction, magnified and limited.");
+    app.add_option("--script", file, "the tool's way, a CSV file: time [s], x, y, z [m]")->check(CLI::ExistingFile);
+    app.add_option("--scale", feel.scale, "from tissue to hand")->capture_default_str();
+    app.add_option("--limit", feel.limit, "of the device [N]")->capture_default_str();
+    return examples::run(app, argc, argv, [&] {
+        if (file.empty()) return play({{0, {0, 0, 0.013}}, {0.4, {0, 0, 0.009}}, {0.8, {0, 0, 0.013}}}, feel);
+        std::ifstream text(file);
+        play(membrane::read_script<double>(text), feel);
+    });
+}

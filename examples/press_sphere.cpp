@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+#include <cstdio>
+#include <membrane/membrane.hpp>
+#include "support/command_line.hpp"
+
+int main(int argc, char** argv) {
+    examples::no_options("Presses a sphere and prints the force.", argc, argv);
+    membrane::NullDevice<double> device({{0.0, {0, 0, 0.013}}, {0.2, {0, 0, 0.010}}}, {.radius = 2e-3});  // [s], [m]
+    const double dt = 1e-3;                                                                               // [s]
+    // [loop]
+    const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});                     // [m]
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
+    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
+    const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};                 // [N/m], [N s/m]
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto normals = membrane::VertexNormals(mesh);
+    auto x = mesh.positions();  // 3 x V [m], ours
+    while (device.running()) {
+        const auto tool = device.read();  // position, velocity, time
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+        tree.refit(x, report.moved);
+        normals.update(x, report.moved);
+        device.write(feel({tool, contact, report}));
+    }
+    // [/loop]
+    std::printf("The hand feels %.3f N.\n", device.force().norm());
+}

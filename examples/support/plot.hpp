@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "support/svg.hpp"
+
+/// Curves over time, one panel above the other on one time axis, with the phases of an experiment as bands.
+///
+///     Plot plot{.title = "Sphere, 642 vertices", .phases = {{"press", 0.1, 0.4}}};
+///     plot.panels = {{"force [mN]", {{.name = "felt", .colour = "#12507b", .samples = {{0.1, 0.0}, {0.4, 3.2}}}}}};
+///     std::ofstream("plot.svg") << drawn(plot);
+namespace examples {
+
+struct Sample {
+    double time;  ///< [s]
+    double value;
+};
+
+struct Curve {
+    std::string name;  ///< In the legend.
+    std::string colour;
+    bool dashed = false;
+    std::vector<Sample> samples = {};
+};
+
+struct PlotPanel {
+    std::string label;  ///< Quantity and unit.
+    std::vector<Curve> curves;
+};
+
+struct Phase {
+    std::string name;
+    double begin, end;  ///< [s]
+};
+
+struct Plot {
+    std::string title;
+    std::vector<Phase> phases;  ///< At least one; together they are the time axis.
+    std::vector<PlotPanel> panels = {};
+};
+
+namespace detail {
+
+/// 1, 2 or 5 times a power of ten: at most `count` such steps cover `range`.
+inline double round_step(double range, int count) {
+    const double least = range / count, power = std::pow(10, std::floor(std::log10(least)));
+    for (const double factor : {1.0, 2.0, 5.0}) {
+        if (factor * power >= 0.999 * least) return factor * power;
+    }
+    return 10 * power;
+}
+
+/// A rectangle of the drawing, and the times and values at its borders.
+struct Axes {
+    double left, top, width, height;
+    double begin, end, low, high;
+
+    [[nodiscard]] Pixel at(const Sample& sample) const {
+        return {left + width * (sample.time - begin) / (end - begin),
+                top + height * (high - sample.value) / (high - low)};
+    }
+    [[nodiscard]] double right() const { return left + width; }
+    [[nodiscard]] double bottom() const { return top + height; }
+};
+
+/// The curve as a path, without samples that would not show.
+inline std::string path(const Axes& axes, const Curve& curve) {
+    constexpr double least = 0.6;  // [px]
+    std::string d;
+    Pixel last;
+    for (const Sample& sample : curve.samples) {
+        const Pixel p = axes.at(sample);
+        if (!d.empty() && std::hypot(p.x - last.x, p.y - last.y) < least) continue;
+        d += (d.empty() ? 'M' : 'L') + number(p.x) + ' ' + number(p.y);
+        last = p;
+    }
+    return d;
+}
+
+inline std::string pen(const Curve& curve) {
+    return "fill='none' stroke='" + curve.colour + "' stroke-width='1.6' stroke-linejoin='round'" +
+           (curve.dashed ? " stroke-dasharray='5 3'" : "");
+}
+
+/// From a round value below all samples to one above; zero always shows.
+inline void fit_values(Axes& axes, const PlotPanel& panel) {
+    double low = 0, high = 0;
+    for (const Curve& curve : panel.curves) {
+        for (const Sample& sample : curve.samples) {
+            low = std::min(low, sample.value);
+            high = std::max(high, sample.value);
+        }
+    }
+    const double step = round_step(high > low ? high - low : 1, 5);
+    axes.low = step * std::floor(low / step);
+    axes.high = std::max(axes.low + step, step * std::ceil(high / step));
+}
+
+inline void draw_values(Svg& svg, const Axes& axes, const std::string& label) {
+    const double step = round_step(axes.high - axes.low, 5);
+    for (double value = axes.low; value < axes.high + step / 2; value += step) {
+        const Pixel p = axes.at({axes.begin, value});
+        svg.line(p, {axes.right(), p.y}, "stroke='#000' stroke-opacity='.09'");
+        svg.text({p.x - 7, p.y + 4}, number(value, 3), {.size = 11, .colour = "#555", .anchor = "end"});
+    }
+    svg.line({axes.left, axes.bottom()}, {axes.right(), axes.bottom()}, "stroke='#333'");
+    svg.text({axes.left - 46, axes.top + axes.height / 2}, label, {.size = 12, .anchor = "middle", .upright = true});
+}
+
+inline void draw_times(Svg& svg, const Axes& axes) {
+    const double step = round_step(axes.end - axes.begin, 10);
+    for (double time = step * std::ceil(axes.begin / step - 1e-9); time < axes.end + 1e-3 * step; time += step) {
+        const Pixel p = axes.at({time, axes.low});
+        svg.line(p, {p.x, p.y + 5}, "stroke='#333'");
+        svg.text({p.x, p.y + 18}, number(time, 3), {.size = 11, .colour = "#555", .anchor = "middle"});
+    }
+    svg.text({axes.left + axes.width / 2, axes.bottom() + 36}, "time [s]", {.size = 12, .anchor = "middle"});
+}
+
+/// Every second phase is shaded, over all panels.
+inline void draw_phases(Svg& svg, const Axes& axes, const std::vector<Phase>& phases) {
+    for (std::size_t i = 0; i < phases.size(); ++i) {
+        const Pixel from = axes.at({phases[i].begin, axes.high}), to = axes.at({phases[i].end, axes.low});
+        if (i % 2 == 1) svg.rectangle(from, to.x - from.x, to.y - from.y, "fill='#f2f4f6'");
+        svg.text({(from.x + to.x) / 2, axes.top - 8}, phases[i].name,
+                 {.size = 11, .colour = "#666", .anchor = "middle"});
+    }
+}
+
+inline void draw_legend(Svg& svg, const Axes& axes, const PlotPanel& panel) {
+    double y = axes.top + 12;
+    for (const Curve& curve : panel.curves) {
+        svg.line({axes.right() + 16, y}, {axes.right() + 38, y}, pen(curve));
+        svg.text({axes.right() + 44, y + 4}, curve.name, {.size = 11});
+        y += 18;
+    }
+}
+
+}  // namespace detail
+
+/// The plot as SVG.
+[[nodiscard]] inline std::string drawn(const Plot& plot) {
+    constexpr double left = 66, top = 62, width = 620, panel_height = 150, gap = 18, legend = 200, foot = 46;
+    const double panels_height = static_cast<double>(plot.panels.size()) * (panel_height + gap) - gap;
+    Svg svg(left + width + legend, top + panels_height + foot, plot.title);
+    svg.text({left, 22}, plot.title, {.size = 14, .bold = true});
+    detail::Axes axes{left, top, width, panels_height, plot.phases.front().begin, plot.phases.back().end, 0, 1};
+    detail::draw_phases(svg, axes, plot.phases);
+    axes.height = panel_height;
+    for (const PlotPanel& panel : plot.panels) {
+        detail::fit_values(axes, panel);
+        detail::draw_values(svg, axes, panel.label);
+        for (const Curve& curve : panel.curves) {
+            svg.add("<path d='", detail::path(axes, curve), "' ", detail::pen(curve), "/>\n");
+        }
+        detail::draw_legend(svg, axes, panel);
+        if (&panel == &plot.panels.back()) detail::draw_times(svg, axes);
+        axes.top += panel_height + gap;
+    }
+    return svg.str();
+}
+
+}  // namespace examples

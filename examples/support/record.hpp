@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <membrane/collision/tool.hpp>
+#include <membrane/core/types.hpp>
+
+#include "support/camera.hpp"
+#include "support/plot.hpp"
+
+/// What is kept of a run of `press_and_pull`.
+namespace examples {
+
+/// The parts of a frame, in their order.
+inline constexpr std::array<std::string_view, 5> parts{"contact", "solve", "refit", "normals", "force"};
+
+/// Times the parts of a frame, one after the other.
+class Stopwatch {
+  public:
+    /// The part that has just been done is over.
+    void lap() {
+        const auto now = std::chrono::steady_clock::now();
+        seconds_[part_++] = std::chrono::duration<double>(now - last_).count();
+        last_ = now;
+    }
+
+    [[nodiscard]] const std::array<double, parts.size()>& seconds() const { return seconds_; }
+
+  private:
+    std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+    std::array<double, parts.size()> seconds_{};
+    std::size_t part_ = 0;
+};
+
+/// One tick of the loop.
+struct Frame {
+    membrane::Tool<double> tool;
+    double depth = 0;                            ///< Of the tool in the membrane [m].
+    double pulled = 0;                           ///< How far what it holds is from where that was at rest [m].
+    Vector3d felt = Vector3d::Zero();            ///< What the device gets from the force policy [N].
+    Vector3d reaction = Vector3d::Zero();        ///< Of the membrane on the tool, from the solver [N].
+    bool at_work = false;                        ///< The tool touches, or the membrane is not yet at rest.
+    std::array<double, parts.size()> seconds{};  ///< That each part took.
+};
+
+/// The membrane and the tool at one time.
+struct Snapshot {
+    membrane::Points<double> points;
+    Frame frame;
+};
+
+struct Record {
+    std::vector<Phase> phases;
+    std::vector<Frame> frames = {};
+    std::vector<Snapshot> snapshots = {};  ///< The last of each phase.
+
+    void add(const Frame& frame, const membrane::Points<double>& x) {
+        const double time = frame.tool.time + 1e-9;  // phases end on ticks, but for rounding
+        if (snapshots.empty() || (time >= phases[snapshots.size() - 1].end && snapshots.size() < phases.size())) {
+            snapshots.emplace_back();
+        }
+        snapshots.back() = {x, frame};
+        frames.push_back(frame);
+    }
+
+    /// This record and then another.
+    [[nodiscard]] Record then(Record next) && {
+        const auto append = [](auto& to, auto& from) {
+            to.insert(to.end(), std::make_move_iterator(from.begin()), std::make_move_iterator(from.end()));
+        };
+        append(phases, next.phases);
+        append(frames, next.frames);
+        append(snapshots, next.snapshots);
+        return std::move(*this);
+    }
+};
+
+}  // namespace examples

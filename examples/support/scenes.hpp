@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include <membrane/haptics/device.hpp>
+#include <membrane/mesh/adjacency.hpp>
+#include <membrane/mesh/shapes.hpp>
+
+#include "support/camera.hpp"
+#include "support/plot.hpp"
+
+/// The membranes of `press_and_pull`, and what the tool does to them.
+namespace examples {
+
+/// A membrane that is part of a sphere around the origin, and how the tool meets it.
+struct Scene {
+    std::string key, name;  ///< For files, and for people.
+    membrane::TriangleMesh<double> mesh;
+    std::vector<membrane::Index> pinned;
+    double radius;                  ///< Of the membrane at rest [m].
+    double tool_radius;             ///< [m]
+    double depth;                   ///< How far it is pressed in, and pulled out [m].
+    Vector3d pressed, slid;         ///< Unit vectors to where it is pressed, and to where the tool slides then.
+    Camera::Options camera;         ///< Sees the tool from the side.
+    Camera::Options camera_after;   ///< Sees where the tool has been.
+    double stiffness = 40;          ///< Of the springs [N/m].
+    double backing_stiffness = 4;   ///< Of the volume springs [N/m],
+    double backing_damping = 0.02;  ///< and their damping [N s/m].
+    double picture_height;          ///< [px]
+    std::string paper_figure = {};  ///< Empty where the paper has no such scene.
+    double paper_frames = 0;        ///< A second, in [Liu07] 3; zero where the paper has no such scene.
+};
+
+/// A sphere as in the paper's figures 3 and 4.
+[[nodiscard]] inline Scene sphere_scene(membrane::Index subdivisions, const std::string& paper_figure,
+                                        double paper_frames) {
+    auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = subdivisions});
+    const Camera::Options camera{.elevation = 18, .distance = 0.08, .metre = 1.07e4};
+    const Camera::Options above{.azimuth = 75, .elevation = 45, .distance = 0.08, .metre = 1.07e4};
+    const std::string count = std::to_string(mesh.vertex_count());
+    return {.key = "sphere_" + count,
+            .name = "sphere, " + count + " vertices",
+            .mesh = std::move(mesh),
+            .pinned = {},
+            .radius = 0.01,
+            .tool_radius = 2.5e-3,
+            .depth = 2e-3,
+            .pressed = Camera(camera).seen(0.25, 0.80, 0.50),
+            .slid = Camera(camera).seen(0.62, 0.72, 0.36),
+            .camera = camera,
+            .camera_after = above,
+            .picture_height = 236,
+            .paper_figure = paper_figure,
+            .paper_frames = paper_frames};
+}
+
+/// A cap with a cornea's measures, its rim clamped.
+[[nodiscard]] inline Scene cornea_scene() {
+    auto mesh = membrane::spherical_cap<double>({.radius = 7.8e-3, .diameter = 11.7e-3, .rings = 12});
+    const Camera::Options camera{.target = {0, 0, 5.45e-3}, .elevation = 20, .distance = 0.06, .metre = 2e4};
+    const membrane::Adjacency adjacency(mesh);
+    const auto rim = adjacency.border_vertices();
+    const std::string count = std::to_string(mesh.vertex_count());
+    return {.key = "cornea",
+            .name = "cornea, " + count + " vertices",
+            .mesh = std::move(mesh),
+            .pinned = {rim.begin(), rim.end()},
+            .radius = 7.8e-3,
+            .tool_radius = 1.2e-3,
+            .depth = 1e-3,
+            .pressed = Vector3d(-0.05, -0.20, 0.96).normalized(),
+            .slid = Vector3d(0.36, -0.10, 0.92).normalized(),
+            .camera = camera,
+            .camera_after = camera,
+            .picture_height = 136};
+}
+
+/// One move of the tool.
+struct Move {
+    std::string name;
+    double duration;  ///< [s]
+    Vector3d toward;  ///< Where it ends: a unit vector,
+    double height;    ///< and the height of the tool's surface above the membrane at rest [m].
+    bool grasping = false;
+};
+
+/// Places in the moves of press and pull together, and in the phases, frames and snapshots that come of them.
+enum Step : std::size_t { approach, press_in, slide, let_go, recover, touch, pull_out, open, recover_again };
+
+[[nodiscard]] inline std::vector<Move> press_moves(const Scene& scene) {
+    const double away = 0.7 * scene.depth;
+    return {{"approach", 0.15, scene.pressed, 0},
+            {"press", 0.25, scene.pressed, -scene.depth},
+            {"slide", 0.35, scene.slid, -scene.depth},
+            {"let go", 0.15, scene.slid, away},
+            {"recover", 0.25, scene.slid, away}};
+}
+
+[[nodiscard]] inline std::vector<Move> pull_moves(const Scene& scene) {
+    const double away = 1.7 * scene.depth;
+    return {{"grasp", 0.15, scene.slid, -0.1 * scene.depth},
+            {"pull", 0.30, scene.slid, scene.depth, true},
+            {"let go", 0.15, scene.slid, away},
+            {"recover", 0.25, scene.slid, away}};
+}
+
+[[nodiscard]] inline std::vector<Move> joined(std::vector<Move> first, const std::vector<Move>& then) {
+    first.insert(first.end(), then.begin(), then.end());
+    return first;
+}
+
+/// Moves as a device plays them, and what they are called when.
+struct Motion {
+    std::vector<membrane::Waypoint<double>> script;
+    std::vector<Phase> phases;
+};
+
+/// The moves one after the other from `start` [s], each beginning and ending gently, `pace` times as fast. Where the
+/// tool stands still, the time is not shortened: a membrane recovers no faster.
+[[nodiscard]] inline Motion motion(const Scene& scene, const std::vector<Move>& moves, double pace, double start = 0) {
+    constexpr int steps = 40;  // of a move
+    Motion result;
+    double time = start, height = 0.7 * scene.depth;
+    Vector3d toward = moves.front().toward;
+    const auto place = [&](const Vector3d& direction, double above) {
+        return Vector3d((scene.radius + scene.tool_radius + above) * direction.normalized());
+    };
+    for (const Move& move : moves) {
+        const bool still = move.toward == toward && move.height == height;
+        const double duration = still ? move.duration : move.duration / pace;
+        for (int i = 0; i < steps; ++i) {
+            const double s = static_cast<double>(i) / steps, share = s * s * (3 - 2 * s);
+            result.script.push_back(
+                {time + s * duration,
+                 place(toward + share * (move.toward - toward), height + share * (move.height - height)),
+                 move.grasping});
+        }
+        result.phases.push_back({move.name, time, time + duration});
+        time += duration;
+        toward = move.toward;
+        height = move.height;
+    }
+    result.script.push_back({time, place(toward, height)});
+    return result;
+}
+
+}  // namespace examples

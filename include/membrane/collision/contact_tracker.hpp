@@ -1,0 +1,329 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include <membrane/collision/aabb_tree.hpp>
+#include <membrane/collision/contact_geometry.hpp>
+#include <membrane/collision/neighbourhood.hpp>
+#include <membrane/collision/tool.hpp>
+#include <membrane/core/index_set.hpp>
+
+/// Does the tool touch, where, how deep, and since when?
+///
+///     auto tree    = membrane::AabbTree(mesh);
+///     auto tracker = membrane::ContactTracker(mesh);
+///     const auto contact = tracker.update(tree, x, tool);                    // once a tick, before the solver's step
+namespace membrane {
+
+struct TrackerOptions {
+    double margin = 0.01;  ///< what is this near counts as touched, and a point as a sphere of this radius [mean edges]
+    Index check_every = 128;  ///< ticks in contact after which the tree is asked whether something else is touched too
+};
+
+/// Finds the contact with the tree while there is none, and follows it over the neighbours of the triangles touched
+/// before, [Liu07] 2.3: in contact the cost depends on what the tool touches and not on the size of the mesh.
+///
+/// Beyond the paper: the neighbours are flooded over every triangle within the tool's reach; a tool whose reference
+/// point (or, for a capsule, its other end) passed the surface since the last tick touches it where it passed, however
+/// far it has come; and a tool that has left the triangles it touched is looked for in the tree. A second fold of the surface
+/// that comes near a tool in contact is found after `check_every` ticks at the latest.
+///
+/// The tool stays on the outer side of a closed surface. On an open one it stays on the side of first contact. The
+/// depth is measured against the surface as it would be without the tool: the mesh, or the anchors handed in.
+template <Real Scalar>
+class ContactTracker {
+  public:
+    /// @throws InvalidInput for options out of range. Cost: O(V + F log F).
+    explicit ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options = {});
+
+    /// The contact of `tool` with the surface at `x` (3 x V [m]). A tool that is not sound touches nothing and is
+    /// forgotten. Online. Cost: in contact, the triangles within the tool's reach and their neighbours; else O(log F).
+    [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                         const Tool<Scalar>& tool) noexcept {
+        return update(tree, x, tool, origins_);
+    }
+
+    /// The same on a body that moves: `anchors` is where the membrane would be without the tool (3 x V [m]).
+    [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                         const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) noexcept;
+
+    /// How often the tree has been asked during contact, since the beginning.
+    [[nodiscard]] Index tree_checks() const noexcept { return tree_checks_; }
+
+    /// Forgets contact and tool.
+    void reset() noexcept;
+
+  private:
+    // What is handed in for one update.
+    struct Scene {
+        const AabbTree<Scalar>& tree;
+        const ConstPointsRef<Scalar>& x;
+        const Tool<Scalar>& tool;
+        const ConstPointsRef<Scalar>& anchors;
+        Scalar radius;  // of the tool, a point's included
+        Scalar travel;  // of the tool since the last tick, at most [m]
+        Scalar reach;   // from the tool's axis to what may touch it in this tick [m]
+    };
+
+    [[nodiscard]] Scene scene_of(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                 const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) const noexcept;
+    bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool touches(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    template <class FirstHit>
+    [[nodiscard]] bool crossing(const Scene& scene, Contact<Scalar>& contact, FirstHit first_hit) const noexcept;
+    void describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept;
+    void gather_from_tree(const Scene& scene) noexcept;
+    void flood(const Scene& scene) noexcept;
+    void gather(const Scene& scene, Index f) noexcept;
+    void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
+
+    Points<Scalar> origins_;
+    Neighbourhood<Scalar> surface_;
+    Scalar margin_;  // [m]
+    Index check_every_;
+
+    IndexSet near_, near_before_;  // the local model: triangles within reach of the tool
+    Index nearest_ = no_index;     // of those
+    Scalar nearest_square_ = 0;
+    IndexSet watched_;  // those and the ones around them
+    BoundedList<TouchedTriangle> listed_;
+    Contact<Scalar> last_;
+    std::optional<Tool<Scalar>> last_tool_;
+    // Where on the surface without the tool its two ends and its contact point are nearest to.
+    std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
+    Index ticks_ = 0, tree_checks_ = 0;
+};
+
+template <Real Scalar>
+ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options)
+    : origins_(mesh.positions()),
+      surface_(mesh),
+      margin_(static_cast<Scalar>(options.margin) * surface_.mean_edge()),
+      check_every_(options.check_every),
+      near_(mesh.triangle_count()),
+      near_before_(near_),
+      watched_(near_),
+      listed_(static_cast<std::size_t>(mesh.triangle_count())) {
+    if (!is_finite(options.margin) || !(options.margin > 0 && options.margin <= 1)) {
+        refuse("ContactTracker", "margin must be above 0 and at most 1 [mean edges], got ", options.margin);
+    }
+    if (options.check_every < 1) refuse("ContactTracker", "check_every must be at least 1, got ", options.check_every);
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::reset() noexcept {
+    near_.clear();
+    last_ = {};
+    last_tool_.reset();
+    origin_triangles_.fill(no_index);
+}
+
+template <Real Scalar>
+Contact<Scalar> ContactTracker<Scalar>::update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                               const Tool<Scalar>& tool,
+                                               const ConstPointsRef<Scalar>& anchors) noexcept {
+    MEMBRANE_ASSERT(x.cols() == origins_.cols() && anchors.cols() == origins_.cols());
+    if (!is_sound(tool)) return Contact<Scalar>::none();
+    const Scene scene = scene_of(tree, x, tool, anchors);
+    const bool before = last_.touching();
+    Contact<Scalar> contact;
+    const bool followed = before && scene.travel <= surface_.mean_edge() && follow(scene, contact);
+    if (before && !followed) ++tree_checks_;
+    if ((followed || find(scene, contact)) && touches(scene, contact)) {
+        complete(scene, contact);
+        contact.phase = before ? ContactPhase::ongoing : ContactPhase::began;
+    } else {
+        near_.clear();
+        origin_triangles_.fill(no_index);
+        contact = {};
+        contact.phase = before ? ContactPhase::ended : ContactPhase::none;
+    }
+    last_tool_ = tool;
+    last_ = contact;
+    last_.touched = last_.watched = {};
+    return contact;
+}
+
+template <Real Scalar>
+auto ContactTracker<Scalar>::scene_of(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                      const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) const noexcept
+    -> Scene {
+    const Tool<Scalar>& last = last_tool_ ? *last_tool_ : tool;
+    const Vector3<Scalar> way = tool.position - last.position;
+    const Scalar travel = (std::max)(norm(way), norm<Scalar>(way + tool.axis - last.axis));
+    // What the tool has withdrawn from comes after it.
+    const Scalar behind = (std::max)(last_.gap, Scalar(0));
+    const Scalar radius = (std::max)(tool.radius, margin_);
+    return {
+        tree, x, tool, anchors, radius, travel, radius + margin_ + (std::min)(travel + behind, surface_.mean_edge())};
+}
+
+// In contact: the triangles touched before and their neighbours know; false if the tool has left them all.
+template <Real Scalar>
+bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    std::swap(near_, near_before_);
+    near_.clear();
+    for (const Index f : near_before_.items()) gather(scene, f);
+    if (++ticks_ % check_every_ == 0) {
+        ++tree_checks_;
+        gather_from_tree(scene);
+    }
+    flood(scene);
+    if (near_.empty()) return false;
+
+    contact.side = last_.side;
+    const auto first_of_near = [&](const Vector3<Scalar>& from, const Vector3<Scalar>& to) {
+        SurfaceHit<Scalar> first{no_index, 2, Vector3<Scalar>::Zero(), 0};
+        for (const Index f : near_.items()) {
+            const auto hit = first_hit(surface_.triangle(scene.x, f), from, to);
+            if (hit && hit->along < first.along) first = {f, hit->along, hit->barycentric, 0};
+        }
+        return first;
+    };
+    if (!crossing(scene, contact, first_of_near)) {
+        describe(scene, nearest_, contact);
+        const Scalar behind = -(contact.gap + scene.radius);
+        contact.crossed =
+            behind > 0 && behind <= (std::max)(-last_.gap, scene.radius) - scene.radius + scene.travel + margin_;
+        if (behind > 0 && !contact.crossed) {  // it cannot have come so far: the surface is creased, not passed
+            contact.gap = behind - scene.radius;
+            contact.normal = -contact.normal;
+        }
+    }
+    return true;
+}
+
+// No contact, or none that could be followed: the tree knows; false if there is nothing to be near to.
+template <Real Scalar>
+bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    contact = {};
+    near_.clear();
+    gather_from_tree(scene);
+    flood(scene);
+    const auto first_of_all = [&](const Vector3<Scalar>& from, const Vector3<Scalar>& to) {
+        return scene.tree.first_hit(scene.x, from, to);
+    };
+    if (!crossing(scene, contact, first_of_all)) {
+        const Index f = near_.empty() ? scene.tree.closest_point(scene.x, scene.tool.position).triangle : nearest_;
+        if (f == no_index) return false;
+        contact.side = last_.touching() ? last_.side : Scalar(1);
+        describe(scene, f, contact);
+        if (contact.gap < -scene.radius && !last_.touching() && !surface_.closed()) {
+            contact.side = -1;  // first seen from this side
+            describe(scene, f, contact);
+        }
+        contact.crossed = contact.gap < -scene.radius;
+    }
+    return true;
+}
+
+// A tool that overlaps touches; one that touched before goes on until the membrane has come back all the way.
+template <Real Scalar>
+bool ContactTracker<Scalar>::touches(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    if (!last_.touching() && contact.gap > 0) return false;
+    measure_depth(scene, contact);
+    if (!last_.touching()) return true;
+    const Scalar slack = margin_ / 1000;
+    return contact.gap <= slack || (contact.depth > 0 && contact.gap <= contact.depth + scene.travel);
+}
+
+// Whether an end of the tool went through the surface since the last tick, from its own side to the other.
+template <Real Scalar>
+template <class FirstHit>
+bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& contact, FirstHit first_hit) const noexcept {
+    if (!last_tool_) return false;
+    const Vector3<Scalar> lift = last_.touching() ? Vector3<Scalar>(margin_ * last_.normal) : Vector3<Scalar>::Zero();
+    const auto through = [&](const Vector3<Scalar>& before, const Vector3<Scalar>& now) {
+        const Vector3<Scalar> from = before + lift;  // what rests on the surface is on its own side of it
+        const auto hit = first_hit(from, now);
+        if (hit.triangle == no_index) return false;
+        Scalar side = last_.touching() ? last_.side : Scalar(1);
+        if (!surface_.closed() && !last_.touching()) {  // first seen from this side
+            side = dot<Scalar>(area_vector(surface_.triangle(scene.x, hit.triangle)), now - from) < 0 ? 1 : -1;
+        }
+        const auto passed = contact_where_passed(surface_, scene.x, hit.triangle, hit.barycentric, from, now, side);
+        if (!(passed.gap < 0)) return false;
+        contact = passed;
+        contact.gap -= scene.radius;
+        return true;
+    };
+    if (through(last_tool_->position, scene.tool.position)) return true;
+    if (feature_pairs(scene.tool) == 1) return false;
+    return through(last_tool_->position + last_tool_->axis, scene.tool.position + scene.tool.axis);
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept {
+    contact = contact_in(surface_, scene.x, f, scene.tool, scene.radius, contact.side);
+    contact.before = contact.on_axis + margin_ * contact.normal;
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::gather_from_tree(const Scene& scene) noexcept {
+    const auto take = [&](Index f) { gather(scene, f); };
+    const auto& tool = scene.tool;
+    scene.tree.touching_capsule(scene.x, tool.position, tool.position + tool.axis, scene.reach, take);
+}
+
+// Spreads over the neighbours as far as the tool reaches.
+template <Real Scalar>
+void ContactTracker<Scalar>::flood(const Scene& scene) noexcept {
+    for (Index i = 0; i < near_.count(); ++i) {
+        surface_.across_sides(near_.items()[static_cast<std::size_t>(i)], [&](Index f) { gather(scene, f); });
+    }
+}
+
+// Takes `f` into the local model if the tool reaches it.
+template <Real Scalar>
+void ContactTracker<Scalar>::gather(const Scene& scene, Index f) noexcept {
+    if (near_.contains(f)) return;
+    const Scalar square = surface_.nearest(scene.x, f, scene.tool).on_triangle.squared_distance;
+    if (!(square <= scene.reach * scene.reach)) return;
+    if (near_.empty() || square < nearest_square_) {
+        nearest_ = f;
+        nearest_square_ = square;
+    }
+    near_.insert(f);
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    // What is not yet within reach, but may come to the tool as the membrane moves.
+    near_.insert(contact.triangle);
+    surface_.around_corners(contact.triangle, [&](Index f) { near_.insert(f); });
+    if (contact.crossed) {
+        scene.tree.touching_capsule(scene.x, contact.before, contact.on_axis, Scalar(0),
+                                    [&](Index f) { near_.insert(f); });
+    }
+    watched_.clear();
+    listed_.clear();
+    for (const Index f : near_.items()) watched_.insert(f);
+    for (const Index f : near_.items()) surface_.around_corners(f, [&](Index g) { watched_.insert(g); });
+    for (const Index f : watched_.items()) listed_.push({f, surface_.corners(f)});
+    contact.radius = scene.radius;
+    contact.reach = scene.reach;
+    contact.watched = listed_.items();
+    contact.touched = contact.watched.first(near_.items().size());
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
+                                                contact.on_axis};
+    const std::size_t count = feature_pairs(scene.tool) == 1 ? 1 : 3;
+    contact.depth = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        Index& f = origin_triangles_[i];
+        f = surface_.descend(scene.anchors, f == no_index ? contact.triangle : f, probes[i]);
+        const Scalar height = contact.side * surface_.height(scene.anchors, f, probes[i]);
+        contact.depth = (std::max)(contact.depth, scene.radius - height);
+    }
+}
+
+}  // namespace membrane

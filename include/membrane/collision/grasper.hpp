@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+
+#include <membrane/collision/contact.hpp>
+#include <membrane/collision/tool.hpp>
+#include <membrane/mesh/triangle.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
+
+/// Forceps: what they hold, from closing to opening.
+///
+///     auto grasper = membrane::Grasper(mesh);
+///     const auto grasp  = grasper.update(contact, x, tool);
+///     const auto report = solver.step(x, dt, network, backing, press(tool, contact, grasp), pull(tool, grasp));
+namespace membrane {
+
+/// A point of the membrane that moves with the tool.
+template <Real Scalar>
+struct Grasp {
+    Index triangle = no_index;                                   ///< none: nothing is held
+    std::array<Index, 3> corners{no_index, no_index, no_index};  ///< its vertices
+    Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the held point
+    Vector3<Scalar> offset = Vector3<Scalar>::Zero();            ///< from the tool to the held point [m]
+    Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< where the held point was at first [m]
+
+    [[nodiscard]] bool holding() const noexcept { return triangle != no_index; }
+
+    /// How far the tool has taken the held point from where it was at first [m]. @pre holding()
+    [[nodiscard]] Vector3<Scalar> displacement(const Tool<Scalar>& tool) const noexcept {
+        return tool.position + offset - origin;
+    }
+};
+
+/// How forceps take hold.
+struct GraspOptions {
+    bool whole_vertex = false;  ///< hold the nearest vertex rather than the very point touched
+};
+
+/// Takes hold of the contact point when the tool closes on the membrane, and lets go when it opens.
+template <Real Scalar>
+class Grasper {
+  public:
+    explicit Grasper(const TriangleMesh<Scalar>& mesh, GraspOptions options = {})
+        : origins_(mesh.positions()), options_(options) {}
+
+    /// What the tool holds now. Forceps that were closed before they touched hold nothing.
+    [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
+                                       const Tool<Scalar>& tool) noexcept;
+
+    /// Lets go.
+    void reset() noexcept { grasp_ = {}; }
+
+  private:
+    Points<Scalar> origins_;
+    GraspOptions options_;
+    Grasp<Scalar> grasp_;
+    bool closed_ = false;
+};
+
+template <Real Scalar>
+Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
+                                      const Tool<Scalar>& tool) noexcept {
+    const bool closes = tool.grasping && !closed_;
+    closed_ = tool.grasping;
+    if (!tool.grasping) grasp_ = {};
+    if (!closes || !contact.touching() || !is_sound(tool)) return grasp_;
+
+    grasp_.triangle = contact.triangle;
+    grasp_.corners = contact.corners;
+    grasp_.barycentric = contact.barycentric;
+    if (options_.whole_vertex) {
+        Eigen::Index nearest;
+        contact.barycentric.maxCoeff(&nearest);
+        grasp_.barycentric = Vector3<Scalar>::Unit(nearest);
+    }
+    grasp_.offset = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
+    grasp_.origin = point_at(triangle_at(origins_, grasp_.corners), grasp_.barycentric);
+    return grasp_;
+}
+
+}  // namespace membrane

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include <membrane/collision/tool.hpp>
+#include <membrane/mesh/adjacency.hpp>
+#include <membrane/mesh/normals.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
+
+/// A surface as seen from one of its triangles: what is around it, which way is out, where it comes nearest to a point.
+///
+///     const membrane::Neighbourhood<double> around(mesh);
+///     const membrane::Index f = around.descend(x, start, q);
+///     const double height = around.height(x, f, q);                        // of q over the surface, negative behind it
+namespace membrane {
+
+/// The triangles of a mesh and their neighbours, with the geometric questions that only these can answer. Positions are
+/// handed in. Online but for the constructor.
+template <Real Scalar>
+class Neighbourhood {
+  public:
+    /// Cost: O(V + F log F).
+    explicit Neighbourhood(const TriangleMesh<Scalar>& mesh);
+
+    [[nodiscard]] Index triangle_count() const noexcept { return static_cast<Index>(triangles_.cols()); }
+    [[nodiscard]] bool closed() const noexcept { return adjacency_.closed(); }
+    [[nodiscard]] Scalar mean_edge() const noexcept { return mean_edge_; }  ///< [m]
+
+    [[nodiscard]] std::array<Index, 3> corners(Index f) const noexcept {
+        return {triangles_(0, f), triangles_(1, f), triangles_(2, f)};
+    }
+    [[nodiscard]] Triangle<Scalar> triangle(const ConstPointsRef<Scalar>& x, Index f) const noexcept {
+        return triangle_at(x, triangles_.col(f));
+    }
+
+    /// Calls `visit(g)` for each triangle that has a side in common with `f`, or a corner; some more than once.
+    template <class Visit>
+    void across_sides(Index f, Visit&& visit) const noexcept;
+    template <class Visit>
+    void around_corners(Index f, Visit&& visit) const noexcept;
+
+    /// The outward unit vector at the point `barycentric` of triangle `f`, see `pseudo_normal`.
+    [[nodiscard]] Vector3<Scalar> outward(const ConstPointsRef<Scalar>& x, Index f,
+                                          const Vector3<Scalar>& barycentric) const noexcept {
+        return pseudo_normal(x, triangles_, adjacency_, f, barycentric);
+    }
+
+    /// Whether the point `barycentric` of triangle `f` is on the border of the surface.
+    [[nodiscard]] bool on_border(Index f, const Vector3<Scalar>& barycentric) const noexcept;
+
+    /// Downhill from `f`, over the triangles around its corners, to one that is nearer to `q` than all around it.
+    [[nodiscard]] Index descend(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q) const noexcept;
+
+    /// Height of `q` over the surface at its nearest point of triangle `f`, negative behind it [m].
+    [[nodiscard]] Scalar height(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q) const noexcept;
+
+    /// Where triangle `f` and the tool's axis come nearest.
+    [[nodiscard]] SegmentPair<Scalar> nearest(const ConstPointsRef<Scalar>& x, Index f,
+                                              const Tool<Scalar>& tool) const noexcept;
+
+  private:
+    Triangles triangles_;
+    Adjacency adjacency_;
+    std::vector<unsigned char> border_;  // vertices on it
+    Scalar mean_edge_ = 0;
+};
+
+template <Real Scalar>
+Neighbourhood<Scalar>::Neighbourhood(const TriangleMesh<Scalar>& mesh)
+    : triangles_(mesh.triangles()), adjacency_(mesh), border_(static_cast<std::size_t>(mesh.vertex_count()), 0) {
+    for (const Index v : adjacency_.border_vertices()) border_[static_cast<std::size_t>(v)] = 1;
+    for (const auto& [first, second] : adjacency_.edges()) {
+        mean_edge_ += norm<Scalar>(point(mesh.positions(), second) - point(mesh.positions(), first));
+    }
+    mean_edge_ /= static_cast<Scalar>(adjacency_.edges().size());
+}
+
+template <Real Scalar>
+template <class Visit>
+void Neighbourhood<Scalar>::across_sides(Index f, Visit&& visit) const noexcept {
+    for (const Index g : adjacency_.triangle_neighbours(f)) {
+        if (g != no_index) visit(g);
+    }
+}
+
+template <Real Scalar>
+template <class Visit>
+void Neighbourhood<Scalar>::around_corners(Index f, Visit&& visit) const noexcept {
+    for (const Index v : corners(f)) {
+        for (const Index g : adjacency_.triangles_of(v)) visit(g);
+    }
+}
+
+template <Real Scalar>
+bool Neighbourhood<Scalar>::on_border(Index f, const Vector3<Scalar>& barycentric) const noexcept {
+    const auto vertices = corners(f);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const auto weight = [&](std::size_t i) { return barycentric[static_cast<Eigen::Index>(i % 3)]; };
+        if (weight(k) == 1) return border_[static_cast<std::size_t>(vertices[k])] != 0;
+        if (weight(k) > 0 && weight(k + 1) > 0 && weight(k + 2) == 0) {
+            return adjacency_.triangle_neighbours(f)[k] == no_index;
+        }
+    }
+    return false;
+}
+
+template <Real Scalar>
+Index Neighbourhood<Scalar>::descend(const ConstPointsRef<Scalar>& x, Index f,
+                                     const Vector3<Scalar>& q) const noexcept {
+    const auto square_to = [&](Index g) { return closest_point(triangle(x, g), q).squared_distance; };
+    Scalar square = square_to(f);
+    for (Index from = no_index; from != f;) {
+        from = f;
+        around_corners(from, [&](Index g) {
+            const Scalar other = square_to(g);
+            if (!(other < square)) return;
+            square = other;
+            f = g;
+        });
+    }
+    return f;
+}
+
+template <Real Scalar>
+Scalar Neighbourhood<Scalar>::height(const ConstPointsRef<Scalar>& x, Index f,
+                                     const Vector3<Scalar>& q) const noexcept {
+    const auto nearest = closest_point(triangle(x, f), q);
+    const Vector3<Scalar> reach = q - nearest.point;
+    return dot(reach, outward(x, f, nearest.barycentric)) < 0 ? -norm(reach) : norm(reach);
+}
+
+template <Real Scalar>
+SegmentPair<Scalar> Neighbourhood<Scalar>::nearest(const ConstPointsRef<Scalar>& x, Index f,
+                                                   const Tool<Scalar>& tool) const noexcept {
+    if (feature_pairs(tool) == 1) return {0, closest_point(triangle(x, f), tool.position)};
+    return closest_to_segment<Scalar>(triangle(x, f), tool.position, tool.position + tool.axis);
+}
+
+}  // namespace membrane

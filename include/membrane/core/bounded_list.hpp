@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <membrane/core/check.hpp>
+
+namespace membrane {
+
+/// A list with room for a fixed number of items: it allocates when it is made or copied, and never else. (A copied
+/// `std::vector` has lost what was reserved.)
+///
+///     BoundedList<Touch<double>> touches(4096);
+///     if (!touches.push(touch)) { /* full */ }
+template <class Item>
+class BoundedList {
+  public:
+    BoundedList() = default;
+    explicit BoundedList(std::size_t room) : slots_(room) {}
+
+    /// Adds `item` at the end, or says that there is no room for it.
+    bool push(const Item& item) noexcept {
+        if (count_ == slots_.size()) return false;
+        slots_[count_++] = item;
+        return true;
+    }
+    void clear() noexcept { count_ = 0; }
+
+    [[nodiscard]] std::size_t size() const noexcept { return count_; }
+    [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
+
+    /// Valid until the list is assigned to or destroyed.
+    [[nodiscard]] std::span<Item> items() noexcept { return {slots_.data(), count_}; }
+    [[nodiscard]] std::span<const Item> items() const noexcept { return {slots_.data(), count_}; }
+
+    /// @pre `i` < size() (asserted)
+    [[nodiscard]] const Item& operator[](std::size_t i) const noexcept {
+        MEMBRANE_ASSERT(i < count_);
+        return slots_[i];
+    }
+
+  private:
+    std::vector<Item> slots_;
+    std::size_t count_ = 0;
+};
+
+}  // namespace membrane

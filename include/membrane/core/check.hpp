@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <atomic>
+#include <concepts>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+
+#include <membrane/core/types.hpp>
+
+/// What happens when something is wrong.
+///
+/// Offline, input from outside is checked in every build and refused with `InvalidInput`. Online, what can be expected
+/// is a value in a report; a broken precondition is a `MEMBRANE_ASSERT`, which only debug builds check.
+///
+///     try { membrane::MassSpringNetwork network(mesh, law, options); }
+///     catch (const membrane::InvalidInput& e) { std::puts(e.what()); }
+///     // MassSpringNetwork: stiffness of spring 17 must be finite and not negative [N/m], got -3
+namespace membrane {
+
+/// Input that a part cannot work with. The message names component, field, index, what was found and what is expected.
+class InvalidInput : public std::invalid_argument {
+  public:
+    using std::invalid_argument::invalid_argument;
+};
+
+/// Called with the message when a check fails and the translation unit is compiled without exceptions. It must not
+/// return: if it does, the program is aborted.
+using InvalidInputHandler = void (*)(const char* message);
+
+/// Called with the condition and its place when a `MEMBRANE_ASSERT` fails; the program is aborted when it returns.
+using AssertHandler = void (*)(const char* condition, const char* file, int line) noexcept;
+
+/// Replaces the handler for the whole program and returns the one before; null restores the stock one, which prints
+/// to stderr. Safe from any thread.
+inline InvalidInputHandler set_invalid_input_handler(InvalidInputHandler handler) noexcept;
+inline AssertHandler set_assert_handler(AssertHandler handler) noexcept;
+
+/// Whether `value` is neither infinite nor NaN, also under `-ffast-math`, which lets the standard's own test say yes
+/// to everything.
+template <Real Scalar>
+[[nodiscard]] bool is_finite(Scalar value) noexcept;
+
+/// Whether all entries of a vector or matrix are finite.
+template <class Derived>
+[[nodiscard]] bool is_finite(const Eigen::DenseBase<Derived>& values) noexcept;
+
+/// Refuses input: throws `InvalidInput` with the parts put together, "component: part part ...". Offline only.
+template <class... Parts>
+[[noreturn]] void refuse(std::string_view component, const Parts&... parts);
+
+/// A precondition of online code: checked where `NDEBUG` is not defined, costs nothing elsewhere.
+#ifdef NDEBUG
+#define MEMBRANE_ASSERT(condition) static_cast<void>(0)
+#else
+#define MEMBRANE_ASSERT(condition) \
+    ((condition) ? static_cast<void>(0) : ::membrane::detail::assertion_failed(#condition, __FILE__, __LINE__))
+#endif
+
+namespace detail {
+
+inline std::atomic<InvalidInputHandler> invalid_input_handler{nullptr};
+inline std::atomic<AssertHandler> assert_handler{nullptr};
+
+[[noreturn]] inline void assertion_failed(const char* condition, const char* file, int line) noexcept {
+    if (const auto handler = assert_handler.load()) {
+        handler(condition, file, line);
+    } else {
+        std::fprintf(stderr, "%s:%d: membrane: broken precondition: %s\n", file, line, condition);
+    }
+    std::abort();
+}
+
+[[noreturn]] inline void invalid_input(const std::string& message) {
+#if defined(__cpp_exceptions) || defined(_CPPUNWIND)
+    throw InvalidInput(message);
+#else
+    if (const auto handler = invalid_input_handler.load()) {
+        handler(message.c_str());
+    } else {
+        std::fprintf(stderr, "membrane: invalid input: %s\n", message.c_str());
+    }
+    std::abort();
+#endif
+}
+
+inline void append(std::string& text, std::string_view part) { text += part; }
+
+template <class Number>
+    requires std::is_arithmetic_v<Number>
+void append(std::string& text, Number number) {
+    if constexpr (std::integral<Number>) {
+        text += std::to_string(number);
+    } else {
+        char digits[32];
+        std::snprintf(digits, sizeof digits, "%.9g", static_cast<double>(number));
+        text += digits;
+    }
+}
+
+}  // namespace detail
+
+inline InvalidInputHandler set_invalid_input_handler(InvalidInputHandler handler) noexcept {
+    return detail::invalid_input_handler.exchange(handler);
+}
+
+inline AssertHandler set_assert_handler(AssertHandler handler) noexcept {
+    return detail::assert_handler.exchange(handler);
+}
+
+template <Real Scalar>
+bool is_finite(Scalar value) noexcept {
+    using Bits = std::conditional_t<sizeof(Scalar) == 4, std::uint32_t, std::uint64_t>;
+    constexpr Bits exponent = sizeof(Scalar) == 4 ? Bits{0x7f800000U} : static_cast<Bits>(0x7ff0000000000000ULL);
+    Bits bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    return (bits & exponent) != exponent;
+}
+
+template <class Derived>
+bool is_finite(const Eigen::DenseBase<Derived>& values) noexcept {
+    for (Eigen::Index column = 0; column < values.cols(); ++column) {
+        for (Eigen::Index row = 0; row < values.rows(); ++row) {
+            if (!is_finite(values.coeff(row, column))) return false;
+        }
+    }
+    return true;
+}
+
+template <class... Parts>
+void refuse(std::string_view component, const Parts&... parts) {
+    std::string message(component);
+    message += ": ";
+    (detail::append(message, parts), ...);
+    detail::invalid_input(message);
+}
+
+}  // namespace membrane

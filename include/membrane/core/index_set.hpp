@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <membrane/core/bounded_list.hpp>
+
+namespace membrane {
+
+/// A set of vertices or triangles that keeps the order of arrival and is emptied in no time, however large the mesh.
+///
+///     IndexSet touched(mesh.triangle_count());
+///     if (touched.insert(f)) { ... }         // f was not in it
+///     for (const Index f : touched.items()) { ... }
+class IndexSet {
+  public:
+    IndexSet() = default;
+
+    /// An empty set that can hold 0 to `size` - 1; allocates all it will ever need.
+    explicit IndexSet(Index size) : mark_(static_cast<std::size_t>(size), 0), items_(mark_.size()) {}
+
+    /// Whether `i` is new to the set; it is in it afterwards. @pre 0 <= `i` < size (asserted)
+    bool insert(Index i) noexcept {
+        if (contains(i)) return false;
+        mark_[static_cast<std::size_t>(i)] = current_;
+        items_.push(i);
+        return true;
+    }
+
+    [[nodiscard]] bool contains(Index i) const noexcept {
+        MEMBRANE_ASSERT(i >= 0 && static_cast<std::size_t>(i) < mark_.size());
+        return mark_[static_cast<std::size_t>(i)] == current_;
+    }
+
+    /// In order of arrival; valid until the next change.
+    [[nodiscard]] std::span<const Index> items() const noexcept { return items_.items(); }
+    [[nodiscard]] Index count() const noexcept { return static_cast<Index>(items_.size()); }
+    [[nodiscard]] bool empty() const noexcept { return items_.empty(); }
+
+    void clear() noexcept {
+        items_.clear();
+        if (++current_ == 0) {  // every 2^32 times the old marks would come back to life
+            std::fill(mark_.begin(), mark_.end(), 0U);
+            current_ = 1;
+        }
+    }
+
+  private:
+    std::vector<std::uint32_t> mark_;  // i is in the set where mark_[i] == current_
+    BoundedList<Index> items_;
+    std::uint32_t current_ = 1;
+};
+
+}  // namespace membrane

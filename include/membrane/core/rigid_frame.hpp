@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <membrane/core/types.hpp>
+
+namespace membrane {
+
+/// A body that moves rigidly, as an eye in its orbit. The membrane stays in the body's own frame, where its anchors
+/// rest, at no cost per vertex: carry the tool in and the force out.
+///
+///     const auto tool = membrane::carried_in(device.read(), eye);
+///     // contact, solve, force: in the eye's frame
+///     device.write(eye.direction_out(force));
+template <Real Scalar>
+struct RigidFrame {
+    Eigen::Matrix<Scalar, 3, 3> rotation = Eigen::Matrix<Scalar, 3, 3>::Identity();  ///< from the body to the world
+    Vector3<Scalar> origin = Vector3<Scalar>::Zero();                                ///< the body's, in the world [m]
+    Vector3<Scalar> velocity = Vector3<Scalar>::Zero();                              ///< of the origin [m/s]
+    Vector3<Scalar> angular_velocity = Vector3<Scalar>::Zero();                      ///< in the world [rad/s]
+
+    [[nodiscard]] Vector3<Scalar> point_in(const Vector3<Scalar>& world) const noexcept {
+        return direction_in(world - origin);
+    }
+    [[nodiscard]] Vector3<Scalar> point_out(const Vector3<Scalar>& body) const noexcept {
+        return origin + direction_out(body);
+    }
+
+    /// A force, an axis, a normal: turned, not moved.
+    [[nodiscard]] Vector3<Scalar> direction_in(const Vector3<Scalar>& world) const noexcept {
+        return {dot<Scalar>(rotation.col(0), world), dot<Scalar>(rotation.col(1), world),
+                dot<Scalar>(rotation.col(2), world)};
+    }
+    [[nodiscard]] Vector3<Scalar> direction_out(const Vector3<Scalar>& body) const noexcept {
+        return rotation.col(0) * body.x() + rotation.col(1) * body.y() + rotation.col(2) * body.z();
+    }
+
+    /// Velocity as seen from the body of what moves with `velocity_of` at `place`, both in the world [m/s], [m].
+    [[nodiscard]] Vector3<Scalar> velocity_in(const Vector3<Scalar>& velocity_of,
+                                              const Vector3<Scalar>& place) const noexcept {
+        return direction_in(velocity_of - velocity - cross<Scalar>(angular_velocity, place - origin));
+    }
+};
+
+}  // namespace membrane

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <concepts>
+#include <cstddef>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <membrane/collision/tool.hpp>
+
+/// Where the tool comes from and the force goes to.
+///
+///     membrane::NullDevice<double> device({{.time = 0, .position = {0, 0, 0.012}}, {.time = 1, .position = {0, 0, 0.009}}},
+///                                         {.tick = 1e-3, .radius = 1e-3});
+///     while (device.running()) { const auto tool = device.read(); ...; device.write(force); }
+namespace membrane {
+
+/// A haptic device, or what stands in for one. Each tick reads once and writes once.
+template <class D, class Scalar>
+concept Device = Real<Scalar> && requires(D& device, const D& idle, const Vector3<Scalar>& force) {
+    { idle.running() }
+    noexcept->std::same_as<bool>;
+    { device.read() }
+    noexcept->std::same_as<Tool<Scalar>>;
+    { device.write(force) }
+    noexcept->std::same_as<void>;
+};
+
+/// Where the tool of a script is at a time.
+template <Real Scalar>
+struct Waypoint {
+    Scalar time = 0;                                     ///< [s]
+    Vector3<Scalar> position = Vector3<Scalar>::Zero();  ///< [m]
+    bool grasping = false;                               ///< from here to the next waypoint
+};
+
+struct NullDeviceOptions {
+    double tick = 1e-3;  ///< from one `read` to the next [s]
+    double radius = 0;   ///< of the tool [m]
+};
+
+/// A device without a device: its tool follows a script in straight lines from waypoint to waypoint, at the velocity
+/// that takes, whatever force is written.
+template <Real Scalar>
+class NullDevice {
+  public:
+    /// @throws InvalidInput for a script that is empty or not finite or does not go forward in time, or bad options
+    explicit NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options = {});
+
+    /// Whether the script is not yet over.
+    [[nodiscard]] bool running() const noexcept { return time() < script_.back().time + tick_ / 2; }
+
+    /// The tool now; time goes on by a tick. Beyond the script's end, its last position.
+    [[nodiscard]] Tool<Scalar> read() noexcept;
+
+    void write(const Vector3<Scalar>& force) noexcept { force_ = force; }
+
+    /// What was written last [N].
+    [[nodiscard]] const Vector3<Scalar>& force() const noexcept { return force_; }
+
+    /// Of the next `read` [s].
+    [[nodiscard]] Scalar time() const noexcept { return script_.front().time + static_cast<Scalar>(ticks_) * tick_; }
+
+    /// Back to the beginning.
+    void restart() noexcept {
+        ticks_ = 0;
+        next_ = 0;
+        force_.setZero();
+    }
+
+  private:
+    std::vector<Waypoint<Scalar>> script_;
+    Scalar tick_, radius_;
+    std::size_t ticks_ = 0;
+    std::size_t next_ = 0;  // the first waypoint that is not over
+    Vector3<Scalar> force_ = Vector3<Scalar>::Zero();
+};
+static_assert(Device<NullDevice<double>, double> && Device<NullDevice<float>, float>);
+
+template <Real Scalar>
+NullDevice<Scalar>::NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options)
+    : script_(std::move(script)),
+      tick_(static_cast<Scalar>(options.tick)),
+      radius_(static_cast<Scalar>(options.radius)) {
+    constexpr std::string_view component = "NullDevice";
+    if (!is_finite(tick_) || !(tick_ > 0)) refuse(component, "tick must be finite and positive [s], got ", tick_);
+    if (!is_finite(radius_) || radius_ < 0) {
+        refuse(component, "radius must be finite and not negative [m], got ", radius_);
+    }
+    if (script_.empty()) refuse(component, "the script must have a waypoint, got none");
+    for (std::size_t i = 0; i < script_.size(); ++i) {
+        const auto& waypoint = script_[i];
+        if (!is_finite(waypoint.time) || !is_finite(waypoint.position)) {
+            refuse(component, "waypoint ", i, " must be finite");
+        }
+        if (i > 0 && !(waypoint.time > script_[i - 1].time)) {
+            refuse(component, "waypoint ", i, " must come after ", script_[i - 1].time, " s, got ", waypoint.time,
+                   " s");
+        }
+    }
+}
+
+template <Real Scalar>
+Tool<Scalar> NullDevice<Scalar>::read() noexcept {
+    const Scalar now = time();
+    ++ticks_;
+    while (next_ < script_.size() && script_[next_].time <= now) ++next_;
+    Tool<Scalar> tool{.radius = radius_, .time = now};
+    const auto& from = script_[next_ == 0 ? 0 : next_ - 1];
+    tool.position = from.position;
+    tool.grasping = from.grasping;
+    if (next_ == 0 || next_ == script_.size()) return tool;
+    const auto& to = script_[next_];
+    tool.velocity = (to.position - from.position) / (to.time - from.time);
+    tool.position += (now - from.time) * tool.velocity;
+    return tool;
+}
+
+}  // namespace membrane

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <concepts>
+
+#include <membrane/collision/contact.hpp>
+#include <membrane/collision/grasper.hpp>
+#include <membrane/collision/tool.hpp>
+#include <membrane/solve/step.hpp>
+
+/// What the hand should feel.
+///
+///     const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};     // [N/m], [N s/m]
+///     device.write(feel({tool, contact, report}));                                         // [N]
+namespace membrane {
+
+/// All that is known at the end of a tick.
+template <Real Scalar>
+struct HapticState {
+    Tool<Scalar> tool;
+    Contact<Scalar> contact;
+    StepReport<Scalar> report;
+    Grasp<Scalar> grasp = {};
+};
+
+/// The force on the hand [N]. What the compiler cannot see: finite for every finite state, and no energy given that the hand did
+/// not bring. The stock policies give zero for what is not finite.
+/// A policy that is to be called with a list in braces, as above, names the scalar of its argument.
+template <class Policy, class Scalar>
+concept ForcePolicy = Real<Scalar> && requires(const Policy& policy, const HapticState<Scalar>& state) {
+    { policy(state) }
+    noexcept->std::same_as<Vector3<Scalar>>;
+};
+
+namespace detail {
+
+/// A device never gets what is not a number.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> finite_or_zero(const Vector3<Scalar>& force) noexcept {
+    return is_finite(force) ? force : Vector3<Scalar>(Vector3<Scalar>::Zero());
+}
+
+}  // namespace detail
+
+/// The force of the paper, F = -k x - mu v, [Liu07] 2.4. Touching: x is the depth and v the velocity along the contact
+/// normal, and so is the force; it never pulls the tool in. Pulling: x is how far the held point is from where it was
+/// at first, v its velocity along that, and the force runs against it. The held point moves with the tool.
+struct SpringDamperForce {
+    double stiffness;    ///< k [N/m]
+    double damping = 0;  ///< mu [N s/m]
+
+    [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept { return force(state); }
+    [[nodiscard]] Vector3<float> operator()(const HapticState<float>& state) const noexcept { return force(state); }
+
+  private:
+    template <Real Scalar>
+    [[nodiscard]] Vector3<Scalar> force(const HapticState<Scalar>& state) const noexcept;
+};
+
+/// The membrane's own reaction, what the solver found: the sum over all constraints of the step, scaled from the tissue
+/// to what a hand can feel.
+struct ReactionForce {
+    double scale = 1;
+
+    [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept { return force(state); }
+    [[nodiscard]] Vector3<float> operator()(const HapticState<float>& state) const noexcept { return force(state); }
+
+  private:
+    template <Real Scalar>
+    [[nodiscard]] Vector3<Scalar> force(const HapticState<Scalar>& state) const noexcept {
+        return detail::finite_or_zero<Scalar>(static_cast<Scalar>(scale) * state.report.total_reaction());
+    }
+};
+
+static_assert(ForcePolicy<SpringDamperForce, double> && ForcePolicy<SpringDamperForce, float>);
+static_assert(ForcePolicy<ReactionForce, double> && ForcePolicy<ReactionForce, float>);
+
+template <Real Scalar>
+Vector3<Scalar> SpringDamperForce::force(const HapticState<Scalar>& state) const noexcept {
+    const auto k = static_cast<Scalar>(stiffness), mu = static_cast<Scalar>(damping);
+    const auto& [tool, contact, report, grasp] = state;
+    if (grasp.holding()) {
+        const Vector3<Scalar> way = grasp.displacement(tool);
+        const Scalar length = norm(way);
+        if (!(length > 0)) return Vector3<Scalar>::Zero();
+        const Vector3<Scalar> along = way / length;
+        return detail::finite_or_zero<Scalar>(-(k * length + mu * dot(tool.velocity, along)) * along);
+    }
+    if (!contact.touching()) return Vector3<Scalar>::Zero();
+    const Scalar push = k * contact.depth - mu * dot(tool.velocity, contact.normal);
+    return detail::finite_or_zero<Scalar>((std::max)(push, Scalar(0)) * contact.normal);
+}
+
+}  // namespace membrane

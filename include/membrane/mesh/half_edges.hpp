@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <compare>
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/types.hpp>
+
+/// The sides of all triangles, those on one edge together: what checks and adjacency are made from.
+///
+///     for_each_edge(half_edges(triangles), [](std::span<const HalfEdge> sides) {
+///         // sides.size() is 1 at a border, 2 inside a surface, more where it is not one
+///     });
+namespace membrane {
+
+/// One side of one triangle, seen from its edge.
+struct HalfEdge {
+    Index first, second;  ///< The edge's vertices, first < second.
+    Index apex;           ///< The triangle's third vertex.
+    Index triangle;
+    Index side;    ///< The triangle's side: from its corner `side` to the next.
+    bool forward;  ///< Whether the triangle runs from `first` to `second`.
+
+    friend constexpr auto operator<=>(const HalfEdge&, const HalfEdge&) = default;
+};
+
+/// The 3 F half-edges, ascending by edge, then apex, then triangle. O(F log F).
+/// @pre No triangle names a vertex twice.
+[[nodiscard]] inline std::vector<HalfEdge> half_edges(const Triangles& triangles);
+
+/// Calls `visit` with the half-edges of each edge, edges ascending.
+template <class Visit>
+void for_each_edge(std::span<const HalfEdge> sides, Visit visit);
+
+inline std::vector<HalfEdge> half_edges(const Triangles& triangles) {
+    std::vector<HalfEdge> sides;
+    sides.reserve(static_cast<std::size_t>(triangles.size()));
+    for (Index f = 0; f < triangles.cols(); ++f) {
+        for (Index side = 0; side < 3; ++side) {
+            const Index from = triangles(side, f);
+            const Index to = triangles((side + 1) % 3, f);
+            const auto [first, second] = std::minmax({from, to});
+            sides.push_back({first, second, triangles((side + 2) % 3, f), f, side, from < to});
+        }
+    }
+    std::sort(sides.begin(), sides.end());
+    return sides;
+}
+
+template <class Visit>
+void for_each_edge(std::span<const HalfEdge> sides, Visit visit) {
+    for (std::size_t begin = 0, end = 0; begin < sides.size(); begin = end) {
+        const HalfEdge& edge = sides[begin];
+        while (end < sides.size() && sides[end].first == edge.first && sides[end].second == edge.second) ++end;
+        visit(sides.subspan(begin, end - begin));
+    }
+}
+
+}  // namespace membrane

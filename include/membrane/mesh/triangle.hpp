@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <membrane/core/check.hpp>
+
+/// One triangle and what can be near it: a point, a segment, a box.
+///
+///     const auto triangle = membrane::triangle_at(x, mesh.triangles().col(f));
+///     const auto nearest  = membrane::closest_point(triangle, tool.position);
+///     if (nearest.squared_distance < radius * radius) { /* the tool touches at nearest.point */ }
+///
+/// All functions are pure, do not allocate and cost a bounded number of operations. Differences are taken first, so
+/// accuracy depends on the size of the triangle and the distances, not on where the origin is. Triangles without area,
+/// down to three equal corners, are segments or points. No finite input gives a NaN.
+namespace membrane {
+
+/// Three corners, counter-clockwise seen from outside [m].
+template <Real Scalar>
+struct Triangle {
+    Vector3<Scalar> a, b, c;
+};
+
+/// A point of a triangle and how far it is from what was asked about.
+template <Real Scalar>
+struct TrianglePoint {
+    Vector3<Scalar> barycentric;  ///< Weights of a, b, c: not negative, sum 1; exactly zero for corners not involved.
+    Vector3<Scalar> point;        ///< [m]
+    Scalar squared_distance;      ///< [m^2]
+};
+
+/// A point of a segment and the point of a triangle nearest to it.
+template <Real Scalar>
+struct SegmentPair {
+    Scalar along;  ///< 0 at the segment's start, 1 at its end.
+    TrianglePoint<Scalar> on_triangle;
+};
+
+/// Where a segment enters a triangle.
+template <Real Scalar>
+struct SegmentHit {
+    Scalar along;  ///< 0 at the segment's start, 1 at its end.
+    Vector3<Scalar> barycentric;
+};
+
+/// The triangle whose corners are the points `corners[0..2]` of `x`.
+template <class Positions, class Corners>
+[[nodiscard]] Triangle<typename Positions::Scalar> triangle_at(const Positions& x, const Corners& corners) noexcept;
+
+/// The normal, as long as the triangle is large [m^2].
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> area_vector(const Triangle<Scalar>& triangle) noexcept;
+
+/// The point with the weights `barycentric`; the corner itself, to the bit, where one weight is 1 and the others 0.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> point_at(const Triangle<Scalar>& triangle, const Vector3<Scalar>& barycentric) noexcept;
+
+/// The point of the triangle nearest to `q`. A triangle whose height is below sqrt(epsilon) of its edges counts as its
+/// three edges, which moves the answer by no more than that height. One that is not finite, or so large that the square
+/// of its area is not, is infinitely far away.
+template <Real Scalar>
+[[nodiscard]] TrianglePoint<Scalar> closest_point(const Triangle<Scalar>& triangle, const Vector3<Scalar>& q) noexcept;
+
+/// The nearest points of the triangle and of the segment from `p` to `q`; at distance 0 where they cross.
+template <Real Scalar>
+[[nodiscard]] SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, const Vector3<Scalar>& p,
+                                                     const Vector3<Scalar>& q) noexcept;
+
+/// The nearest points of the triangle's edge `k`, from corner `k` to the next, and of the segment from `p` to `q`.
+template <Real Scalar>
+[[nodiscard]] SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, int k, const Vector3<Scalar>& p,
+                                                     const Vector3<Scalar>& q) noexcept;
+
+/// Where the segment first meets the triangle, from either side; edges, corners and the segment's ends belong to it.
+///
+/// Watertight: what could be a hit within the rounding errors of the computation is one, so that no segment slips
+/// through between two triangles with a common edge. A segment in the plane of the triangle enters at an edge, or
+/// starts inside. A triangle without area is never hit: its neighbours are.
+template <Real Scalar>
+[[nodiscard]] std::optional<SegmentHit<Scalar>> first_hit(const Triangle<Scalar>& triangle, const Vector3<Scalar>& from,
+                                                          const Vector3<Scalar>& to) noexcept;
+
+/// Whether the triangle and the box between the corners `low` and `high` have a point in common, borders included; what
+/// could be one within the rounding errors is one. Separating axes, all 13 [Akenine-Moeller01].
+template <Real Scalar>
+[[nodiscard]] bool touches_box(const Triangle<Scalar>& triangle, const Vector3<Scalar>& low,
+                               const Vector3<Scalar>& high) noexcept;
+
+namespace detail {
+
+/// `part / whole` between 0 and 1, whatever the two are.
+template <Real Scalar>
+[[nodiscard]] Scalar fraction(Scalar part, Scalar whole) noexcept {
+    if (!(part > 0)) return 0;
+    return part < whole ? part / whole : Scalar(1);
+}
+
+template <Real Scalar>
+[[nodiscard]] Scalar largest_magnitude(const Vector3<Scalar>& a) noexcept {
+    using std::abs;
+    return (std::max)((std::max)(abs(a.x()), abs(a.y())), abs(a.z()));
+}
+
+/// Corner 0, 1, 2, and 0 again.
+template <Real Scalar>
+[[nodiscard]] const Vector3<Scalar>& corner(const Triangle<Scalar>& triangle, int k) noexcept {
+    return k == 1 ? triangle.b : k == 2 ? triangle.c : triangle.a;
+}
+
+/// The weights of a point on the edge from corner `k` to the next.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> on_edge(int k, Scalar along) noexcept {
+    Vector3<Scalar> barycentric(0, 0, 0);
+    barycentric[k] = 1 - along;
+    barycentric[k == 2 ? 0 : k + 1] = along;
+    return barycentric;
+}
+
+}  // namespace detail
+
+template <class Positions, class Corners>
+Triangle<typename Positions::Scalar> triangle_at(const Positions& x, const Corners& corners) noexcept {
+    return {point(x, corners[0]), point(x, corners[1]), point(x, corners[2])};
+}
+
+template <Real Scalar>
+Vector3<Scalar> area_vector(const Triangle<Scalar>& triangle) noexcept {
+    return cross<Scalar>(triangle.b - triangle.a, triangle.c - triangle.a) / 2;
+}
+
+template <Real Scalar>
+Vector3<Scalar> point_at(const Triangle<Scalar>& triangle, const Vector3<Scalar>& barycentric) noexcept {
+    return (barycentric[0] * triangle.a + barycentric[1] * triangle.b) + barycentric[2] * triangle.c;
+}
+
+template <Real Scalar>
+TrianglePoint<Scalar> closest_point(const Triangle<Scalar>& triangle, const Vector3<Scalar>& q) noexcept {
+    const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
+    const Vector3<Scalar> normal = cross(ab, ac);
+    const Scalar whole = squared_norm(normal);
+    Scalar nearest = std::numeric_limits<Scalar>::infinity();
+    if (!is_finite(whole)) return {{1, 0, 0}, triangle.a, nearest};  // then so is a corner, or far too large
+    const bool has_area = whole > std::numeric_limits<Scalar>::epsilon() * (squared_norm(ab) * squared_norm(ac));
+    const Scalar weight_b = dot(normal, cross(aq, ac)), weight_c = dot(normal, cross(ab, aq));
+    const Scalar weight_a = whole - weight_b - weight_c;
+
+    if (has_area && weight_a >= 0 && weight_b >= 0 && weight_c >= 0) {
+        const Scalar b = weight_b / whole, c = weight_c / whole;
+        const Vector3<Scalar> barycentric((std::max)(Scalar(0), 1 - b - c), b, c);
+        return {barycentric, point_at(triangle, barycentric), squared_norm<Scalar>(aq - b * ab - c * ac)};
+    }
+    // Outside, the nearest point lies on an edge that faces q.
+    Vector3<Scalar> barycentric(1, 0, 0);
+    const auto consider = [&](int k, const Vector3<Scalar>& offset, const Vector3<Scalar>& edge) {
+        const Scalar along = detail::fraction(dot(offset, edge), squared_norm(edge));
+        const auto squared_distance = squared_norm<Scalar>(offset - along * edge);
+        if (!(squared_distance < nearest)) return;
+        nearest = squared_distance;
+        barycentric = detail::on_edge(k, along);
+    };
+    if (!has_area || weight_c < 0) consider(0, aq, ab);
+    if (!has_area || weight_a < 0) consider(1, q - triangle.b, triangle.c - triangle.b);
+    if (!has_area || weight_b < 0) consider(2, q - triangle.c, -ac);
+    return {barycentric, point_at(triangle, barycentric), nearest};
+}
+
+template <Real Scalar>
+SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, int k, const Vector3<Scalar>& p,
+                                       const Vector3<Scalar>& q) noexcept {
+    // The nearest points of two lines, each then clamped to its segment in turn [Ericson05] 5.1.9.
+    const Vector3<Scalar> segment = q - p, start = detail::corner(triangle, k), offset = start - p;
+    const Vector3<Scalar> edge = detail::corner(triangle, k + 1) - start;
+    const Vector3<Scalar> common = cross(segment, edge);
+    Scalar along = detail::fraction(dot(cross(offset, edge), common), squared_norm(common));
+    const Scalar foot = detail::fraction(dot<Scalar>(along * segment - offset, edge), squared_norm(edge));
+    along = detail::fraction(dot<Scalar>(offset + foot * edge, segment), squared_norm(segment));
+    const auto squared_distance = squared_norm<Scalar>((offset + foot * edge) - along * segment);
+    const Vector3<Scalar> barycentric = detail::on_edge(k, foot);
+    return {along, {barycentric, point_at(triangle, barycentric), squared_distance}};
+}
+
+template <Real Scalar>
+SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, const Vector3<Scalar>& p,
+                                       const Vector3<Scalar>& q) noexcept {
+    if (const auto hit = first_hit(triangle, p, q)) {
+        return {hit->along, {hit->barycentric, point_at(triangle, hit->barycentric), 0}};
+    }
+    SegmentPair<Scalar> best{0, closest_point(triangle, p)};
+    const auto end = closest_point(triangle, q);
+    if (end.squared_distance < best.on_triangle.squared_distance) best = {1, end};
+
+    for (int k = 0; k < 3; ++k) {
+        const auto edge = closest_to_segment(triangle, k, p, q);
+        if (edge.on_triangle.squared_distance < best.on_triangle.squared_distance) best = edge;
+    }
+    return best;
+}
+
+namespace detail {
+
+/// Relative bound, with room to spare, of the rounding error of a sum of products of three differences, in units of
+/// the product of their largest components.
+template <Real Scalar>
+inline constexpr Scalar rounding = 64 * std::numeric_limits<Scalar>::epsilon();
+
+/// Narrows [first, last] to where `value + along * slope` is not negative; says whether anything is left.
+template <Real Scalar>
+[[nodiscard]] bool clip(Scalar value, Scalar slope, Scalar& first, Scalar& last) noexcept {
+    if (slope == 0) return value >= 0;
+    const Scalar crossing = -value / slope;
+    (slope > 0 ? first : last) = slope > 0 ? (std::max)(first, crossing) : (std::min)(last, crossing);
+    return first <= last;
+}
+
+/// The weights follow from the point on the segment: solved for together with it, they would part from it where the
+/// segment meets the plane at a small angle.
+template <Real Scalar>
+[[nodiscard]] SegmentHit<Scalar> hit_at(const Triangle<Scalar>& triangle, const Vector3<Scalar>& from,
+                                        const Vector3<Scalar>& segment, Scalar along) noexcept {
+    return {along, closest_point<Scalar>(triangle, from + along * segment).barycentric};
+}
+
+/// `first_hit` for a segment that runs in the triangle's plane, or beside it.
+template <Real Scalar>
+[[nodiscard]] std::optional<SegmentHit<Scalar>> first_hit_in_plane(const Triangle<Scalar>& triangle,
+                                                                   const Vector3<Scalar>& from,
+                                                                   const Vector3<Scalar>& segment) noexcept {
+    const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, start = from - triangle.a;
+    const Vector3<Scalar> normal = cross(ab, ac);
+    const Scalar size = (std::max)(largest_magnitude(ab), largest_magnitude(ac));
+    const Scalar reach = (std::max)(size, largest_magnitude(start));
+    if (!(squared_norm(normal) > std::numeric_limits<Scalar>::epsilon() * (squared_norm(ab) * squared_norm(ac)))) {
+        return std::nullopt;
+    }
+    Scalar first = 0, last = 1;
+    const Scalar height = dot(normal, start), climb = dot(normal, segment), slack = rounding<Scalar> * reach * size;
+    if (!clip(slack * size + height, climb, first, last)) return std::nullopt;
+    if (!clip(slack * size - height, -climb, first, last)) return std::nullopt;
+    for (int k = 0; k < 3; ++k) {
+        const Vector3<Scalar> inward = cross<Scalar>(normal, corner(triangle, k + 1) - corner(triangle, k));
+        const auto inside = dot<Scalar>(inward, from - corner(triangle, k));
+        if (!clip(slack * largest_magnitude(normal) + inside, dot(inward, segment), first, last)) return std::nullopt;
+    }
+    return hit_at(triangle, from, segment, first);
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+std::optional<SegmentHit<Scalar>> first_hit(const Triangle<Scalar>& triangle, const Vector3<Scalar>& from,
+                                            const Vector3<Scalar>& to) noexcept {
+    using std::abs;
+    const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a;
+    const Vector3<Scalar> segment = to - from, offset = triangle.a - from;
+    const Vector3<Scalar> normal = cross(ab, ac), moment = cross(segment, offset);
+    const Scalar climb = dot(segment, normal), sign = climb < 0 ? Scalar(-1) : Scalar(1), whole = sign * climb;
+    const Scalar size = (std::max)(detail::largest_magnitude(ab), detail::largest_magnitude(ac));
+    const Scalar reach = (std::max)(size, detail::largest_magnitude(offset));
+    const Scalar slack = detail::rounding<Scalar> * reach * size * detail::largest_magnitude(segment);
+    if (!(whole > slack)) return detail::first_hit_in_plane(triangle, from, segment);
+
+    // Cramer's rule for from + along * segment = a + b * ab + c * ac [Moeller97], signs decided before the division.
+    const Scalar weight_b = -sign * dot(moment, ac), weight_c = sign * dot(moment, ab);
+    if (!(weight_b >= -slack && weight_c >= -slack && weight_b + weight_c <= whole + slack)) return std::nullopt;
+    const Scalar distance = sign * dot(normal, offset);
+    const Scalar end_slack = detail::rounding<Scalar> * reach * size * size;
+    if (!(distance >= -end_slack && distance <= whole + (slack + end_slack))) return std::nullopt;
+    return detail::hit_at(triangle, from, segment, detail::fraction(distance, whole));
+}
+
+template <Real Scalar>
+bool touches_box(const Triangle<Scalar>& triangle, const Vector3<Scalar>& low, const Vector3<Scalar>& high) noexcept {
+    using std::abs;
+    Scalar size = (std::max)(detail::largest_magnitude(low), detail::largest_magnitude(high));
+    for (int k = 0; k < 3; ++k) size = (std::max)(size, detail::largest_magnitude(detail::corner(triangle, k)));
+    const Scalar slack = 8 * std::numeric_limits<Scalar>::epsilon() * size;
+    const Vector3<Scalar> centre = (low + high) / 2, half = ((high - low) / 2).array() + slack;
+    const Vector3<Scalar> corners[] = {triangle.a - centre, triangle.b - centre, triangle.c - centre};
+    const auto overlap_along = [&](const Vector3<Scalar>& axis) {
+        const Scalar a = dot(axis, corners[0]), b = dot(axis, corners[1]), c = dot(axis, corners[2]);
+        const Scalar reach = (half.x() * abs(axis.x()) + half.y() * abs(axis.y())) + half.z() * abs(axis.z());
+        return (std::min)((std::min)(a, b), c) <= reach && (std::max)((std::max)(a, b), c) >= -reach;
+    };
+    if (!overlap_along({1, 0, 0}) || !overlap_along({0, 1, 0}) || !overlap_along({0, 0, 1})) return false;
+    for (int k = 0; k < 3; ++k) {
+        const Vector3<Scalar> edge = corners[k == 2 ? 0 : k + 1] - corners[k];
+        if (!overlap_along({0, -edge.z(), edge.y()}) || !overlap_along({edge.z(), 0, -edge.x()})) return false;
+        if (!overlap_along({-edge.y(), edge.x(), 0})) return false;
+    }
+    return overlap_along(cross<Scalar>(corners[1] - corners[0], corners[2] - corners[0]));
+}
+
+}  // namespace membrane

@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <membrane/core/compressed_rows.hpp>
+#include <membrane/core/field.hpp>
+#include <membrane/mesh/adjacency.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/network/spring_law.hpp>
+
+/// The membrane as masses joined by springs, one along each edge of the mesh.
+///
+///     const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});
+///     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
+///     const auto force = network.pull(v, x).force;                                          // [N]
+namespace membrane {
+
+/// Constants of a network. What is given for each spring stands in the order of `Adjacency::edges()`.
+template <Real Scalar>
+struct NetworkOptions {
+    Field<Scalar> stiffness = {};    ///< k_ij [N/m], required; a spring of stiffness zero is left out
+    Field<Scalar> mass = {};         ///< m_i [kg]; only (4) as published and explicit Euler need it
+    Field<Scalar> viscosity = {};    ///< d_i [N s/m], zero if not given; only explicit Euler feels it
+    Field<Scalar> rest_length = {};  ///< r_ij [m]; if not given, the lengths in the mesh
+    std::vector<Index> pinned = {};  ///< vertices that never move: a clamped rim is `border(mesh)`
+};
+
+/// One spring of the network.
+template <Real Scalar>
+struct Spring {
+    Index first, second;
+    Scalar stiffness;    ///< [N/m]
+    Scalar rest_length;  ///< [m]
+};
+
+/// One spring as the vertex at one end sees it.
+template <Real Scalar>
+struct SpringEnd {
+    Index other;
+    Scalar stiffness;    ///< [N/m]
+    Scalar rest_length;  ///< [m]
+};
+
+/// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1): constant once built, no positions in it.
+template <Real Scalar_, SpringLaw<Scalar_> Law>
+class MassSpringNetwork {
+  public:
+    using Scalar = Scalar_;
+
+    /// @throws InvalidInput for a number that is negative, not finite, missing, or of the wrong count. Cost: O(V + F log F).
+    MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law, const NetworkOptions<Scalar>& options);
+
+    [[nodiscard]] Index vertex_count() const noexcept { return ends_.row_count(); }
+    [[nodiscard]] std::span<const Spring<Scalar>> springs() const noexcept { return springs_; }
+    [[nodiscard]] const Law& law() const noexcept { return law_; }
+
+    /// The springs of vertex `v`, by ascending vertex at the other end.
+    [[nodiscard]] std::span<const SpringEnd<Scalar>> springs_of(Index v) const noexcept { return ends_[v]; }
+
+    [[nodiscard]] bool pinned(Index v) const noexcept { return pinned_[static_cast<std::size_t>(v)] != 0; }
+    [[nodiscard]] bool has_masses() const noexcept { return !mass_.empty(); }
+    [[nodiscard]] Scalar mass(Index v) const noexcept {
+        return mass_[static_cast<std::size_t>(v)];
+    }  ///< @pre has_masses()
+    [[nodiscard]] Scalar viscosity(Index v) const noexcept {
+        return viscosity_.empty() ? Scalar(0) : viscosity_[static_cast<std::size_t>(v)];
+    }
+
+    /// Sum of the spring forces on vertex `v` at positions `x`. A spring of length zero has no direction and no force.
+    [[nodiscard]] Pull<Scalar> pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// Tension of spring `s` [N].
+    [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
+        return response(springs_[static_cast<std::size_t>(s)], x).tension;
+    }
+
+    /// Energy stored in all springs [J]. Cost: O(springs).
+    [[nodiscard]] Scalar energy(const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// An unbalanced force that is nothing beside the others [N]: 1e-9 of the stiffest spring stretched by its own
+    /// length, or what the spacing of numbers makes of it where that is more.
+    [[nodiscard]] Scalar negligible_force() const noexcept { return negligible_force_; }
+
+  private:
+    [[nodiscard]] SpringResponse<Scalar> response(const Spring<Scalar>& s,
+                                                  const ConstPointsRef<Scalar>& x) const noexcept {
+        const Scalar length = norm<Scalar>(point(x, s.second) - point(x, s.first));
+        return law_(SpringState<Scalar>{s.stiffness, s.rest_length, length});
+    }
+    void build_springs(const Adjacency& adjacency, const Points<Scalar>& x, const NetworkOptions<Scalar>& options);
+
+    Law law_;
+    std::vector<Spring<Scalar>> springs_;
+    CompressedRows<SpringEnd<Scalar>> ends_;  // each spring twice
+    std::vector<Scalar> mass_, viscosity_;
+    std::vector<unsigned char> pinned_;
+    Scalar negligible_force_ = 0;
+};
+
+template <Real Scalar, class Law>
+MassSpringNetwork(const TriangleMesh<Scalar>&, const Law&, const NetworkOptions<Scalar>&)
+    -> MassSpringNetwork<Scalar, Law>;
+
+namespace detail {
+inline constexpr std::string_view network_name = "MassSpringNetwork";
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law>
+MassSpringNetwork<Scalar, Law>::MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law,
+                                                  const NetworkOptions<Scalar>& options)
+    : law_(law) {
+    if constexpr (requires { law_.check(); }) law_.check();
+    const Index vertices = mesh.vertex_count();
+    if (options.mass.given())
+        mass_ = options.mass.expand(vertices, detail::network_name, "mass", "vertex", "kg", false);
+    if (options.viscosity.given()) {
+        viscosity_ = options.viscosity.expand(vertices, detail::network_name, "viscosity", "vertex", "N s/m");
+    }
+    pinned_.assign(static_cast<std::size_t>(vertices), 0);
+    for (std::size_t i = 0; i < options.pinned.size(); ++i) {
+        const Index v = options.pinned[i];
+        if (v < 0 || v >= vertices) {
+            refuse(detail::network_name, "pinned ", i, " names vertex ", v, ", expected 0 to ", vertices - 1);
+        }
+        pinned_[static_cast<std::size_t>(v)] = 1;
+    }
+    build_springs(Adjacency(mesh), mesh.positions(), options);
+    ends_ = CompressedRows<SpringEnd<Scalar>>(vertices, [this](auto put) {
+        for (const auto& s : springs_) {  // ascending, so each row is
+            put(s.first, SpringEnd<Scalar>{s.second, s.stiffness, s.rest_length});
+            put(s.second, SpringEnd<Scalar>{s.first, s.stiffness, s.rest_length});
+        }
+    });
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law>
+void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, const Points<Scalar>& x,
+                                                   const NetworkOptions<Scalar>& options) {
+    const auto edges = adjacency.edges();
+    const auto count = static_cast<Index>(edges.size());
+    if (!options.stiffness.given()) refuse(detail::network_name, "stiffness of the springs [N/m] is required");
+    const auto stiffness = options.stiffness.expand(count, detail::network_name, "stiffness", "spring", "N/m");
+    std::vector<Scalar> rest(edges.size());
+    if (options.rest_length.given()) {
+        rest = options.rest_length.expand(count, detail::network_name, "rest length", "spring", "m");
+    } else {
+        for (std::size_t s = 0; s < edges.size(); ++s) {
+            rest[s] = norm<Scalar>(point(x, edges[s][1]) - point(x, edges[s][0]));
+        }
+    }
+    springs_.reserve(edges.size());
+    for (std::size_t s = 0; s < edges.size(); ++s) {
+        if (stiffness[s] > 0) springs_.push_back({edges[s][0], edges[s][1], stiffness[s], rest[s]});
+    }
+    const Scalar spacing = std::numeric_limits<Scalar>::epsilon() * x.cwiseAbs().maxCoeff();
+    for (const auto& s : springs_) {
+        const Scalar force = s.stiffness * (std::max)(s.rest_length / Scalar(1e9), 64 * spacing);
+        negligible_force_ = (std::max)(negligible_force_, force);
+    }
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law>
+Pull<Scalar> MassSpringNetwork<Scalar, Law>::pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
+    const Vector3<Scalar> here = point(x, v);
+    Pull<Scalar> sum{Vector3<Scalar>::Zero(), 0};
+    for (const auto& end : springs_of(v)) {
+        const Vector3<Scalar> reach = point(x, end.other) - here;
+        const Scalar length = norm(reach);
+        if (length == 0) {
+            sum.stiffness += end.stiffness;
+            continue;
+        }
+        const auto answer = law_(SpringState<Scalar>{end.stiffness, end.rest_length, length});
+        const Scalar across = answer.tension / length;  // curvature at right angles to the spring
+        sum.force += across * reach;
+        sum.stiffness += (std::max)(answer.stiffness, across);
+    }
+    return sum;
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law>
+Scalar MassSpringNetwork<Scalar, Law>::energy(const ConstPointsRef<Scalar>& x) const noexcept {
+    Scalar sum = 0;
+    for (const auto& s : springs_) sum += response(s, x).energy;
+    return sum;
+}
+
+}  // namespace membrane

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <string_view>
+#include <vector>
+
+#include <membrane/core/field.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/network/spring_law.hpp>
+
+/// What holds the membrane to the body under it.
+///
+///     const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+///     solver.step(x, dt, network, backing, press(tool, contact));                        // the body stands still
+///     solver.step(x, dt, network, backing.at(anchors, previous), press(tool, contact));  // the body moves
+namespace membrane {
+
+/// Constants of the volume springs, the same for all vertices or one for each.
+template <Real Scalar>
+struct VolumeOptions {
+    Field<Scalar> stiffness = {};  ///< k'_s [N/m], required; larger clings more
+    Field<Scalar> damping = {};    ///< k'_d [N s/m], zero if not given; recovery takes the time k'_d / k'_s [s]
+};
+
+/// A model of the body under the membrane: the pull on vertex `v` at `position`, which was at `start` when the tick of
+/// length `dt` began. What the compiler cannot see: the pull does no work on the membrane over a closed path.
+template <class Volume, class Scalar>
+concept VolumeModel = Real<Scalar> &&
+    requires(const Volume& volume, Index v, const Vector3<Scalar>& position, Scalar dt) {
+    { volume.pull(v, position, position, dt) }
+    noexcept->std::same_as<Pull<Scalar>>;
+};
+
+/// No body under the membrane: nothing holds it, at no cost.
+struct NoVolumeSprings {
+    template <Real Scalar>
+    [[nodiscard]] Pull<Scalar> pull(Index, const Vector3<Scalar>&, const Vector3<Scalar>&, Scalar) const noexcept {
+        return {Vector3<Scalar>::Zero(), 0};
+    }
+};
+static_assert(VolumeModel<NoVolumeSprings, float> && VolumeModel<NoVolumeSprings, double>);
+
+template <Real Scalar>
+class MovedVolumeSprings;
+
+/// Virtual volume springs, [Liu07] (5): one for each vertex, of rest length zero, from the anchor to the vertex.
+template <Real Scalar>
+class VirtualVolumeSprings {
+  public:
+    /// Anchors are the positions of `mesh`.
+    /// @throws InvalidInput for a constant that is negative, not finite, missing, or of the wrong count
+    VirtualVolumeSprings(const TriangleMesh<Scalar>& mesh, const VolumeOptions<Scalar>& options);
+
+    [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
+    [[nodiscard]] Scalar stiffness(Index v) const noexcept { return stiffness_[static_cast<std::size_t>(v)]; }
+    [[nodiscard]] Scalar damping(Index v) const noexcept {
+        return damping_.empty() ? Scalar(0) : damping_[static_cast<std::size_t>(v)];
+    }
+
+    /// The same springs with their anchors moved by the body under them: they were at `previous` when the tick began
+    /// and are at `anchors` now (3 x V [m]). Both are the caller's and must outlive what is returned.
+    /// Let the solver know with `wake_all()` that vertices have lost their balance, and the tracker where the anchors are.
+    /// @pre as many points as vertices (asserted)
+    [[nodiscard]] MovedVolumeSprings<Scalar> at(const ConstPointsRef<Scalar>& anchors,
+                                                const ConstPointsRef<Scalar>& previous) const noexcept;
+
+    /// Force of the spring on vertex `v` at `position`. The velocity in (5) is the vertex's relative to its anchor over
+    /// the tick: how often a solver visits the vertex within the tick does not change the damping.
+    [[nodiscard]] Pull<Scalar> pull(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
+                                    Scalar dt) const noexcept {
+        const Vector3<Scalar> anchor = point(anchors_, v);
+        return pull_of_length(v, position - anchor, start - anchor, dt);
+    }
+
+    /// Energy stored in the spring of vertex `v` at `position` [J].
+    [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept {
+        return stiffness(v) * squared_norm<Scalar>(position - point(anchors_, v)) / 2;
+    }
+
+  private:
+    friend class MovedVolumeSprings<Scalar>;
+
+    // Spring of vertex v, `length` from anchor to vertex now, `before` at the start of the tick.
+    [[nodiscard]] Pull<Scalar> pull_of_length(Index v, const Vector3<Scalar>& length, const Vector3<Scalar>& before,
+                                              Scalar dt) const noexcept;
+
+    Points<Scalar> anchors_;
+    std::vector<Scalar> stiffness_, damping_;
+};
+
+/// Volume springs whose anchors have moved: a view for the length of a call or two, see `VirtualVolumeSprings::at`.
+template <Real Scalar>
+class MovedVolumeSprings {
+  public:
+    MovedVolumeSprings(const VirtualVolumeSprings<Scalar>& springs, const ConstPointsRef<Scalar>& anchors,
+                       const ConstPointsRef<Scalar>& previous) noexcept
+        : springs_(&springs), anchors_(anchors), previous_(previous) {
+        MEMBRANE_ASSERT(anchors.cols() == springs.anchors().cols() && previous.cols() == anchors.cols());
+    }
+
+    [[nodiscard]] const ConstPointsRef<Scalar>& anchors() const noexcept { return anchors_; }
+
+    [[nodiscard]] Pull<Scalar> pull(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
+                                    Scalar dt) const noexcept {
+        return springs_->pull_of_length(v, position - point(anchors_, v), start - point(previous_, v), dt);
+    }
+
+    [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept {
+        return springs_->stiffness(v) * squared_norm<Scalar>(position - point(anchors_, v)) / 2;
+    }
+
+  private:
+    const VirtualVolumeSprings<Scalar>* springs_;
+    ConstPointsRef<Scalar> anchors_, previous_;
+};
+static_assert(VolumeModel<VirtualVolumeSprings<double>, double> && VolumeModel<MovedVolumeSprings<float>, float>);
+
+template <Real Scalar>
+VirtualVolumeSprings<Scalar>::VirtualVolumeSprings(const TriangleMesh<Scalar>& mesh,
+                                                   const VolumeOptions<Scalar>& options)
+    : anchors_(mesh.positions()) {
+    constexpr std::string_view component = "VirtualVolumeSprings";
+    if (!options.stiffness.given()) refuse(component, "stiffness [N/m] is required");
+    stiffness_ = options.stiffness.expand(mesh.vertex_count(), component, "stiffness", "vertex", "N/m");
+    if (options.damping.given()) {
+        damping_ = options.damping.expand(mesh.vertex_count(), component, "damping", "vertex", "N s/m");
+    }
+}
+
+template <Real Scalar>
+MovedVolumeSprings<Scalar> VirtualVolumeSprings<Scalar>::at(const ConstPointsRef<Scalar>& anchors,
+                                                            const ConstPointsRef<Scalar>& previous) const noexcept {
+    return {*this, anchors, previous};
+}
+
+template <Real Scalar>
+Pull<Scalar> VirtualVolumeSprings<Scalar>::pull_of_length(Index v, const Vector3<Scalar>& length,
+                                                          const Vector3<Scalar>& before, Scalar dt) const noexcept {
+    const Scalar k = stiffness(v);
+    const Scalar d = damping(v);
+    const Scalar rate = d == 0 ? Scalar(0) : d / dt;
+    Pull<Scalar> answer{-k * length, k + rate};
+    const Scalar square = squared_norm(length);
+    if (rate == 0 || square == 0) return answer;  // the spring acts only while it has a length
+    answer.force -= (rate * dot<Scalar>(length - before, length) / square) * length;
+    return answer;
+}
+
+}  // namespace membrane

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <span>
+
+#include <membrane/collision/grasper.hpp>
+#include <membrane/collision/tool.hpp>
+#include <membrane/solve/touch.hpp>
+
+/// What acts on the membrane from outside, as arguments of a step.
+///
+///     const auto report = solver.step(x, dt, network, backing, press(tool, contact), pull(tool, grasp));
+///     report.reactions[0]                                          // force of the membrane on the pressing tool [N]
+namespace membrane {
+
+/// Something that acts on the membrane during one step. `begin` names the vertices where its force enters and puts in
+/// place what it holds; `enforce` is called in every sweep once layer 0 has moved, and once more at the end; it
+/// mends what they broke and says whether there was anything to mend; `reaction` is the force of the membrane on whoever acts [N].
+template <class C, class Scalar>
+concept Constraint = Real<Scalar> && requires(const C& constraint, Region<Scalar>& region, const Region<Scalar>& done) {
+    { constraint.sound() }
+    noexcept->std::same_as<bool>;  // else the step is refused
+    { constraint.begin(region) }
+    noexcept;
+    { constraint.enforce(region) }
+    noexcept->std::same_as<bool>;
+    { constraint.reaction(done) }
+    noexcept->std::same_as<Vector3<Scalar>>;
+};
+
+/// Holds a point of a triangle at `target`; its corners are free otherwise.
+template <Real Scalar>
+struct HeldPoint {
+    Index triangle = no_index;  ///< none: holds nothing
+    std::array<Index, 3> corners{no_index, no_index, no_index};
+    Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();
+    Vector3<Scalar> target = Vector3<Scalar>::Zero();  ///< [m]
+
+    [[nodiscard]] bool sound() const noexcept;
+    void begin(Region<Scalar>& region) const noexcept;
+    bool enforce(Region<Scalar>& region) const noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
+};
+
+/// Holds a vertex at `target`.
+template <Real Scalar>
+struct HeldVertex {
+    Index vertex;
+    Vector3<Scalar> target;  ///< [m]
+
+    [[nodiscard]] bool sound() const noexcept { return is_finite(target); }
+    void begin(Region<Scalar>& region) const noexcept;
+    bool enforce(Region<Scalar>&) const noexcept { return false; }
+    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept {
+        return region.unbalanced(vertex);
+    }
+};
+
+/// Holds vertices where they are. No force enters there: they seed no queue. Their reactions add up.
+struct Pinned {
+    std::span<const Index> vertices;  ///< of the caller
+
+    [[nodiscard]] bool sound() const noexcept { return true; }
+    template <Real Scalar>
+    void begin(Region<Scalar>& region) const noexcept;
+    template <Real Scalar>
+    bool enforce(Region<Scalar>&) const noexcept {
+        return false;
+    }
+    template <Real Scalar>
+    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
+};
+
+/// An external force on a point of a triangle, F^ext of [Liu07] (1).
+template <Real Scalar>
+struct Load {
+    std::array<Index, 3> corners;
+    Vector3<Scalar> barycentric;
+    Vector3<Scalar> force;  ///< [N]
+
+    [[nodiscard]] bool sound() const noexcept;
+    void begin(Region<Scalar>& region) const noexcept;
+    bool enforce(Region<Scalar>&) const noexcept { return false; }
+    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>&) const noexcept { return -force; }
+};
+
+static_assert(Constraint<HeldPoint<double>, double> && Constraint<HeldVertex<double>, double>);
+static_assert(Constraint<Pinned, double> && Constraint<Load<double>, double>);
+
+/// What forceps hold follows the tool.
+template <Real Scalar>
+[[nodiscard]] HeldPoint<Scalar> pull(const Tool<Scalar>& tool, const Grasp<Scalar>& grasp) noexcept {
+    return {grasp.triangle, grasp.corners, grasp.barycentric, tool.position + grasp.offset};
+}
+
+/// Vertex `v` is held at `target` [m].
+template <class Target>
+[[nodiscard]] HeldVertex<typename Target::Scalar> pull(Index v, const Eigen::MatrixBase<Target>& target) noexcept {
+    return {v, target};
+}
+
+/// `vertices` stay where they are; the span must outlive the step.
+[[nodiscard]] inline Pinned pin(std::span<const Index> vertices) noexcept { return {vertices}; }
+
+/// `force` [N] acts on the point `barycentric` of the triangle with the vertices `corners`.
+template <Real Scalar>
+[[nodiscard]] Load<Scalar> load(const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
+                                const Vector3<Scalar>& force) noexcept {
+    return {corners, barycentric, force};
+}
+
+namespace detail {
+
+template <Real Scalar>
+[[nodiscard]] bool is_barycentric(const Vector3<Scalar>& weights) noexcept {
+    const Scalar slack = 16 * std::numeric_limits<Scalar>::epsilon();
+    return is_finite(weights) && weights.minCoeff() >= -slack && std::abs(weights.sum() - 1) <= 4 * slack;
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+bool HeldPoint<Scalar>::sound() const noexcept {
+    return triangle == no_index || (detail::is_barycentric(barycentric) && is_finite(target));
+}
+
+template <Real Scalar>
+void HeldPoint<Scalar>::begin(Region<Scalar>& region) const noexcept {
+    if (triangle == no_index || !seed_corners(region, corners)) return;
+    const Vector3<Scalar> none = Vector3<Scalar>::Zero();
+    Touch<Scalar> touch{triangle, 0, corners, barycentric, none, none, none};
+    if (const auto* before = region.recall(triangle, 0)) touch.force = before->force;
+    push_point(region, corners, barycentric, touch.force);
+    region.remember(touch);
+    const Vector3<Scalar> now = point_at(triangle_of(region, corners), barycentric);
+    shift_point<Scalar>(region, corners, barycentric, target - now);
+}
+
+template <Real Scalar>
+bool HeldPoint<Scalar>::enforce(Region<Scalar>& region) const noexcept {
+    bool changed = false;
+    for (auto& touch : region.touches()) {
+        const Scalar compliance = compliance_of(region, touch);
+        if (!(compliance > 0)) continue;
+        const Vector3<Scalar> now = point_at(triangle_of(region, corners), barycentric);
+        const Vector3<Scalar> more = (target - now) / compliance;
+        if (!(norm(more) > region.negligible_force())) continue;
+        change_force(region, touch, more);
+        changed = true;
+    }
+    return changed;
+}
+
+template <Real Scalar>
+Vector3<Scalar> HeldPoint<Scalar>::reaction(const Region<Scalar>& region) const noexcept {
+    return reaction_of_touches(region);
+}
+
+template <Real Scalar>
+void HeldVertex<Scalar>::begin(Region<Scalar>& region) const noexcept {
+    if (!region.check(vertex)) return;
+    region.seed(vertex);
+    region.hold(vertex, target);
+}
+
+template <Real Scalar>
+void Pinned::begin(Region<Scalar>& region) const noexcept {
+    for (const Index v : vertices) {
+        if (!region.check(v)) return;
+        region.hold(v);
+    }
+}
+
+template <Real Scalar>
+Vector3<Scalar> Pinned::reaction(const Region<Scalar>& region) const noexcept {
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    for (const Index v : vertices) sum += region.unbalanced(v);
+    return sum;
+}
+
+template <Real Scalar>
+bool Load<Scalar>::sound() const noexcept {
+    return detail::is_barycentric(barycentric) && is_finite(force);
+}
+
+template <Real Scalar>
+void Load<Scalar>::begin(Region<Scalar>& region) const noexcept {
+    if (seed_corners(region, corners)) push_point(region, corners, barycentric, force);
+}
+
+}  // namespace membrane

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+
+#include <membrane/collision/contact.hpp>
+#include <membrane/collision/grasper.hpp>
+#include <membrane/collision/tool.hpp>
+#include <membrane/mesh/passing.hpp>
+#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/touch.hpp>
+
+/// The tool against the membrane.
+///
+///     const auto contact = tracker.update(tree, x, tool);
+///     const auto report  = solver.step(x, dt, network, backing, press(tool, contact));
+///     report.reactions[0]                                                    // force of the membrane on the tool [N]
+namespace membrane {
+
+/// Keeps the surface outside the tool, without friction: every touched triangle in its point nearest to the tool, by a
+/// force along the normal that pushes and never pulls, shared out to the corners by barycentric weights.
+template <Real Scalar>
+struct Press {
+    Tool<Scalar> tool;
+    Contact<Scalar> contact;
+
+    [[nodiscard]] bool sound() const noexcept { return is_sound(tool); }
+    void begin(Region<Scalar>& region) const noexcept;
+    bool enforce(Region<Scalar>& region) const noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
+
+  private:
+    void clear_way(Region<Scalar>& region) const noexcept;
+    void carry(Region<Scalar>& region, const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
+               const Vector3<Scalar>& normal) const noexcept;
+    void find_touches(Region<Scalar>& region) const noexcept;
+    void keep_side(Region<Scalar>& region) const noexcept;
+    Scalar aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept;
+    [[nodiscard]] static bool on_face(const Touch<Scalar>& touch) noexcept {
+        return touch.pair < 2 && touch.barycentric.minCoeff() > 0;
+    }
+};
+
+static_assert(Constraint<Press<double>, double> && Constraint<Press<float>, float>);
+
+/// The tool presses where it touches. Forceps that hold something press nothing.
+template <Real Scalar>
+[[nodiscard]] Press<Scalar> press(const Tool<Scalar>& tool, const Contact<Scalar>& contact,
+                                  const Grasp<Scalar>& grasp = {}) noexcept {
+    return {tool, grasp.holding() ? Contact<Scalar>::none() : contact};
+}
+
+namespace detail {
+
+// Touches share vertices: within one call they take turns this often at the most.
+inline constexpr int touch_passes = 8;
+
+/// A face that rocks under a tool moves the contact point along itself, and with it the pressure from corner to corner:
+/// for each corner the stiffness [N/m] that this amounts to. `moment` is the pressure times the distance from the face
+/// to the tool's axis [N m].
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> wandering_stiffness(const Triangle<Scalar>& triangle, const Vector3<Scalar>& barycentric,
+                                                  Scalar moment) noexcept {
+    Vector3<Scalar> squares;  // of the side across from each corner
+    squares << squared_norm<Scalar>(triangle.c - triangle.b), squared_norm<Scalar>(triangle.a - triangle.c),
+        squared_norm<Scalar>(triangle.b - triangle.a);
+    Vector3<Scalar> stiffness = Vector3<Scalar>::Zero();
+    if (barycentric.minCoeff() > 0) {
+        stiffness = (moment / (4 * squared_norm(area_vector(triangle)))) * squares;
+    } else if (barycentric.maxCoeff() < 1) {
+        Eigen::Index apart;
+        barycentric.minCoeff(&apart);
+        stiffness.setConstant(moment / squares[apart]);
+        stiffness[apart] = 0;
+    }
+    return is_finite(stiffness) ? stiffness : Vector3<Scalar>(Vector3<Scalar>::Zero());
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
+    if (!contact.touching()) return;
+    for (const auto& watched : contact.watched) {
+        for (const Index v : watched.corners) {
+            if (!region.check(v)) return;
+        }
+    }
+    for (const auto& touched : contact.touched) seed_corners(region, touched.corners);
+    const auto keep = [&] {
+        for (const Index v : region.corners_of(contact.watched)) region.keep(v);
+    };
+    if (!contact.crossed) keep();
+    clear_way(region);
+    if (contact.crossed) keep();
+    find_touches(region);
+    // The surface gives way before any force is known.
+    for (int pass = 0; pass < detail::touch_passes; ++pass) {
+        bool moved = false;
+        for (auto& touch : region.touches()) {
+            const Scalar overlap = -aim(region, touch);
+            if (!(overlap > region.negligible_force() * compliance_of(region, touch))) continue;
+            shift_point<Scalar>(region, touch.corners, touch.barycentric, -overlap * touch.normal);
+            moved = true;
+        }
+        if (!moved) break;
+    }
+    keep_side(region);
+}
+
+// The surface gives way at the contact point first. And the tool does not pass it: where the tool's way since the last
+// tick leads through, the surface is taken along.
+template <Real Scalar>
+void Press<Scalar>::clear_way(Region<Scalar>& region) const noexcept {
+    const Scalar slack = region.negligible_force() * region.compliance(contact.corners[0]);
+    if (contact.gap < -slack) carry(region, contact.corners, contact.barycentric, contact.normal);
+    if (!contact.crossed) return;
+    const Vector3<Scalar> back = contact.before - contact.on_axis;
+    for (int pass = 0; pass < detail::touch_passes; ++pass) {
+        const TouchedTriangle* passed = nullptr;
+        SegmentHit<Scalar> first{2, Vector3<Scalar>::Zero()};
+        Vector3<Scalar> first_normal = contact.normal;
+        for (const auto& touched : contact.touched) {
+            const auto triangle = triangle_of(region, touched.corners);
+            const auto hit = first_hit(triangle, contact.before, contact.on_axis);
+            if (!hit || !(hit->along < first.along)) continue;
+            Vector3<Scalar> normal = direction(area_vector(triangle), contact.normal);
+            if (dot(normal, back) < 0) normal = -normal;
+            const Scalar height = dot<Scalar>(contact.on_axis - triangle.a, normal);
+            if (!(height < 0)) continue;  // it has only come to the plane
+            passed = &touched;
+            first = *hit;
+            first_normal = normal;
+        }
+        if (passed == nullptr) return;
+        carry(region, passed->corners, first.barycentric, first_normal);
+    }
+}
+
+// Takes the point of the triangle along to where it just touches the tool.
+template <Real Scalar>
+void Press<Scalar>::carry(Region<Scalar>& region, const std::array<Index, 3>& corners,
+                          const Vector3<Scalar>& barycentric, const Vector3<Scalar>& normal) const noexcept {
+    const Vector3<Scalar> now = point_at(triangle_of(region, corners), barycentric);
+    shift_point<Scalar>(region, corners, barycentric, contact.on_axis - contact.radius * normal - now);
+}
+
+template <Real Scalar>
+void Press<Scalar>::find_touches(Region<Scalar>& region) const noexcept {
+    const int pairs = feature_pairs(tool);
+    for (const auto& touched : contact.touched) {
+        const auto triangle = triangle_of(region, touched.corners);
+        for (int pair = 0; pair < pairs; ++pair) {
+            const auto nearest = proximity(triangle, tool, pair);
+            if (!nearest) continue;
+            const bool apart = norm(nearest->reach) > contact.radius / 1000;
+            const Vector3<Scalar> towards = apart ? nearest->reach : Vector3<Scalar>(contact.before - contact.on_axis);
+            const Vector3<Scalar> normal = direction(towards, contact.normal);
+            const Vector3<Scalar> none = Vector3<Scalar>::Zero();
+            Touch<Scalar> touch{touched.triangle, pair, touched.corners, nearest->barycentric, normal, none, none};
+            if (const auto* before = region.recall(touched.triangle, pair)) {
+                touch.force = -norm(before->force) * normal;
+                attach(region, touch);
+            } else if (norm(nearest->reach) > contact.reach) {
+                continue;
+            }
+            region.remember(touch);
+        }
+    }
+}
+
+// Brings the touch up to date with the positions, its pressure unchanged, and returns the gap. The tool stays on the
+// side of the triangle, or of the edge or corner it is nearest to, where the touch was found.
+template <Real Scalar>
+Scalar Press<Scalar>::aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept {
+    const Scalar pressure = norm(touch.force);
+    if (pressure > 0) detach(region, touch);
+    const auto triangle = triangle_of(region, touch.corners);
+    const auto nearest = proximity(triangle, tool, touch.pair);
+    if (nearest) touch.barycentric = nearest->barycentric;
+    if (!nearest || is_rigid(region, touch.corners, touch.barycentric)) {
+        touch.force.setZero();
+        touch.stiffness.setZero();
+        return std::numeric_limits<Scalar>::infinity();
+    }
+    const Vector3<Scalar> along = on_face(touch) ? area_vector(triangle) : nearest->reach;
+    const Vector3<Scalar> away = direction(along, touch.normal);
+    touch.normal = dot(away, touch.normal) < 0 ? Vector3<Scalar>(-away) : away;
+    touch.force = -pressure * touch.normal;
+    if (pressure > 0) {
+        touch.stiffness = detail::wandering_stiffness(triangle, touch.barycentric, pressure * norm(nearest->reach));
+        attach(region, touch);
+    }
+    return dot(nearest->reach, touch.normal) - contact.radius;
+}
+
+// However far vertices have jumped, the surface has not passed the tool: if it would have, they go back to where on
+// their way it had not.
+template <Real Scalar>
+void Press<Scalar>::keep_side(Region<Scalar>& region) const noexcept {
+    const auto vertices = region.corners_of(contact.watched);
+    Scalar farthest = 0;
+    for (const Index v : vertices) {
+        farthest = (std::max)(farthest, squared_norm<Scalar>(region.position(v) - region.kept(v)));
+    }
+    if (4 * farthest < contact.radius * contact.radius && contact.gap > -contact.radius / 2) return;
+    Scalar first = 1;
+    for (const auto& watched : contact.watched) {
+        const auto& v = watched.corners;
+        const Triangle<Scalar> before{region.kept(v[0]), region.kept(v[1]), region.kept(v[2])};
+        first = (std::min)(first, passing_time<Scalar>(before, triangle_of(region, v), contact.on_axis));
+    }
+    if (first == 1) return;
+    for (const Index v : vertices) region.go_back(v, 1 - Scalar(0.9) * first);
+}
+
+template <Real Scalar>
+bool Press<Scalar>::enforce(Region<Scalar>& region) const noexcept {
+    if (!contact.touching()) return false;
+    bool changed = false;
+    for (int pass = 0; pass < detail::touch_passes; ++pass) {
+        bool again = false;
+        for (auto& touch : region.touches()) {
+            const Scalar gap = aim(region, touch);
+            const Scalar compliance = compliance_of(region, touch);
+            const Scalar pressure = -dot(touch.force, touch.normal);
+            if (!(compliance > 0) || (pressure == 0 && gap >= 0)) continue;
+            const Scalar more = (std::max)(-gap / compliance, -pressure);
+            if (!(std::abs(more) > region.negligible_force())) continue;
+            change_force<Scalar>(region, touch, -more * touch.normal);
+            again = true;
+        }
+        changed |= again;
+        if (!again) break;
+    }
+    keep_side(region);
+    return changed;
+}
+
+template <Real Scalar>
+Vector3<Scalar> Press<Scalar>::reaction(const Region<Scalar>& region) const noexcept {
+    return reaction_of_touches(region);
+}
+
+}  // namespace membrane

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+#include <membrane/core/index_set.hpp>
+#include <membrane/network/mass_spring_network.hpp>
+
+/// The order in which a force spreads through the springs.
+///
+///     membrane::PropagationQueue queue(network.vertex_count());
+///     queue.build(network, seeds, 6);
+///     for (const membrane::Index v : queue.vertices()) { ... }              // nearest to the contact first
+namespace membrane {
+
+/// Vertices in the order of a breadth-first search from the seeds, [Liu07] 2.2: the seeds are layer 0, layer k holds the
+/// vertices that k springs and no fewer join to a seed. Within a layer, the order of arrival.
+class PropagationQueue {
+  public:
+    explicit PropagationQueue(Index vertex_count)
+        : reached_(vertex_count), layer_ends_(static_cast<std::size_t>(vertex_count)) {}
+
+    /// Builds the queue anew, up to layer `layers` (0 for the seeds alone, `unlimited` for all they are joined to). A
+    /// pinned vertex passes no force on: it is never in the queue. Seeds may be named twice.
+    /// Online. Cost: the springs of the vertices in the queue.
+    template <Real Scalar, class Law>
+    void build(const MassSpringNetwork<Scalar, Law>& network, std::span<const Index> seeds, Index layers) noexcept;
+
+    [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
+    [[nodiscard]] bool contains(Index v) const noexcept { return reached_.contains(v); }
+
+    /// How many layers there are: at most one more than asked for, fewer where the mesh ends before.
+    [[nodiscard]] Index layer_count() const noexcept { return static_cast<Index>(layer_ends_.size()); }
+
+    /// The vertices of layer `k`. @pre 0 <= `k` < layer_count() (asserted)
+    [[nodiscard]] std::span<const Index> layer(Index k) const noexcept {
+        MEMBRANE_ASSERT(k >= 0 && k < layer_count());
+        const auto at = static_cast<std::size_t>(k);
+        const std::size_t begin = k == 0 ? 0 : layer_ends_[at - 1];
+        return vertices().subspan(begin, layer_ends_[at] - begin);
+    }
+
+    void clear() noexcept {
+        reached_.clear();
+        layer_ends_.clear();
+    }
+
+  private:
+    IndexSet reached_;
+    BoundedList<std::size_t> layer_ends_;
+};
+
+template <Real Scalar, class Law>
+void PropagationQueue::build(const MassSpringNetwork<Scalar, Law>& network, std::span<const Index> seeds,
+                             Index layers) noexcept {
+    clear();
+    for (const Index v : seeds) {
+        if (!network.pinned(v)) reached_.insert(v);
+    }
+    std::size_t begin = 0;
+    for (Index k = 0; begin < vertices().size(); ++k) {
+        const std::size_t end = vertices().size();
+        layer_ends_.push(end);
+        if (k == layers) break;
+        for (; begin < end; ++begin) {
+            for (const auto& spring : network.springs_of(vertices()[begin])) {
+                if (!network.pinned(spring.other)) reached_.insert(spring.other);
+            }
+        }
+    }
+}
+
+}  // namespace membrane

@@ -1,0 +1,267 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/index_set.hpp>
+#include <membrane/core/types.hpp>
+
+namespace membrane {
+
+/// What is handed in for one step.
+template <class Scalar, class Network, class Volume>
+struct StepInput {
+    PointsRef<Scalar>& x;
+    Scalar dt;
+    const Network& network;
+    const Volume& volume;
+};
+
+/// A point of the surface that a constraint acts on, and the force it acts with.
+template <Real Scalar>
+struct Touch {
+    Index triangle;  ///< with `pair`, what the touch is found again by in the next step
+    int pair;
+    std::array<Index, 3> corners;
+    Vector3<Scalar> barycentric;
+    Vector3<Scalar> normal;     ///< from the surface to the tool
+    Vector3<Scalar> force;      ///< on the membrane [N]
+    Vector3<Scalar> stiffness;  ///< that the touch adds to each corner's [N/m]
+};
+
+/// What the solver remembers from step to step for its constraints, and what it works with within one. `external`
+/// is zero, like `stiffness`, wherever nothing has pushed since `open`.
+template <Real Scalar>
+struct Workspace {
+    /// The largest number of constraints of one step.
+    static constexpr std::size_t most_constraints = 16;
+
+    /// `is_pinned(v)` says which vertices never move.
+    template <class IsPinned>
+    Workspace(Index vertex_count, IsPinned is_pinned, Index most_touches);
+
+    [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(pinned.size()); }
+
+    void open() noexcept;           ///< Begins a step.
+    void close() noexcept;          ///< Keeps the touches of the step that ends for the next one.
+    void forget() noexcept;         ///< Keeps no touches.
+    void drop_external() noexcept;  ///< Takes all pushes back.
+
+    struct Range {
+        std::size_t begin = 0, end = 0;
+    };
+    std::vector<unsigned char> pinned;
+    IndexSet seeds, held, saved, pushed, patch;
+    Points<Scalar> start;           // of saved vertices, where they were when the step began
+    Points<Scalar> external;        // of pushed vertices, the constraints' force on them
+    Points<Scalar> unbalanced;      // of visited vertices, the force on them at the end of the step
+    Points<Scalar> kept;            // of vertices that a constraint keeps, where they were
+    std::vector<Scalar> stiffness;  // of pushed vertices, what touches add to it
+    std::vector<Scalar> compliance;
+    BoundedList<Touch<Scalar>> touches, touches_before;
+    std::array<Range, most_constraints> ranges{}, ranges_before{};
+    Scalar negligible_force = 0;
+    bool invalid = false, full = false;
+};
+
+/// The part of the membrane that a step works on, as the constraints see it: they name the vertices where a force
+/// enters, hold some, push others.
+template <Real Scalar>
+class Region {
+  public:
+    Region(PointsRef<Scalar>& x, Workspace<Scalar>& work) noexcept : x_(x), work_(work) {}
+
+    /// Whether `v` is a vertex; if not, the step is refused.
+    bool check(Index v) noexcept;
+
+    /// Puts `v` into layer 0 of the queue.
+    void seed(Index v) noexcept { work_.seeds.insert(v); }
+
+    /// Holds `v` at `target`, or where it is, until the step ends. A pinned vertex stays where it is.
+    void hold(Index v, const Vector3<Scalar>& target) noexcept;
+    void hold(Index v) noexcept { work_.held.insert(v); }
+
+    /// Whether nothing moves `v` in this step but `hold`.
+    [[nodiscard]] bool fixed(Index v) const noexcept {
+        return work_.pinned[static_cast<std::size_t>(v)] != 0 || work_.held.contains(v);
+    }
+
+    [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept { return point(x_, v); }
+
+    /// The vertices of these triangles, each once; valid until the next call.
+    template <class TouchedTriangles>
+    [[nodiscard]] std::span<const Index> corners_of(const TouchedTriangles& triangles) noexcept {
+        work_.patch.clear();
+        for (const auto& triangle : triangles) {
+            for (const Index v : triangle.corners) work_.patch.insert(v);
+        }
+        return work_.patch.items();
+    }
+
+    /// Keeps the position of `v`, and goes back to the one kept, part of the way or all of it.
+    void keep(Index v) noexcept { work_.kept.col(v) = x_.col(v); }
+    [[nodiscard]] Vector3<Scalar> kept(Index v) const noexcept { return point(work_.kept, v); }
+    void go_back(Index v, Scalar part) noexcept { place(v, (1 - part) * position(v) + part * point(work_.kept, v)); }
+
+    void shift(Index v, const Vector3<Scalar>& by) noexcept { place(v, position(v) + by); }
+
+    /// Adds to the external force on `v` for this step [N].
+    void push(Index v, const Vector3<Scalar>& force) noexcept {
+        work_.pushed.insert(v);
+        work_.external.col(v) += force;
+    }
+
+    /// Adds to the stiffness of `v` for this step [N/m]: a force that turns as `v` moves.
+    void stiffen(Index v, Scalar by) noexcept {
+        work_.pushed.insert(v);
+        work_.stiffness[static_cast<std::size_t>(v)] += by;
+    }
+
+    /// How far `v` moved for each newton at the last visit, zero if it is fixed [m/N].
+    [[nodiscard]] Scalar compliance(Index v) const noexcept {
+        return fixed(v) ? Scalar(0) : work_.compliance[static_cast<std::size_t>(v)];
+    }
+
+    /// At the end of the step: springs, backing and external forces on `v` [N].
+    [[nodiscard]] Vector3<Scalar> unbalanced(Index v) const noexcept { return point(work_.unbalanced, v); }
+
+    /// A change of force that is not worth making [N].
+    [[nodiscard]] Scalar negligible_force() const noexcept { return work_.negligible_force; }
+
+    /// The touch that this constraint had here in the step before, or null.
+    [[nodiscard]] const Touch<Scalar>* recall(Index triangle, int pair) noexcept;
+
+    /// Remembers a touch of this constraint; refuses the step where there is no room for more.
+    void remember(const Touch<Scalar>& touch) noexcept;
+
+    /// The touches of this constraint in this step.
+    [[nodiscard]] std::span<Touch<Scalar>> touches() noexcept {
+        const auto range = work_.ranges[constraint_];
+        return work_.touches.items().subspan(range.begin, range.end - range.begin);
+    }
+    [[nodiscard]] std::span<const Touch<Scalar>> touches() const noexcept {
+        return const_cast<Region&>(*this).touches();
+    }
+
+    // For the solver.
+
+    /// Whose touches are meant: those of constraint number `constraint`.
+    void turn_to(std::size_t constraint) noexcept { constraint_ = constraint; }
+
+    /// The constraint turned to has no touches yet.
+    void open() noexcept {
+        work_.ranges[constraint_] = {work_.touches.size(), work_.touches.size()};
+        last_recalled_ = 0;
+    }
+
+    void set_compliance(Index v, Scalar compliance) noexcept {
+        work_.compliance[static_cast<std::size_t>(v)] = compliance;
+    }
+
+    /// Moves `v`, keeping where it was when the step began.
+    void place(Index v, const Vector3<Scalar>& target) noexcept {
+        save(v);
+        x_.col(v) = target;
+    }
+    void save(Index v) noexcept {
+        if (work_.saved.insert(v)) work_.start.col(v) = x_.col(v);
+    }
+
+  private:
+    PointsRef<Scalar>& x_;
+    Workspace<Scalar>& work_;
+    std::size_t constraint_ = 0;
+    std::size_t last_recalled_ = 0;
+};
+
+template <Real Scalar>
+template <class IsPinned>
+Workspace<Scalar>::Workspace(Index vertices, IsPinned is_pinned, Index most_touches)
+    : pinned(static_cast<std::size_t>(vertices)),
+      seeds(vertices),
+      held(vertices),
+      saved(vertices),
+      pushed(vertices),
+      patch(vertices),
+      start(Points<Scalar>::Zero(3, vertices)),
+      external(start),
+      unbalanced(start),
+      kept(start),
+      stiffness(pinned.size(), Scalar(0)),
+      compliance(pinned.size(), Scalar(0)),
+      touches(static_cast<std::size_t>(most_touches)),
+      touches_before(touches) {
+    for (Index v = 0; v < vertices; ++v) pinned[static_cast<std::size_t>(v)] = is_pinned(v) ? 1 : 0;
+}
+
+template <Real Scalar>
+void Workspace<Scalar>::open() noexcept {
+    drop_external();
+    seeds.clear();
+    held.clear();
+    saved.clear();
+    touches.clear();
+    ranges = {};
+    invalid = full = false;
+}
+
+template <Real Scalar>
+void Workspace<Scalar>::close() noexcept {
+    std::swap(touches, touches_before);
+    std::swap(ranges, ranges_before);
+}
+
+template <Real Scalar>
+void Workspace<Scalar>::forget() noexcept {
+    touches_before.clear();
+    ranges_before = {};
+}
+
+template <Real Scalar>
+void Workspace<Scalar>::drop_external() noexcept {
+    for (const Index v : pushed.items()) {
+        external.col(v).setZero();
+        stiffness[static_cast<std::size_t>(v)] = 0;
+    }
+    pushed.clear();
+}
+
+template <Real Scalar>
+bool Region<Scalar>::check(Index v) noexcept {
+    const bool valid = v >= 0 && v < work_.vertex_count();
+    if (!valid) work_.invalid = true;
+    return valid;
+}
+
+template <Real Scalar>
+void Region<Scalar>::hold(Index v, const Vector3<Scalar>& target) noexcept {
+    work_.held.insert(v);
+    if (work_.pinned[static_cast<std::size_t>(v)] == 0) place(v, target);
+}
+
+template <Real Scalar>
+const Touch<Scalar>* Region<Scalar>::recall(Index triangle, int pair) noexcept {
+    // Touches come in nearly the same order every time: the search starts where the last one ended.
+    const auto range = work_.ranges_before[constraint_];
+    const std::size_t count = range.end - range.begin;
+    for (std::size_t i = 0; i < count; ++i) {
+        const std::size_t at = range.begin + (last_recalled_ + i) % count;
+        const auto& touch = work_.touches_before[at];
+        if (touch.triangle != triangle || touch.pair != pair) continue;
+        last_recalled_ = at - range.begin + 1;
+        return &touch;
+    }
+    return nullptr;
+}
+
+template <Real Scalar>
+void Region<Scalar>::remember(const Touch<Scalar>& touch) noexcept {
+    if (!work_.touches.push(touch)) work_.full = true;
+    work_.ranges[constraint_].end = work_.touches.size();
+}
+
+}  // namespace membrane

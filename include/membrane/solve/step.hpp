@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include <membrane/core/check.hpp>
+
+/// What a step of the solver may cost, and what it says of itself.
+///
+///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4});
+///     const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+///     if (report.status != membrane::StepStatus::advanced) { /* nothing has moved */ }
+namespace membrane {
+
+/// What a step may cost. More of everything is more accurate.
+template <Real Scalar>
+struct SolverOptions {
+    Index layers = 6;               ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
+    Index sweeps = 4;               ///< passes over the queue in each step
+    Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 is visited whatever this says
+    Scalar negligible_force = 0;    ///< a vertex with less on it is at rest [N]; 0 takes the network's own figure
+    Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time
+
+    /// @throws InvalidInput for an option out of its range
+    void check() const;
+};
+
+enum class StepStatus {
+    advanced,          ///< the positions are the new ones
+    bad_time_step,     ///< dt is not finite and positive: nothing has moved
+    bad_input,         ///< a tool, target, load, index or position is not valid: nothing has moved
+    unstable,          ///< the rule diverges for this dt: nothing has moved
+    too_many_touches,  ///< more touched triangles than there is room for: nothing has moved
+};
+
+/// What a step did. The spans are the solver's and valid until its next step.
+template <Real Scalar>
+struct StepReport {
+    StepStatus status = StepStatus::advanced;
+    bool converged = false;  ///< nothing is left to do: no force above the negligible one on any vertex that may move
+    Scalar residual = 0;     ///< largest unbalanced force on a free vertex that was visited, at the end [N]
+    Index visits = 0;        ///< of vertices, those that only look included
+    std::span<const Index> moved;                ///< vertices whose position changed
+    std::span<const Vector3<Scalar>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]
+
+    /// The membrane's force on all constraints together [N].
+    [[nodiscard]] Vector3<Scalar> total_reaction() const noexcept {
+        Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+        for (const auto& reaction : reactions) sum += reaction;
+        return sum;
+    }
+};
+
+template <Real Scalar>
+void SolverOptions<Scalar>::check() const {
+    constexpr std::string_view component = "QuasiStaticSolver";
+    const auto at_least = [&](Index number, Index least, std::string_view name) {
+        if (number < least) refuse(component, name, " must be at least ", least, ", got ", number);
+    };
+    at_least(layers, 0, "layers");
+    at_least(sweeps, 1, "sweeps");
+    at_least(most_visits, 1, "most_visits");
+    at_least(most_touches, 0, "most_touches");
+    if (!is_finite(negligible_force) || negligible_force < 0) {
+        refuse(component, "negligible_force must be finite and not negative [N], got ", negligible_force);
+    }
+}
+
+}  // namespace membrane

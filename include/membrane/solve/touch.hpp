@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <membrane/mesh/triangle.hpp>
+#include <membrane/solve/region.hpp>
+
+/// What constraints do to a point of a triangle: it is pushed, held or shifted by way of the triangle's corners, each in
+/// proportion to its barycentric weight.
+namespace membrane {
+
+/// The triangle with these vertices where it is now.
+template <Real Scalar>
+[[nodiscard]] Triangle<Scalar> triangle_of(const Region<Scalar>& region, const std::array<Index, 3>& corners) noexcept {
+    return {region.position(corners[0]), region.position(corners[1]), region.position(corners[2])};
+}
+
+/// Whether the corners are vertices; if they are, they become seeds, else the step is refused.
+template <Real Scalar>
+bool seed_corners(Region<Scalar>& region, const std::array<Index, 3>& corners) noexcept {
+    for (const Index v : corners) {
+        if (!region.check(v)) return false;
+        region.seed(v);
+    }
+    return true;
+}
+
+/// `force` [N] on the point, shared out to the corners.
+template <Real Scalar>
+void push_point(Region<Scalar>& region, const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
+                const Vector3<Scalar>& force) noexcept {
+    for (std::size_t k = 0; k < 3; ++k) region.push(corners[k], barycentric[static_cast<Eigen::Index>(k)] * force);
+}
+
+/// The weights of the corners that are free to move, zero for the others.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> free_weights(const Region<Scalar>& region, const std::array<Index, 3>& corners,
+                                           const Vector3<Scalar>& barycentric) noexcept {
+    Vector3<Scalar> weights = barycentric;
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (region.fixed(corners[k])) weights[static_cast<Eigen::Index>(k)] = 0;
+    }
+    return weights;
+}
+
+/// Whether the point hardly moves however far its free corners do: less than a tenth as far. No force makes it give way.
+template <Real Scalar>
+[[nodiscard]] bool is_rigid(const Region<Scalar>& region, const std::array<Index, 3>& corners,
+                            const Vector3<Scalar>& barycentric) noexcept {
+    return squared_norm(free_weights(region, corners, barycentric)) < Scalar(0.01);
+}
+
+/// Moves the point by `way` [m], each free corner in proportion to its weight; not if it is rigid.
+template <Real Scalar>
+void shift_point(Region<Scalar>& region, const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
+                 const Vector3<Scalar>& way) noexcept {
+    if (is_rigid(region, corners, barycentric)) return;
+    const Vector3<Scalar> weights = free_weights(region, corners, barycentric);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Scalar part = weights[static_cast<Eigen::Index>(k)] / squared_norm(weights);
+        if (part > 0) region.shift(corners[k], part * way);
+    }
+}
+
+/// How far the touched point moves for each newton on it [m/N].
+template <Real Scalar>
+[[nodiscard]] Scalar compliance_of(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
+    Scalar sum = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Scalar weight = touch.barycentric[static_cast<Eigen::Index>(k)];
+        sum += weight * weight * region.compliance(touch.corners[k]);
+    }
+    return sum;
+}
+
+/// Brings what the touch does to its corners into the region, and takes it out again.
+template <Real Scalar>
+void attach(Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
+    push_point(region, touch.corners, touch.barycentric, touch.force);
+    for (std::size_t k = 0; k < 3; ++k) {
+        region.stiffen(touch.corners[k], touch.stiffness[static_cast<Eigen::Index>(k)]);
+    }
+}
+template <Real Scalar>
+void detach(Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
+    push_point<Scalar>(region, touch.corners, touch.barycentric, -touch.force);
+    for (std::size_t k = 0; k < 3; ++k) {
+        region.stiffen(touch.corners[k], -touch.stiffness[static_cast<Eigen::Index>(k)]);
+    }
+}
+
+/// Adds `force` [N] to what an attached touch acts with, and lets its corners follow as far as they will for that.
+template <Real Scalar>
+void change_force(Region<Scalar>& region, Touch<Scalar>& touch, const Vector3<Scalar>& force) noexcept {
+    touch.force += force;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vector3<Scalar> part = touch.barycentric[static_cast<Eigen::Index>(k)] * force;
+        region.push(touch.corners[k], part);
+        const Scalar compliance = region.compliance(touch.corners[k]);
+        if (compliance > 0) region.shift(touch.corners[k], compliance * part);
+    }
+}
+
+/// The force of the membrane on whoever touches it in these touches [N].
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> reaction_of_touches(const Region<Scalar>& region) noexcept {
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    for (const auto& touch : region.touches()) sum -= touch.force;
+    return sum;
+}
+
+}  // namespace membrane

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/collision/contact_tracker.hpp>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/network/volume_springs.hpp>
+#include <membrane/solve/press.hpp>
+#include <membrane/solve/quasi_static.hpp>
+
+#include "support/brute_force.hpp"
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/refusal.hpp"
+
+using membrane::AabbTree;
+using membrane::Contact;
+using membrane::ContactPhase;
+using membrane::ContactTracker;
+using membrane::Index;
+using membrane::Points;
+using membrane::Tool;
+using membrane::TriangleMesh;
+using membrane::Triangles;
+using membrane::Vector3;
+
+namespace {
+
+using Vector = Vector3<double>;
+
+/// The sphere with waves in it.
+Points<double> wavy(const Points<double>& x, test::Random& random) {
+    Points<double> deformed = x;
+    for (int wave = 0; wave < 4; ++wave) {
+        const Vector towards = random.unit_vector();
+        const double amplitude = random.number(-0.06, 0.06), number = random.number(1.0, 4.0), phase = random.number();
+        for (Eigen::Index v = 0; v < x.cols(); ++v) {
+            deformed.col(v) += amplitude * std::sin(number * towards.dot(x.col(v)) + 6 * phase) * x.col(v);
+        }
+    }
+    return deformed;
+}
+
+/// Distance by brute force over all triangles.
+double distance_to(const Points<double>& x, const Triangles& triangles, const Vector& q) {
+    double least = std::numeric_limits<double>::infinity();
+    for (Eigen::Index f = 0; f < triangles.cols(); ++f) {
+        const auto triangle = test::brute_triangle<double>(membrane::triangle_at(x, triangles.col(f)));
+        least = std::min(least, test::squared_distance<double>(triangle, q));
+    }
+    return std::sqrt(least);
+}
+
+/// How often the surface winds round `q`, by the angles of its triangles: 1 inside a sound surface, 0 outside.
+double winding_number(const Points<double>& x, const Triangles& triangles, const Vector& q) {
+    double sum = 0;
+    for (Eigen::Index f = 0; f < triangles.cols(); ++f) {
+        const Vector a = (x.col(triangles(0, f)) - q).normalized(), b = (x.col(triangles(1, f)) - q).normalized(),
+                     c = (x.col(triangles(2, f)) - q).normalized();
+        const double volume = a.dot(test::cross<double>(b, c));
+        sum += 2 * std::atan2(volume, 1 + a.dot(b) + b.dot(c) + c.dot(a));
+    }
+    return sum / (4 * std::numbers::pi);
+}
+
+}  // namespace
+
+TEST_CASE("the tracker agrees with a search of the whole surface along random tracks") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
+    const double edge = membrane::Neighbourhood<double>(mesh).mean_edge();
+    AabbTree<double> tree(mesh);
+    ContactTracker<double> tracker(mesh);
+    long contact_ticks = 0, agreements = 0;
+    for (int seed = 1; seed <= cases(100000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        static Points<double> x;
+        if (seed % 50 == 1) x = wavy(mesh.positions(), random);
+        if (seed % 50 == 1) tree.refit(x);
+        tracker.reset();
+        Tool<double> tool{.radius = random.number(0.05, 2.0) * edge};
+        Vector over = random.unit_vector(), way = random.unit_vector();
+        double height = random.number(0.5, 1.5);
+        for (int tick = 0; tick < 20; ++tick) {
+            over = (over + 0.1 * edge * way).normalized();
+            const Vector foot = 3 * over * (1 - tree.first_hit(x, 3 * over, Vector::Zero()).along);
+            height = std::clamp(height + random.number(-0.05, 0.05) * edge / tool.radius, 0.4, 1.6);
+            tool.position = foot + height * tool.radius * over;
+            const auto contact = tracker.update(tree, x, tool);
+            const auto nearest = tree.closest_point(x, tool.position);
+            const double gap = std::sqrt(nearest.squared_distance) - tool.radius;
+            if (!contact.touching()) {
+                REQUIRE(gap > 0);
+                continue;
+            }
+            ++contact_ticks;
+            if (contact.crossed) continue;
+            CAPTURE(seed, tick, tool.radius, gap);
+            REQUIRE(std::abs(contact.gap - gap) <= 1e-12);
+            REQUIRE(std::abs((contact.point - nearest.point).norm()) <= 1e-6);
+            ++agreements;
+            if (tick % 5 != 0) continue;
+            std::vector<Index> listed;
+            for (const auto& touched : contact.touched) listed.push_back(touched.triangle);
+            tree.touching_sphere(x, tool.position, tool.radius,
+                                 [&](Index f) { REQUIRE(std::find(listed.begin(), listed.end(), f) != listed.end()); });
+        }
+    }
+    CAPTURE(contact_ticks, agreements, tracker.tree_checks());
+    REQUIRE(agreements > contact_ticks / 2);
+    REQUIRE(tracker.tree_checks() <= contact_ticks / 100);
+}
+
+TEST_CASE("a fast stroke leaves the tool on the side it came from") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
+    const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = 1.0});
+    const membrane::VirtualVolumeSprings backing(mesh, {.stiffness = 0.3});
+    const double edge = membrane::Neighbourhood<double>(mesh).mean_edge();
+    const AabbTree<double> fresh_tree(mesh);
+    const ContactTracker<double> fresh_tracker(mesh);
+    const membrane::QuasiStaticSolver fresh_solver(network, {.layers = 4, .sweeps = 4});
+    auto tree = fresh_tree;
+    auto tracker = fresh_tracker;
+    auto solver = fresh_solver;
+    Points<double> x = mesh.positions();
+    long touching = 0;
+    for (int seed = 1; seed <= cases(100000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const double radius = random.chance(0.25) ? 0 : random.number(0.02, 1.5) * edge;
+        const Vector out = random.unit_vector();
+        const Vector from = (1.02 + radius) * out;
+        Vector to;
+        do {
+            to = 0.95 * random.vector();
+        } while (to.norm() > 0.95 || to.dot(out) < 0.8);
+        const double speed = std::exp(random.number(std::log(0.1 * edge), std::log(4 * edge)));
+        const int ticks = std::min(12, static_cast<int>(std::ceil((to - from).norm() / speed)));
+        for (int tick = 0; tick <= ticks + 1; ++tick) {
+            const Tool<double> tool{.position = from + std::min(1.0, double(tick) / ticks) * (to - from),
+                                    .radius = radius};
+            const auto contact = tracker.update(tree, x, tool);
+            const auto report = solver.step(x, 1e-3, network, backing, press(tool, contact));
+            REQUIRE(report.status == membrane::StepStatus::advanced);
+            tree.refit(x, report.moved);
+            if (!contact.touching()) continue;
+            ++touching;
+            CAPTURE(seed, tick, ticks, radius);
+            REQUIRE(std::abs(winding_number(x, mesh.triangles(), tool.position)) < 0.5);
+        }
+        x = mesh.positions();
+        tree.refit(x);
+        tracker.reset();
+        solver.reset();
+    }
+    REQUIRE(touching > cases(100000));
+}
+
+TEST_CASE("a contact begins, goes on and ends once, with the depth against the surface without the tool") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
+    const AabbTree<double> tree(mesh);
+    ContactTracker<double> tracker(mesh);
+    const Points<double>& x = mesh.positions();
+    const double radius = 0.1;
+    int began = 0, ended = 0;
+    for (int tick = 0; tick <= 200; ++tick) {
+        const double z = tick < 100 ? 1.2 - 0.002 * tick : 1.0 + 0.002 * (tick - 100);
+        const Tool<double> tool{.position = {0.02, 0.01, z}, .radius = radius};
+        const auto contact = tracker.update(tree, x, tool);
+        began += contact.phase == ContactPhase::began ? 1 : 0;
+        ended += contact.phase == ContactPhase::ended ? 1 : 0;
+        const double gap = distance_to(x, mesh.triangles(), tool.position) - radius;
+        CAPTURE(tick, z, gap);
+        if (gap > 1e-9) {
+            CHECK_FALSE(contact.touching());
+        } else if (gap < -1e-9) {
+            REQUIRE(contact.touching());
+            CHECK(std::abs(contact.gap - gap) < 1e-12);
+            CHECK(std::abs(contact.depth + gap) < 1e-12);  // nothing gives way here
+            CHECK(contact.normal.z() > 0.9);
+            CHECK(std::abs(contact.normal.norm() - 1) < 1e-12);
+        }
+    }
+    CHECK(began == 1);
+    CHECK(ended == 1);
+}
+
+TEST_CASE("anchors that moved carry the depth with them") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
+    const Vector shift(0.3, -0.1, 0.2);
+    const Points<double> moved = mesh.positions().colwise() + shift;
+    AabbTree<double> tree(mesh);
+    tree.refit(moved);
+    ContactTracker<double> still(mesh), carried(mesh);
+    const AabbTree<double> still_tree(mesh);
+    const Tool<double> tool{.position = {0, 0, 1.05}, .radius = 0.1};
+    Tool<double> moved_tool = tool;
+    moved_tool.position += shift;
+    const auto a = still.update(still_tree, mesh.positions(), tool);
+    const auto b = carried.update(tree, moved, moved_tool, moved);
+    REQUIRE(a.touching());
+    REQUIRE(b.touching());
+    CHECK(std::abs(a.depth - b.depth) < 1e-12);
+    CHECK(a.triangle == b.triangle);
+}
+
+TEST_CASE("an open sheet is touched from either side, and the side of first contact is kept") {
+    const auto mesh = membrane::sheet<double>({.width = 1, .height = 1, .columns = 10, .rows = 10});
+    const AabbTree<double> tree(mesh);
+    for (const double side : {1.0, -1.0}) {
+        ContactTracker<double> tracker(mesh);
+        Contact<double> contact;
+        for (int tick = 0; tick <= 20; ++tick) {
+            const Tool<double> tool{.position = {0.03, 0.02, side * (0.1 - 0.008 * tick)}, .radius = 0.05};
+            contact = tracker.update(tree, mesh.positions(), tool);
+            CAPTURE(side, tick);
+            if (!contact.touching()) continue;
+            CHECK(contact.side == side);
+            CHECK(contact.normal.z() * side > 0.999);
+        }
+        CHECK(contact.crossed);
+        CHECK(std::abs(contact.depth - (0.05 + 0.06)) < 1e-12);
+    }
+}
+
+TEST_CASE("a tool that flies through in one tick touches where it went through") {
+    const auto mesh = membrane::sheet<double>({.width = 1, .height = 1, .columns = 10, .rows = 10});
+    const AabbTree<double> tree(mesh);
+    ContactTracker<double> tracker(mesh);
+    CHECK_FALSE(tracker.update(tree, mesh.positions(), Tool<double>{.position = {0.1, 0.1, 1}}).touching());
+    const auto contact = tracker.update(tree, mesh.positions(), Tool<double>{.position = {-0.1, -0.1, -1e6}});
+    REQUIRE(contact.phase == ContactPhase::began);
+    CHECK(contact.crossed);
+    CHECK(contact.side == 1);
+    CHECK(std::abs(contact.point.x() - 0.1) < 1e-5);
+    CHECK(contact.depth > 0.9e6);
+}
+
+TEST_CASE("a capsule touches with its ends, its middle and what it is stuck through") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
+    const AabbTree<double> tree(mesh);
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Tool<double> tool{.radius = random.number(0.01, 0.2)};
+        tool.position = random.number(0.9, 1.4) * random.unit_vector();
+        tool.axis = random.number(0.1, 1.5) * random.unit_vector();
+        ContactTracker<double> tracker(mesh);
+        const auto contact = tracker.update(tree, mesh.positions(), tool);
+        std::vector<Index> touched;
+        tree.touching_capsule(mesh.positions(), tool.position, tool.position + tool.axis, tool.radius,
+                              [&](Index f) { touched.push_back(f); });
+        CAPTURE(seed);
+        if (touched.empty() && (tool.position).norm() > 1) CHECK_FALSE(contact.touching());
+        if (touched.empty()) continue;
+        REQUIRE(contact.touching());
+        for (const Index f : touched) {
+            CHECK(std::any_of(contact.touched.begin(), contact.touched.end(),
+                              [f](const auto& listed) { return listed.triangle == f; }));
+        }
+    }
+}
+
+TEST_CASE("a tool that is not sound touches nothing and changes nothing") {
+    const auto mesh = membrane::icosphere<float>({.radius = 1, .subdivisions = 2});
+    const AabbTree<float> tree(mesh);
+    ContactTracker<float> tracker(mesh);
+    const Tool<float> tool{.position = {0, 0, 1.05F}, .radius = 0.1F};
+    REQUIRE(tracker.update(tree, mesh.positions(), tool).phase == ContactPhase::began);
+    for (const float bad : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+        Tool<float> broken = tool;
+        broken.position.y() = bad;
+        CHECK(tracker.update(tree, mesh.positions(), broken).phase == ContactPhase::none);
+        broken = tool;
+        broken.radius = -bad;
+        CHECK(tracker.update(tree, mesh.positions(), broken).phase == ContactPhase::none);
+    }
+    CHECK(tracker.update(tree, mesh.positions(), tool).phase == ContactPhase::ongoing);
+}
+
+TEST_CASE("tracker options out of range are refused") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 1});
+    for (const double margin : {0.0, -1.0, 1.5, std::numeric_limits<double>::quiet_NaN()}) {
+        CHECK_THAT(test::refusal([&] { ContactTracker<double>(mesh, {.margin = margin}); }),
+                   ContainsSubstring("ContactTracker: margin must be above 0 and at most 1 [mean edges], got "));
+    }
+    CHECK(test::refusal([&] { ContactTracker<double>(mesh, {.check_every = 0}); }) ==
+          "ContactTracker: check_every must be at least 1, got 0");
+}

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: MIT
+// Float positions for a solver of doubles.
+// expect: (cannot convert|no known conversion).*PointsRef<double>
+#include <membrane/solve/quasi_static.hpp>
+
+#ifdef CORRECT
+using Positions = Eigen::Matrix3Xd;
+#else
+using Positions = Eigen::Matrix3Xf;
+#endif
+
+using Network = membrane::MassSpringNetwork<double, membrane::LinearSpring>;
+
+auto step(membrane::QuasiStaticSolver<double>& solver, Positions& x, const Network& network) {
+    return solver.step(x, 1e-3, network, membrane::NoVolumeSprings{}).residual;
+}

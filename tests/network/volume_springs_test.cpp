@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/network/volume_springs.hpp>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/child_process.hpp"
+#include "support/random.hpp"
+#include "support/refusal.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+/// (5) as it is printed: u the spring from its fixed to its moving end, v the velocity of the moving end.
+template <class S>
+Vector3<S> printed(S k, S d, const Vector3<S>& u, const Vector3<S>& v) {
+    const S length = u.norm();
+    return -(k * length + d * (v.dot(u) / length)) * u / length;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("a volume spring pulls as (5) says", "[network]", double, float) {
+    using S = TestType;
+    const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
+    for (int seed = 1; seed <= cases(300); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        std::vector<S> stiffness(12), damping(12);
+        for (S& k : stiffness) k = random.number<S>(0, 10);
+        for (S& d : damping) d = random.chance(0.3) ? S(0) : random.number<S>(0, 1);
+        const VirtualVolumeSprings backing(mesh, {.stiffness = stiffness, .damping = damping});
+        const Index v = random.index(12);
+        const S k = backing.stiffness(v), d = backing.damping(v), dt = random.number<S>(S(0.01), 1);
+        REQUIRE(k == stiffness[static_cast<std::size_t>(v)]);
+        REQUIRE(d == damping[static_cast<std::size_t>(v)]);
+        const Vector3<S> anchor = point(mesh.positions(), v);
+        const Vector3<S> start = anchor + random.vector<S>(), now = start + S(0.3) * random.vector<S>();
+        const S tolerance = 30 * std::numeric_limits<S>::epsilon() * (1 + k + d / dt);
+
+        const auto pull = backing.pull(v, now, start, dt);
+        REQUIRE(norm<S>(pull.force - printed<S>(k, d, now - anchor, (now - start) / dt)) <= tolerance);
+        REQUIRE(pull.stiffness == Approx(k + d / dt));
+        // At a standstill there is no damping.
+        REQUIRE(norm<S>(backing.pull(v, now, now, dt).force + k * (now - anchor)) <= tolerance);
+
+        // On a body that moves, the velocity is relative to it.
+        const Points<S> before = test::jittered(mesh.positions(), S(0.2), random);
+        const Points<S> after = test::jittered(before, S(0.2), random);
+        const Vector3<S> u = now - point(after, v), u_before = start - point(before, v);
+        const auto moved = backing.at(after, before).pull(v, now, start, dt);
+        REQUIRE(norm<S>(moved.force - printed<S>(k, d, u, (u - u_before) / dt)) <= tolerance);
+        REQUIRE(moved.stiffness == pull.stiffness);
+        REQUIRE(backing.at(after, before).energy(v, now) == Approx(k / 2 * squared_norm(u)));
+        // What moves along with its anchor is not damped.
+        const Vector3<S> along = start + (point(after, v) - point(before, v));
+        const auto carried = backing.at(after, before).pull(v, along, start, dt).force;
+        REQUIRE(norm<S>(carried + k * u_before) <= tolerance);
+    }
+}
+
+TEMPLATE_TEST_CASE("springs with their anchors where they were are the same springs, to the bit", "[network]", double,
+                   float) {
+    using S = TestType;
+    Random random(1);
+    const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
+    const VirtualVolumeSprings backing(mesh, {.stiffness = S(3), .damping = S(0.2)});
+    CHECK(backing.anchors() == mesh.positions());
+    const auto there = backing.at(backing.anchors(), backing.anchors());
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        const Vector3<S> now = random.vector<S>(), start = random.vector<S>();
+        REQUIRE(there.pull(v, now, start, S(0.1)).force == backing.pull(v, now, start, S(0.1)).force);
+        REQUIRE(there.pull(v, now, start, S(0.1)).stiffness == backing.pull(v, now, start, S(0.1)).stiffness);
+        REQUIRE(there.energy(v, now) == backing.energy(v, now));
+    }
+}
+
+TEST_CASE("without damping the force is the negative gradient of the energy", "[network]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
+    Random random(2);
+    const VirtualVolumeSprings backing(mesh, {.stiffness = 3.0});
+    const Points<double> anchors = test::jittered(mesh.positions(), 0.2, random);
+    const auto moved = backing.at(anchors, mesh.positions());
+    const auto check = [&](const auto& springs) {
+        const double h = 1e-4;
+        for (Index v = 0; v < mesh.vertex_count(); ++v) {
+            const Vector3<double> here = random.vector();
+            Vector3<double> difference;
+            for (int k = 0; k < 3; ++k) {
+                const Vector3<double> by = h * Vector3<double>::Unit(k);
+                difference[k] = -(springs.energy(v, here + by) - springs.energy(v, here - by)) / (2 * h);
+            }
+            REQUIRE(norm<double>(springs.pull(v, here, random.vector(), 0.1).force - difference) < 1e-10);
+        }
+    };
+    check(backing);
+    check(moved);
+}
+
+TEMPLATE_TEST_CASE("a spring without length does not act", "[network]", double, float) {
+    using S = TestType;
+    const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
+    const VirtualVolumeSprings backing(mesh, {.stiffness = S(3), .damping = S(2)});
+    const Vector3<S> anchor = point(mesh.positions(), 4);
+    for (const Vector3<S>& start : {anchor, Vector3<S>(5, 5, 5)}) {
+        const auto pull = backing.pull(4, anchor, start, S(0.1));
+        CHECK(pull.force == Vector3<S>(0, 0, 0));
+        CHECK(pull.stiffness == Approx(23));
+    }
+    CHECK(backing.energy(4, anchor) == 0);
+    // However short it is, the force is a number.
+    for (S length = 1; length > 0; length /= 16) {
+        const Vector3<S> place = anchor + Vector3<S>(length, 0, 0);
+        CHECK(is_finite(backing.pull(4, place, Vector3<S>(0, 0, 0), S(1e-3)).force));
+    }
+}
+
+TEMPLATE_TEST_CASE("no volume springs, no pull", "[network]", double, float) {
+    using S = TestType;
+    const auto pull = NoVolumeSprings{}.pull<S>(3, {1, 2, 3}, {4, 5, 6}, S(0.1));
+    CHECK(pull.force == Vector3<S>(0, 0, 0));
+    CHECK(pull.stiffness == 0);
+    STATIC_REQUIRE(std::is_empty_v<NoVolumeSprings>);
+}
+
+TEST_CASE("volume springs own what they know", "[network]") {
+    auto mesh = std::make_unique<TriangleMesh<double>>(icosphere({.radius = 1, .subdivisions = 0}));
+    auto first =
+        std::make_unique<VirtualVolumeSprings<double>>(*mesh, VolumeOptions<double>{.stiffness = 3, .damping = 1});
+    const auto expected = first->pull(7, {1, 2, 3}, {0, 0, 0}, 0.5).force;
+    mesh.reset();
+    const auto copy = *first;
+    const auto moved = std::move(*first);
+    first.reset();
+    CHECK(copy.pull(7, {1, 2, 3}, {0, 0, 0}, 0.5).force == expected);
+    CHECK(moved.pull(7, {1, 2, 3}, {0, 0, 0}, 0.5).force == expected);
+}
+
+TEMPLATE_TEST_CASE("volume springs that make no sense are refused by name", "[network][bad]", double, float) {
+    using S = TestType;
+    const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
+    const auto refused = [&](const VolumeOptions<S>& options) {
+        return test::refusal([&] { VirtualVolumeSprings(mesh, options); });
+    };
+    const std::string name = "VirtualVolumeSprings: ";
+    CHECK(refused({}) == name + "stiffness [N/m] is required");
+    CHECK(refused({.stiffness = S(0)}) == "");
+    CHECK(refused({.stiffness = std::vector<S>(11, 1)}) ==
+          name + "stiffness must be one number or one for each vertex (12), got 11");
+    CHECK(refused({.stiffness = S(1), .damping = std::vector<S>(30, 1)}) ==
+          name + "damping must be one number or one for each vertex (12), got 30");
+    for (const auto& [wrong, text] : {std::pair<S, std::string>{S(-3), "-3"},
+                                      {std::numeric_limits<S>::infinity(), "inf"},
+                                      {std::numeric_limits<S>::quiet_NaN(), "nan"}}) {
+        std::vector<S> each(12, 1);
+        each[11] = wrong;
+        CHECK(refused({.stiffness = wrong}) == name + "stiffness must be finite and not negative [N/m], got " + text);
+        CHECK(refused({.stiffness = each}) ==
+              name + "stiffness of vertex 11 must be finite and not negative [N/m], got " + text);
+        CHECK(refused({.stiffness = S(1), .damping = wrong}) ==
+              name + "damping must be finite and not negative [N s/m], got " + text);
+        CHECK(refused({.stiffness = S(1), .damping = each}) ==
+              name + "damping of vertex 11 must be finite and not negative [N s/m], got " + text);
+    }
+}
+
+#ifndef NDEBUG
+TEST_CASE("anchors of the wrong count are a broken precondition", "[network][bad]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    const VirtualVolumeSprings backing(mesh, {.stiffness = 3.0});
+    const Points<double> right = mesh.positions(), fewer = right.leftCols(11);
+    CHECK(test::in_child([&] { (void)backing.at(right, right); }).signal == 0);
+    CHECK(test::in_child([&] { (void)backing.at(fewer, right); }).signal == SIGABRT);
+    CHECK(test::in_child([&] { (void)backing.at(right, fewer); }).signal == SIGABRT);
+}
+#endif

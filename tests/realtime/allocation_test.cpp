@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: MIT
+#include "support/allocation_guard.hpp"
+
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/whole_loop.hpp"
+
+namespace {
+
+/// Keeps the compiler from leaving out what nobody looks at.
+void used(const void* memory) {
+    const void* volatile sink = memory;
+    static_cast<void>(sink);
+}
+
+/// How much `act` allocates.
+template <class Act>
+long allocated_by(Act act) {
+    const test::AllocationCount count;
+    act();
+    return count.so_far();
+}
+
+template <class Loop>
+bool same_bits(const Loop& a, const Loop& b) {
+    const auto bytes = static_cast<std::size_t>(a.x.size()) * sizeof(a.x(0, 0));
+    return std::memcmp(a.x.data(), b.x.data(), bytes) == 0 && a.device.force() == b.device.force();
+}
+
+}  // namespace
+
+TEST_CASE("the guard counts whatever allocates", "[allocation]") {
+    CHECK(allocated_by([] {}) == 0);
+    CHECK(allocated_by([] { used(std::make_unique<int>(1).get()); }) == 1);
+    CHECK(allocated_by([] { used(std::make_unique<int[]>(100).get()); }) == 1);
+    struct alignas(64) Wide {
+        char bytes[64];
+    };
+    CHECK(allocated_by([] { used(std::make_unique<Wide>().get()); }) == 1);
+    CHECK(allocated_by([] { used(std::string(100, 'a').data()); }) == 1);
+    CHECK(allocated_by([] { used(std::vector<double>(3).data()); }) == 1);
+    CHECK(allocated_by([] { used(Eigen::VectorXd(3).data()); }) == 1);
+    CHECK(allocated_by([] {
+              const Eigen::Matrix3Xd a = Eigen::Matrix3Xd::Ones(3, 2);
+              const Eigen::Ref<const Eigen::Matrix3Xd> copied(2 * a);
+              used(copied.data());
+          }) == 2);
+    const auto freed = [](void* memory) {
+        used(memory);
+        std::free(memory);
+    };
+    CHECK(allocated_by([&] { freed(std::malloc(10)); }) == 1);
+    CHECK(allocated_by([&] { freed(std::calloc(10, 10)); }) == 1);
+    CHECK(allocated_by([&] { freed(std::realloc(nullptr, 10)); }) == 1);
+    CHECK(allocated_by([&] { freed(std::aligned_alloc(64, 64)); }) == 1);
+    CHECK(allocated_by([&] {
+              void* memory = nullptr;
+              static_cast<void>(posix_memalign(&memory, 64, 64));
+              freed(memory);
+          }) == 1);
+}
+
+TEST_CASE("a million ticks allocate nothing", "[allocation]") {
+    test::WholeLoop<double> loop(1);
+    const long allocated = allocated_by([&] {
+        for (int i = 0; i < cases(1'000'000); ++i) loop.tick();
+    });
+    CHECK(allocated == 0);
+    CHECK(loop.touching > cases(400'000));
+    CHECK(loop.holding > cases(100'000));
+    CHECK(loop.x.allFinite());
+}
+
+TEMPLATE_TEST_CASE("nor does whatever else a loop can hold", "[allocation]", double, float) {
+    test::WholeLoop<TestType> usual(2);
+    test::OddLoop<TestType> odd(3);
+    const long allocated = allocated_by([&] {
+        for (int i = 0; i < cases(5'000); ++i) {
+            usual.tick();
+            odd.tick();
+        }
+    });
+    CHECK(allocated == 0);
+    CHECK(odd.refused > 0);
+    CHECK(usual.x.allFinite());
+    CHECK(odd.x.allFinite());
+}
+
+TEMPLATE_TEST_CASE("copied and moved parts run on to the same bits, and allocate nothing", "[allocation]",
+                   (test::WholeLoop<double>), (test::OddLoop<double>), (test::WholeLoop<float>),
+                   (test::OddLoop<float>)) {
+    TestType original(4);
+    bool same = true;
+    for (const int before : {0, 1, 150, 2000}) {  // at rest, in the air, in contact
+        for (int i = 0; i < before; ++i) original.tick();
+        auto copied = std::make_unique<TestType>(original);
+        auto moved = std::make_unique<TestType>(std::move(*copied));
+        copied.reset();
+        TestType assigned(5);
+        for (int i = 0; i < 200; ++i) assigned.tick();
+        assigned = std::as_const(*moved);
+        TestType assigned_by_move(6);
+        assigned_by_move = TestType(assigned);
+        const long allocated = allocated_by([&] {
+            for (int i = 0; i < cases(1000); ++i) {
+                for (TestType* loop : {&original, moved.get(), &assigned, &assigned_by_move}) loop->tick();
+                same = same && same_bits(original, *moved) && same_bits(original, assigned) &&
+                       same_bits(original, assigned_by_move);
+            }
+        });
+        CHECK(allocated == 0);
+    }
+    CHECK(same);
+}

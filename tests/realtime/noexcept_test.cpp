@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <span>
+
+#include <membrane/membrane.hpp>
+#include <membrane/solve/explicit_euler.hpp>
+
+#include "support/catch.hpp"
+
+// What is called in a user's loop does not throw, and says so. Laws, rules, volume models, constraints, force policies
+// and devices say so by their concepts. The lambdas are compiled, never called.
+
+using namespace membrane;
+
+namespace {
+
+// Eigen's own types may throw when they are copied (a matrix allocates), so `noexcept(call)` says no to a call that takes
+// one by value: here the type of the function is asked.
+template <class Function>
+constexpr bool is_noexcept = false;
+template <class Result, class Class, class... Arguments>
+constexpr bool is_noexcept<Result (Class::*)(Arguments...) noexcept> = true;
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("surfaces are looked at without exceptions", "[noexcept]", double, float) {
+    using S = TestType;
+    static_cast<void>([](const Vector3<S>& p, S s, const Points<S>& points, const Triangle<S>& triangle) {
+        static_assert(noexcept(dot(p, p))&& noexcept(squared_norm(p))&& noexcept(norm(p))&& noexcept(cross(p, p)));
+        static_assert(noexcept(direction(p, p))&& noexcept(point(points, 0)));
+        static_assert(noexcept(is_finite(s))&& noexcept(is_finite(p)));
+        static_assert(noexcept(area_vector(triangle))&& noexcept(point_at(triangle, p)));
+        static_assert(noexcept(closest_point(triangle, p))&& noexcept(closest_to_segment(triangle, p, p)));
+        static_assert(noexcept(closest_to_segment(triangle, 0, p, p))&& noexcept(first_hit(triangle, p, p)));
+        static_assert(noexcept(touches_box(triangle, p, p)));
+    });
+    static_cast<void>([](VertexNormals<S>& normals, const ConstPointsRef<S>& x, std::span<const Index> moved,
+                         const Triangles& triangles, const Adjacency& adjacency, const Vector3<S>& barycentric,
+                         const std::array<Index, 3>& corners) {
+        static_assert(noexcept(triangle_at(x, corners)));
+        static_assert(noexcept(normals.update(x))&& noexcept(normals.update(x, moved))&& noexcept(normals.values()));
+        static_assert(noexcept(pseudo_normal(x, triangles, adjacency, 0, barycentric)));
+        static_assert(noexcept(adjacency.neighbours(0))&& noexcept(adjacency.triangles_of(0)));
+        static_assert(noexcept(adjacency.triangle_neighbours(0))&& noexcept(adjacency.edges()));
+        static_assert(noexcept(adjacency.border_vertices())&& noexcept(adjacency.closed()));
+    });
+    SUCCEED();
+}
+
+TEMPLATE_TEST_CASE("contact is found without exceptions", "[noexcept]", double, float) {
+    using S = TestType;
+    static_cast<void>([](AabbTree<S>& tree, const ConstPointsRef<S>& x, std::span<const Index> moved,
+                         const Vector3<S>& p, S radius, void (*visit)(Index)) {
+        static_assert(noexcept(tree.refit(x))&& noexcept(tree.refit(x, moved))&& noexcept(tree.closest_point(x, p)));
+        static_assert(noexcept(tree.first_hit(x, p, p))&& noexcept(tree.touching_sphere(x, p, radius, visit)));
+        static_assert(noexcept(tree.touching_box(x, p, p, visit)));
+        static_assert(noexcept(tree.touching_capsule(x, p, p, radius, visit)));
+    });
+    static_cast<void>([](ContactTracker<S>& tracker, Grasper<S>& grasper, const AabbTree<S>& tree,
+                         const ConstPointsRef<S>& x, const Tool<S>& tool, const Contact<S>& contact,
+                         const Grasp<S>& grasp, const RigidFrame<S>& frame, const Vector3<S>& p) {
+        static_assert(noexcept(tracker.update(tree, x, tool))&& noexcept(tracker.update(tree, x, tool, x)));
+        static_assert(noexcept(tracker.reset())&& noexcept(tracker.tree_checks()));
+        static_assert(noexcept(grasper.update(contact, x, tool))&& noexcept(grasper.reset()));
+        static_assert(noexcept(contact.touching())&& noexcept(Contact<S>::none())&& noexcept(grasp.holding()));
+        static_assert(noexcept(is_sound(tool))&& noexcept(carried_in(tool, frame)));
+        static_assert(noexcept(frame.point_in(p))&& noexcept(frame.point_out(p))&& noexcept(frame.velocity_in(p, p)));
+        static_assert(noexcept(frame.direction_in(p))&& noexcept(frame.direction_out(p)));
+    });
+    SUCCEED();
+}
+
+TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double, float) {
+    using S = TestType;
+    using Network = MassSpringNetwork<S, LinearSpring>;
+    using Volume = VirtualVolumeSprings<S>;
+    static_cast<void>([](const Network& network, const Volume& volume, const ConstPointsRef<S>& x, const Vector3<S>& p,
+                         S s, std::span<const Index> vertices, PropagationQueue& queue) {
+        static_assert(noexcept(network.pull(0, x))&& noexcept(network.tension(0, x))&& noexcept(network.energy(x)));
+        static_assert(noexcept(network.springs_of(0))&& noexcept(network.pinned(0))&& noexcept(network.mass(0)));
+        static_assert(noexcept(volume.pull(0, p, p, s))&& noexcept(volume.energy(0, p))&& noexcept(volume.at(x, x)));
+        static_assert(noexcept(volume.at(x, x).pull(0, p, p, s))&& noexcept(largest_curvature(network, 0, x)));
+        static_assert(
+            noexcept(queue.build(network, vertices, 4))&& noexcept(queue.vertices())&& noexcept(queue.layer(0)));
+        static_assert(noexcept(queue.contains(0))&& noexcept(queue.clear()));
+    });
+    static_cast<void>([](const Tool<S>& tool, const Contact<S>& contact, const Grasp<S>& grasp, const Vector3<S>& p,
+                         const std::array<Index, 3>& corners, std::span<const Index> vertices) {
+        static_assert(noexcept(press(tool, contact, grasp)));
+        static_assert(noexcept(pull(tool, grasp))&& noexcept(pull(0, p))&& noexcept(pin(vertices)));
+        static_assert(noexcept(load(corners, p, p)));
+    });
+    using Solver = QuasiStaticSolver<S, MassStep>;
+    static_assert(is_noexcept<decltype(&Solver::template step<LinearSpring, Volume>)>);
+    static_assert(is_noexcept<decltype(&Solver::template step<LinearSpring, NoVolumeSprings, Press<S>, HeldPoint<S>,
+                                                              HeldVertex<S>, Load<S>, Pinned>)>);
+    static_assert(is_noexcept<decltype(&Solver::wake)> && is_noexcept<decltype(&Solver::wake_all)>);
+    static_assert(is_noexcept<decltype(&Solver::reset)>);
+    using Euler = ExplicitEuler<S>;
+    bool (Euler::*const step)(PointsRef<S>, PointsRef<S>, S, const Network&, const Volume&) noexcept = &Euler::step;
+    bool (Euler::*const pushed)(PointsRef<S>, PointsRef<S>, S, const Network&, const Volume&,
+                                const ConstPointsRef<S>&) noexcept = &Euler::step;
+    CHECK((step != nullptr && pushed != nullptr));
+}
+
+TEMPLATE_TEST_CASE("the device is served without exceptions", "[noexcept]", double, float) {
+    using S = TestType;
+    static_cast<void>([](NullDevice<S>& device, const Vector3<S>& force, const HapticState<S>& state,
+                         const SpringDamperForce& springs, const ReactionForce& reaction) {
+        static_assert(noexcept(device.running())&& noexcept(device.read())&& noexcept(device.write(force)));
+        static_assert(noexcept(device.force())&& noexcept(device.time())&& noexcept(device.restart()));
+        static_assert(noexcept(springs(state))&& noexcept(reaction(state)));
+    });
+    SUCCEED();
+}

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+#include <csignal>
+#include <cstdlib>
+
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/child_process.hpp"
+#include "support/system_call_guard.hpp"
+#include "support/whole_loop.hpp"
+
+namespace {
+
+/// How a process ends that does `act` without being allowed to call the system.
+template <class Act>
+test::ChildResult without_system_calls(Act act) {
+    return test::in_child([&] {
+        test::forbid_system_calls();
+        act();
+    });
+}
+
+}  // namespace
+
+TEST_CASE("the guard kills whatever calls the system", "[system_call]") {
+    CHECK(without_system_calls([] {}).signal == 0);
+    CHECK(without_system_calls([] { syscall(SYS_getpid); }).signal == SIGSYS);
+    CHECK(without_system_calls([] { sleep(1); }).signal == SIGSYS);
+    CHECK(without_system_calls([] {
+              void* volatile large = std::malloc(100'000'000);  // glibc asks the system
+              std::free(large);
+          }).signal == SIGSYS);
+}
+
+TEMPLATE_TEST_CASE("a loop does not call the system", "[system_call]", (test::WholeLoop<double>),
+                   (test::WholeLoop<float>), (test::OddLoop<double>), (test::OddLoop<float>)) {
+    TestType loop(1);
+    const auto child = without_system_calls([&] {
+        for (int i = 0; i < cases(5'000); ++i) loop.tick();
+        if (!loop.x.allFinite()) std::abort();
+    });
+    CHECK(child.signal == 0);
+    CHECK(child.code == 0);
+}

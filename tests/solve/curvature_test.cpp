@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/curvature.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Eigenvalues>
+#include <membrane/mesh/shapes.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/meshes.hpp"
+#include "support/spring_law_check.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+template <class S>
+using Matrix3 = Eigen::Matrix<S, 3, 3>;
+
+template <class S>
+S expected_eigenvalue(const Matrix3<S>& a) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(a.template cast<double>());
+    return static_cast<S>(solver.eigenvalues().maxCoeff());
+}
+
+/// Minus the change of the force on `v` by its own position, by central differences.
+template <class Network>
+Matrix3<double> stiffness_block(const Network& network, Index v, Points<double> x, double h) {
+    Matrix3<double> block;
+    for (int k = 0; k < 3; ++k) {
+        const double here = x(k, v);
+        x(k, v) = here + h;
+        const Vector3<double> after = network.pull(v, x).force;
+        x(k, v) = here - h;
+        block.col(k) = (network.pull(v, x).force - after) / (2 * h);
+        x(k, v) = here;
+    }
+    return (block + block.transpose()) / 2;
+}
+
+template <class Law>
+void largest_curvature_is_that_of_the_forces(const Law& law) {
+    for (int seed = 1; seed <= cases(20); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere({.radius = 1, .subdivisions = random.index(3)});
+        const MassSpringNetwork network(mesh, law, {.stiffness = 3.0});
+        const Points<double> x = test::jittered(mesh.positions(), 0.08, random);
+        for (int n = 0; n < 20; ++n) {
+            const Index v = random.index(mesh.vertex_count());
+            const double found = largest_curvature<double>(network, v, x);
+            const double expected = expected_eigenvalue(stiffness_block(network, v, x, 1e-5));
+            REQUIRE(std::abs(found - expected) <= 1e-6 * network.pull(v, x).stiffness);
+            // The bound that costs nothing holds, and is not wasteful.
+            REQUIRE(found <= network.pull(v, x).stiffness * (1 + 1e-12));
+            REQUIRE(network.pull(v, x).stiffness <= 3 * std::max(found, 3.0));
+        }
+    }
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("largest eigenvalue of symmetric matrices", "[curvature]", double, float) {
+    using S = TestType;
+    // Half of the digits, where two eigenvalues are equal: what a closed form can do.
+    const S tolerance = 2 * std::sqrt(std::numeric_limits<S>::epsilon());
+    const auto check = [&](const Matrix3<S>& a) {
+        const S size = a.cwiseAbs().maxCoeff();
+        CAPTURE(a);
+        REQUIRE(std::abs(largest_eigenvalue(a) - expected_eigenvalue(a)) <= tolerance * size);
+    };
+    for (int seed = 1; seed <= cases(1000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Matrix3<S> a;
+        for (int i = 0; i < 3; ++i) a.col(i) = random.vector<S>();
+        check((a + a.transpose()) / 2);
+        check(static_cast<S>(std::pow(10, random.number(-15.0, 15.0))) * (a + a.transpose()));
+        check(a * a.transpose());
+        // Of one direction, of two, and nearly the same in all three: where a closed form may fail.
+        const Vector3<S> u = random.unit_vector<S>(), w = random.unit_vector<S>();
+        check(u * u.transpose());
+        check(-u * u.transpose());
+        check(u * u.transpose() + w * w.transpose());
+        check(Matrix3<S>(Matrix3<S>::Identity() + std::numeric_limits<S>::epsilon() * (a + a.transpose())));
+        check(Matrix3<S>(random.vector<S>().asDiagonal()));
+    }
+    CHECK(largest_eigenvalue<S>(Matrix3<S>::Zero()) == 0);
+    CHECK(largest_eigenvalue<S>(Matrix3<S>::Identity() * S(7)) == 7);
+    CHECK(largest_eigenvalue<S>(Vector3<S>(1, 5, 2).asDiagonal().toDenseMatrix()) == Approx(5));
+    CHECK(largest_eigenvalue<S>(Vector3<S>(-1, -5, -2).asDiagonal().toDenseMatrix()) == Approx(-1));
+}
+
+TEST_CASE("largest curvature of a vertex is that of its forces, for every law", "[curvature]") {
+    SECTION("linear") { largest_curvature_is_that_of_the_forces(LinearSpring{}); }
+    SECTION("exponential") { largest_curvature_is_that_of_the_forces(ExponentialSpring{}); }
+    SECTION("of one's own") { largest_curvature_is_that_of_the_forces(test::CubicSpring{}); }
+}
+
+TEMPLATE_TEST_CASE("largest curvature by hand", "[curvature]", double, float) {
+    using S = TestType;
+    // A flat star of six equal springs at rest: 3 k in the plane, nothing across.
+    const auto mesh = disc<S>({.radius = 1, .rings = 1});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = S(2)});
+    CHECK(largest_curvature<S>(network, 0, mesh.positions()) == Approx(6));
+    CHECK(network.pull(0, mesh.positions()).stiffness == 12);
+    // All ends in one point: the springs have no direction, any may be the stiff one.
+    const Points<S> collapsed = Points<S>::Zero(3, 7);
+    CHECK(largest_curvature<S>(network, 0, collapsed) == 12);
+    const MassSpringNetwork none(mesh, LinearSpring{}, {.stiffness = S(0)});
+    CHECK(largest_curvature<S>(none, 0, mesh.positions()) == 0);
+}

@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/propagation_queue.hpp>
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/child_process.hpp"
+#include "support/meshes.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+constexpr Index far_away = 1'000'000;
+
+std::set<Index> set_of(std::span<const Index> vertices) { return {vertices.begin(), vertices.end()}; }
+
+/// A mesh with holes, springs left out, and pinned vertices.
+MassSpringNetwork<double, LinearSpring> random_network(Random& random) {
+    const auto mesh = test::with_holes(test::random_surface<double>(random), random).mesh();
+    std::vector<double> stiffness(Adjacency(mesh).edges().size(), 1.0);
+    for (double& k : stiffness) {
+        if (random.chance(0.1)) k = 0;
+    }
+    std::vector<Index> pinned;
+    for (Index n = random.index(4); n > 0; --n) pinned.push_back(random.index(mesh.vertex_count()));
+    return MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = stiffness, .pinned = pinned});
+}
+
+/// How many springs lie between each vertex and the nearest seed: not a search, but distances that are lowered along
+/// one spring after the other until none can be.
+std::vector<Index> distances(const MassSpringNetwork<double, LinearSpring>& network, const std::vector<Index>& seeds) {
+    std::vector<Index> distance(static_cast<std::size_t>(network.vertex_count()), far_away);
+    const auto at = [&](Index v) -> Index& { return distance[static_cast<std::size_t>(v)]; };
+    for (const Index v : seeds) {
+        if (!network.pinned(v)) at(v) = 0;
+    }
+    for (bool lowered = true; lowered;) {
+        lowered = false;
+        for (const auto& spring : network.springs()) {
+            if (network.pinned(spring.first) || network.pinned(spring.second)) continue;
+            for (const auto& [v, w] : {std::pair(spring.first, spring.second), {spring.second, spring.first}}) {
+                if (at(v) + 1 >= at(w)) continue;
+                at(w) = at(v) + 1;
+                lowered = true;
+            }
+        }
+    }
+    return distance;
+}
+
+}  // namespace
+
+TEST_CASE("layers are distances in springs from the seeds", "[queue]") {
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto network = random_network(random);
+        PropagationQueue queue(network.vertex_count());
+        for (int again = 0; again < 3; ++again) {
+            std::vector<Index> seeds;
+            for (Index n = random.index(4); n >= 0; --n) seeds.push_back(random.index(network.vertex_count()));
+            if (random.chance(0.3)) seeds.push_back(seeds.front());  // named twice
+            const Index layers = random.chance(0.2) ? unlimited : random.index(7);
+            queue.build(network, seeds, layers);
+
+            const auto distance = distances(network, seeds);
+            std::vector<std::set<Index>> expected;
+            for (Index v = 0; v < network.vertex_count(); ++v) {
+                const Index k = distance[static_cast<std::size_t>(v)];
+                const bool reached = k <= layers && k < far_away;
+                REQUIRE(queue.contains(v) == reached);
+                if (!reached) continue;
+                expected.resize(std::max(expected.size(), static_cast<std::size_t>(k) + 1));
+                expected[static_cast<std::size_t>(k)].insert(v);
+            }
+            REQUIRE(queue.layer_count() == static_cast<Index>(expected.size()));
+            std::size_t before = 0;
+            for (Index k = 0; k < queue.layer_count(); ++k) {
+                REQUIRE(set_of(queue.layer(k)) == expected[static_cast<std::size_t>(k)]);
+                REQUIRE(queue.layer(k).size() == expected[static_cast<std::size_t>(k)].size());
+                REQUIRE(queue.layer(k).data() == queue.vertices().data() + before);  // nearest to the contact first
+                before += queue.layer(k).size();
+            }
+            REQUIRE(queue.vertices().size() == before);
+        }
+    }
+}
+
+TEST_CASE("within a layer vertices stand in the order of arrival", "[queue]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto network = random_network(random);
+        const std::vector<Index> seeds{random.index(network.vertex_count()), random.index(network.vertex_count())};
+        PropagationQueue queue(network.vertex_count());
+        queue.build(network, seeds, unlimited);
+        const auto vertices = queue.vertices();
+        std::vector<std::size_t> place(static_cast<std::size_t>(network.vertex_count()), vertices.size());
+        for (std::size_t i = 0; i < vertices.size(); ++i) place[static_cast<std::size_t>(vertices[i])] = i;
+        // Each was brought in by the first of its neighbours in the queue; who came first brought in first.
+        std::size_t last = 0;
+        for (const Index v : vertices.subspan(queue.layer_count() > 0 ? queue.layer(0).size() : 0)) {
+            std::size_t first = vertices.size();
+            for (const auto& end : network.springs_of(v)) {
+                first = std::min(first, place[static_cast<std::size_t>(end.other)]);
+            }
+            REQUIRE(first < place[static_cast<std::size_t>(v)]);
+            REQUIRE(last <= first);
+            last = first;
+        }
+    }
+}
+
+TEST_CASE("a queue by hand", "[queue]") {
+    // 6 - 7 - 8
+    // | / | / |     vertices row by row, diagonals from lower left to upper right
+    // 3 - 4 - 5
+    // | / | / |
+    // 0 - 1 - 2
+    const auto mesh = sheet({.columns = 2, .rows = 2});
+    const auto vertices = [](const auto& span) { return std::vector<Index>(span.begin(), span.end()); };
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
+    PropagationQueue queue(9);
+    CHECK(queue.layer_count() == 0);
+    CHECK(queue.vertices().empty());
+    queue.build(network, std::vector<Index>{2}, 1);
+    CHECK(vertices(queue.vertices()) == std::vector<Index>{2, 1, 5});
+    queue.build(network, std::vector<Index>{2}, unlimited);
+    CHECK(queue.layer_count() == 5);
+    CHECK(vertices(queue.vertices()) == std::vector<Index>{2, 1, 5, 0, 4, 8, 3, 7, 6});
+    queue.build(network, std::vector<Index>{8, 0}, 0);
+    CHECK(vertices(queue.vertices()) == std::vector<Index>{8, 0});
+    CHECK(queue.layer_count() == 1);
+    queue.build(network, std::vector<Index>{}, 3);
+    CHECK(queue.layer_count() == 0);
+    CHECK_FALSE(queue.contains(8));
+    queue.build(network, std::vector<Index>{4}, 3);
+    queue.clear();
+    CHECK(queue.vertices().empty());
+    CHECK(queue.layer_count() == 0);
+
+    // Pinned vertices are in nobody's way but stop the force.
+    const MassSpringNetwork wall(mesh, LinearSpring{}, {.stiffness = 1.0, .pinned = {3, 4, 5}});
+    queue.build(wall, std::vector<Index>{4, 1}, unlimited);
+    CHECK(vertices(queue.vertices()) == std::vector<Index>{1, 0, 2});
+    queue.build(wall, std::vector<Index>{4}, unlimited);
+    CHECK(queue.layer_count() == 0);
+}
+
+TEST_CASE("a queue is copied and moved with all it holds", "[queue]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
+    auto first = std::make_unique<PropagationQueue>(mesh.vertex_count());
+    first->build(network, std::vector<Index>{5}, 2);
+    PropagationQueue copy = *first;
+    PropagationQueue moved = std::move(*first);
+    first.reset();
+    CHECK(set_of(copy.vertices()) == set_of(moved.vertices()));
+    CHECK(copy.layer_count() == 3);
+    copy.build(network, std::vector<Index>{5}, unlimited);
+    CHECK(copy.vertices().size() == 162);
+    CHECK(moved.vertices().size() == 1 + 5 + 10);
+    STATIC_REQUIRE(noexcept(copy.build(network, std::span<const Index>{}, 0)));
+}
+
+#ifndef NDEBUG
+TEST_CASE("a layer that there is not is a broken precondition", "[queue][bad]") {
+    const MassSpringNetwork network(sheet({.columns = 2, .rows = 2}), LinearSpring{}, {.stiffness = 1.0});
+    PropagationQueue queue(9);
+    queue.build(network, std::vector<Index>{2}, 1);
+    CHECK(test::in_child([&] { (void)queue.layer(1); }).signal == 0);
+    CHECK(test::in_child([&] { (void)queue.layer(2); }).signal == SIGABRT);
+    CHECK(test::in_child([&] { (void)queue.layer(-1); }).signal == SIGABRT);
+}
+#endif

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/quasi_static.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <membrane/collision/aabb_tree.hpp>
+#include <membrane/collision/contact_tracker.hpp>
+#include <membrane/collision/grasper.hpp>
+#include <membrane/haptics/device.hpp>
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/solve/press.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/settle.hpp"
+
+using namespace membrane;
+
+namespace {
+
+constexpr double radius = 0.01, stiffness = 40, dt = 1e-3;
+
+/// How far `x` is from the shape `rest` where the two lie on one another best [m].
+double distance_from_shape(const Points<double>& x, const Points<double>& rest) {
+    const Eigen::Matrix4d best = Eigen::umeyama(x, rest, false);
+    const Points<double> moved = (best.topLeftCorner<3, 3>() * x).colwise() + best.topRightCorner<3, 1>();
+    return (moved - rest).colwise().norm().maxCoeff();
+}
+
+/// A sphere in a user's loop.
+struct Membrane {
+    TriangleMesh<double> mesh;
+    MassSpringNetwork<double, LinearSpring> network{mesh, LinearSpring{},
+                                                    NetworkOptions<double>{.stiffness = stiffness}};
+    QuasiStaticSolver<double> solver{network, SolverOptions<double>{.layers = 6, .sweeps = 4}};
+    AabbTree<double> tree{mesh};
+    ContactTracker<double> tracker{mesh};
+    Grasper<double> grasper{mesh};
+    Points<double> x = mesh.positions();
+
+    explicit Membrane(Index subdivisions) : mesh(icosphere({.radius = radius, .subdivisions = subdivisions})) {}
+
+    /// Plays `script`, and then lets the membrane come to rest. Returns the largest distance from the shape on the way
+    /// and the one at the end [R].
+    template <class Volume>
+    std::pair<double, double> play(const std::vector<Waypoint<double>>& script, double tool_radius,
+                                   const Volume& volume) {
+        NullDevice<double> device(script, {.tick = dt, .radius = tool_radius});
+        double largest = 0;
+        while (device.running()) {
+            const auto tool = device.read();
+            const auto contact = tracker.update(tree, x, tool);
+            const auto grasp = grasper.update(contact, x, tool);
+            const auto report = solver.step(x, dt, network, volume, press(tool, contact, grasp), pull(tool, grasp));
+            REQUIRE(report.status == StepStatus::advanced);
+            tree.refit(x, report.moved);
+            largest = std::max(largest, (x - mesh.positions()).colwise().norm().maxCoeff());
+        }
+        REQUIRE(test::settle(solver, x, dt, network, volume).converged);
+        return {largest / radius, distance_from_shape(x, mesh.positions()) / radius};
+    }
+};
+
+/// Down onto the sphere along `from`, a fifth of the radius deep, and away again.
+std::vector<Waypoint<double>> press_script(const Vector3<double>& from, double tool_radius) {
+    const double touching = radius + tool_radius;
+    return {{.time = 0, .position = (touching + 0.001) * from},
+            {.time = 0.2, .position = (touching - 0.2 * radius) * from},
+            {.time = 0.3, .position = (touching - 0.2 * radius) * from},
+            {.time = 0.5, .position = (touching + 0.005) * from}};
+}
+
+/// Down onto the surface, which between its vertices lies lower than the sphere, closed there, a fifth of the radius up, and opened.
+std::vector<Waypoint<double>> pull_script(const Vector3<double>& from, double tool_radius) {
+    const double touching = radius + tool_radius;
+    return {{.time = 0, .position = (touching + 0.001) * from},
+            {.time = 0.1, .position = (touching - 0.05 * radius) * from, .grasping = true},
+            {.time = 0.3, .position = (touching + 0.2 * radius) * from, .grasping = true},
+            {.time = 0.4, .position = (touching + 0.2 * radius) * from},
+            {.time = 0.5, .position = (touching + 0.5 * radius) * from}};
+}
+
+}  // namespace
+
+TEST_CASE("with volume springs of a hundredth of the springs the shape comes back", "[recovery]") {
+    for (const Index subdivisions : {2, 3}) {
+        for (const double part : {0.01, 0.2}) {
+            for (int seed = 1; seed <= cases(2); ++seed) {
+                CAPTURE(subdivisions, part, seed);
+                test::Random random(static_cast<std::uint64_t>(seed));
+                Membrane membrane(subdivisions);
+                const VirtualVolumeSprings backing(membrane.mesh,
+                                                   {.stiffness = part * stiffness, .damping = part * 0.1});
+                const auto pressed = membrane.play(press_script(random.unit_vector(), 2e-3), 2e-3, backing);
+                REQUIRE(pressed.first > 0.15);
+                REQUIRE(pressed.second < 1e-6);
+                const auto pulled = membrane.play(pull_script(random.unit_vector(), 5e-4), 5e-4, backing);
+                REQUIRE(pulled.first > 0.15);
+                REQUIRE(pulled.second < 1e-6);
+            }
+        }
+    }
+}
+
+TEST_CASE("without volume springs the shape does not come back from a press", "[recovery]") {
+    for (const Index subdivisions : {2, 3}) {
+        for (int seed = 1; seed <= cases(3); ++seed) {
+            CAPTURE(subdivisions, seed);
+            test::Random random(static_cast<std::uint64_t>(seed));
+            const Vector3<double> from = random.unit_vector();
+            Membrane pressed(subdivisions), pulled(subdivisions);
+            const auto after_press = pressed.play(press_script(from, 2e-3), 2e-3, NoVolumeSprings{});
+            REQUIRE(after_press.first > 0.1);
+            CHECK(after_press.second > 0.01);
+            const auto after_pull = pulled.play(pull_script(from, 5e-4), 5e-4, NoVolumeSprings{});
+            REQUIRE(after_pull.first > 0.1);
+            WARN("without volume springs, " << pressed.mesh.vertex_count() << " vertices: off by " << after_press.second
+                                            << " R after the press, " << after_pull.second << " R after the pull");
+        }
+    }
+}

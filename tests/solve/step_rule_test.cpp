@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/step_rule.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/solve/quasi_static.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/meshes.hpp"
+#include "support/refusal.hpp"
+#include "support/settle.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+template <class S>
+bool same_bits(const Points<S>& a, const Points<S>& b) {
+    return a.cols() == b.cols() && std::memcmp(a.data(), b.data(), sizeof(S) * static_cast<std::size_t>(a.size())) == 0;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", double, float) {
+    using S = TestType;
+    const VertexState<S> vertex{.stiffness = 8, .mass = S(0.5), .dt = S(0.1)};
+    CHECK(MassStep{}.compliance(vertex) == S(0.1) * S(0.1) / S(0.5));
+    CHECK(SafeStep{}.compliance(vertex) == S(1) / 8);
+    CHECK(SafeStep{.omega = 1.5}.compliance(vertex) == S(1.5) / 8);
+    // Where nothing pulls, nothing moves.
+    CHECK(SafeStep{}.compliance(VertexState<S>{.stiffness = 0, .mass = 0, .dt = S(0.1)}) == 0);
+    STATIC_REQUIRE_FALSE(StepRule<int, S>);
+}
+
+TEST_CASE("a safe step that would not be safe is refused by name", "[rule][bad]") {
+    const auto refused = [](double omega) { return test::refusal([&] { SafeStep{.omega = omega}.check(); }); };
+    for (const double omega : {1e-9, 0.5, 1.0, 1.9, 1.999}) CHECK(refused(omega) == "");
+    const std::string name = "SafeStep: omega must lie between 0 and 2, got ";
+    CHECK(refused(0) == name + "0");
+    CHECK(refused(2) == name + "2");
+    CHECK(refused(-1) == name + "-1");
+    CHECK(refused(std::numeric_limits<double>::infinity()) == name + "inf");
+    CHECK(refused(std::nan("")) == name + "nan");
+}
+
+// ---- a safe step never raises the energy
+
+namespace {
+
+/// What the springs and the volume spring of one vertex store, in long double: rounding is no excuse.
+struct VertexEnergy {
+    const MassSpringNetwork<double, LinearSpring>& network;
+    const VirtualVolumeSprings<double>& backing;
+
+    long double operator()(Index v, const Points<double>& x) const {
+        const auto length = [&](const auto& a, const auto& b) {
+            long double sum = 0;
+            for (int k = 0; k < 3; ++k) {
+                const long double way = static_cast<long double>(a[k]) - static_cast<long double>(b[k]);
+                sum += way * way;
+            }
+            return std::sqrt(sum);
+        };
+        const long double u = length(x.col(v), backing.anchors().col(v));
+        long double energy = backing.stiffness(v) * u * u / 2;
+        for (const auto& end : network.springs_of(v)) {
+            const long double stretch = length(x.col(v), x.col(end.other)) - end.rest_length;
+            energy += end.stiffness * stretch * stretch / 2;
+        }
+        return energy;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("no visit of a safe step raises the energy, on whatever linear springs", "[rule]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere({.radius = 1, .subdivisions = random.index(3)});
+        // Stiffnesses and rest lengths apart by up to 12 decades, none at all, and all kinds of tangles.
+        const double decades = random.number(0.0, 6.0), tangle = random.chance(0.5) ? 0.05 : 2;
+        const auto spread = [&] { return std::pow(10, random.number(-decades, decades)); };
+        const std::size_t edges = Adjacency(mesh).edges().size();
+        std::vector<double> stiffness(edges), rest(edges),
+            backing_stiffness(static_cast<std::size_t>(mesh.vertex_count()));
+        for (double& k : stiffness) k = random.chance(0.1) ? 0 : spread();
+        for (double& r : rest) r = random.chance(0.1) ? 0 : random.number(0.0, 2.0);
+        for (double& k : backing_stiffness) k = random.chance(0.3) ? 0 : spread();
+        const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = stiffness, .rest_length = rest});
+        const VirtualVolumeSprings backing(mesh, {.stiffness = backing_stiffness, .damping = random.index(2) * 0.1});
+        const VertexEnergy energy{network, backing};
+
+        const double omega = random.chance(0.5) ? 1.99 : random.number(0.1, 1.99);
+        CAPTURE(omega, decades, tangle);
+        QuasiStaticSolver solver(network, {.layers = 0, .sweeps = 1, .negligible_force = 1e-290}, SafeStep{omega});
+        Points<double> x = test::jittered(mesh.positions(), tangle, random);
+        for (int visit = 0; visit < 200; ++visit) {
+            const std::array<Index, 1> vertex{random.index(mesh.vertex_count())};
+            if (random.chance(0.05)) {  // a spring of length zero
+                const auto ends = network.springs_of(vertex[0]);
+                if (!ends.empty()) x.col(vertex[0]) = x.col(ends[0].other);
+            }
+            const long double before = energy(vertex[0], x);
+            const Points<double> from = x;
+            solver.reset();
+            solver.wake(vertex);
+            const auto report = solver.step(x, 0.1, network, backing);
+            REQUIRE(report.status == StepStatus::advanced);
+            REQUIRE(report.visits == 2);  // one, and a last look
+            const long double after = energy(vertex[0], x);
+            REQUIRE(after <= before * (1 + 1e-14L));
+            for (Index v = 0; v < mesh.vertex_count(); ++v) {
+                if (v != vertex[0]) REQUIRE(point(x, v) == point(from, v));
+            }
+        }
+    }
+}
+
+TEST_CASE("whole steps of safe visits never raise the energy", "[rule]") {
+    for (int seed = 1; seed <= cases(20); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
+        const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
+        const VirtualVolumeSprings backing(mesh, {.stiffness = random.number()});
+        QuasiStaticSolver solver(network, {.sweeps = 1 + random.index(5)}, SafeStep{random.number(0.1, 1.99)});
+        Points<double> x = test::jittered(mesh.positions(), 0.3, random);
+        const auto energy = [&] {
+            double sum = network.energy(x);
+            for (Index v = 0; v < mesh.vertex_count(); ++v) sum += backing.energy(v, point(x, v));
+            return sum;
+        };
+        solver.wake_all();
+        for (double before = energy(); before > 1e-9;) {
+            const auto report = solver.step(x, 0.1, network, backing);
+            REQUIRE(report.status == StepStatus::advanced);
+            if (report.converged) break;
+            const double now = energy();
+            REQUIRE(now <= before * (1 + 1e-14));
+            before = now;
+        }
+    }
+}
+
+// ---- where the rule as published is stable
+
+namespace {
+
+/// The limit of dt^2 / m for vertex `v` of the mesh at rest, by hand: 2 over the largest eigenvalue of its own block.
+template <class S>
+S limit_of(const MassSpringNetwork<S, LinearSpring>& network, Index v, const Points<S>& x, S volume) {
+    Eigen::Matrix3d block = Eigen::Matrix3d::Identity() * static_cast<double>(volume);
+    for (const auto& end : network.springs_of(v)) {
+        const Eigen::Vector3d u = (x.col(end.other) - x.col(v)).template cast<double>().normalized();
+        block += static_cast<double>(end.stiffness) * u * u.transpose();
+    }
+    Eigen::Vector3d direction(1, 2, 3);  // power iteration
+    for (int i = 0; i < 10'000; ++i) direction = (block * direction).normalized();
+    return static_cast<S>(2 / (block * direction).norm());
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("the rule as published converges up to its limit, and is refused beyond", "[rule]", double, float) {
+    using S = TestType;
+    const S dt = S(1e-3), volume = S(0.4);
+    const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 2});
+    const auto with_mass = [&](S mass) {
+        return MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = S(1), .mass = mass});
+    };
+    const VirtualVolumeSprings backing(mesh, {.stiffness = volume});
+    S limit = std::numeric_limits<S>::max();
+    for (Index v = 0; v < 162; ++v) {
+        limit = std::min(limit, limit_of<S>(with_mass(1), v, mesh.positions(), volume));
+    }
+    // Small displacements, so that the eigenvalues stay what they are at rest.
+    Random random(1);
+    const Points<S> start = test::jittered(mesh.positions(), S(1e-3), random);
+    for (const S part : {S(0.1), S(0.5), S(0.9), S(0.97)}) {
+        CAPTURE(part);
+        const auto network = with_mass(dt * dt / (part * limit));
+        QuasiStaticSolver solver(network, {.layers = unlimited, .sweeps = 10}, MassStep{});
+        Points<S> x = start;
+        solver.wake_all();
+        const auto report = test::settle(solver, x, dt, network, backing);
+        REQUIRE(report.status == StepStatus::advanced);
+        REQUIRE(report.converged);
+        REQUIRE((x - mesh.positions()).cwiseAbs().maxCoeff() <
+                200 * std::max(S(1e-9), std::numeric_limits<S>::epsilon()));
+    }
+    for (const S part : {S(1.03), S(1.1), S(2), S(1e3), S(1e9)}) {
+        CAPTURE(part);
+        const auto network = with_mass(dt * dt / (part * limit));
+        QuasiStaticSolver solver(network, {.layers = unlimited, .sweeps = 10}, MassStep{});
+        Points<S> x = start;
+        solver.wake_all();
+        const auto report = solver.step(x, dt, network, backing);
+        CHECK(report.status == StepStatus::unstable);
+        CHECK_FALSE(report.converged);
+        CHECK(report.moved.empty());
+        CHECK(same_bits(x, start));
+        // A smaller time step, and it goes on.
+        CHECK(solver.step(x, dt * std::sqrt(S(0.5) / part), network, backing).status == StepStatus::advanced);
+    }
+}
+
+TEST_CASE("beyond its limit the rule as published does diverge: the refusal is no mere caution", "[rule]") {
+    // A single vertex between six that are pinned: its own block is all there is.
+    const auto mesh = disc({.radius = 1, .rings = 1});
+    const double dt = 1e-3, limit = 2.0 / 3;  // six springs of 1 N/m in the plane
+    const auto with_part = [&](double part) {
+        return MassSpringNetwork(mesh, LinearSpring{},
+                                 {.stiffness = 1.0, .mass = dt * dt / (part * limit), .pinned = {1, 2, 3, 4, 5, 6}});
+    };
+    const auto largest_way = [&](double part) {  // by hand, without the solver's check
+        const auto network = with_part(part);
+        Points<double> x = mesh.positions();
+        x.col(0) = Vector3<double>(1e-6, 0, 0);
+        for (int i = 0; i < 3000; ++i) x.col(0) += dt * dt / network.mass(0) * network.pull(0, x).force;
+        return norm(point(x, 0));
+    };
+    CHECK(largest_way(0.99) < 1e-9);
+    CHECK(largest_way(1.01) > 1e-3);
+    for (const auto& [part, status] : {std::pair(0.99, StepStatus::advanced), {1.01, StepStatus::unstable}}) {
+        CAPTURE(part);
+        const auto network = with_part(part);
+        QuasiStaticSolver solver(network, {.layers = 0, .sweeps = 1}, MassStep{});
+        Points<double> x = mesh.positions();
+        x.col(0) = Vector3<double>(1e-6, 0, 0);
+        solver.wake_all();
+        CHECK(solver.step(x, dt, network, NoVolumeSprings{}).status == status);
+    }
+}
+
+TEST_CASE("dt of the rule as published from a millionth to a thousand seconds comes to a safe outcome", "[rule][bad]") {
+    const auto mesh = icosphere({.radius = 0.01, .subdivisions = 2});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 1e-4});
+    const VirtualVolumeSprings backing(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const Vector3<double> target = 1.2 * point(mesh.positions(), 7);
+    for (double dt = 1e-6; dt <= 1e3; dt *= 3) {
+        CAPTURE(dt);
+        QuasiStaticSolver published(network, {}, MassStep{});
+        QuasiStaticSolver safe(network, {}, SafeStep{});
+        Points<double> x = mesh.positions(), y = x;
+        for (int i = 0; i < 200; ++i) {
+            const Points<double> before = x;
+            const auto report = published.step(x, dt, network, backing, pull(7, target));
+            REQUIRE(is_finite(x));
+            if (report.status != StepStatus::advanced) {
+                REQUIRE(report.status == StepStatus::unstable);
+                REQUIRE(same_bits(x, before));
+            }
+            REQUIRE(safe.step(y, dt, network, backing, pull(7, target)).status == StepStatus::advanced);
+        }
+        REQUIRE((y - mesh.positions()).cwiseAbs().maxCoeff() < 0.0021);
+    }
+}
+
+namespace {
+
+/// A rule of a user's own: half as far as is safe.
+struct HalfStep {
+    template <Real Scalar>
+    [[nodiscard]] Scalar compliance(const VertexState<Scalar>& vertex) const noexcept {
+        return vertex.stiffness > 0 ? 1 / (2 * vertex.stiffness) : Scalar(0);
+    }
+};
+
+}  // namespace
+
+TEST_CASE("a rule of one's own finds the same equilibrium", "[rule]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
+    const VirtualVolumeSprings backing(mesh, {.stiffness = 0.5});
+    const SolverOptions<double> options{.negligible_force = 1e-13};
+    const Vector3<double> target = 1.2 * point(mesh.positions(), 7);
+    QuasiStaticSolver own(network, options, HalfStep{});
+    QuasiStaticSolver stock(network, options);
+    Points<double> x = mesh.positions(), y = x;
+    REQUIRE(test::settle(own, x, 0.1, network, backing, pull(7, target)).converged);
+    REQUIRE(test::settle(stock, y, 0.1, network, backing, pull(7, target)).converged);
+    CHECK((x - y).cwiseAbs().maxCoeff() < 1e-11);
+}

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/touch.hpp>
+
+#include <array>
+#include <cmath>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+using membrane::Index;
+using membrane::Points;
+using membrane::PointsRef;
+using membrane::Region;
+using membrane::Touch;
+using membrane::Vector3;
+using membrane::Workspace;
+
+namespace {
+
+constexpr std::array<Index, 3> corners{0, 1, 2};
+
+/// Three vertices, the last of them pinned if asked for.
+struct Membrane {
+    explicit Membrane(test::Random& random, bool last_pinned = false)
+        : x(3, 3),
+          work(
+              3, [=](Index v) { return last_pinned && v == 2; }, 8),
+          ref(x),
+          region(ref, work) {
+        for (Index v = 0; v < 3; ++v) x.col(v) = random.vector();
+        work.open();
+        region.open();
+        for (Index v = 0; v < 3; ++v) region.set_compliance(v, random.number(0.1, 2.0));
+    }
+    Points<double> x;
+    Workspace<double> work;
+    PointsRef<double> ref;
+    Region<double> region;
+};
+
+Vector3<double> at(const Points<double>& x, const Vector3<double>& barycentric) { return x * barycentric; }
+
+}  // namespace
+
+TEST_CASE("a point that is shifted goes where it should, and pinned corners stay") {
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane m(random, seed % 2 == 0);
+        const Vector3<double> barycentric = random.barycentric(), way = random.vector();
+        const Points<double> before = m.x;
+        membrane::shift_point<double>(m.region, corners, barycentric, way);
+        const bool rigid = membrane::is_rigid(m.region, corners, barycentric);
+        CAPTURE(seed, barycentric.transpose());
+        CHECK((at(m.x, barycentric) - at(before, barycentric) - (rigid ? 0 : 1) * way).norm() < 1e-12);
+        if (seed % 2 == 0) CHECK(m.x.col(2) == before.col(2));
+        if (seed % 2 == 1) CHECK_FALSE(rigid);
+    }
+}
+
+TEST_CASE("a point on a pinned corner is rigid") {
+    test::Random random(1);
+    Membrane m(random, true);
+    CHECK(membrane::is_rigid<double>(m.region, corners, {0, 0, 1}));
+    CHECK(membrane::is_rigid<double>(m.region, corners, {0.05, 0, 0.95}));
+    CHECK_FALSE(membrane::is_rigid<double>(m.region, corners, {0.2, 0, 0.8}));
+}
+
+TEST_CASE("a force on a point is shared out, moves it by its compliance, and can be taken back") {
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane m(random);
+        const Vector3<double> none = Vector3<double>::Zero(), force = random.vector();
+        Touch<double> touch{0, 0, corners, random.barycentric(), none, none, random.vector<double>(0, 1)};
+        membrane::attach(m.region, touch);
+        const Points<double> before = m.x;
+        membrane::change_force(m.region, touch, force);
+        const Vector3<double> way = at(m.x, touch.barycentric) - at(before, touch.barycentric);
+        CAPTURE(seed);
+        CHECK((way - membrane::compliance_of(m.region, touch) * force).norm() < 1e-12);
+        CHECK((m.work.external.rowwise().sum() - force).norm() < 1e-12);
+        for (Index v = 0; v < 3; ++v) {
+            CHECK((m.work.external.col(v) - touch.barycentric[v] * force).norm() < 1e-12);
+            CHECK(m.work.stiffness[static_cast<std::size_t>(v)] == touch.stiffness[v]);
+        }
+        m.region.remember(touch);
+        CHECK((membrane::reaction_of_touches(m.region) + force).norm() < 1e-12);
+        membrane::detach(m.region, touch);
+        CHECK(m.work.external.cwiseAbs().maxCoeff() < 1e-15);
+    }
+}
+
+TEST_CASE("corners become seeds unless one is no vertex") {
+    test::Random random(1);
+    Membrane m(random);
+    CHECK(membrane::seed_corners(m.region, corners));
+    CHECK(m.work.seeds.count() == 3);
+    CHECK_FALSE(m.work.invalid);
+    CHECK_FALSE(membrane::seed_corners<double>(m.region, {0, 3, 1}));
+    CHECK(m.work.invalid);
+}

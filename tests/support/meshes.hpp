@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
+
+#include "support/random.hpp"
+#include "support/refusal.hpp"
+
+/// Surfaces to change before they become a mesh.
+///
+///     auto surface = test::random_surface<double>(random);
+///     surface.triangles(0, 3) = 1000;
+///     CHECK(test::refusal([&] { surface.mesh(); }) == "...");
+namespace test {
+
+template <membrane::Real Scalar>
+struct Surface {
+    membrane::Points<Scalar> x;
+    membrane::Triangles triangles;
+
+    membrane::TriangleMesh<Scalar> mesh() const { return {x, triangles}; }
+    membrane::Index vertex_count() const { return static_cast<membrane::Index>(x.cols()); }
+    membrane::Index triangle_count() const { return static_cast<membrane::Index>(triangles.cols()); }
+
+    membrane::Index add(const membrane::Vector3<Scalar>& point) {
+        x.conservativeResize(3, x.cols() + 1);
+        x.col(x.cols() - 1) = point;
+        return vertex_count() - 1;
+    }
+    membrane::Index add(membrane::Index a, membrane::Index b, membrane::Index c) {
+        triangles.conservativeResize(3, triangles.cols() + 1);
+        triangles.col(triangles.cols() - 1) << a, b, c;
+        return triangle_count() - 1;
+    }
+    /// The triangles and vertices of `other` beside these.
+    void add(const Surface& other) {
+        const membrane::Index vertices = vertex_count(), first = triangle_count();
+        x.conservativeResize(3, x.cols() + other.x.cols());
+        x.rightCols(other.x.cols()) = other.x;
+        triangles.conservativeResize(3, first + other.triangles.cols());
+        triangles.rightCols(other.triangles.cols()) = other.triangles.array() + vertices;
+    }
+    void remove_triangle(membrane::Index f) {
+        triangles.col(f) = triangles.col(triangles.cols() - 1).eval();
+        triangles.conservativeResize(3, triangles.cols() - 1);
+    }
+    void turn(membrane::Index f) { std::swap(triangles(0, f), triangles(1, f)); }
+};
+
+template <membrane::Real Scalar>
+Surface<Scalar> surface_of(const membrane::TriangleMesh<Scalar>& mesh) {
+    return {mesh.positions(), mesh.triangles()};
+}
+
+inline std::vector<membrane::Index> random_order(membrane::Index count, Random& random) {
+    std::vector<membrane::Index> order(static_cast<std::size_t>(count));
+    std::iota(order.begin(), order.end(), 0);
+    for (membrane::Index i = count; i > 1; --i) {
+        std::swap(order[static_cast<std::size_t>(i - 1)], order[static_cast<std::size_t>(random.index(i))]);
+    }
+    return order;
+}
+
+/// The same surface with vertices and triangles in another order and other first corners.
+template <membrane::Real Scalar>
+Surface<Scalar> shuffled(const Surface<Scalar>& surface, Random& random) {
+    Surface<Scalar> result = surface;
+    const auto vertices = random_order(surface.vertex_count(), random);
+    const auto triangles = random_order(surface.triangle_count(), random);
+    for (membrane::Index v = 0; v < surface.vertex_count(); ++v) {
+        result.x.col(vertices[static_cast<std::size_t>(v)]) = surface.x.col(v);
+    }
+    for (membrane::Index f = 0; f < surface.triangle_count(); ++f) {
+        const membrane::Index first = random.index(3);
+        for (membrane::Index k = 0; k < 3; ++k) {
+            result.triangles(k, triangles[static_cast<std::size_t>(f)]) =
+                vertices[static_cast<std::size_t>(surface.triangles((k + first) % 3, f))];
+        }
+    }
+    return result;
+}
+
+/// A closed surface: an icosphere of 12 to 162 vertices, jittered, turned, moved, shuffled, 1 mm to 10 m large.
+template <membrane::Real Scalar>
+Surface<Scalar> random_closed_surface(Random& random) {
+    Surface<Scalar> surface = surface_of(membrane::icosphere<Scalar>({.radius = 1, .subdivisions = random.index(3)}));
+    const auto size = static_cast<Scalar>(std::pow(10, random.number(-3.0, 1.0)));
+    surface.x = size * (random.rotation<Scalar>() * jittered(surface.x, Scalar(0.03), random));
+    surface.x.colwise() += size * random.vector<Scalar>();
+    return shuffled(surface, random);
+}
+
+/// A surface with a border: a sheet, disc or cap, jittered, turned, moved, shuffled, 1 mm to 10 m large.
+template <membrane::Real Scalar>
+Surface<Scalar> random_open_surface(Random& random) {
+    Surface<Scalar> surface;
+    switch (const membrane::Index n = 1 + random.index(5); random.index(3)) {
+        case 0:
+            surface = surface_of(membrane::sheet<Scalar>({.width = 1, .height = 1, .columns = n, .rows = 6 - n}));
+            break;
+        case 1: surface = surface_of(membrane::disc<Scalar>({.radius = 1, .rings = n})); break;
+        default: surface = surface_of(membrane::spherical_cap<Scalar>({.radius = 1, .diameter = 1.5, .rings = n}));
+    }
+    const auto size = static_cast<Scalar>(std::pow(10, random.number(-3.0, 1.0)));
+    surface.x = size * (random.rotation<Scalar>() * jittered(surface.x, Scalar(0.03), random));
+    surface.x.colwise() += size * random.vector<Scalar>();
+    return shuffled(surface, random);
+}
+
+template <membrane::Real Scalar>
+Surface<Scalar> random_surface(Random& random) {
+    return random.chance(0.5) ? random_closed_surface<Scalar>(random) : random_open_surface<Scalar>(random);
+}
+
+/// The surface with holes, ragged borders and perhaps several parts and isolated vertices, still one that is accepted.
+template <membrane::Real Scalar>
+Surface<Scalar> with_holes(Surface<Scalar> surface, Random& random) {
+    const membrane::Index most = surface.triangle_count() / 2;
+    for (membrane::Index removed = 0; removed < most; ++removed) {
+        Surface<Scalar> smaller = surface;
+        smaller.remove_triangle(random.index(smaller.triangle_count()));
+        if (refusal([&] { (void)smaller.mesh(); }).empty()) surface = smaller;
+    }
+    return surface;
+}
+
+}  // namespace test

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+
+#include <membrane/core/types.hpp>
+
+/// The equilibrium of a small membrane found in another way than the solver's: all free vertices at once, by Newton's
+/// method with a dense Jacobian from differences. Forces are summed here, from energies that the network does not see.
+namespace test {
+
+/// Where `residual` (as many numbers as unknowns) vanishes, from `x` on; steps are halved until they help.
+template <class Residual>
+Eigen::VectorXd newton(Residual residual, Eigen::VectorXd x) {
+    const Eigen::Index count = x.size();
+    Eigen::VectorXd here = residual(x);
+    const double size = x.cwiseAbs().maxCoeff();
+    for (int iteration = 0; iteration < 100; ++iteration) {
+        Eigen::MatrixXd jacobian(count, count);
+        const double h = 1e-6 * (size > 0 ? size : 1.0);
+        for (Eigen::Index i = 0; i < count; ++i) {
+            Eigen::VectorXd after = x, before = x;
+            after[i] += h;
+            before[i] -= h;
+            jacobian.col(i) = (residual(after) - residual(before)) / (2 * h);
+        }
+        const Eigen::VectorXd way = -jacobian.partialPivLu().solve(here);
+        double step = 1;
+        Eigen::VectorXd there = residual(x + way);
+        while (!(there.norm() < here.norm()) && step > 1e-10) {
+            step /= 2;
+            there = residual(x + step * way);
+        }
+        if (!(there.norm() < here.norm())) return x;  // no nearer than rounding lets it
+        x += step * way;
+        here = there;
+    }
+    return x;
+}
+
+/// A point of the membrane, as weights of its vertices, and where it is held or what pulls on it.
+struct HeldPlace {
+    std::vector<membrane::Index> vertices;
+    std::vector<double> weights;
+    Eigen::Vector3d target;
+};
+struct LoadedPlace {
+    std::vector<membrane::Index> vertices;
+    std::vector<double> weights;
+    Eigen::Vector3d force;
+};
+
+/// What is at rest on springs (any law), volume springs of one stiffness, held places and loads.
+template <class Network>
+struct SmallMembrane {
+    const Network& network;
+    membrane::Points<double> anchors;
+    double volume_stiffness = 0;
+    std::vector<membrane::Index> fixed = {};
+    std::vector<HeldPlace> held = {};
+    std::vector<LoadedPlace> loads = {};
+
+    struct Equilibrium {
+        membrane::Points<double> x;
+        std::vector<Eigen::Vector3d> holding;  // the force on each held place
+    };
+
+    /// The equilibrium near `start`, 3 x V.
+    Equilibrium equilibrium(const membrane::Points<double>& start) const {
+        std::vector<membrane::Index> free;
+        for (membrane::Index v = 0; v < network.vertex_count(); ++v) {
+            bool is_free = true;
+            for (const membrane::Index w : fixed) is_free &= v != w;
+            if (is_free) free.push_back(v);
+        }
+        const auto unknowns = static_cast<Eigen::Index>(3 * (free.size() + held.size()));
+        const auto take_apart = [&](const Eigen::VectorXd& u) {
+            Equilibrium state{start, {}};
+            Eigen::Index at = 0;
+            for (const membrane::Index v : free) state.x.col(v) = u.segment<3>(at), at += 3;
+            for (std::size_t i = 0; i < held.size(); ++i) state.holding.push_back(u.segment<3>(at)), at += 3;
+            return state;
+        };
+        const auto residual = [&](const Eigen::VectorXd& u) {
+            const Equilibrium state = take_apart(u);
+            const membrane::Points<double> forces = forces_at(state);
+            Eigen::VectorXd result(unknowns);
+            Eigen::Index at = 0;
+            for (const membrane::Index v : free) result.segment<3>(at) = forces.col(v), at += 3;
+            for (const auto& place : held) {
+                Eigen::Vector3d here = Eigen::Vector3d::Zero();
+                for (std::size_t k = 0; k < place.vertices.size(); ++k) {
+                    here += place.weights[k] * state.x.col(place.vertices[k]);
+                }
+                result.segment<3>(at) = here - place.target, at += 3;
+            }
+            return result;
+        };
+        Eigen::VectorXd u = Eigen::VectorXd::Zero(unknowns);
+        Eigen::Index at = 0;
+        for (const membrane::Index v : free) u.segment<3>(at) = start.col(v), at += 3;
+        return take_apart(newton(residual, u));
+    }
+
+  private:
+    membrane::Points<double> forces_at(const Equilibrium& state) const {
+        membrane::Points<double> forces = volume_stiffness * (anchors - state.x);
+        for (const auto& s : network.springs()) {
+            const Eigen::Vector3d reach = state.x.col(s.second) - state.x.col(s.first);
+            const double length = reach.stableNorm();
+            const auto answer = network.law()(membrane::SpringState<double>{s.stiffness, s.rest_length, length});
+            forces.col(s.first) += answer.tension / length * reach;
+            forces.col(s.second) -= answer.tension / length * reach;
+        }
+        for (const auto& load : loads) {
+            for (std::size_t k = 0; k < load.vertices.size(); ++k) {
+                forces.col(load.vertices[k]) += load.weights[k] * load.force;
+            }
+        }
+        for (std::size_t i = 0; i < held.size(); ++i) {
+            for (std::size_t k = 0; k < held[i].vertices.size(); ++k) {
+                forces.col(held[i].vertices[k]) += held[i].weights[k] * state.holding[i];
+            }
+        }
+        return forces;
+    }
+};
+
+}  // namespace test
