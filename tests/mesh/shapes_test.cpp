@@ -2,10 +2,11 @@
 #include <membrane/mesh/shapes.hpp>
 
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Polygon_mesh_processing/orientation.h>
@@ -250,10 +251,10 @@ TEMPLATE_TEST_CASE("options that make no shape are refused", "[shapes][bad]", do
         CHECK(refusal([&] { (void)disc<S>({.rings = wrong}); }) == "disc: rings" + range);
         CHECK(refusal([&] { (void)spherical_cap<S>({.rings = wrong}); }) == "spherical_cap: rings" + range);
     }
-    for (const double wrong : {0.0, -1.0, infinity, -infinity, not_a_number}) {
-        char text[8];
-        std::snprintf(text, sizeof text, "%g", wrong);
-        const std::string range = std::string(" must be finite and positive [m], got ") + text;
+    const std::vector<std::pair<double, std::string>> not_positive{
+        {0.0, "0"}, {-1.0, "-1"}, {infinity, "inf"}, {-infinity, "-inf"}, {not_a_number, "nan"}};
+    for (const auto& [wrong, text] : not_positive) {
+        const std::string range = " must be finite and positive [m], got " + text;
         CHECK(refusal([&] { (void)icosphere<S>({.radius = wrong}); }) == "icosphere: radius" + range);
         CHECK(refusal([&] { (void)sheet<S>({.width = wrong}); }) == "sheet: width" + range);
         CHECK(refusal([&] { (void)sheet<S>({.height = wrong}); }) == "sheet: height" + range);
