@@ -30,7 +30,6 @@
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/press.hpp>
-#include <membrane/solve/press.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
 #include <membrane/haptics/force_policy.hpp>

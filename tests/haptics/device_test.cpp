@@ -100,6 +100,12 @@ TEST_CASE("time does not drift, however long the script", "[device]") {
     CHECK(std::abs(ticks - 10'001) <= 1);
 }
 
+TEST_CASE("a script may be written where the device is made", "[device]") {
+    NullDevice<double> device({{.time = 0}, {.time = 1, .position = {1, 0, 0}}}, {.tick = 0.5});
+    (void)device.read();
+    CHECK(device.read().position == Vector3<double>(0.5, 0, 0));
+}
+
 TEST_CASE("a script of one waypoint lasts a tick", "[device]") {
     NullDevice<double> device({{.time = 3, .position = {1, 2, 3}, .grasping = true}});
     CHECK(device.running());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <membrane/mesh/shapes.hpp>
+#include <membrane/network/volume_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -296,6 +297,33 @@ TEMPLATE_TEST_CASE("a negligible force is small beside the springs' and large be
     const auto mesh = icosphere<S>({.subdivisions = 1});
     CHECK(MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = S(0)}).negligible_force() == 0);
     CHECK(MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = S(0)}).springs().empty());
+}
+
+namespace {
+
+/// Parts of a scene, their constants written where the parts are made: not every compiler takes that lightly.
+struct Scene {
+    explicit Scene(const TriangleMesh<double>& mesh)
+        : network(mesh, LinearSpring{}, {.stiffness = 1.0}), backing{mesh, {.stiffness = 2.0}} {}
+    MassSpringNetwork<double, LinearSpring> network;
+    VirtualVolumeSprings<double> backing;
+};
+
+MassSpringNetwork<double, LinearSpring> network_of(const TriangleMesh<double>& mesh) {
+    return {mesh, LinearSpring{}, {.stiffness = 3.0}};
+}
+
+VirtualVolumeSprings<double> backing_of(const TriangleMesh<double>& mesh) { return {mesh, {.stiffness = 4.0}}; }
+
+}  // namespace
+
+TEST_CASE("constants may be written in the midst of another initialiser", "[network]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    const Scene scene(mesh);
+    CHECK(scene.network.springs()[0].stiffness == 1.0);
+    CHECK(scene.backing.stiffness(0) == 2.0);
+    CHECK(network_of(mesh).springs()[0].stiffness == 3.0);
+    CHECK(backing_of(mesh).stiffness(0) == 4.0);
 }
 
 TEST_CASE("a network owns what it knows", "[network]") {

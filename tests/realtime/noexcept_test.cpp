@@ -84,6 +84,14 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
             noexcept(queue.build(network, vertices, 4))&& noexcept(queue.vertices())&& noexcept(queue.layer(0)));
         static_assert(noexcept(queue.contains(0))&& noexcept(queue.clear()));
     });
+    static_cast<void>([](ActiveVertices& active, const Network& network, std::span<const Index> vertices,
+                         const SolverOptions<S>& options, bool (*is_balanced)(Index)) {
+        static_assert(noexcept(active.arrange(network, vertices, options))&& noexcept(active.vertices()));
+        static_assert(noexcept(active.touched())&& noexcept(active.beyond())&& noexcept(active.queue()));
+        static_assert(noexcept(active.settle(is_balanced))&& noexcept(active.stir_neighbours(network, 0)));
+        static_assert(noexcept(active.close())&& noexcept(active.cancel(network, 4))&& noexcept(active.clear()));
+        static_assert(noexcept(active.wake(0)));
+    });
     static_cast<void>([](const Tool<S>& tool, const Contact<S>& contact, const Grasp<S>& grasp, const Vector3<S>& p,
                          const std::array<Index, 3>& corners, std::span<const Index> vertices) {
         static_assert(noexcept(press(tool, contact, grasp)));

@@ -569,9 +569,49 @@ TEMPLATE_TEST_CASE("positions and anchors that are no numbers are refused, and n
                                         other.wake_all();
                                         return other.step(y, S(0.1), sphere.network,
                                                           sphere.backing.at(anchors, sphere.mesh.positions()));
-                                    }) != StepStatus::advanced);
+                                    }) == StepStatus::bad_input);
         }
     }
+}
+
+TEMPLATE_TEST_CASE("a target so far off that forces are no numbers is bad input", "[solver][bad]", double, float) {
+    using S = TestType;
+    const Sphere<S> sphere;
+    const Vector3<S> far(0, (std::numeric_limits<S>::max)(), 0);
+    CHECK(status_of_refused(sphere, QuasiStaticSolver(sphere.network), [&](auto& solver, Points<S>& x) {
+              return solver.step(x, S(0.1), sphere.network, sphere.backing, pull(3, far));
+          }) == StepStatus::bad_input);
+}
+
+namespace {
+
+/// A law that a rule takes for soft and that is not: its forces soon leave the range of numbers.
+struct Runaway {
+    template <Real S>
+    [[nodiscard]] SpringResponse<S> operator()(const SpringState<S>& spring) const noexcept {
+        const S stretch = spring.length / spring.rest_length - 1;
+        const S force = spring.stiffness * std::exp(1000 * std::abs(stretch)) * stretch;
+        return {force, spring.stiffness, S(0)};
+    }
+};
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("a rule that runs away is called unstable, and nothing has moved", "[solver][bad]", double, float) {
+    using S = TestType;
+    const Sphere<S> sphere;
+    const MassSpringNetwork network(sphere.mesh, Runaway{}, NetworkOptions<S>{.stiffness = S(1)});
+    CHECK(status_of_refused(sphere, QuasiStaticSolver(network, {.sweeps = 50}), [&](auto& solver, Points<S>& x) {
+              return solver.step(x, S(0.1), network, sphere.backing, pull(3, sphere.raised(3, S(0.02))));
+          }) == StepStatus::unstable);
+}
+
+TEST_CASE("waking what is no vertex wakes nobody", "[solver][bad]") {
+    const Sphere<double> sphere;
+    QuasiStaticSolver solver(sphere.network);
+    solver.wake(std::vector<Index>{-1, 162, std::numeric_limits<Index>::max(), std::numeric_limits<Index>::min()});
+    Points<double> x = sphere.mesh.positions();
+    CHECK(solver.step(x, 1e-3, sphere.network, sphere.backing).visits == 0);
 }
 
 TEMPLATE_TEST_CASE("more touches than there is room for are refused, and nothing has moved", "[solver][bad]", double,

@@ -57,7 +57,7 @@ template <Real Scalar>
 
 /// Nearest points of pair `pair`, 0 to `feature_pairs(tool)` - 1: each end of the axis against the triangle, then the
 /// axis against each edge. None where the axis is nearest with an end: the end has a pair of its own. Each pair changes
-/// smoothly as things move, and the triangle is outside the tool where all its pairs are.
+/// smoothly as things move. Where all pairs are outside, the tool is, or its axis runs through the triangle's inside.
 template <Real Scalar>
 [[nodiscard]] std::optional<Proximity<Scalar>> proximity(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool,
                                                          int pair) noexcept;

@@ -18,7 +18,7 @@ namespace membrane {
 template <Real Scalar>
 class Field {
   public:
-    Field() noexcept {}  // NOLINT(modernize-use-equals-default): g++ 12 breaks off over it in a member's initialiser
+    Field() = default;
     Field(Scalar uniform) : values_{uniform}, uniform_{true} {}                 // NOLINT(google-explicit-constructor)
     Field(std::vector<Scalar> each) : values_(std::move(each)) {}               // NOLINT(google-explicit-constructor)
     Field(std::span<const Scalar> each) : values_(each.begin(), each.end()) {}  // NOLINT(google-explicit-constructor)

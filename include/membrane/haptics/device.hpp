@@ -5,6 +5,7 @@
 #include <concepts>
 #include <cstddef>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -35,6 +36,9 @@ struct Waypoint {
     Vector3<Scalar> position = Vector3<Scalar>::Zero();  ///< [m]
     bool grasping = false;                               ///< from here to the next waypoint
 };
+// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+static_assert(std::is_default_constructible_v<Waypoint<float>>);
+static_assert(std::is_default_constructible_v<Waypoint<double>>);
 
 struct NullDeviceOptions {
     double tick = 1e-3;  ///< from one `read` to the next [s]

@@ -6,6 +6,7 @@
 #include <limits>
 #include <span>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
@@ -30,6 +31,9 @@ struct NetworkOptions {
     Field<Scalar> rest_length = {};  ///< r_ij [m]; if not given, the lengths in the mesh
     std::vector<Index> pinned = {};  ///< vertices that never move: a clamped rim is `border(mesh)`
 };
+// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+static_assert(std::is_default_constructible_v<NetworkOptions<float>>);
+static_assert(std::is_default_constructible_v<NetworkOptions<double>>);
 
 /// One spring of the network.
 template <Real Scalar>

@@ -4,6 +4,7 @@
 #include <concepts>
 #include <cstddef>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include <membrane/core/field.hpp>
@@ -23,6 +24,9 @@ struct VolumeOptions {
     Field<Scalar> stiffness = {};  ///< k'_s [N/m], required; larger clings more
     Field<Scalar> damping = {};    ///< k'_d [N s/m], zero if not given; recovery takes the time k'_d / k'_s [s]
 };
+// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+static_assert(std::is_default_constructible_v<VolumeOptions<float>>);
+static_assert(std::is_default_constructible_v<VolumeOptions<double>>);
 
 /// A model of the body under the membrane: the pull on vertex `v` at `position`, which was at `start` when the tick of
 /// length `dt` began. What the compiler cannot see: the pull does no work on the membrane over a closed path.

@@ -11,9 +11,9 @@
 
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
+#include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/curvature.hpp>
-#include <membrane/solve/propagation_queue.hpp>
 #include <membrane/solve/region.hpp>
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
@@ -51,6 +51,7 @@ class QuasiStaticSolver {
                                           const Volume& volume, const Constraints&... constraints) noexcept;
 
     /// Has a look at these vertices in the next steps: what moved them, or their anchors, was not a step of this solver.
+    /// An index that is no vertex is passed over.
     void wake(std::span<const Index> vertices) noexcept;
     void wake_all() noexcept;
 
@@ -58,16 +59,16 @@ class QuasiStaticSolver {
     void reset() noexcept;
 
     /// The propagation queue of the last step.
-    [[nodiscard]] const PropagationQueue& queue() const noexcept { return queue_; }
+    [[nodiscard]] const PropagationQueue& queue() const noexcept { return active_.queue(); }
 
   private:
     void open(std::size_t constraint_count) noexcept;
-    template <class Network>
-    void arrange(const Network& network) noexcept;
     template <class Handed, class Enforce>
-    bool sweep(const Handed& scene, Region<Scalar>& region, bool first, Enforce enforce) noexcept;
+    [[nodiscard]] StepStatus advance(const Handed& scene, Region<Scalar>& region, Enforce enforce) noexcept;
+    template <class Handed, class Enforce>
+    bool sweep(const Handed& scene, Region<Scalar>& region, Enforce enforce) noexcept;
     template <class Handed>
-    bool visit(Index v, const Handed& scene, Region<Scalar>& region, bool first) noexcept;
+    bool visit(Index v, const Handed& scene, Region<Scalar>& region) noexcept;
     template <class Handed>
     [[nodiscard]] Pull<Scalar> pull_on(Index v, const Handed& scene) const noexcept;
     template <class Handed>
@@ -75,17 +76,16 @@ class QuasiStaticSolver {
     template <class Handed>
     bool look(const Handed& scene) noexcept;
     template <class Handed>
+    [[nodiscard]] Vector3<Scalar> lasting_force(Index v, const Handed& scene) const noexcept;
+    template <class Handed>
     void settle(const Handed& scene) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept;
 
     Rule rule_;
     SolverOptions<Scalar> options_;
-    PropagationQueue queue_;
+    ActiveVertices active_;
     Workspace<Scalar> work_;
-    IndexSet visited_;                   // this step's vertices, in the order of their visits
-    IndexSet restless_, next_restless_;  // outside the queue, not at rest
-    IndexSet stirred_;                   // visited since the membrane was last at rest as a whole
-    IndexSet last_seeds_, last_held_;
+    IndexSet last_held_;
     BoundedList<Index> moved_;
     std::array<Vector3<Scalar>, Workspace<Scalar>::most_constraints> reactions_{};
     StepReport<Scalar> report_;
@@ -97,15 +97,10 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const MassSpringNetwork<Scala
                                                    const SolverOptions<Scalar>& options, const Rule& rule)
     : rule_(rule),
       options_((options.check(), options)),
-      queue_(network.vertex_count()),
+      active_(network.vertex_count()),
       work_(
           network.vertex_count(), [&](Index v) { return network.pinned(v); }, options.most_touches),
-      visited_(network.vertex_count()),
-      restless_(network.vertex_count()),
-      next_restless_(restless_),
-      stirred_(restless_),
-      last_seeds_(restless_),
-      last_held_(restless_),
+      last_held_(network.vertex_count()),
       moved_(static_cast<std::size_t>(network.vertex_count())) {
     if constexpr (requires { rule.check(); }) rule.check();
     if constexpr (requires { requires Rule::needs_mass; }) {
@@ -139,25 +134,24 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step(PointsRef<Scalar> x, Sc
     if (work_.invalid) return refuse_step(StepStatus::bad_input, x);
     if (work_.full) return refuse_step(StepStatus::too_many_touches, x);
 
-    arrange(network);
-    for (const Index v : visited_.items()) region.save(v);
+    for (const Index v : last_held_.items()) {
+        if (!region.fixed(v)) active_.wake(v);
+    }
+    active_.arrange(network, work_.seeds.items(), options_);
+    for (const Index v : active_.vertices()) region.save(v);
     const auto enforce = [&] {
         bool mended = false;
         for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(region); });
         return mended;
     };
-    bool changed = true;
-    for (Index i = 0; i < options_.sweeps && changed; ++i) {
-        changed = sweep(scene, region, i == 0, enforce);
-        if (report_.status != StepStatus::advanced) return refuse_step(report_.status, x);
+    if (const StepStatus status = advance(scene, region, enforce); status != StepStatus::advanced) {
+        active_.cancel(network, options_.layers);
+        return refuse_step(status, x);
     }
-    if (changed) enforce();
-    if (!look(scene)) return refuse_step(StepStatus::unstable, x);
     for_each(
         [&](const auto& constraint, std::size_t i) { reactions_[i] = constraint.reaction(std::as_const(region)); });
     settle(scene);
     work_.close();
-    std::swap(last_held_, work_.held);
     return report_;
 }
 
@@ -170,52 +164,41 @@ void QuasiStaticSolver<Scalar, Rule>::open(std::size_t constraint_count) noexcep
     report_.reactions = {reactions_.data(), constraint_count};
 }
 
-// The vertices of this step, in the order of their visits: the queue, then what is still restless outside it.
+// All sweeps, and a look at what has come of them.
 template <Real Scalar, StepRule<Scalar> Rule>
-template <class Network>
-void QuasiStaticSolver<Scalar, Rule>::arrange(const Network& network) noexcept {
-    for (const Index v : last_held_.items()) {
-        if (!work_.held.contains(v)) restless_.insert(v);
+template <class Handed, class Enforce>
+StepStatus QuasiStaticSolver<Scalar, Rule>::advance(const Handed& scene, Region<Scalar>& region,
+                                                    Enforce enforce) noexcept {
+    bool changed = true;
+    for (Index i = 0; i < options_.sweeps && changed; ++i) {
+        changed = sweep(scene, region, enforce);
+        if (report_.status != StepStatus::advanced) return report_.status;
     }
-    const auto seeds = work_.seeds.items(), before = last_seeds_.items();
-    if (!std::equal(seeds.begin(), seeds.end(), before.begin(), before.end())) {
-        for (const Index v : queue_.vertices()) restless_.insert(v);
-        queue_.build(network, seeds, options_.layers);
-    }
-    std::swap(last_seeds_, work_.seeds);
-    const Index touched = queue_.layer_count() > 0 ? static_cast<Index>(queue_.layer(0).size()) : 0;
-    const Index room = (std::max)({touched, Index(1), options_.most_visits / (options_.sweeps + 1)});
-    visited_.clear();
-    for (const auto vertices : {queue_.vertices(), restless_.items()}) {
-        for (const Index v : vertices) {
-            if (visited_.count() == room) return;
-            if (!network.pinned(v)) visited_.insert(v);
-        }
-    }
+    if (changed) enforce();
+    if (look(scene)) return StepStatus::advanced;
+    region.put_back([&](Index v) { return !work_.held.contains(v); });
+    return look(scene) ? StepStatus::unstable : StepStatus::bad_input;  // no better: what was handed in is to blame
 }
 
 template <Real Scalar, StepRule<Scalar> Rule>
 template <class Handed, class Enforce>
-bool QuasiStaticSolver<Scalar, Rule>::sweep(const Handed& scene, Region<Scalar>& region, bool first,
-                                            Enforce enforce) noexcept {
-    const auto vertices = visited_.items();
-    const std::size_t touched = queue_.layer_count() > 0 ? queue_.layer(0).size() : 0;
+bool QuasiStaticSolver<Scalar, Rule>::sweep(const Handed& scene, Region<Scalar>& region, Enforce enforce) noexcept {
     bool changed = false;
-    for (const Index v : vertices.first(touched)) changed |= visit(v, scene, region, first);
+    for (const Index v : active_.touched()) changed |= visit(v, scene, region);
     changed |= enforce();
-    for (const Index v : vertices.subspan(touched)) changed |= visit(v, scene, region, first);
+    for (const Index v : active_.beyond()) changed |= visit(v, scene, region);
     return changed;
 }
 
 template <Real Scalar, StepRule<Scalar> Rule>
 template <class Handed>
-bool QuasiStaticSolver<Scalar, Rule>::visit(Index v, const Handed& scene, Region<Scalar>& region, bool first) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::visit(Index v, const Handed& scene, Region<Scalar>& region) noexcept {
     if (region.fixed(v)) return false;
     ++report_.visits;
     const auto pull = pull_on(v, scene);
     const Scalar mass = scene.network.has_masses() ? scene.network.mass(v) : Scalar(0);
     const Scalar compliance = rule_.compliance(VertexState<Scalar>{pull.stiffness, mass, scene.dt});
-    if (first && compliance * pull.stiffness >= 2 && diverges(v, scene, compliance)) {
+    if (compliance * pull.stiffness >= 2 && diverges(v, scene, compliance)) {
         report_.status = StepStatus::unstable;
         return false;
     }
@@ -253,64 +236,52 @@ bool QuasiStaticSolver<Scalar, Rule>::look(const Handed& scene) noexcept {
         return is_finite(force);
     };
     bool finite = true;
-    for (const Index v : visited_.items()) {
+    for (const Index v : active_.vertices()) {
         if (!work_.held.contains(v)) finite &= look_at(v, true);
     }
     for (const Index v : work_.held.items()) finite &= look_at(v, false);
     return finite;
 }
 
+// Damping may hold in balance, for the length of a tick, what is not at rest.
+template <Real Scalar, StepRule<Scalar> Rule>
+template <class Handed>
+Vector3<Scalar> QuasiStaticSolver<Scalar, Rule>::lasting_force(Index v, const Handed& scene) const noexcept {
+    const Vector3<Scalar> here = point(scene.x, v), start = point(work_.start, v);
+    const Vector3<Scalar> still = scene.volume.pull(v, here, here, scene.dt).force;
+    const Vector3<Scalar> moving = scene.volume.pull(v, here, start, scene.dt).force;
+    return point(work_.unbalanced, v) + (still - moving);
+}
+
 // Who has moved, and who has to be looked at again.
 template <Real Scalar, StepRule<Scalar> Rule>
 template <class Handed>
 void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene) noexcept {
-    next_restless_.clear();
-    for (const Index v : restless_.items()) {
-        if (!visited_.contains(v) && !scene.network.pinned(v)) next_restless_.insert(v);
-    }
-    bool at_rest = next_restless_.empty() && visited_.count() >= static_cast<Index>(queue_.vertices().size());
-    for (const Index v : visited_.items()) {
-        stirred_.insert(v);
-        if (work_.held.contains(v)) continue;
-        // Damping may hold in balance, for the length of a tick, what is not at rest.
-        const Vector3<Scalar> here = point(scene.x, v), start = point(work_.start, v);
-        const Vector3<Scalar> still = scene.volume.pull(v, here, here, scene.dt).force;
-        const Vector3<Scalar> moving = scene.volume.pull(v, here, start, scene.dt).force;
-        const Vector3<Scalar> lasting = point(work_.unbalanced, v) + (still - moving);
-        if (norm(lasting) <= work_.negligible_force) continue;
-        at_rest = false;
-        if (!queue_.contains(v)) next_restless_.insert(v);
-    }
+    active_.settle(
+        [&](Index v) { return work_.held.contains(v) || norm(lasting_force(v, scene)) <= work_.negligible_force; });
     for (const Index v : work_.saved.items()) {
         const Vector3<Scalar> way = point(scene.x, v) - point(work_.start, v);
         if (way.isZero(0)) continue;
         moved_.push(v);
-        if (norm(way) <= work_.compliance[static_cast<std::size_t>(v)] * work_.negligible_force) continue;
-        for (const auto& end : scene.network.springs_of(v)) {
-            if (!stirred_.contains(end.other) || visited_.contains(end.other)) continue;
-            next_restless_.insert(end.other);
-            at_rest = false;
-        }
+        const Scalar negligible = work_.compliance[static_cast<std::size_t>(v)] * work_.negligible_force;
+        if (norm(way) > negligible) active_.stir_neighbours(scene.network, v);
     }
-    std::swap(restless_, next_restless_);
-    report_.converged = at_rest && report_.residual <= work_.negligible_force;
-    if (restless_.empty() && last_seeds_.empty()) stirred_.clear();
     report_.moved = moved_.items();
+    report_.converged = active_.close() && report_.residual <= work_.negligible_force;
+    std::swap(last_held_, work_.held);
 }
 
 template <Real Scalar, StepRule<Scalar> Rule>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept {
-    for (const Index v : work_.saved.items()) x.col(v) = work_.start.col(v);
+    Region<Scalar>(x, work_).put_back([](Index) { return true; });
     report_.status = status;
-    if (status == StepStatus::unstable && !is_finite(x)) report_.status = StepStatus::bad_input;
     return report_;
 }
 
 template <Real Scalar, StepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::wake(std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
-        restless_.insert(v);
-        stirred_.insert(v);
+        if (v >= 0 && v < work_.vertex_count() && work_.pinned[static_cast<std::size_t>(v)] == 0) active_.wake(v);
     }
 }
 
@@ -321,9 +292,9 @@ void QuasiStaticSolver<Scalar, Rule>::wake_all() noexcept {
 
 template <Real Scalar, StepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
-    queue_.clear();
+    active_.clear();
     work_.forget();
-    for (IndexSet* set : {&visited_, &restless_, &stirred_, &last_seeds_, &last_held_}) set->clear();
+    last_held_.clear();
 }
 
 }  // namespace membrane

@@ -171,6 +171,14 @@ class Region {
         if (work_.saved.insert(v)) work_.start.col(v) = x_.col(v);
     }
 
+    /// Puts the saved vertices for which `which(v)` back to where they were.
+    template <class Which>
+    void put_back(Which which) noexcept {
+        for (const Index v : work_.saved.items()) {
+            if (which(v)) x_.col(v) = work_.start.col(v);
+        }
+    }
+
   private:
     PointsRef<Scalar>& x_;
     Workspace<Scalar>& work_;

@@ -16,11 +16,12 @@ namespace membrane {
 /// What a step may cost. More of everything is more accurate.
 template <Real Scalar>
 struct SolverOptions {
-    Index layers = 6;               ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
-    Index sweeps = 4;               ///< passes over the queue in each step
-    Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 is visited whatever this says
-    Scalar negligible_force = 0;    ///< a vertex with less on it is at rest [N]; 0 takes the network's own figure
-    Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time
+    Index layers = 6;  ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
+    Index sweeps = 4;  ///< passes over the queue in each step
+    Index most_visits =
+        unlimited;                ///< visits of vertices in a step, beyond what is held; layer 0 gets its visits anyway
+    Scalar negligible_force = 0;  ///< a vertex with less on it is at rest [N]; 0 takes the network's own figure
+    Index most_touches = 4096;    ///< room for touched triangles; it decides the memory, not the time
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
@@ -29,7 +30,7 @@ struct SolverOptions {
 enum class StepStatus {
     advanced,          ///< the positions are the new ones
     bad_time_step,     ///< dt is not finite and positive: nothing has moved
-    bad_input,         ///< a tool, target, load, index or position is not valid: nothing has moved
+    bad_input,         ///< a tool, target, load, anchor, index or position is not valid: nothing has moved
     unstable,          ///< the rule diverges for this dt: nothing has moved
     too_many_touches,  ///< more touched triangles than there is room for: nothing has moved
 };

@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <utility>
+
+#include <membrane/core/index_set.hpp>
+#include <membrane/solve/propagation_queue.hpp>
+
+/// Which vertices a step visits.
+///
+///     active.arrange(network, seeds, options);
+///     for (const membrane::Index v : active.vertices()) { ... }                    // visits, nearest to the contact first
+///     active.settle(is_balanced);
+///     const bool nothing_left = active.close();
+namespace membrane {
+
+/// The vertices at work: the propagation queue, and outside it the restless ones, which a contact that has moved on or
+/// ended has left out of balance. A vertex is restless until it is seen to be in balance; it becomes restless again
+/// when a neighbour moves, unless it has never been part of what is going on: beyond the layers the membrane stands still.
+class ActiveVertices {
+  public:
+    explicit ActiveVertices(Index vertex_count);
+
+    /// Begins a step: builds the queue where the seeds are others than before, and lines up what is to be visited: the
+    /// queue, then the restless, then what the queue has left behind, as many as `options` leaves room for, layer 0 in
+    /// any case. To be followed by `settle` and `close`, or by `cancel`. Online.
+    template <class Network, class Options>
+    void arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept;
+
+    /// This step's vertices in the order of their visits, and those of them that are layer 0.
+    [[nodiscard]] std::span<const Index> vertices() const noexcept { return visited_.items(); }
+    [[nodiscard]] std::span<const Index> touched() const noexcept {
+        return vertices().first(queue_.layer_count() > 0 ? queue_.layer(0).size() : 0);
+    }
+    [[nodiscard]] std::span<const Index> beyond() const noexcept { return vertices().subspan(touched().size()); }
+    [[nodiscard]] const PropagationQueue& queue() const noexcept { return queue_; }
+
+    /// Makes `v` restless from the next `arrange` on. @pre a vertex (asserted) that is not pinned
+    void wake(Index v) noexcept {
+        restless_.insert(v);
+        stirred_.insert(v);
+    }
+
+    /// Ends a step: who of the visited is not balanced, `is_balanced(v)`, and who was not visited, is restless now.
+    template <class IsBalanced>
+    void settle(IsBalanced is_balanced) noexcept;
+
+    /// After `settle`: `v` has moved far enough for its neighbours to feel it.
+    template <class Network>
+    void stir_neighbours(const Network& network, Index v) noexcept;
+
+    /// After all stirring: whether everyone is at rest.
+    [[nodiscard]] bool close() noexcept;
+
+    /// As if `arrange` had not been called, with up to the same `layers`.
+    template <class Network>
+    void cancel(const Network& network, Index layers) noexcept;
+
+    void clear() noexcept;
+
+  private:
+    PropagationQueue queue_;
+    IndexSet seeds_, next_seeds_;
+    IndexSet restless_, next_restless_;
+    IndexSet left_;     // by the queue, which has gone elsewhere
+    IndexSet visited_;  // in this step
+    IndexSet stirred_;  // visited since everyone was last at rest
+    bool queue_at_rest_ = true;
+};
+
+inline ActiveVertices::ActiveVertices(Index vertex_count)
+    : queue_(vertex_count),
+      seeds_(vertex_count),
+      next_seeds_(seeds_),
+      restless_(seeds_),
+      next_restless_(seeds_),
+      left_(seeds_),
+      visited_(seeds_),
+      stirred_(seeds_) {}
+
+template <class Network, class Options>
+void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
+    next_seeds_.clear();
+    for (const Index v : seeds) next_seeds_.insert(v);
+    left_.clear();
+    const auto before = seeds_.items(), now = next_seeds_.items();
+    if (!std::equal(now.begin(), now.end(), before.begin(), before.end())) {
+        for (const Index v : queue_.vertices()) left_.insert(v);
+        queue_.build(network, seeds, options.layers);
+    }
+    const Index touched = queue_.layer_count() > 0 ? static_cast<Index>(queue_.layer(0).size()) : 0;
+    const Index room = (std::max)({touched, Index(1), options.most_visits / (options.sweeps + 1)});
+    const Index others = (std::min)(restless_.count() + left_.count(), room / 4);  // their turn under a lasting contact
+    visited_.clear();
+    const auto line_up = [&](std::span<const Index> vertices, Index most) {
+        for (const Index v : vertices) {
+            if (visited_.count() >= most) return;
+            visited_.insert(v);
+        }
+    };
+    line_up(queue_.vertices(), (std::max)(touched, room - others));
+    line_up(restless_.items(), room);
+    line_up(left_.items(), room);
+}
+
+template <class IsBalanced>
+void ActiveVertices::settle(IsBalanced is_balanced) noexcept {
+    next_restless_.clear();
+    for (const auto others : {restless_.items(), left_.items()}) {
+        for (const Index v : others) {
+            if (!visited_.contains(v)) next_restless_.insert(v);
+        }
+    }
+    std::size_t balanced = 0;
+    for (const Index v : vertices()) {
+        stirred_.insert(v);
+        const bool rests = is_balanced(v), in_queue = queue_.contains(v);
+        if (rests && in_queue) ++balanced;
+        if (!rests && !in_queue) next_restless_.insert(v);
+    }
+    queue_at_rest_ = balanced == queue_.vertices().size();
+}
+
+template <class Network>
+void ActiveVertices::stir_neighbours(const Network& network, Index v) noexcept {
+    for (const auto& end : network.springs_of(v)) {
+        if (stirred_.contains(end.other) && !visited_.contains(end.other)) next_restless_.insert(end.other);
+    }
+}
+
+inline bool ActiveVertices::close() noexcept {
+    std::swap(seeds_, next_seeds_);
+    std::swap(restless_, next_restless_);
+    if (restless_.empty() && seeds_.empty()) stirred_.clear();
+    return queue_at_rest_ && restless_.empty();
+}
+
+template <class Network>
+void ActiveVertices::cancel(const Network& network, Index layers) noexcept {
+    queue_.build(network, seeds_.items(), layers);
+}
+
+inline void ActiveVertices::clear() noexcept {
+    queue_.clear();
+    for (IndexSet* set : {&seeds_, &restless_, &left_, &visited_, &stirred_}) set->clear();
+}
+
+}  // namespace membrane

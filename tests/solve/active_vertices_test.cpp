@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/active_vertices.hpp>
+
+#include <set>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/solve/step.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/child_process.hpp"
+#include "support/meshes.hpp"
+
+using namespace membrane;
+using test::Random;
+using List = std::vector<Index>;
+using Options = SolverOptions<double>;
+
+namespace {
+
+List list_of(std::span<const Index> vertices) { return {vertices.begin(), vertices.end()}; }
+
+const auto balanced = [](Index) { return true; };
+const auto unbalanced = [](Index) { return false; };
+
+/// 0 - 1 - 2 - 3 - 4 - 5: of a strip of triangles only the springs along its lower side.
+struct Chain {
+    TriangleMesh<double> mesh = sheet({.width = 5, .height = 1, .columns = 5, .rows = 1});
+    MassSpringNetwork<double, LinearSpring> network{mesh, LinearSpring{},
+                                                    NetworkOptions<double>{.stiffness = only_along()}};
+
+    std::vector<double> only_along() const {
+        std::vector<double> all;
+        const Adjacency adjacency(mesh);
+        for (const auto& [first, second] : adjacency.edges()) {
+            all.push_back(second == first + 1 && second < 6 ? 1.0 : 0.0);
+        }
+        return all;
+    }
+};
+
+}  // namespace
+
+TEST_CASE("visits go through the queue, then to what an earlier contact has left out of balance", "[active]") {
+    const Chain chain;
+    ActiveVertices active(12);
+    active.arrange(chain.network, List{1}, Options{.layers = 1});
+    CHECK(list_of(active.vertices()) == List{1, 0, 2});
+    CHECK(list_of(active.touched()) == List{1});
+    CHECK(list_of(active.beyond()) == List{0, 2});
+    active.settle(balanced);
+    CHECK(active.close());
+
+    // The contact moves on: who was in the queue and is no longer is visited once more.
+    active.arrange(chain.network, List{4}, Options{.layers = 1});
+    CHECK(list_of(active.vertices()) == List{4, 3, 5, 1, 0, 2});
+    active.settle([](Index v) { return v != 2; });
+    CHECK_FALSE(active.close());
+    active.arrange(chain.network, List{4}, Options{.layers = 1});
+    CHECK(list_of(active.vertices()) == List{4, 3, 5, 2});
+    active.settle(balanced);
+    active.stir_neighbours(chain.network, 2);  // 3 is being visited, 1 is not
+    CHECK_FALSE(active.close());
+    active.arrange(chain.network, List{4}, Options{.layers = 1});
+    CHECK(list_of(active.vertices()) == List{4, 3, 5, 1});
+    active.settle(balanced);
+    CHECK(active.close());
+
+    // Nothing left of the contact: once all is at rest there is nothing to do.
+    active.arrange(chain.network, List{}, Options{.layers = 1});
+    CHECK(list_of(active.vertices()) == List{4, 3, 5});
+    CHECK(active.touched().empty());
+    active.settle(balanced);
+    CHECK(active.close());
+    active.arrange(chain.network, List{}, Options{.layers = 1});
+    CHECK(active.vertices().empty());
+}
+
+TEST_CASE("beyond the layers nobody is stirred, however far the frontier moves", "[active]") {
+    const Chain chain;
+    ActiveVertices active(12);
+    for (int i = 0; i < 3; ++i) {
+        active.arrange(chain.network, List{0}, Options{.layers = 2});
+        CHECK(list_of(active.vertices()) == List{0, 1, 2});
+        active.settle(balanced);
+        for (const Index v : {0, 1, 2}) active.stir_neighbours(chain.network, v);
+        CHECK(active.close());
+    }
+}
+
+TEST_CASE("who is woken is visited until balanced, and feels its neighbours from then on", "[active]") {
+    const Chain chain;
+    ActiveVertices active(12);
+    active.wake(3);
+    for (int i = 0; i < 3; ++i) {
+        active.arrange(chain.network, List{0}, Options{.layers = 0});
+        CHECK(list_of(active.vertices()) == List{0, 3});
+        active.settle([&](Index v) { return v != 3 || i == 2; });
+        CHECK(active.close() == (i == 2));
+    }
+    active.arrange(chain.network, List{2}, Options{.layers = 0});
+    active.settle(balanced);
+    active.stir_neighbours(chain.network, 2);
+    CHECK_FALSE(active.close());
+    active.arrange(chain.network, List{2}, Options{.layers = 0});
+    CHECK(list_of(active.vertices()) == List{2, 3});
+
+    active.clear();
+    CHECK(active.vertices().empty());
+    CHECK(active.queue().vertices().empty());
+    active.arrange(chain.network, List{}, Options{});
+    CHECK(active.vertices().empty());
+}
+
+TEST_CASE("a step that is cancelled was never arranged", "[active]") {
+    const Chain chain;
+    ActiveVertices active(12);
+    active.wake(5);
+    active.arrange(chain.network, List{0}, Options{.layers = 1});
+    active.settle(unbalanced);
+    CHECK_FALSE(active.close());
+    ActiveVertices spared = active;
+    for (const List& seeds : {List{3}, List{}, List{0}, List{0, 3}}) {
+        active.arrange(chain.network, seeds, Options{.layers = 1});
+        active.cancel(chain.network, 1);
+        CHECK(list_of(active.queue().vertices()) == list_of(spared.queue().vertices()));
+        ActiveVertices other = active, like = spared;
+        other.arrange(chain.network, List{2}, Options{.layers = 1});
+        like.arrange(chain.network, List{2}, Options{.layers = 1});
+        CHECK(list_of(other.vertices()) == list_of(like.vertices()));
+    }
+}
+
+TEST_CASE("with little room layer 0 comes first, and the restless keep a turn", "[active]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
+        const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
+        ActiveVertices active(162);
+        List seeds;
+        for (Index n = 1 + random.index(3); n > 0; --n) seeds.push_back(random.index(162));
+        const std::set<Index> layer0(seeds.begin(), seeds.end());
+        const Options options{.layers = unlimited, .sweeps = 1 + random.index(6), .most_visits = 1 + random.index(500)};
+        const auto room = static_cast<std::size_t>(options.most_visits / (options.sweeps + 1));
+        active.arrange(network, seeds, options);
+        active.settle(unbalanced);
+        (void)active.close();
+        std::set<Index> left;
+        while (left.size() < 20) left.insert(random.index(162));
+        for (const Index v : left) active.wake(v);
+
+        std::set<Index> seen;
+        for (int i = 0; i < 200; ++i) {
+            active.arrange(network, seeds, options);
+            REQUIRE(active.vertices().size() <= std::max({room, layer0.size(), std::size_t(1)}));
+            REQUIRE(active.vertices().size() >= std::min(room - room / 4, std::size_t(162)));
+            REQUIRE(active.touched().size() == layer0.size());
+            const auto visits = list_of(active.vertices());
+            REQUIRE(std::set<Index>(visits.begin(), visits.end()).size() == visits.size());
+            for (const Index v : active.touched()) REQUIRE(layer0.count(v) == 1);
+            seen.insert(visits.begin(), visits.end());
+            active.settle(unbalanced);
+            REQUIRE_FALSE(active.close());
+        }
+        if (room >= layer0.size() + 4) {
+            for (const Index v : left) REQUIRE(seen.count(v) == 1);
+        }
+    }
+}
+
+TEST_CASE("to wake what is no vertex is a broken precondition", "[active][bad]") {
+#ifndef NDEBUG
+    CHECK(test::in_child([] { ActiveVertices(12).wake(12); }).signal == SIGABRT);
+    CHECK(test::in_child([] { ActiveVertices(12).wake(-1); }).signal == SIGABRT);
+#endif
+    CHECK(test::in_child([] { ActiveVertices(12).wake(11); }).signal == 0);
+}
