@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// An engine's vertices, interleaved and in floats, are deformed where they are: nothing is copied in or out.
+// An engine's vertices, interleaved and in floats, are deformed where they are: the loop copies no position in or out,
+// and writes the normals that have changed.
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -55,6 +56,7 @@ int main(int argc, char** argv) {
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
     auto normals = membrane::VertexNormals(mesh);
+    shown_normals = normals.values();
     membrane::NullDevice<float> device({{0, {0, 0, 0.013F}}, {0.2F, {0, 0, 0.010F}}}, {.radius = 2e-3});
 
     std::size_t written = 0;
@@ -63,8 +65,7 @@ int main(int argc, char** argv) {
         const auto contact = tracker.update(tree, x, tool);
         const auto report = solver.step(x, dt, network, backing, press(tool, contact));
         tree.refit(x, report.moved);
-        normals.update(x, report.moved);
-        for (const auto v : report.moved) shown_normals.col(v) = normals.values().col(v);
+        for (const auto v : normals.update(x, report.moved)) shown_normals.col(v) = normals.values().col(v);
         device.write(membrane::ReactionForce{}({tool, contact, report}));
         written = std::max(written, report.moved.size());
     }

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <memory>
 #include <numeric>
@@ -17,6 +16,7 @@
 #include <CGAL/AABB_tree.h>
 #include <membrane/mesh/shapes.hpp>
 
+#include "support/bits.hpp"
 #include "support/brute_force.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -27,6 +27,7 @@
 
 using namespace membrane;
 using test::Random;
+using test::same_bits;
 
 namespace {
 
@@ -87,11 +88,6 @@ template <class S>
 Scene<S> random_scene(Random& random) {
     const auto surface = test::random_surface<S>(random);
     return {surface.mesh(), thresholds[static_cast<std::size_t>(random.index(thresholds.size()))]};
-}
-
-template <class S>
-bool same_bits(const S& a, const S& b) {
-    return std::memcmp(a.data(), b.data(), sizeof(*a.data()) * static_cast<std::size_t>(a.size())) == 0;
 }
 
 template <class S>

@@ -115,48 +115,121 @@ TEST_CASE("the tracker agrees with a search of the whole surface along random tr
     REQUIRE(tracker.tree_checks() <= contact_ticks / 100);
 }
 
+namespace {
+
+/// A sphere that is stroked again and again, each time from rest.
+class Stroked {
+  public:
+    explicit Stroked(Index subdivisions)
+        : mesh_(membrane::icosphere<double>({.radius = 1, .subdivisions = subdivisions})) {}
+
+    double edge() const { return membrane::Neighbourhood<double>(mesh_).mean_edge(); }
+
+    /// Takes the tool along the places, a tick each; whether it was on its side of the surface after every tick.
+    bool stays_outside(const std::vector<Vector>& places, double radius) {
+        auto tracker = fresh_tracker_;
+        auto solver = fresh_solver_;
+        tree_.refit(mesh_.positions());
+        Points<double> x = mesh_.positions();
+        for (const Vector& place : places) {
+            const Tool<double> tool{.position = place, .radius = radius};
+            const auto contact = tracker.update(tree_, x, tool);
+            const auto report = solver.step(x, 1e-3, network_, backing_, press(tool, contact));
+            if (report.status != membrane::StepStatus::advanced) return false;
+            tree_.refit(x, report.moved);
+            if (!contact.touching()) continue;
+            ++touching;
+            if (std::abs(winding_number(x, mesh_.triangles(), place)) > 0.5) return false;
+        }
+        return true;
+    }
+
+    long touching = 0;  // ticks
+
+  private:
+    TriangleMesh<double> mesh_;
+    membrane::MassSpringNetwork<double, membrane::LinearSpring> network_{mesh_, {}, {.stiffness = 1.0}};
+    membrane::VirtualVolumeSprings<double> backing_{mesh_, {.stiffness = 0.3}};
+    membrane::QuasiStaticSolver<double> fresh_solver_{network_, {.layers = 4, .sweeps = 4}};
+    ContactTracker<double> fresh_tracker_{mesh_};
+    AabbTree<double> tree_{mesh_};
+};
+
+/// From place to place, a tick for each `speed`, and two ticks at the end.
+std::vector<Vector> way_through(const std::vector<Vector>& places, double speed) {
+    std::vector<Vector> way{places.front()};
+    for (std::size_t i = 1; i < places.size(); ++i) {
+        const int ticks = std::min(20, static_cast<int>(std::ceil((places[i] - places[i - 1]).norm() / speed)));
+        for (int tick = 1; tick <= ticks; ++tick) {
+            way.push_back(places[i - 1] + double(tick) / ticks * (places[i] - places[i - 1]));
+        }
+    }
+    way.insert(way.end(), 2, places.back());
+    return way;
+}
+
+double random_speed(test::Random& random, double slowest, double fastest) {
+    return std::exp(random.number(std::log(slowest), std::log(fastest)));
+}
+
+}  // namespace
+
 TEST_CASE("a fast stroke leaves the tool on the side it came from") {
-    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
-    const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = 1.0});
-    const membrane::VirtualVolumeSprings backing(mesh, {.stiffness = 0.3});
-    const double edge = membrane::Neighbourhood<double>(mesh).mean_edge();
-    const AabbTree<double> fresh_tree(mesh);
-    const ContactTracker<double> fresh_tracker(mesh);
-    const membrane::QuasiStaticSolver fresh_solver(network, {.layers = 4, .sweeps = 4});
-    auto tree = fresh_tree;
-    auto tracker = fresh_tracker;
-    auto solver = fresh_solver;
-    Points<double> x = mesh.positions();
-    long touching = 0;
+    Stroked sphere(2);
+    const double edge = sphere.edge();
     for (int seed = 1; seed <= cases(100000); ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));
         const double radius = random.chance(0.25) ? 0 : random.number(0.02, 1.5) * edge;
         const Vector out = random.unit_vector();
-        const Vector from = (1.02 + radius) * out;
+        const double deepest = random.chance(0.5) ? 0.2 : 0.5;  // of the radius
         Vector to;
         do {
-            to = 0.95 * random.vector();
-        } while (to.norm() > 0.95 || to.dot(out) < 0.8);
-        const double speed = std::exp(random.number(std::log(0.1 * edge), std::log(4 * edge)));
-        const int ticks = std::min(12, static_cast<int>(std::ceil((to - from).norm() / speed)));
-        for (int tick = 0; tick <= ticks + 1; ++tick) {
-            const Tool<double> tool{.position = from + std::min(1.0, double(tick) / ticks) * (to - from),
-                                    .radius = radius};
-            const auto contact = tracker.update(tree, x, tool);
-            const auto report = solver.step(x, 1e-3, network, backing, press(tool, contact));
-            REQUIRE(report.status == membrane::StepStatus::advanced);
-            tree.refit(x, report.moved);
-            if (!contact.touching()) continue;
-            ++touching;
-            CAPTURE(seed, tick, ticks, radius);
+            to = random.vector();
+        } while (to.norm() > 0.95 || to.dot(out) < 1 - deepest);
+        CAPTURE(seed, radius);
+        REQUIRE(sphere.stays_outside(
+            way_through({(1.02 + radius) * out, to}, random_speed(random, 0.1 * edge, 4 * edge)), radius));
+    }
+    REQUIRE(sphere.touching > cases(100000));
+}
+
+TEST_CASE("a tool that strokes sideways in a dent stays on the side it came from") {
+    Stroked sphere(2);
+    const double edge = sphere.edge();
+    for (int seed = 1; seed <= cases(10000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const double radius = random.chance(0.25) ? 0 : random.number(0.02, 1.5) * edge;
+        const Vector out = random.unit_vector(), beside = (out + random.number() * random.unit_vector()).normalized();
+        const Vector in = (1 - random.number(0.0, 0.2)) * out, to = (1 - random.number(0.0, 0.2)) * beside;
+        CAPTURE(seed, radius);
+        REQUIRE(sphere.stays_outside(
+            way_through({(1.02 + radius) * out, in, to}, random_speed(random, 0.1 * edge, edge)), radius));
+    }
+    REQUIRE(sphere.touching > cases(50000));
+}
+
+TEST_CASE("a tool that a surface has not given way to stays behind it, until it does") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
+    const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = 1.0});
+    const membrane::VirtualVolumeSprings backing(mesh, {.stiffness = 0.3});
+    AabbTree<double> tree(mesh);
+    ContactTracker<double> tracker(mesh);
+    membrane::QuasiStaticSolver solver(network);
+    Points<double> x = mesh.positions();
+    for (int tick = 0; tick < 20; ++tick) {
+        const Tool<double> tool{.position = {0.03, 0.02, 1.05 - 0.01 * tick}, .radius = 0.02};
+        const auto contact = tracker.update(tree, x, tool);
+        const bool refused = tick > 2 && tick < 15;
+        const auto report = solver.step(x, refused ? 0.0 : 1e-3, network, backing, press(tool, contact));
+        tree.refit(x, report.moved);
+        CAPTURE(tick);
+        REQUIRE((report.status == membrane::StepStatus::advanced) == !refused);
+        if (contact.touching()) REQUIRE(contact.normal.z() > 0);
+        if (refused && tick > 8) REQUIRE(contact.crossed);
+        if (!refused && contact.touching()) {
             REQUIRE(std::abs(winding_number(x, mesh.triangles(), tool.position)) < 0.5);
         }
-        x = mesh.positions();
-        tree.refit(x);
-        tracker.reset();
-        solver.reset();
     }
-    REQUIRE(touching > cases(100000));
 }
 
 TEST_CASE("a contact begins, goes on and ends once, with the depth against the surface without the tool") {

@@ -1,6 +1,10 @@
-# cmake -D program=FILE -D script=CSV -D folder=DIR -P own_force_policy.cmake: plays a script from a file, and refuses
-# one that is none.
-execute_process(COMMAND ${program} --script ${script} RESULT_VARIABLE code OUTPUT_VARIABLE output)
+# cmake -D program=FILE -D data=DIR -D folder=DIR -P own_force_policy.cmake: the example plays its own script, and one
+# from a file, and refuses what is none.
+execute_process(COMMAND ${program} RESULT_VARIABLE code OUTPUT_QUIET)
+if(NOT code EQUAL 0)
+    message(FATAL_ERROR "expected exit code 0, got ${code}")
+endif()
+execute_process(COMMAND ${program} --script ${data}/press_and_release.csv RESULT_VARIABLE code OUTPUT_VARIABLE output)
 if(NOT code EQUAL 0 OR NOT output MATCHES "at the limit")
     message(FATAL_ERROR "the script was not played to the device's limit:\n${output}")
 endif()

@@ -3,7 +3,6 @@
 
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <memory>
 #include <numbers>
@@ -13,6 +12,7 @@
 #include <CGAL/Side_of_triangle_mesh.h>
 #include <membrane/mesh/shapes.hpp>
 
+#include "support/bits.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/cgal_mesh.hpp"
@@ -21,13 +21,9 @@
 
 using namespace membrane;
 using test::Random;
+using test::same_bits;
 
 namespace {
-
-template <class S>
-bool same_bits(const Points<S>& a, const Points<S>& b) {
-    return a.cols() == b.cols() && std::memcmp(a.data(), b.data(), sizeof(S) * static_cast<std::size_t>(a.size())) == 0;
-}
 
 /// Sum over all triangles, in long double; zero where there is no area.
 template <class S>
@@ -152,7 +148,9 @@ TEST_CASE("an update of the moved vertices changes these and their neighbours on
         const std::vector<Index> moved{random.index(642), random.index(642), random.index(642)};
         std::set<Index> near(moved.begin(), moved.end());
         for (const Index v : moved) near.insert(adjacency.neighbours(v).begin(), adjacency.neighbours(v).end());
-        normals.update(test::jittered(mesh.positions(), 0.01, random), moved);  // all move, only some are named
+        const auto updated = normals.update(test::jittered(mesh.positions(), 0.01, random), moved);  // all move
+        REQUIRE(updated.size() == near.size());
+        REQUIRE(std::set<Index>(updated.begin(), updated.end()) == near);
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             REQUIRE((point(normals.values(), v) == point(before, v)) == (near.count(v) == 0));
         }

@@ -253,8 +253,9 @@ TEMPLATE_TEST_CASE("options that make no shape are refused", "[shapes][bad]", do
     }
     const std::vector<std::pair<double, std::string>> not_positive{
         {0.0, "0"}, {-1.0, "-1"}, {infinity, "inf"}, {-infinity, "-inf"}, {not_a_number, "nan"}};
-    for (const auto& [wrong, text] : not_positive) {
-        const std::string range = " must be finite and positive [m], got " + text;
+    for (const auto& pair : not_positive) {
+        const double wrong = pair.first;
+        const std::string range = " must be finite and positive [m], got " + pair.second;
         CHECK(refusal([&] { (void)icosphere<S>({.radius = wrong}); }) == "icosphere: radius" + range);
         CHECK(refusal([&] { (void)sheet<S>({.width = wrong}); }) == "sheet: width" + range);
         CHECK(refusal([&] { (void)sheet<S>({.height = wrong}); }) == "sheet: height" + range);

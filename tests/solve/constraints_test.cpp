@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include <membrane/solve/press.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
+#include "support/bits.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/meshes.hpp"
@@ -22,15 +22,11 @@
 
 using namespace membrane;
 using test::Random;
+using test::same_bits;
 
 namespace {
 
 constexpr double dt = 1e-3;
-
-template <class S>
-bool same_bits(const Points<S>& a, const Points<S>& b) {
-    return a.cols() == b.cols() && std::memcmp(a.data(), b.data(), sizeof(S) * static_cast<std::size_t>(a.size())) == 0;
-}
 
 std::array<Index, 3> corners_of(const TriangleMesh<double>& mesh, Index f) {
     return {mesh.triangles()(0, f), mesh.triangles()(1, f), mesh.triangles()(2, f)};
@@ -211,7 +207,7 @@ TEST_CASE("nothing is held by forceps that hold nothing", "[constraints]") {
     CHECK(report.status == StepStatus::advanced);
     CHECK(report.visits == 0);
     CHECK(report.reactions[0] == Vector3<double>(0, 0, 0));
-    CHECK(same_bits<double>(x, membrane.mesh.positions()));
+    CHECK(same_bits(x, membrane.mesh.positions()));
 }
 
 TEST_CASE("the network's own pins cannot be pulled away", "[constraints]") {
@@ -223,7 +219,7 @@ TEST_CASE("the network's own pins cannot be pulled away", "[constraints]") {
     const auto report =
         test::settle(solver, x, dt, membrane.network, membrane.backing, pull(7, Vector3<double>(2, 2, 2)), pin(pinned));
     CHECK(report.converged);
-    CHECK(same_bits<double>(x, membrane.mesh.positions()));
+    CHECK(same_bits(x, membrane.mesh.positions()));
 }
 
 namespace {

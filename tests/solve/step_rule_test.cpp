@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <string>
 #include <vector>
@@ -12,6 +11,7 @@
 #include <membrane/mesh/shapes.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
+#include "support/bits.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/meshes.hpp"
@@ -20,15 +20,7 @@
 
 using namespace membrane;
 using test::Random;
-
-namespace {
-
-template <class S>
-bool same_bits(const Points<S>& a, const Points<S>& b) {
-    return a.cols() == b.cols() && std::memcmp(a.data(), b.data(), sizeof(S) * static_cast<std::size_t>(a.size())) == 0;
-}
-
-}  // namespace
+using test::same_bits;
 
 TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", double, float) {
     using S = TestType;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 
@@ -27,10 +28,10 @@ struct TrackerOptions {
 /// Finds the contact with the tree while there is none, and follows it over the neighbours of the triangles touched
 /// before, [Liu07] 2.3: in contact the cost depends on what the tool touches and not on the size of the mesh.
 ///
-/// Beyond the paper: the neighbours are flooded over every triangle within the tool's reach; a tool whose reference
-/// point (or, for a capsule, its other end) passed the surface since the last tick touches it where it passed, however
-/// far it has come; and a tool that has left the triangles it touched is looked for in the tree. A second fold of the surface
-/// that comes near a tool in contact is found after `check_every` ticks at the latest.
+/// Beyond the paper: the neighbours are flooded over every triangle within the tool's reach. A tool whose reference point
+/// (or, for a capsule, its other end) went through the surface since the last tick touches it where it went through,
+/// however far it has come: the tree is asked about its way in every tick. A second fold of the surface that comes near a
+/// tool in contact is found after `check_every` ticks at the latest.
 ///
 /// The tool stays on the outer side of a closed surface. On an open one it stays on the side of first contact. The
 /// depth is measured against the surface as it would be without the tool: the mesh, or the anchors handed in.
@@ -41,7 +42,7 @@ class ContactTracker {
     explicit ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options = {});
 
     /// The contact of `tool` with the surface at `x` (3 x V [m]). A tool that is not sound touches nothing and is
-    /// forgotten. Online. Cost: in contact, the triangles within the tool's reach and their neighbours; else O(log F).
+    /// forgotten. Online. Cost: O(log F), and in contact the triangles within the tool's reach and their neighbours.
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool) noexcept {
         return update(tree, x, tool, origins_);
@@ -51,7 +52,7 @@ class ContactTracker {
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) noexcept;
 
-    /// How often the tree has been asked during contact, since the beginning.
+    /// How often the tree has been asked for what the tool touches during contact, since the beginning.
     [[nodiscard]] Index tree_checks() const noexcept { return tree_checks_; }
 
     /// Forgets contact and tool.
@@ -74,14 +75,16 @@ class ContactTracker {
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool touches(const Scene& scene, Contact<Scalar>& contact) noexcept;
-    template <class FirstHit>
-    [[nodiscard]] bool crossing(const Scene& scene, Contact<Scalar>& contact, FirstHit first_hit) const noexcept;
+    bool crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept;
     void describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept;
     void gather_from_tree(const Scene& scene) noexcept;
     void flood(const Scene& scene) noexcept;
     void gather(const Scene& scene, Index f) noexcept;
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
+
+    static constexpr int rings_watched = 2;
+    static constexpr Scalar negligible_way = Scalar(1e-6);  // part of the tool's way in a tick
 
     Points<Scalar> origins_;
     Neighbourhood<Scalar> surface_;
@@ -178,24 +181,7 @@ bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact
     if (near_.empty()) return false;
 
     contact.side = last_.side;
-    const auto first_of_near = [&](const Vector3<Scalar>& from, const Vector3<Scalar>& to) {
-        SurfaceHit<Scalar> first{no_index, 2, Vector3<Scalar>::Zero(), 0};
-        for (const Index f : near_.items()) {
-            const auto hit = first_hit(surface_.triangle(scene.x, f), from, to);
-            if (hit && hit->along < first.along) first = {f, hit->along, hit->barycentric, 0};
-        }
-        return first;
-    };
-    if (!crossing(scene, contact, first_of_near)) {
-        describe(scene, nearest_, contact);
-        const Scalar behind = -(contact.gap + scene.radius);
-        contact.crossed =
-            behind > 0 && behind <= (std::max)(-last_.gap, scene.radius) - scene.radius + scene.travel + margin_;
-        if (behind > 0 && !contact.crossed) {  // it cannot have come so far: the surface is creased, not passed
-            contact.gap = behind - scene.radius;
-            contact.normal = -contact.normal;
-        }
-    }
+    if (!crossing(scene, contact)) describe(scene, nearest_, contact);
     return true;
 }
 
@@ -206,19 +192,11 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
     near_.clear();
     gather_from_tree(scene);
     flood(scene);
-    const auto first_of_all = [&](const Vector3<Scalar>& from, const Vector3<Scalar>& to) {
-        return scene.tree.first_hit(scene.x, from, to);
-    };
-    if (!crossing(scene, contact, first_of_all)) {
+    if (!crossing(scene, contact)) {
         const Index f = near_.empty() ? scene.tree.closest_point(scene.x, scene.tool.position).triangle : nearest_;
         if (f == no_index) return false;
         contact.side = last_.touching() ? last_.side : Scalar(1);
         describe(scene, f, contact);
-        if (contact.gap < -scene.radius && !last_.touching() && !surface_.closed()) {
-            contact.side = -1;  // first seen from this side
-            describe(scene, f, contact);
-        }
-        contact.crossed = contact.gap < -scene.radius;
     }
     return true;
 }
@@ -233,35 +211,47 @@ bool ContactTracker<Scalar>::touches(const Scene& scene, Contact<Scalar>& contac
     return contact.gap <= slack || (contact.depth > 0 && contact.gap <= contact.depth + scene.travel);
 }
 
-// Whether an end of the tool went through the surface since the last tick, from its own side to the other.
+// Whether the way of an end of the tool since the last tick leads through the surface.
 template <Real Scalar>
-template <class FirstHit>
-bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& contact, FirstHit first_hit) const noexcept {
+bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept {
     if (!last_tool_) return false;
-    const Vector3<Scalar> lift = last_.touching() ? Vector3<Scalar>(margin_ * last_.normal) : Vector3<Scalar>::Zero();
-    const auto through = [&](const Vector3<Scalar>& before, const Vector3<Scalar>& now) {
-        const Vector3<Scalar> from = before + lift;  // what rests on the surface is on its own side of it
-        const auto hit = first_hit(from, now);
+    const Scalar side = last_.touching() ? last_.side : Scalar(1);
+    const auto through = [&](const Vector3<Scalar>& from, const Vector3<Scalar>& now) {
+        const auto hit = scene.tree.first_hit(scene.x, from, now);
         if (hit.triangle == no_index) return false;
-        Scalar side = last_.touching() ? last_.side : Scalar(1);
-        if (!surface_.closed() && !last_.touching()) {  // first seen from this side
-            side = dot<Scalar>(area_vector(surface_.triangle(scene.x, hit.triangle)), now - from) < 0 ? 1 : -1;
+        auto passed = contact_where_passed(surface_, scene.x, hit.triangle, hit.barycentric, from, now, side);
+        if (std::abs(passed.gap) <= negligible_way * norm<Scalar>(now - from)) return false;  // it has only come to it
+        if (passed.gap > 0) {
+            if (hit.along < negligible_way) return false;  // it leaves what it rests on
+            passed.normal = -passed.normal;                // of a crease, or an open surface from its other side
+            passed.gap = -passed.gap;
+            if (!surface_.closed() && !last_.touching()) passed.side = -side;
         }
-        const auto passed = contact_where_passed(surface_, scene.x, hit.triangle, hit.barycentric, from, now, side);
-        if (!(passed.gap < 0)) return false;
         contact = passed;
         contact.gap -= scene.radius;
         return true;
     };
-    if (through(last_tool_->position, scene.tool.position)) return true;
-    if (feature_pairs(scene.tool) == 1) return false;
-    return through(last_tool_->position + last_tool_->axis, scene.tool.position + scene.tool.axis);
+    return through(last_tool_->position, scene.tool.position) ||
+           (feature_pairs(scene.tool) > 1 &&
+            through(last_tool_->position + last_tool_->axis, scene.tool.position + scene.tool.axis));
 }
 
+// Behind a closed surface is a tool that was not in contact, or that the surface has not given way to. No way has led
+// any other in: it is outside, whatever the surface looks like where it is creased.
 template <Real Scalar>
 void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept {
-    contact = contact_in(surface_, scene.x, f, scene.tool, scene.radius, contact.side);
-    contact.before = contact.on_axis + margin_ * contact.normal;
+    const auto seen_from = [&](Scalar side) {
+        contact = contact_in(surface_, scene.x, f, scene.tool, scene.radius, side);
+        return contact.gap < -scene.radius;
+    };
+    bool behind = seen_from(contact.side);
+    if (behind && !last_.touching() && !surface_.closed()) behind = seen_from(-1);  // it is first seen from there
+    contact.crossed = behind && (!last_.touching() || !has_given_way(surface_, scene.x, last_));
+    if (behind && !contact.crossed) {
+        contact.gap = -contact.gap - 2 * scene.radius;
+        contact.normal = -contact.normal;
+    }
+    contact.before = (contact.crossed ? contact.point : contact.on_axis) + margin_ * contact.normal;
 }
 
 template <Real Scalar>
@@ -304,7 +294,12 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
     watched_.clear();
     listed_.clear();
     for (const Index f : near_.items()) watched_.insert(f);
-    for (const Index f : near_.items()) surface_.around_corners(f, [&](Index g) { watched_.insert(g); });
+    std::size_t next = 0;
+    for (int ring = 0; ring < rings_watched; ++ring) {
+        for (const std::size_t end = watched_.items().size(); next < end; ++next) {
+            surface_.around_corners(watched_.items()[next], [&](Index f) { watched_.insert(f); });
+        }
+    }
     for (const Index f : watched_.items()) listed_.push({f, surface_.corners(f)});
     contact.radius = scene.radius;
     contact.reach = scene.reach;

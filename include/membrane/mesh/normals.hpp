@@ -4,12 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <cstdint>
 #include <limits>
 #include <span>
-#include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
+#include <membrane/core/index_set.hpp>
 #include <membrane/mesh/adjacency.hpp>
 #include <membrane/mesh/triangle.hpp>
 
@@ -35,10 +34,10 @@ class VertexNormals {
     /// @pre `x` has a column for each vertex (asserted).
     void update(const ConstPointsRef<Scalar>& x) noexcept;
 
-    /// Of the vertices `moved` and their neighbours, each once; a vertex may be named several times. Linear in the
-    /// number of their triangles, no allocation.
+    /// Of the vertices `moved` and their neighbours, each once; a vertex may be named several times. Returns them, valid
+    /// until the next update: no other normal has changed. Linear in the number of their triangles, no allocation.
     /// @pre `x` has a column for each vertex and `moved` names vertices (asserted).
-    void update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
+    std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
     /// 3 x V, unit length.
     [[nodiscard]] const Points<Scalar>& values() const noexcept { return values_; }
@@ -50,8 +49,7 @@ class VertexNormals {
     CompressedRows<std::array<Index, 2>> opposite_;  // of v: the other two corners of each triangle, in its order
     Points<Scalar> values_;
     Points<Scalar> at_rest_;
-    std::vector<std::uint64_t> updated_;  // the round in which a vertex was last updated
-    std::uint64_t round_ = 0;
+    IndexSet updated_;  // by the last call
 };
 
 /// The angle-weighted normal where `barycentric` says, of the face, edge or corner: its sign against the way from there
@@ -94,7 +92,7 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
                 }),
       values_(3, mesh.vertex_count()),
       at_rest_(Vector3<Scalar>(0, 0, 1).replicate(1, mesh.vertex_count())),
-      updated_(static_cast<std::size_t>(mesh.vertex_count()), 0) {
+      updated_(mesh.vertex_count()) {
     update(mesh.positions());
     at_rest_ = values_;
 }
@@ -106,9 +104,10 @@ void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
 }
 
 template <Real Scalar>
-void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
+std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x,
+                                                     std::span<const Index> moved) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
-    ++round_;
+    updated_.clear();
     for (const Index v : moved) {
         const auto around = opposite_[v];
         update_once(x, v);
@@ -117,6 +116,7 @@ void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x, std::span<co
             update_once(x, last);
         }
     }
+    return updated_.items();
 }
 
 template <Real Scalar>
@@ -129,10 +129,7 @@ void VertexNormals<Scalar>::update_vertex(const ConstPointsRef<Scalar>& x, Index
 
 template <Real Scalar>
 void VertexNormals<Scalar>::update_once(const ConstPointsRef<Scalar>& x, Index v) noexcept {
-    std::uint64_t& round = updated_[static_cast<std::size_t>(v)];
-    if (round == round_) return;
-    round = round_;
-    update_vertex(x, v);
+    if (updated_.insert(v)) update_vertex(x, v);
 }
 
 template <class Positions>

@@ -2,16 +2,42 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
 
 #include <membrane/mesh/triangle.hpp>
 
 namespace membrane {
 
 /// When the triangle first passes `q` as its corners move in straight lines: a time from 0 to 1 just before it does, or
-/// 1 if it does not. Passings that undo each other within a sixteenth of the time may go unseen.
+/// 1 if it does not. The volume between triangle and `q` is a cubic of time, and changes its sign there.
 template <Real Scalar>
 [[nodiscard]] Scalar passing_time(const Triangle<Scalar>& from, const Triangle<Scalar>& to,
                                   const Vector3<Scalar>& q) noexcept;
+
+namespace detail {
+
+/// The polynomial of degree 3 with these Bernstein coefficients, at `t`.
+template <Real Scalar>
+[[nodiscard]] Scalar cubic_at(const std::array<Scalar, 4>& p, Scalar t) noexcept {
+    const auto between = [t](Scalar a, Scalar b) { return (1 - t) * a + t * b; };
+    const Scalar ab = between(p[0], p[1]), bc = between(p[1], p[2]), cd = between(p[2], p[3]);
+    return between(between(ab, bc), between(bc, cd));
+}
+
+/// 0, 1, and the times between where the cubic may turn, ascending: it is monotonic from each to the next.
+template <Real Scalar>
+[[nodiscard]] std::array<Scalar, 4> turning_times(const std::array<Scalar, 4>& p) noexcept {
+    const Scalar c = p[1] - p[0], b = (p[2] - p[1]) - c, a = (p[3] - p[2]) - (p[2] - p[1]) - b;  // a t^2 + 2 b t + c
+    const Scalar root = std::sqrt((std::max)(b * b - a * c, Scalar(0)));
+    const Scalar sum = b < 0 ? b - root : b + root;
+    const auto inside = [](Scalar t) { return t > 0 && t < 1 ? t : Scalar(0); };
+    const auto [first, second] = std::minmax({inside(-sum / a), inside(-c / sum)});
+    return {0, first, second, 1};
+}
+
+}  // namespace detail
 
 template <Real Scalar>
 Scalar passing_time(const Triangle<Scalar>& from, const Triangle<Scalar>& to, const Vector3<Scalar>& q) noexcept {
@@ -19,30 +45,38 @@ Scalar passing_time(const Triangle<Scalar>& from, const Triangle<Scalar>& to, co
     const Vector3<Scalar> high = from.a.cwiseMax(from.b).cwiseMax(from.c).cwiseMax(to.a).cwiseMax(to.b).cwiseMax(to.c);
     if (!((low.array() <= q.array()).all() && (q.array() <= high.array()).all())) return 1;
 
-    const auto seen_from_q = [&](Scalar t) {
-        const auto corner = [&](const Vector3<Scalar>& begin, const Vector3<Scalar>& end) {
-            return Vector3<Scalar>((1 - t) * (begin - q) + t * (end - q));
-        };
-        return Triangle<Scalar>{corner(from.a, to.a), corner(from.b, to.b), corner(from.c, to.c)};
+    const Triangle<Scalar> begin{from.a - q, from.b - q, from.c - q}, end{to.a - q, to.b - q, to.c - q};
+    const auto volume = [](const Vector3<Scalar>& a, const Vector3<Scalar>& b, const Vector3<Scalar>& c) {
+        return dot(a, cross(b, c));
     };
-    const auto is_behind = [&](Scalar t) {
-        const auto triangle = seen_from_q(t);
-        return dot(triangle.a, cross(triangle.b, triangle.c)) < 0;
-    };
-    constexpr int parts = 16, halvings = 30;
+    const std::array<Scalar, 4> volumes{
+        volume(begin.a, begin.b, begin.c),
+        (volume(end.a, begin.b, begin.c) + volume(begin.a, end.b, begin.c) + volume(begin.a, begin.b, end.c)) / 3,
+        (volume(begin.a, end.b, end.c) + volume(end.a, begin.b, end.c) + volume(end.a, end.b, begin.c)) / 3,
+        volume(end.a, end.b, end.c)};
+    const auto [least, most] = std::minmax_element(volumes.begin(), volumes.end());
+    if (*least > 0 || *most < 0) return 1;  // a cubic stays between its coefficients
+
     const Scalar size = detail::largest_magnitude<Scalar>(high - low);
-    bool before = is_behind(0);
-    for (int part = 1; part <= parts; ++part) {
-        Scalar first = static_cast<Scalar>(part - 1) / parts, last = static_cast<Scalar>(part) / parts;
-        const bool now = is_behind(last);
-        if (now == before) continue;
-        for (int i = 0; i < halvings; ++i) {
+    const auto is_behind = [&](Scalar t) { return detail::cubic_at(volumes, t) < 0; };
+    const auto meets = [&](Scalar t) {
+        const auto corner = [t](const Vector3<Scalar>& a, const Vector3<Scalar>& b) {
+            return Vector3<Scalar>((1 - t) * a + t * b);
+        };
+        const Triangle<Scalar> then{corner(begin.a, end.a), corner(begin.b, end.b), corner(begin.c, end.c)};
+        return closest_point<Scalar>(then, Vector3<Scalar>::Zero()).squared_distance <= Scalar(1e-10) * size * size;
+    };
+    constexpr int halvings = 40;
+    const auto times = detail::turning_times(volumes);
+    for (std::size_t i = 0; i < 3; ++i) {
+        Scalar first = times[i], last = times[i + 1];
+        const bool before = is_behind(first);
+        if (is_behind(last) == before) continue;
+        for (int k = 0; k < halvings; ++k) {
             const Scalar middle = (first + last) / 2;
             (is_behind(middle) == before ? first : last) = middle;
         }
-        const auto nearest = closest_point<Scalar>(seen_from_q(last), Vector3<Scalar>::Zero());
-        if (nearest.squared_distance <= Scalar(1e-10) * size * size) return first;
-        before = now;
+        if (meets(last)) return first;
     }
     return 1;
 }

@@ -34,9 +34,8 @@ struct Press {
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
 
   private:
-    void clear_way(Region<Scalar>& region) const noexcept;
-    void carry(Region<Scalar>& region, const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
-               const Vector3<Scalar>& normal) const noexcept;
+    void take_along(Region<Scalar>& region) const noexcept;
+    void give_way(Region<Scalar>& region) const noexcept;
     void find_touches(Region<Scalar>& region) const noexcept;
     void keep_side(Region<Scalar>& region) const noexcept;
     Scalar aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept;
@@ -91,12 +90,10 @@ void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
         }
     }
     for (const auto& touched : contact.touched) seed_corners(region, touched.corners);
-    const auto keep = [&] {
-        for (const Index v : region.corners_of(contact.watched)) region.keep(v);
-    };
-    if (!contact.crossed) keep();
-    clear_way(region);
-    if (contact.crossed) keep();
+    if (contact.crossed) take_along(region);
+    for (const Index v : region.corners_of(contact.watched)) region.keep(v);
+    const Scalar slack = region.negligible_force() * region.compliance(contact.corners[0]);
+    if (!contact.crossed && contact.gap < -slack) give_way(region);
     find_touches(region);
     // The surface gives way before any force is known.
     for (int pass = 0; pass < detail::touch_passes; ++pass) {
@@ -112,41 +109,36 @@ void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
     keep_side(region);
 }
 
-// The surface gives way at the contact point first. And the tool does not pass it: where the tool's way since the last
-// tick leads through, the surface is taken along.
+// The tool does not pass the surface: what its way since the last tick leads through goes the same way, all of it, or
+// until it is a radius ahead.
+//
+// Seen from a tool that moves by d, a vertex that moves by w d, 0 <= w <= 1, moves by (w - 1) d. So the tool can meet
+// only points of triangles that lie on its way, and does not meet one a part s of the way ahead if the corners there
+// move by w > 1 - s. Triangles off the way are safe however their corners move by such w.
 template <Real Scalar>
-void Press<Scalar>::clear_way(Region<Scalar>& region) const noexcept {
-    const Scalar slack = region.negligible_force() * region.compliance(contact.corners[0]);
-    if (contact.gap < -slack) carry(region, contact.corners, contact.barycentric, contact.normal);
-    if (!contact.crossed) return;
-    const Vector3<Scalar> back = contact.before - contact.on_axis;
-    for (int pass = 0; pass < detail::touch_passes; ++pass) {
-        const TouchedTriangle* passed = nullptr;
-        SegmentHit<Scalar> first{2, Vector3<Scalar>::Zero()};
-        Vector3<Scalar> first_normal = contact.normal;
-        for (const auto& touched : contact.touched) {
-            const auto triangle = triangle_of(region, touched.corners);
-            const auto hit = first_hit(triangle, contact.before, contact.on_axis);
-            if (!hit || !(hit->along < first.along)) continue;
-            Vector3<Scalar> normal = direction(area_vector(triangle), contact.normal);
-            if (dot(normal, back) < 0) normal = -normal;
-            const Scalar height = dot<Scalar>(contact.on_axis - triangle.a, normal);
-            if (!(height < 0)) continue;  // it has only come to the plane
-            passed = &touched;
-            first = *hit;
-            first_normal = normal;
+void Press<Scalar>::take_along(Region<Scalar>& region) const noexcept {
+    const Vector3<Scalar> way = contact.on_axis - contact.before;
+    for (const Index v : region.corners_of(contact.touched)) region.keep(v);
+    for (const auto& touched : contact.touched) {
+        const auto& v = touched.corners;
+        const Triangle<Scalar> before{region.kept(v[0]), region.kept(v[1]), region.kept(v[2])};
+        const auto hit = first_hit(before, contact.before, contact.on_axis);
+        if (!hit) continue;
+        const Scalar part = 1 - (std::max)(hit->along - contact.radius / norm(way), Scalar(0));
+        for (const Index corner : v) {
+            if (region.fixed(corner)) continue;
+            const Vector3<Scalar> so_far = region.position(corner) - region.kept(corner);
+            if (dot(so_far, way) < part * squared_norm(way)) region.place(corner, region.kept(corner) + part * way);
         }
-        if (passed == nullptr) return;
-        carry(region, passed->corners, first.barycentric, first_normal);
     }
 }
 
-// Takes the point of the triangle along to where it just touches the tool.
+// The surface gives way at the contact point first, to where it just touches the tool.
 template <Real Scalar>
-void Press<Scalar>::carry(Region<Scalar>& region, const std::array<Index, 3>& corners,
-                          const Vector3<Scalar>& barycentric, const Vector3<Scalar>& normal) const noexcept {
-    const Vector3<Scalar> now = point_at(triangle_of(region, corners), barycentric);
-    shift_point<Scalar>(region, corners, barycentric, contact.on_axis - contact.radius * normal - now);
+void Press<Scalar>::give_way(Region<Scalar>& region) const noexcept {
+    const Vector3<Scalar> now = point_at(triangle_of(region, contact.corners), contact.barycentric);
+    const Vector3<Scalar> way = contact.on_axis - contact.radius * contact.normal - now;
+    shift_point<Scalar>(region, contact.corners, contact.barycentric, way);
 }
 
 template <Real Scalar>
@@ -198,24 +190,28 @@ Scalar Press<Scalar>::aim(Region<Scalar>& region, Touch<Scalar>& touch) const no
     return dot(nearest->reach, touch.normal) - contact.radius;
 }
 
-// However far vertices have jumped, the surface has not passed the tool: if it would have, they go back to where on
-// their way it had not.
+// However far vertices have jumped, the surface has not passed the tool: if it would have, all go back to where on their
+// way it had not, and leave the tool some room.
 template <Real Scalar>
 void Press<Scalar>::keep_side(Region<Scalar>& region) const noexcept {
-    const auto vertices = region.corners_of(contact.watched);
     Scalar farthest = 0;
-    for (const Index v : vertices) {
+    for (const Index v : region.corners_of(contact.watched)) {
         farthest = (std::max)(farthest, squared_norm<Scalar>(region.position(v) - region.kept(v)));
     }
     if (4 * farthest < contact.radius * contact.radius && contact.gap > -contact.radius / 2) return;
+    const Scalar rounding = 16 * std::numeric_limits<Scalar>::epsilon() * detail::largest_magnitude(contact.on_axis);
     Scalar first = 1;
     for (const auto& watched : contact.watched) {
         const auto& v = watched.corners;
         const Triangle<Scalar> before{region.kept(v[0]), region.kept(v[1]), region.kept(v[2])};
-        first = (std::min)(first, passing_time<Scalar>(before, triangle_of(region, v), contact.on_axis));
+        const Scalar time = passing_time<Scalar>(before, triangle_of(region, v), contact.on_axis);
+        if (time == 1) continue;
+        const Scalar room = std::sqrt(closest_point(before, contact.on_axis).squared_distance);
+        if (room <= rounding) continue;  // on the tool's axis: there is no telling its side
+        const Scalar part = room > contact.radius / 2 ? 1 - contact.radius / (4 * room) : Scalar(0.1);
+        first = (std::min)(first, part * time);
     }
-    if (first == 1) return;
-    for (const Index v : vertices) region.go_back(v, 1 - Scalar(0.9) * first);
+    if (first < 1) region.go_back(1 - first);
 }
 
 template <Real Scalar>

@@ -59,7 +59,7 @@ struct Workspace {
     Points<Scalar> start;           // of saved vertices, where they were when the step began
     Points<Scalar> external;        // of pushed vertices, the constraints' force on them
     Points<Scalar> unbalanced;      // of visited vertices, the force on them at the end of the step
-    Points<Scalar> kept;            // of vertices that a constraint keeps, where they were
+    Points<Scalar> kept;            // of saved vertices, where they were when a constraint kept them, or at the start
     std::vector<Scalar> stiffness;  // of pushed vertices, what touches add to it
     std::vector<Scalar> compliance;
     BoundedList<Touch<Scalar>> touches, touches_before;
@@ -102,10 +102,19 @@ class Region {
         return work_.patch.items();
     }
 
-    /// Keeps the position of `v`, and goes back to the one kept, part of the way or all of it.
-    void keep(Index v) noexcept { work_.kept.col(v) = x_.col(v); }
+    /// Keeps the position of `v`. What is not kept counts as kept where the step began.
+    void keep(Index v) noexcept {
+        save(v);
+        work_.kept.col(v) = x_.col(v);
+    }
     [[nodiscard]] Vector3<Scalar> kept(Index v) const noexcept { return point(work_.kept, v); }
-    void go_back(Index v, Scalar part) noexcept { place(v, (1 - part) * position(v) + part * point(work_.kept, v)); }
+
+    /// All that this step moves goes back to where it was kept, part of the way or all of it.
+    void go_back(Scalar part) noexcept {
+        for (const Index v : work_.saved.items()) {
+            if (!fixed(v)) x_.col(v) = (1 - part) * position(v) + part * kept(v);
+        }
+    }
 
     void shift(Index v, const Vector3<Scalar>& by) noexcept { place(v, position(v) + by); }
 
@@ -168,7 +177,7 @@ class Region {
         x_.col(v) = target;
     }
     void save(Index v) noexcept {
-        if (work_.saved.insert(v)) work_.start.col(v) = x_.col(v);
+        if (work_.saved.insert(v)) work_.start.col(v) = work_.kept.col(v) = x_.col(v);
     }
 
     /// Puts the saved vertices for which `which(v)` back to where they were.
