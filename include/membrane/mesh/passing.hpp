@@ -32,7 +32,7 @@ template <Real Scalar>
     const Scalar c = p[1] - p[0], b = (p[2] - p[1]) - c, a = (p[3] - p[2]) - (p[2] - p[1]) - b;  // a t^2 + 2 b t + c
     const Scalar root = std::sqrt((std::max)(b * b - a * c, Scalar(0)));
     const Scalar sum = b < 0 ? b - root : b + root;
-    const auto inside = [](Scalar t) { return t > 0 && t < 1 ? t : Scalar(0); };
+    const auto inside = [](Scalar t) { return (std::min)((std::max)(Scalar(0), t), Scalar(1)); };  // NaN: 0
     const auto [first, second] = std::minmax({inside(-sum / a), inside(-c / sum)});
     return {0, first, second, 1};
 }
