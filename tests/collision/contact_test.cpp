@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/collision/contact.hpp>
 
+#include <limits>
+
 #include "support/catch.hpp"
 
 using namespace membrane;
@@ -27,4 +29,30 @@ TEST_CASE("a contact touches from its beginning to before its end", "[contact]")
         contact.phase = phase;
         CHECK(contact.touching() == touching);
     }
+}
+
+TEMPLATE_TEST_CASE("a contact is sound if its numbers are, or if it touches nothing", "[contact]", double, float) {
+    using S = TestType;
+    const S bad = std::numeric_limits<S>::quiet_NaN();
+    Contact<S> contact;
+    contact.gap = bad;
+    CHECK(is_sound(contact));
+    contact.phase = ContactPhase::began;
+    contact.radius = 1;
+    CHECK_FALSE(is_sound(contact));
+    contact.gap = 0;
+    CHECK(is_sound(contact));
+    for (auto* numbers : {&contact.barycentric, &contact.point, &contact.normal, &contact.on_axis, &contact.before}) {
+        numbers->z() = bad;
+        CHECK_FALSE(is_sound(contact));
+        numbers->z() = 0;
+    }
+    for (S* number : {&contact.reach, &contact.radius}) {
+        *number = bad;
+        CHECK_FALSE(is_sound(contact));
+        *number = 1;
+    }
+    CHECK(is_sound(contact));
+    contact.radius = 0;
+    CHECK_FALSE(is_sound(contact));
 }

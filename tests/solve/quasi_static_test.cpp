@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include <membrane/collision/contact_tracker.hpp>
 #include <membrane/mesh/shapes.hpp>
 #include <membrane/solve/press.hpp>
 
@@ -538,6 +539,26 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
         CHECK(refused(press(Tool<S>{.position = somewhere, .velocity = wrong}, Contact<S>::none())));
     }
     CHECK(refused(press(Tool<S>{.position = somewhere, .radius = S(-0.1)}, Contact<S>::none())));
+    const Tool<S> tool{.position = {0, 0, S(1.05)}, .radius = S(0.1)};
+    ContactTracker<S> tracker(sphere.mesh);
+    const auto contact = tracker.update(AabbTree<S>(sphere.mesh), sphere.mesh.positions(), tool);
+    REQUIRE(contact.touching());
+    const auto refused_with = [&](auto change) {
+        auto changed = contact;
+        change(changed);
+        return refused(press(tool, changed));
+    };
+    CHECK(refused_with([](auto& c) { c.corners[1] = no_index; }));
+    CHECK(refused_with([](auto& c) { c.corners[2] = 162; }));
+    CHECK(refused_with([](auto& c) { c.gap = Limits::quiet_NaN(); }));
+    CHECK(refused_with([](auto& c) { c.on_axis.x() = Limits::infinity(); }));
+    CHECK(refused_with([](auto& c) { c.radius = 0; }));
+    const std::vector<TouchedTriangle> elsewhere{{0, {0, 1, 162}}};
+    CHECK(refused_with([&](auto& c) { c.touched = elsewhere; }));
+    CHECK(refused_with([&](auto& c) { c.watched = elsewhere; }));
+    Contact<S> made_up;
+    made_up.phase = ContactPhase::ongoing;
+    CHECK(refused(press(tool, made_up)));
     CHECK(refused(load({3, 4, 5}, Vector3<S>(S(-0.5), S(1), S(0.5)), somewhere)));
     CHECK(refused(HeldPoint<S>{0, {3, 4, 5}, Vector3<S>(S(0.5), S(0.5), S(0.5)), somewhere}));
 }

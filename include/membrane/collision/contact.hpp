@@ -4,7 +4,7 @@
 #include <array>
 #include <span>
 
-#include <membrane/core/types.hpp>
+#include <membrane/core/check.hpp>
 
 namespace membrane {
 
@@ -51,5 +51,14 @@ struct Contact {
         return phase == ContactPhase::began || phase == ContactPhase::ongoing;
     }
 };
+
+/// Whether the numbers of a contact that touches are finite. Its vertices are for those to check who know the mesh.
+template <Real Scalar>
+[[nodiscard]] bool is_sound(const Contact<Scalar>& contact) noexcept {
+    if (!contact.touching()) return true;
+    return is_finite(contact.barycentric) && is_finite(contact.point) && is_finite(contact.normal) &&
+           is_finite(contact.on_axis) && is_finite(contact.before) && is_finite(contact.gap) &&
+           is_finite(contact.reach) && is_finite(contact.radius) && contact.radius > 0;
+}
 
 }  // namespace membrane

@@ -41,8 +41,8 @@ class ContactTracker {
     /// @throws InvalidInput for options out of range. Cost: O(V + F log F).
     explicit ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options = {});
 
-    /// The contact of `tool` with the surface at `x` (3 x V [m]). A tool that is not sound touches nothing and is
-    /// forgotten. Online. Cost: O(log F), and in contact the triangles within the tool's reach and their neighbours.
+    /// The contact of `tool` with the surface at `x` (3 x V [m]). A tool that is not sound touches nothing and
+    /// changes nothing. Online. Cost: O(log F), and in contact the triangles within the tool's reach and their neighbours.
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool) noexcept {
         return update(tree, x, tool, origins_);

@@ -59,7 +59,8 @@ struct SpringDamperForce {
 };
 
 /// The membrane's own reaction, what the solver found: the sum over all constraints of the step, scaled from the tissue
-/// to what a hand can feel.
+/// to what a hand can feel. Where a step has loads, pins or a second hand's tool, a policy of one's own takes the
+/// `report.reactions` that are this hand's.
 struct ReactionForce {
     double scale = 1;
 

@@ -28,7 +28,7 @@ struct Press {
     Tool<Scalar> tool;
     Contact<Scalar> contact;
 
-    [[nodiscard]] bool sound() const noexcept { return is_sound(tool); }
+    [[nodiscard]] bool sound() const noexcept { return is_sound(tool) && is_sound(contact); }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>& region) const noexcept;
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
@@ -84,9 +84,13 @@ template <Real Scalar>
 template <Real Scalar>
 void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
     if (!contact.touching()) return;
-    for (const auto& watched : contact.watched) {
-        for (const Index v : watched.corners) {
-            if (!region.check(v)) return;
+    const auto are_vertices = [&](const auto& corners) {
+        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return region.check(v); });
+    };
+    if (!are_vertices(contact.corners)) return;
+    for (const auto triangles : {contact.touched, contact.watched}) {
+        for (const auto& triangle : triangles) {
+            if (!are_vertices(triangle.corners)) return;
         }
     }
     for (const auto& touched : contact.touched) seed_corners(region, touched.corners);

@@ -16,12 +16,11 @@ namespace membrane {
 /// What a step may cost. More of everything is more accurate.
 template <Real Scalar>
 struct SolverOptions {
-    Index layers = 6;  ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
-    Index sweeps = 4;  ///< passes over the queue in each step
-    Index most_visits =
-        unlimited;                ///< visits of vertices in a step, beyond what is held; layer 0 gets its visits anyway
-    Scalar negligible_force = 0;  ///< a vertex with less on it is at rest [N]; 0 takes the network's own figure
-    Index most_touches = 4096;    ///< room for touched triangles; it decides the memory, not the time
+    Index layers = 6;               ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
+    Index sweeps = 4;               ///< passes over the queue in each step
+    Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 and what is held get theirs anyway
+    Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
+    Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
