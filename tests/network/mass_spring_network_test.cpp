@@ -386,3 +386,80 @@ TEMPLATE_TEST_CASE("a network that makes no sense is refused by name", "[network
     CHECK(test::refusal([&] { MassSpringNetwork(mesh, ExponentialSpring{.stiffening = -1}, {.stiffness = S(1)}); }) ==
           "ExponentialSpring: stiffening must be finite and positive, got -1");
 }
+
+// ---- the energy around a vertex
+
+namespace {
+
+/// A vertex whose springs are stretched, pressed together, without length or rest length, of 1 to 1e6 N/m.
+template <class S>
+struct OddVertex {
+    explicit OddVertex(Random& random)
+        : mesh(icosphere<S>({.radius = 1, .subdivisions = 1})),
+          network(mesh, LinearSpring{}, {.stiffness = stiffnesses(random), .rest_length = rest_lengths(random)}),
+          x(test::jittered(mesh.positions(), static_cast<S>(random.chance(0.5) ? 0.02 : 1), random)),
+          v(random.index(42)) {
+        if (random.chance(0.2)) x.col(v) = x.col(network.springs_of(v).front().other);
+    }
+    static std::vector<S> stiffnesses(Random& random) {
+        std::vector<S> values(120);
+        for (S& k : values) k = static_cast<S>(std::pow(10, random.number(0.0, 6.0)));
+        return values;
+    }
+    static std::vector<S> rest_lengths(Random& random) {
+        std::vector<S> values(120);
+        for (S& r : values) r = random.chance(0.1) ? S(0) : random.number<S>(0, 2);
+        return values;
+    }
+    TriangleMesh<S> mesh;
+    MassSpringNetwork<S, LinearSpring> network;
+    Points<S> x;
+    Index v;
+};
+
+}  // namespace
+
+TEST_CASE("a curved pull is the pull, and bounds the energy all around", "[network]") {
+    for (int seed = 1; seed <= cases(20'000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const OddVertex<double> odd(random);
+        const auto curved = odd.network.curved_pull(odd.v, odd.x);
+        const auto pull = odd.network.pull(odd.v, odd.x);
+        REQUIRE(norm<double>(curved.force - pull.force) <= 1e-12 * norm(pull.force));
+        REQUIRE(curved.stiffness == Approx(pull.stiffness));
+
+        const Vector3<double> here = point(odd.x, odd.v),
+                              way = std::pow(10, random.number(-4.0, 1.0)) * random.vector();
+        const double longest = norm(way) * (1 + random.index(2) * random.number());
+        const Vector3<double> relieved = curved.relief * way;
+        const double bend = curved.stiffness * squared_norm(way) - dot(way, relieved) / (1 + longest / curved.size);
+        const double before = odd.network.energy(odd.v, here, odd.x),
+                     after = odd.network.energy(odd.v, here + way, odd.x);
+        REQUIRE(after <= before - dot(curved.force, way) + bend / 2 + 1e-12 * (before + after));
+        REQUIRE(dot(way, relieved) >= -1e-12 * curved.stiffness * squared_norm(way));
+        REQUIRE(curved.relief.trace() <= 2 * curved.stiffness * (1 + 1e-12));
+    }
+}
+
+TEST_CASE("where no spring is pressed together, a curved pull has the curvature of the forces", "[network]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
+        const MassSpringNetwork network(mesh, ExponentialSpring{}, {.stiffness = 3.0});
+        Points<double> x = 1.1 * test::jittered(mesh.positions(), 0.01, random);
+        const Index v = random.index(42);
+        const auto curved = network.curved_pull(v, x);
+        const double h = 1e-6;
+        for (int k = 0; k < 3; ++k) {
+            const Vector3<double> along = Vector3<double>::Unit(k);
+            Points<double> there = x, back = x;
+            there(k, v) += h;
+            back(k, v) -= h;
+            const Vector3<double> found = (network.pull(v, back).force - network.pull(v, there).force) / (2 * h);
+            const Vector3<double> expected = curved.stiffness * along - curved.relief * along;
+            REQUIRE(norm<double>(found - expected) < 1e-5 * curved.stiffness);
+        }
+    }
+}

@@ -27,6 +27,12 @@ Vector3<S> printed(S k, S d, const Vector3<S>& u, const Vector3<S>& v) {
     return -(k * length + d * (v.dot(u) / length)) * u / length;
 }
 
+/// The velocity along `u` at which its length comes from that of `before` in a tick.
+template <class S>
+Vector3<S> velocity_along(const Vector3<S>& u, const Vector3<S>& before, S dt) {
+    return (u.norm() - before.norm()) / dt * u.normalized();
+}
+
 }  // namespace
 
 TEMPLATE_TEST_CASE("a volume spring pulls as (5) says", "[network]", double, float) {
@@ -48,7 +54,8 @@ TEMPLATE_TEST_CASE("a volume spring pulls as (5) says", "[network]", double, flo
         const S tolerance = 30 * std::numeric_limits<S>::epsilon() * (1 + k + d / dt);
 
         const auto pull = backing.pull(v, now, start, dt);
-        REQUIRE(norm<S>(pull.force - printed<S>(k, d, now - anchor, (now - start) / dt)) <= tolerance);
+        const Vector3<S> here = now - anchor, there = start - anchor;
+        REQUIRE(norm<S>(pull.force - printed<S>(k, d, here, velocity_along<S>(here, there, dt))) <= tolerance);
         REQUIRE(pull.stiffness == Approx(k + d / dt));
         // At a standstill there is no damping.
         REQUIRE(norm<S>(backing.pull(v, now, now, dt).force + k * (now - anchor)) <= tolerance);
@@ -58,7 +65,7 @@ TEMPLATE_TEST_CASE("a volume spring pulls as (5) says", "[network]", double, flo
         const Points<S> after = test::jittered(before, S(0.2), random);
         const Vector3<S> u = now - point(after, v), u_before = start - point(before, v);
         const auto moved = backing.at(after, before).pull(v, now, start, dt);
-        REQUIRE(norm<S>(moved.force - printed<S>(k, d, u, (u - u_before) / dt)) <= tolerance);
+        REQUIRE(norm<S>(moved.force - printed<S>(k, d, u, velocity_along<S>(u, u_before, dt))) <= tolerance);
         REQUIRE(moved.stiffness == pull.stiffness);
         REQUIRE(backing.at(after, before).energy(v, now) == Approx(k / 2 * squared_norm(u)));
         // What moves along with its anchor is not damped.
@@ -81,6 +88,41 @@ TEMPLATE_TEST_CASE("springs with their anchors where they were are the same spri
         REQUIRE(there.pull(v, now, start, S(0.1)).force == backing.pull(v, now, start, S(0.1)).force);
         REQUIRE(there.pull(v, now, start, S(0.1)).stiffness == backing.pull(v, now, start, S(0.1)).stiffness);
         REQUIRE(there.energy(v, now) == backing.energy(v, now));
+    }
+}
+
+TEST_CASE("over a short tick the damping is by the velocity along the spring, as it is printed", "[network]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    const VirtualVolumeSprings backing(mesh, {.stiffness = 3.0, .damping = 0.5});
+    for (int seed = 1; seed <= cases(300); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Vector3<double> anchor = point(mesh.positions(), 0), velocity = random.vector();
+        const Vector3<double> now = anchor + random.number(0.1, 1.0) * random.unit_vector();
+        const double dt = 1e-5;
+        const auto pull = backing.pull(0, now, now - dt * velocity, dt);
+        REQUIRE(norm<double>(pull.force - printed<double>(3, 0.5, now - anchor, velocity)) < 1e-4);
+    }
+}
+
+TEST_CASE("the damping force is the negative gradient of what damping takes", "[network]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    const double dt = 0.1, damping = 0.5, h = 1e-5;
+    const VirtualVolumeSprings backing(mesh, {.stiffness = 0.0, .damping = damping});
+    for (int seed = 1; seed <= cases(300); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Vector3<double> anchor = point(mesh.positions(), 0), start = anchor + random.vector();
+        const Vector3<double> now = anchor + random.number(0.1, 1.0) * random.unit_vector();
+        const auto taken = [&](const Vector3<double>& at) {
+            const double change = (at - anchor).norm() - (start - anchor).norm();
+            return damping / (2 * dt) * change * change;
+        };
+        for (int k = 0; k < 3; ++k) {
+            const Vector3<double> by = h * Vector3<double>::Unit(k);
+            const double slope = (taken(now + by) - taken(now - by)) / (2 * h);
+            REQUIRE(std::abs(backing.pull(0, now, start, dt).force[k] + slope) < 1e-7);
+        }
     }
 }
 

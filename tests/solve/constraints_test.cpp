@@ -236,8 +236,7 @@ struct AtRest {
     AtRest(int seed, Index layers)
         : random(static_cast<std::uint64_t>(seed)),
           membrane(LinearSpring{}, random),
-          solver(membrane.network, {.layers = layers, .sweeps = 50, .negligible_force = negligible},
-                 SafeStep{.omega = 1.3}),
+          solver(membrane.network, {.layers = layers, .sweeps = 50, .negligible_force = negligible}),
           x(membrane.mesh.positions()) {}
 
     void push(const std::array<Index, 3>& corners, const Vector3<double>& weights, const Vector3<double>& force) {

@@ -57,17 +57,19 @@ double worst_error(double m, double d, double k, int steps, Simulate simulate) {
     return worst;
 }
 
-/// The error halves with the step: the method is of first order.
+/// The error halves with the step, within `margin`: the method is of first order.
 template <class Simulate>
-void check_first_order(double m, double d, double k, Simulate simulate) {
-    double before = worst_error(m, d, k, 250, simulate);
-    CHECK(before < 0.1);
+void check_first_order(double m, double d, double k, Simulate simulate, double margin = 0.1) {
+    const double first = worst_error(m, d, k, 250, simulate);
+    CHECK(first < 0.1);
+    double before = first;
     for (int steps = 500; steps <= 8000; steps *= 2) {
         const double now = worst_error(m, d, k, steps, simulate);
         CAPTURE(steps, before, now);
-        CHECK(std::log2(before / now) == Approx(1).margin(0.1));
+        CHECK(std::log2(before / now) == Approx(1).margin(margin));
         before = now;
     }
+    CHECK(std::log2(first / before) / 5 == Approx(1).margin(0.1));
     CHECK(before < 0.003);
 }
 
@@ -102,15 +104,18 @@ TEST_CASE("a damped volume spring follows its closed form, too", "[euler]") {
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 0.0, .mass = m, .pinned = {0, 2}});
     const VirtualVolumeSprings backing(mesh, {.stiffness = k, .damping = d});
     const Vector3<double> way(0.3, -0.2, 0.6);
-    check_first_order(m, d, k, [&](double dt, int steps, auto see) {
-        ExplicitEuler euler(network);
-        Points<double> x = mesh.positions(), velocity = zeros<double>(3);
-        x.col(1) += way;
-        for (int i = 1; i <= steps; ++i) {
-            REQUIRE(euler.step(x, velocity, dt, network, backing));
-            see(i, dot<double>(point(x, 1) - backing.anchors().col(1), way) / squared_norm(way));
-        }
-    });
+    check_first_order(
+        m, d, k,
+        [&](double dt, int steps, auto see) {
+            ExplicitEuler euler(network);
+            Points<double> x = mesh.positions(), velocity = zeros<double>(3);
+            x.col(1) += way;
+            for (int i = 1; i <= steps; ++i) {
+                REQUIRE(euler.step(x, velocity, dt, network, backing));
+                see(i, dot<double>(point(x, 1) - backing.anchors().col(1), way) / squared_norm(way));
+            }
+        },
+        0.3);  // where it passes its anchor, the length has a kink
 }
 
 TEMPLATE_TEST_CASE("(2) and (3): the force changes the velocity, the new velocity moves the point", "[euler]", double,
@@ -142,7 +147,8 @@ TEMPLATE_TEST_CASE("(2) and (3): the force changes the velocity, the new velocit
                 continue;
             }
             const Vector3<S> u = point(x0, v) - point(mesh.positions(), v), speed = point(v0, v);
-            const Vector3<S> volume = -S(2) * u - S(0.3) * dot(speed, u) / squared_norm(u) * u;
+            const S rate = (norm(u) - norm<S>(u - dt * speed)) / dt;  // of the length
+            const Vector3<S> volume = -S(2) * u - S(0.3) * rate / norm(u) * u;
             const Vector3<S> force = network.pull(v, x0).force + volume + point(external, v);
             const Vector3<S> new_speed = speed + dt / network.mass(v) * (force - network.viscosity(v) * speed);
             REQUIRE(norm<S>(point(velocity, v) - new_speed) <= 10 * tolerance);

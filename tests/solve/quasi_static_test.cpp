@@ -619,7 +619,8 @@ TEMPLATE_TEST_CASE("a rule that runs away is called unstable, and nothing has mo
     using S = TestType;
     const Sphere<S> sphere;
     const MassSpringNetwork network(sphere.mesh, Runaway{}, NetworkOptions<S>{.stiffness = S(1)});
-    CHECK(status_of_refused(sphere, QuasiStaticSolver(network, {.sweeps = 50}), [&](auto& solver, Points<S>& x) {
+    QuasiStaticSolver runs_away(network, {.sweeps = 50}, SafeStep{});
+    CHECK(status_of_refused(sphere, runs_away, [&](auto& solver, Points<S>& x) {
               return solver.step(x, S(0.1), network, sphere.backing, pull(3, sphere.raised(3, S(0.02))));
           }) == StepStatus::unstable);
 }

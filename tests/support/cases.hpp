@@ -1,15 +1,20 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-/// How many random cases to run: `full` in an optimised build; a twentieth, but at least one, where asserts or a
-/// sanitizer make each case slow.
+#include <cstdlib>
+
+/// How many random cases to run: `full` in an optimised build, or `in_long_run` in one that was asked to be long
+/// (`tests/run --long` sets MEMBRANE_LONG_TESTS); a twentieth, but at least one, where asserts or a sanitizer make each
+/// case slow.
 ///
 ///     for (int seed = 1; seed <= cases(200); ++seed) {
 ///         CAPTURE(seed);
-inline int cases(int full) {
+inline int cases(int full, int in_long_run) {
 #if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__)
-    return full;
+    return std::getenv("MEMBRANE_LONG_TESTS") != nullptr ? in_long_run : full;
 #else
+    static_cast<void>(in_long_run);
     return full < 20 ? 1 : full / 20;
 #endif
 }
+inline int cases(int full) { return cases(full, full); }

@@ -79,6 +79,19 @@ class MassSpringNetwork {
     /// Sum of the spring forces on vertex `v` at positions `x`. A spring of length zero has no direction and no force.
     [[nodiscard]] Pull<Scalar> pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
+    /// The same, and a bound of the energy. A spring of stiffness k and tension T that is l long stores
+    /// k (l' - r)^2 / 2 and a constant when it is l' long, r = l - T / k (or less, where it never stiffens): of
+    /// k (l'^2 - 2 r l' + r^2) / 2 only the second term is no square of a distance. Let u be the direction away from the
+    /// other end. A vertex that moves by a along u and by b across, no more than rho in all, makes
+    /// l' = sqrt((l + a)^2 + b^2) >= l + a + b^2 / (2 (l + rho)). So the energy stays below one that curves by k along the
+    /// spring and by k (1 - r / (l + rho)) across it. `relief` is the sum of k min(r / l, 1) (I - u u^T), `size` the
+    /// smallest max(l, r): with these, relief / (1 + rho / size) is no more than the sum of k r / (l + rho) (I - u u^T).
+    [[nodiscard]] CurvedPull<Scalar> curved_pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// Energy stored in the springs of vertex `v` where it is at `position`, the others at `x` [J].
+    [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position,
+                                const ConstPointsRef<Scalar>& x) const noexcept;
+
     /// Tension of spring `s` [N].
     [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
         return response(springs_[static_cast<std::size_t>(s)], x).tension;
@@ -184,6 +197,44 @@ Pull<Scalar> MassSpringNetwork<Scalar, Law>::pull(Index v, const ConstPointsRef<
         const Scalar across = answer.tension / length;  // curvature at right angles to the spring
         sum.force += across * reach;
         sum.stiffness += (std::max)(answer.stiffness, across);
+    }
+    return sum;
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law>
+CurvedPull<Scalar> MassSpringNetwork<Scalar, Law>::curved_pull(Index v,
+                                                               const ConstPointsRef<Scalar>& x) const noexcept {
+    const Vector3<Scalar> here = point(x, v);
+    CurvedPull<Scalar> sum;
+    for (const auto& end : springs_of(v)) {
+        const Vector3<Scalar> reach = point(x, end.other) - here;
+        const Scalar length = norm(reach);
+        if (length == 0) {
+            sum.stiffness += end.stiffness;
+            continue;
+        }
+        const auto answer = law_(SpringState<Scalar>{end.stiffness, end.rest_length, length});
+        const Scalar across = answer.tension / length;
+        const Scalar stiffness = (std::max)(answer.stiffness, across);
+        const Scalar relief = (std::min)(stiffness - across, stiffness);
+        sum.force += across * reach;
+        sum.stiffness += stiffness;
+        if (!(relief > 0)) continue;
+        const Vector3<Scalar> u = reach / length;
+        sum.relief += diagonal3(relief);
+        sum.relief += outer(-relief, u);
+        sum.size = (std::min)(sum.size, length + (std::max)(-answer.tension / stiffness, Scalar(0)));
+    }
+    return sum;
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law>
+Scalar MassSpringNetwork<Scalar, Law>::energy(Index v, const Vector3<Scalar>& position,
+                                              const ConstPointsRef<Scalar>& x) const noexcept {
+    Scalar sum = 0;
+    for (const auto& end : springs_of(v)) {
+        const Scalar length = norm<Scalar>(point(x, end.other) - position);
+        sum += law_(SpringState<Scalar>{end.stiffness, end.rest_length, length}).energy;
     }
     return sum;
 }

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <concepts>
+#include <limits>
 
 #include <membrane/core/check.hpp>
+#include <membrane/core/symmetric3.hpp>
 
 /// What one spring does at a given length: constant stiffness, or stiffness as a function of the elongation.
 ///
@@ -41,6 +43,14 @@ concept SpringLaw = Real<Scalar> && std::copyable<Law> && requires(const Law& la
     noexcept->std::same_as<SpringResponse<Scalar>>;
 };
 
+/// A law that sets `never_stiffens` says that no spring is stiffer at another length than it is at this one, or than its
+/// tension over its length if that is more. Then steps are known to be safe; with other laws, a solver has to look.
+template <class Law>
+[[nodiscard]] consteval bool never_stiffens() noexcept {
+    if constexpr (requires { Law::never_stiffens; }) return Law::never_stiffens;
+    return false;
+}
+
 /// What pulls on a vertex: the sum over its springs.
 template <Real Scalar>
 struct Pull {
@@ -48,8 +58,20 @@ struct Pull {
     Scalar stiffness;       ///< at least the curvature of the energy in every direction [N/m]
 };
 
+/// What pulls on a vertex, and what is known of the energy around it: for a move d of a length up to rho it is at most
+/// E - force . d + d . (stiffness I - relief / (1 + rho / size)) d / 2, see `MassSpringNetwork::curved_pull`.
+template <Real Scalar>
+struct CurvedPull {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();        ///< [N]
+    Scalar stiffness = 0;                                   ///< [N/m]
+    Symmetric3<Scalar> relief;                              ///< no eigenvalue below zero [N/m]
+    Scalar size = std::numeric_limits<Scalar>::infinity();  ///< [m]
+};
+
 /// Tension proportional to the elongation, [Liu07] 2.2: k (l - r).
 struct LinearSpring {
+    static constexpr bool never_stiffens = true;
+
     template <Real Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
         const Scalar elongation = spring.length - spring.rest_length;

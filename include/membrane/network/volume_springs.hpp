@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <string_view>
@@ -70,8 +71,9 @@ class VirtualVolumeSprings {
     [[nodiscard]] MovedVolumeSprings<Scalar> at(const ConstPointsRef<Scalar>& anchors,
                                                 const ConstPointsRef<Scalar>& previous) const noexcept;
 
-    /// Force of the spring on vertex `v` at `position`. The velocity in (5) is the vertex's relative to its anchor over
-    /// the tick: how often a solver visits the vertex within the tick does not change the damping.
+    /// Force of the spring on vertex `v` at `position`. The velocity along the spring in (5) is by how much its length
+    /// has changed over the tick: how often a solver visits the vertex within the tick does not change the damping, and
+    /// the damping force, like that of a spring, has an energy: k'_d (change of length)^2 / (2 dt).
     [[nodiscard]] Pull<Scalar> pull(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                     Scalar dt) const noexcept {
         const Vector3<Scalar> anchor = point(anchors_, v);
@@ -148,7 +150,8 @@ Pull<Scalar> VirtualVolumeSprings<Scalar>::pull_of_length(Index v, const Vector3
     Pull<Scalar> answer{-k * length, k + rate};
     const Scalar square = squared_norm(length);
     if (rate == 0 || square == 0) return answer;  // the spring acts only while it has a length
-    answer.force -= (rate * dot<Scalar>(length - before, length) / square) * length;
+    const Scalar now = std::sqrt(square);
+    answer.force -= (rate * (now - norm(before)) / now) * length;
     return answer;
 }
 

@@ -145,11 +145,10 @@ template <Real Scalar>
 bool HeldPoint<Scalar>::enforce(Region<Scalar>& region) const noexcept {
     bool changed = false;
     for (auto& touch : region.touches()) {
-        const Scalar compliance = compliance_of(region, touch);
-        if (!(compliance > 0)) continue;
         const Vector3<Scalar> now = point_at(triangle_of(region, corners), barycentric);
-        const Vector3<Scalar> more = (target - now) / compliance;
-        if (!(norm(more) > region.negligible_force())) continue;
+        if (!(norm<Scalar>(target - now) > negligible_shift(region, touch))) continue;
+        const Vector3<Scalar> more = force_for<Scalar>(region, touch, target - now);
+        if (more.isZero(0)) continue;
         change_force(region, touch, more);
         changed = true;
     }

@@ -56,7 +56,7 @@ template <Real Scalar>
 namespace detail {
 
 // Touches share vertices: within one call they take turns this often at the most.
-inline constexpr int touch_passes = 8;
+inline constexpr int most_turns = 8;
 
 /// A face that rocks under a tool moves the contact point along itself, and with it the pressure from corner to corner:
 /// for each corner the stiffness [N/m] that this amounts to. `moment` is the pressure times the distance from the face
@@ -100,11 +100,11 @@ void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
     if (!contact.crossed && contact.gap < -slack) give_way(region);
     find_touches(region);
     // The surface gives way before any force is known.
-    for (int pass = 0; pass < detail::touch_passes; ++pass) {
+    for (int pass = 0; pass < detail::most_turns; ++pass) {
         bool moved = false;
         for (auto& touch : region.touches()) {
             const Scalar overlap = -aim(region, touch);
-            if (!(overlap > region.negligible_force() * compliance_of(region, touch))) continue;
+            if (!(overlap > negligible_shift(region, touch))) continue;
             shift_point<Scalar>(region, touch.corners, touch.barycentric, -overlap * touch.normal);
             moved = true;
         }
@@ -221,24 +221,24 @@ void Press<Scalar>::keep_side(Region<Scalar>& region) const noexcept {
 template <Real Scalar>
 bool Press<Scalar>::enforce(Region<Scalar>& region) const noexcept {
     if (!contact.touching()) return false;
-    bool changed = false;
-    for (int pass = 0; pass < detail::touch_passes; ++pass) {
-        bool again = false;
+    Scalar first = 0;  // largest change of a force in the first turn [N]
+    for (int turn = 0; turn < detail::most_turns; ++turn) {
+        Scalar largest = 0;
         for (auto& touch : region.touches()) {
             const Scalar gap = aim(region, touch);
             const Scalar compliance = compliance_of(region, touch);
             const Scalar pressure = -dot(touch.force, touch.normal);
             if (!(compliance > 0) || (pressure == 0 && gap >= 0)) continue;
             const Scalar more = (std::max)(-gap / compliance, -pressure);
-            if (!(std::abs(more) > region.negligible_force())) continue;
+            if (!(std::abs(more) * compliance > negligible_shift(region, touch))) continue;
             change_force<Scalar>(region, touch, -more * touch.normal);
-            again = true;
+            largest = (std::max)(largest, std::abs(more));
         }
-        changed |= again;
-        if (!again) break;
+        if (turn == 0) first = largest;
+        if (!(largest > first / 2)) break;  // the vertices have to find their balance anew
     }
     keep_side(region);
-    return changed;
+    return first > 0;
 }
 
 template <Real Scalar>

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -13,10 +14,10 @@
 #include <membrane/network/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/constraints.hpp>
-#include <membrane/solve/curvature.hpp>
 #include <membrane/solve/region.hpp>
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
+#include <membrane/solve/visit.hpp>
 
 /// Where the membrane comes to rest, and what it pushes back with.
 ///
@@ -35,7 +36,7 @@ namespace membrane {
 ///
 /// Positions, network and backing are handed in at each step, always those of one membrane; what is remembered (queue,
 /// restless vertices, contact forces) is a cache. One thread at a time for each solver.
-template <Real Scalar, StepRule<Scalar> Rule = SafeStep>
+template <Real Scalar, StepRule<Scalar> Rule = BlockStep>
 class QuasiStaticSolver {
   public:
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
@@ -70,16 +71,13 @@ class QuasiStaticSolver {
     template <class Handed>
     bool visit(Index v, const Handed& scene, Region<Scalar>& region) noexcept;
     template <class Handed>
-    [[nodiscard]] Pull<Scalar> pull_on(Index v, const Handed& scene) const noexcept;
-    template <class Handed>
-    [[nodiscard]] bool diverges(Index v, const Handed& scene, Scalar compliance) const noexcept;
-    template <class Handed>
     bool look(const Handed& scene) noexcept;
-    template <class Handed>
-    [[nodiscard]] Vector3<Scalar> lasting_force(Index v, const Handed& scene) const noexcept;
     template <class Handed>
     void settle(const Handed& scene) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept;
+
+    static constexpr bool gives_numbers =
+        std::same_as<Scalar, decltype(std::declval<Rule>().compliance(VertexState<Scalar>{}))>;
 
     Rule rule_;
     SolverOptions<Scalar> options_;
@@ -89,6 +87,7 @@ class QuasiStaticSolver {
     BoundedList<Index> moved_;
     std::array<Vector3<Scalar>, Workspace<Scalar>::most_constraints> reactions_{};
     StepReport<Scalar> report_;
+    bool mended_ = false;  // by constraints, at the end of the step
 };
 
 template <Real Scalar, StepRule<Scalar> Rule>
@@ -106,6 +105,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const MassSpringNetwork<Scala
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
     }
+    if constexpr (!gives_numbers) work_.block_compliance.resize(static_cast<std::size_t>(network.vertex_count()));
     work_.negligible_force = options.negligible_force > 0 ? options.negligible_force : network.negligible_force();
 }
 
@@ -122,7 +122,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step(PointsRef<Scalar> x, Sc
     if (!(constraints.sound() && ...)) return refuse_step(StepStatus::bad_input, x);
 
     Region<Scalar> region(x, work_);
-    const StepInput<Scalar, MassSpringNetwork<Scalar, Law>, Volume> scene{x, dt, network, volume};
+    const StepInput<Scalar, MassSpringNetwork<Scalar, Law>, Volume> scene{x, dt, network, volume, work_};
     const auto for_each = [&]([[maybe_unused]] auto act) {  // there may be none
         std::size_t i = 0;
         ((region.turn_to(i), act(constraints, i), ++i), ...);
@@ -174,7 +174,7 @@ StepStatus QuasiStaticSolver<Scalar, Rule>::advance(const Handed& scene, Region<
         changed = sweep(scene, region, enforce);
         if (report_.status != StepStatus::advanced) return report_.status;
     }
-    if (changed) enforce();
+    mended_ = changed && enforce();
     if (look(scene)) return StepStatus::advanced;
     region.put_back([&](Index v) { return !work_.held.contains(v); });
     return look(scene) ? StepStatus::unstable : StepStatus::bad_input;  // no better: what was handed in is to blame
@@ -184,8 +184,11 @@ template <Real Scalar, StepRule<Scalar> Rule>
 template <class Handed, class Enforce>
 bool QuasiStaticSolver<Scalar, Rule>::sweep(const Handed& scene, Region<Scalar>& region, Enforce enforce) noexcept {
     bool changed = false;
-    for (const Index v : active_.touched()) changed |= visit(v, scene, region);
-    changed |= enforce();
+    for (Index i = 0; i < options_.contact_visits; ++i) {
+        for (const Index v : active_.touched()) changed |= visit(v, scene, region);
+        if (report_.status != StepStatus::advanced || !enforce()) break;
+        changed = true;
+    }
     for (const Index v : active_.beyond()) changed |= visit(v, scene, region);
     return changed;
 }
@@ -195,33 +198,20 @@ template <class Handed>
 bool QuasiStaticSolver<Scalar, Rule>::visit(Index v, const Handed& scene, Region<Scalar>& region) noexcept {
     if (region.fixed(v)) return false;
     ++report_.visits;
-    const auto pull = pull_on(v, scene);
-    const Scalar mass = scene.network.has_masses() ? scene.network.mass(v) : Scalar(0);
-    const Scalar compliance = rule_.compliance(VertexState<Scalar>{pull.stiffness, mass, scene.dt});
-    if (compliance * pull.stiffness >= 2 && diverges(v, scene, compliance)) {
-        report_.status = StepStatus::unstable;
-        return false;
+    const auto state = state_of<Rule>(scene, v);
+    const auto compliance = rule_.compliance(state);
+    if constexpr (gives_numbers) {
+        if (compliance * state.stiffness >= 2 && diverges(scene, v, compliance)) {
+            report_.status = StepStatus::unstable;
+            return false;
+        }
+        region.set_compliance(v, compliance);
+    } else {
+        region.set_compliance(v, compliance, state.stiffness > 0 ? 1 / state.stiffness : Scalar(0));
     }
-    region.set_compliance(v, compliance);
-    if (!(norm(pull.force) > work_.negligible_force)) return false;
-    scene.x.col(v) += compliance * pull.force;
+    if (!(norm(state.force) > work_.negligible_force)) return false;
+    scene.x.col(v) += held_back<Rule, Scalar>(scene, v, compliance * state.force);
     return true;
-}
-
-template <Real Scalar, StepRule<Scalar> Rule>
-template <class Handed>
-bool QuasiStaticSolver<Scalar, Rule>::diverges(Index v, const Handed& scene, Scalar compliance) const noexcept {
-    const Scalar bound = pull_on(v, scene).stiffness, springs = scene.network.pull(v, scene.x).stiffness;
-    return compliance * (largest_curvature<Scalar>(scene.network, v, scene.x) + (bound - springs)) >= 2;
-}
-
-template <Real Scalar, StepRule<Scalar> Rule>
-template <class Handed>
-Pull<Scalar> QuasiStaticSolver<Scalar, Rule>::pull_on(Index v, const Handed& scene) const noexcept {
-    const auto springs = scene.network.pull(v, scene.x);
-    const auto backing = scene.volume.pull(v, point(scene.x, v), point(work_.start, v), scene.dt);
-    const Scalar touches = (std::max)(work_.stiffness[static_cast<std::size_t>(v)], Scalar(0));
-    return {springs.force + backing.force + point(work_.external, v), springs.stiffness + backing.stiffness + touches};
 }
 
 // The forces at the end; false if any is not finite.
@@ -229,7 +219,7 @@ template <Real Scalar, StepRule<Scalar> Rule>
 template <class Handed>
 bool QuasiStaticSolver<Scalar, Rule>::look(const Handed& scene) noexcept {
     const auto look_at = [&](Index v, bool free) {
-        const auto force = pull_on(v, scene).force;
+        const auto force = pull_on(scene, v).force;
         work_.unbalanced.col(v) = force;
         ++report_.visits;
         if (free) report_.residual = (std::max)(report_.residual, norm(force));
@@ -243,22 +233,12 @@ bool QuasiStaticSolver<Scalar, Rule>::look(const Handed& scene) noexcept {
     return finite;
 }
 
-// Damping may hold in balance, for the length of a tick, what is not at rest.
-template <Real Scalar, StepRule<Scalar> Rule>
-template <class Handed>
-Vector3<Scalar> QuasiStaticSolver<Scalar, Rule>::lasting_force(Index v, const Handed& scene) const noexcept {
-    const Vector3<Scalar> here = point(scene.x, v), start = point(work_.start, v);
-    const Vector3<Scalar> still = scene.volume.pull(v, here, here, scene.dt).force;
-    const Vector3<Scalar> moving = scene.volume.pull(v, here, start, scene.dt).force;
-    return point(work_.unbalanced, v) + (still - moving);
-}
-
 // Who has moved, and who has to be looked at again.
 template <Real Scalar, StepRule<Scalar> Rule>
 template <class Handed>
 void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene) noexcept {
     active_.settle(
-        [&](Index v) { return work_.held.contains(v) || norm(lasting_force(v, scene)) <= work_.negligible_force; });
+        [&](Index v) { return work_.held.contains(v) || norm(lasting_force(scene, v)) <= work_.negligible_force; });
     for (const Index v : work_.saved.items()) {
         const Vector3<Scalar> way = point(scene.x, v) - point(work_.start, v);
         if (way.isZero(0)) continue;
@@ -267,7 +247,7 @@ void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene) noexcept {
         if (norm(way) > negligible) active_.stir_neighbours(scene.network, v);
     }
     report_.moved = moved_.items();
-    report_.converged = active_.close() && report_.residual <= work_.negligible_force;
+    report_.converged = active_.close() && !mended_ && report_.residual <= work_.negligible_force;
     std::swap(last_held_, work_.held);
 }
 

@@ -8,18 +8,10 @@
 #include <vector>
 
 #include <membrane/core/index_set.hpp>
+#include <membrane/core/symmetric3.hpp>
 #include <membrane/core/types.hpp>
 
 namespace membrane {
-
-/// What is handed in for one step.
-template <class Scalar, class Network, class Volume>
-struct StepInput {
-    PointsRef<Scalar>& x;
-    Scalar dt;
-    const Network& network;
-    const Volume& volume;
-};
 
 /// A point of the surface that a constraint acts on, and the force it acts with.
 template <Real Scalar>
@@ -62,6 +54,7 @@ struct Workspace {
     Points<Scalar> kept;            // of saved vertices, where they were when a constraint kept them, or at the start
     std::vector<Scalar> stiffness;  // of pushed vertices, what touches add to it
     std::vector<Scalar> compliance;
+    std::vector<Symmetric3<Scalar>> block_compliance;  // for rules that give blocks, else empty
     BoundedList<Touch<Scalar>> touches, touches_before;
     std::array<Range, most_constraints> ranges{}, ranges_before{};
     Scalar negligible_force = 0;
@@ -130,7 +123,15 @@ class Region {
         work_.stiffness[static_cast<std::size_t>(v)] += by;
     }
 
-    /// How far `v` moved for each newton at the last visit, zero if it is fixed [m/N].
+    /// How far `v` moves for `force` by the rule of the last visit, not at all if it is fixed [m].
+    [[nodiscard]] Vector3<Scalar> answer(Index v, const Vector3<Scalar>& force) const noexcept {
+        if (fixed(v)) return Vector3<Scalar>::Zero();
+        const auto at = static_cast<std::size_t>(v);
+        return work_.block_compliance.empty() ? Vector3<Scalar>(work_.compliance[at] * force)
+                                              : work_.block_compliance[at] * force;
+    }
+
+    /// How far at least [m/N].
     [[nodiscard]] Scalar compliance(Index v) const noexcept {
         return fixed(v) ? Scalar(0) : work_.compliance[static_cast<std::size_t>(v)];
     }
@@ -169,6 +170,11 @@ class Region {
 
     void set_compliance(Index v, Scalar compliance) noexcept {
         work_.compliance[static_cast<std::size_t>(v)] = compliance;
+    }
+    /// @pre the workspace has room for blocks
+    void set_compliance(Index v, const Symmetric3<Scalar>& compliance, Scalar least) noexcept {
+        set_compliance(v, least);
+        work_.block_compliance[static_cast<std::size_t>(v)] = compliance;
     }
 
     /// Moves `v`, keeping where it was when the step began.

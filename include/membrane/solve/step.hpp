@@ -18,6 +18,7 @@ template <Real Scalar>
 struct SolverOptions {
     Index layers = 6;               ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
     Index sweeps = 4;               ///< passes over the queue in each step
+    Index contact_visits = 4;       ///< visits of layer 0 in each sweep: what touches the tool settles last
     Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 and what is held get theirs anyway
     Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
     Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time
@@ -60,6 +61,7 @@ void SolverOptions<Scalar>::check() const {
     };
     at_least(layers, 0, "layers");
     at_least(sweeps, 1, "sweeps");
+    at_least(contact_visits, 1, "contact_visits");
     at_least(most_visits, 1, "most_visits");
     at_least(most_touches, 0, "most_touches");
     if (!is_finite(negligible_force) || negligible_force < 0) {

@@ -64,15 +64,44 @@ void shift_point(Region<Scalar>& region, const std::array<Index, 3>& corners, co
     }
 }
 
-/// How far the touched point moves for each newton on it [m/N].
+/// How far the touched point moves for `force` on it [m].
 template <Real Scalar>
-[[nodiscard]] Scalar compliance_of(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
+[[nodiscard]] Vector3<Scalar> answer_of(const Region<Scalar>& region, const Touch<Scalar>& touch,
+                                        const Vector3<Scalar>& force) noexcept {
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Scalar weight = touch.barycentric[static_cast<Eigen::Index>(k)];
+        sum += weight * region.answer(touch.corners[k], weight * force);
+    }
+    return sum;
+}
+
+/// A distance that is not worth moving it by: what a negligible force does where all springs resist [m].
+template <Real Scalar>
+[[nodiscard]] Scalar negligible_shift(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
     Scalar sum = 0;
     for (std::size_t k = 0; k < 3; ++k) {
         const Scalar weight = touch.barycentric[static_cast<Eigen::Index>(k)];
         sum += weight * weight * region.compliance(touch.corners[k]);
     }
-    return sum;
+    return region.negligible_force() * sum;
+}
+
+/// How far it moves along its normal for each newton along that [m/N].
+template <Real Scalar>
+[[nodiscard]] Scalar compliance_of(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
+    return dot(touch.normal, answer_of(region, touch, touch.normal));
+}
+
+/// The force that would move it by `way` [N]; none where nothing can.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> force_for(const Region<Scalar>& region, const Touch<Scalar>& touch,
+                                        const Vector3<Scalar>& way) noexcept {
+    const Vector3<Scalar> x = answer_of<Scalar>(region, touch, Vector3<Scalar>::UnitX());
+    const Vector3<Scalar> y = answer_of<Scalar>(region, touch, Vector3<Scalar>::UnitY());
+    const Vector3<Scalar> z = answer_of<Scalar>(region, touch, Vector3<Scalar>::UnitZ());
+    if (!(x[0] > 0)) return Vector3<Scalar>::Zero();
+    return inverse(Symmetric3<Scalar>{x[0], y[1], z[2], x[1], x[2], y[2]}) * way;
 }
 
 /// Brings what the touch does to its corners into the region, and takes it out again.
@@ -98,8 +127,8 @@ void change_force(Region<Scalar>& region, Touch<Scalar>& touch, const Vector3<Sc
     for (std::size_t k = 0; k < 3; ++k) {
         const Vector3<Scalar> part = touch.barycentric[static_cast<Eigen::Index>(k)] * force;
         region.push(touch.corners[k], part);
-        const Scalar compliance = region.compliance(touch.corners[k]);
-        if (compliance > 0) region.shift(touch.corners[k], compliance * part);
+        const Vector3<Scalar> way = region.answer(touch.corners[k], part);
+        if (!way.isZero(0)) region.shift(touch.corners[k], way);
     }
 }
 

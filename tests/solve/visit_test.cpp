@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/visit.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/network/volume_springs.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/meshes.hpp"
+#include "support/spring_law_check.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+/// A small membrane in the middle of a step.
+template <class Law>
+struct MidStep {
+    explicit MidStep(std::uint64_t seed, const Law& law = {})
+        : random(seed),
+          network(mesh, law, {.stiffness = 3.0, .mass = 0.5}),
+          backing(mesh, {.stiffness = 2.0, .damping = 0.3}),
+          work(
+              42, [](Index) { return false; }, 4),
+          x(test::jittered(mesh.positions(), 0.1, random)),
+          ref(x),
+          v(random.index(42)) {
+        work.open();
+        work.start = test::jittered(x, 0.05, random);
+        work.external.col(v) = force;
+        work.stiffness[static_cast<std::size_t>(v)] = 7;
+    }
+    Random random;
+    TriangleMesh<double> mesh = icosphere({.radius = 1, .subdivisions = 1});
+    MassSpringNetwork<double, Law> network;
+    VirtualVolumeSprings<double> backing;
+    Workspace<double> work;
+    Points<double> x;
+    PointsRef<double> ref;
+    Index v;
+    Vector3<double> force = random.vector();
+    StepInput<double, MassSpringNetwork<double, Law>, VirtualVolumeSprings<double>> scene{ref, 0.1, network, backing,
+                                                                                          work};
+};
+
+struct Blocks {
+    static constexpr bool needs_relief = true;
+};
+struct Numbers {};
+
+}  // namespace
+
+TEST_CASE("a vertex is told of all that pulls on it", "[visit]") {
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        MidStep<LinearSpring> step(static_cast<std::uint64_t>(seed));
+        const Index v = step.v;
+        const auto springs = step.network.pull(v, step.x);
+        const auto backing = step.backing.pull(v, point(step.x, v), point(step.work.start, v), 0.1);
+        const Vector3<double> force = springs.force + backing.force + step.force;
+        const double stiffness = springs.stiffness + backing.stiffness + 7;
+
+        REQUIRE(norm<double>(pull_on(step.scene, v).force - force) < 1e-13);
+        REQUIRE(pull_on(step.scene, v).stiffness == Approx(stiffness));
+        for (const auto& state : {state_of<Numbers>(step.scene, v), state_of<Blocks>(step.scene, v)}) {
+            REQUIRE(norm<double>(state.force - force) < 1e-13);
+            REQUIRE(state.stiffness == Approx(stiffness));
+            REQUIRE(state.mass == 0.5);
+            REQUIRE(state.dt == 0.1);
+            REQUIRE_FALSE(state.touched);
+        }
+        REQUIRE(state_of<Numbers>(step.scene, v).relief.trace() == 0);
+        REQUIRE(state_of<Blocks>(step.scene, v).relief.trace() == step.network.curved_pull(v, step.x).relief.trace());
+        step.work.seeds.insert(v);
+        REQUIRE(state_of<Blocks>(step.scene, v).touched);
+
+        // What damping holds back is no rest.
+        step.work.unbalanced.col(v) = force;
+        const Vector3<double> lasting =
+            springs.force + step.force - 2.0 * (point(step.x, v) - point(step.backing.anchors(), v));
+        REQUIRE(norm<double>(lasting_force(step.scene, v) - lasting) < 1e-13);
+    }
+}
+
+TEST_CASE("a way on which springs stiffen is halved until the energy does not rise, others are not", "[visit]") {
+    int halved = 0;
+    for (int seed = 1; seed <= cases(300); ++seed) {
+        CAPTURE(seed);
+        const auto check = [&](auto step) {
+            const Index v = step.v;
+            const Vector3<double> pull = pull_on(step.scene, v).force, start = point(step.x, v);
+            const Vector3<double> way = step.random.number(0.0, 0.5) * direction<double>(pull, pull);
+            const Vector3<double> found = held_back<BlockStep, double>(step.scene, v, way);
+            const auto others = others_on(step.scene, v);
+            const auto energy = [&](const Vector3<double>& by) {
+                return step.network.energy(v, start + by, step.x) - dot<double>(others.force, by) +
+                       others.stiffness * squared_norm(by) / 2;
+            };
+            REQUIRE(held_back<MassStep, double>(step.scene, v, way) == way);
+            if (found == way) return;
+            ++halved;
+            const double times = std::log2(norm(way) / norm(found));
+            REQUIRE(times == Approx(std::round(times)));
+            REQUIRE(norm<double>(cross(way, found)) < 1e-12);
+            REQUIRE(energy(found) <= energy({0, 0, 0}) + 1e-12);
+            REQUIRE(energy(2 * found) > energy({0, 0, 0}));
+        };
+        check(MidStep<ExponentialSpring>(static_cast<std::uint64_t>(seed)));
+        check(MidStep<test::CubicSpring>(static_cast<std::uint64_t>(seed)));
+        MidStep<LinearSpring> linear(static_cast<std::uint64_t>(seed));
+        const Vector3<double> far(9, 9, 9);
+        REQUIRE(held_back<BlockStep, double>(linear.scene, linear.v, far) == far);
+    }
+    CHECK(halved > cases(30));
+}
+
+TEST_CASE("a step diverges beyond two over the curvature", "[visit]") {
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        MidStep<LinearSpring> step(static_cast<std::uint64_t>(seed));
+        const double others = others_on(step.scene, step.v).stiffness;
+        const double limit = 2 / (largest_curvature<double>(step.network, step.v, step.x) + others);
+        REQUIRE_FALSE(diverges(step.scene, step.v, 0.999 * limit));
+        REQUIRE(diverges(step.scene, step.v, 1.001 * limit));
+    }
+}
