@@ -71,7 +71,7 @@ const std::vector<Table> all_tables{
      "From a vertex held 0.2 R inside to rest, to the same residual",
      {{"explicit Euler at its best", "explicit_euler"},
       {"quasi-static, all layers", "quasi_static/all_layers", Row::gain, "explicit_euler"},
-      {"  with omega 1.9", "quasi_static/omega_1_9", Row::gain, "explicit_euler"},
+      {"  with omega 1.4", "quasi_static/omega_1_4", Row::gain, "explicit_euler"},
       {"quasi-static, 6 layers", "quasi_static/six_layers", Row::gain, "explicit_euler"},
       {"Euler: best dt", "explicit_euler", Row::counter, "dt"},
       {"Euler: best viscosity", "explicit_euler", Row::counter, "viscosity", "Ns/m"},

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-// What the loop needs, in the order of the data flow. Scripts and the explicit Euler method are included by their own
-// names.
+// What the loop needs, in the order of the data flow. Scripts, the explicit Euler method and what tells how
+// accurate a step is are included by their own names.
 //
 // clang-format off
 #include <membrane/core/types.hpp>

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <membrane/accuracy/newton_system.hpp>
+#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/network/volume_springs.hpp>
+
+namespace membrane {
+
+/// Springs and backing where the membrane is.
+struct ElasticState {
+    Points<double> x;                 ///< 3 x V [m]
+    Points<double> springs, backing;  ///< force on each vertex, 3 x V [N]
+    double energy = 0;                ///< of the springs [J]
+    double largest_force = 0;         ///< of a single spring, or on a single vertex by the backing [N]
+};
+
+/// A membrane without time, in double whatever its scalar: its springs by their law, its backing as it pulls in a tick
+/// without end, in which no damping is left.
+///
+///     Elasticity elasticity(network, volume);
+///     const auto state = elasticity.at(x);                    // state.springs + state.backing [N]
+///     elasticity.add_stiffness(state, system);
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
+class Elasticity {
+    static_assert(SpringLaw<Law, double>, "an equilibrium is found in double: the law must take SpringState<double>");
+
+  public:
+    /// Keeps a reference to both.
+    Elasticity(const MassSpringNetwork<Scalar, Law>& network, const Volume& volume)
+        : network_(network), volume_(volume) {}
+
+    /// O(V + springs).
+    [[nodiscard]] ElasticState at(const Points<double>& x);
+
+    /// Adds the second derivative of the energy to H, exact for springs and for a backing that is linear; else as much
+    /// as the backing says its curvature is at the most.
+    void add_stiffness(const ElasticState& state, NewtonSystem& system) const;
+
+    /// How much more energy `b` holds than `a` [J]; of the backing by the trapezium rule, exact where it is linear.
+    [[nodiscard]] double energy_change(const ElasticState& a, const ElasticState& b) const {
+        return (b.energy - a.energy) - (a.backing + b.backing).cwiseProduct(b.x - a.x).sum() / 2;
+    }
+
+    /// The largest of the springs' stiffnesses, and the backing's [N/m].
+    [[nodiscard]] double largest_stiffness(const ElasticState& state) const;
+
+  private:
+    [[nodiscard]] SpringResponse<double> response(const Spring<Scalar>& spring, double length) const noexcept {
+        const double shortest = (std::numeric_limits<double>::min)();  // a law is asked for no less
+        return network_.law()(SpringState<double>{static_cast<double>(spring.stiffness),
+                                                  static_cast<double>(spring.rest_length),
+                                                  (std::max)(length, shortest)});
+    }
+    [[nodiscard]] static Vector3<double> reach(const Spring<Scalar>& spring, const Points<double>& x) noexcept {
+        return point(x, spring.second) - point(x, spring.first);
+    }
+    void ask_backing(const Points<double>& x);
+
+    const MassSpringNetwork<Scalar, Law>& network_;
+    const Volume& volume_;
+    Points<Scalar> asked_;     // where the backing was asked last, 3 x V
+    Points<double> answered_;  // its force there
+    std::vector<double> backing_stiffness_;
+};
+
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
+ElasticState Elasticity<Scalar, Law, Volume>::at(const Points<double>& x) {
+    ElasticState state{x, Points<double>::Zero(3, x.cols()), Points<double>::Zero(3, x.cols())};
+    for (const auto& spring : network_.springs()) {
+        const Vector3<double> along = reach(spring, x);
+        const double length = norm(along);
+        const auto answer = response(spring, length);
+        state.energy += answer.energy;
+        if (length == 0) continue;
+        const Vector3<double> pull = (answer.tension / length) * along;
+        state.springs.col(spring.first) += pull;
+        state.springs.col(spring.second) -= pull;
+        state.largest_force = (std::max)(state.largest_force, std::abs(answer.tension));
+    }
+    ask_backing(x);
+    for (Index v = 0; v < x.cols(); ++v) {
+        const Vector3<double> since = point(x, v) - point(asked_, v).template cast<double>();
+        state.backing.col(v) = point(answered_, v) - backing_stiffness_[static_cast<std::size_t>(v)] * since;
+        state.largest_force = (std::max)(state.largest_force, norm(point(state.backing, v)));
+    }
+    return state;
+}
+
+// Where a float is asked anew its rounding changes the answer: it is not, as long as x hardly moves.
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
+void Elasticity<Scalar, Law, Volume>::ask_backing(const Points<double>& x) {
+    const bool first = asked_.cols() == 0;
+    if (first) {
+        asked_.resize(3, x.cols());
+        answered_.resize(3, x.cols());
+        backing_stiffness_.resize(static_cast<std::size_t>(x.cols()));
+    }
+    constexpr auto endless = std::numeric_limits<Scalar>::infinity();
+    const double spacing = static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * x.cwiseAbs().maxCoeff();
+    for (Index v = 0; v < x.cols(); ++v) {
+        const Vector3<double> here = point(x, v);
+        if (!first && norm<double>(here - point(asked_, v).template cast<double>()) <= 64 * spacing) continue;
+        const Vector3<Scalar> place = here.cast<Scalar>();
+        const auto pull = volume_.pull(v, place, place, endless);
+        asked_.col(v) = place;
+        answered_.col(v) = pull.force.template cast<double>();
+        backing_stiffness_[static_cast<std::size_t>(v)] = pull.stiffness;
+    }
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
+void Elasticity<Scalar, Law, Volume>::add_stiffness(const ElasticState& state, NewtonSystem& system) const {
+    for (const auto& spring : network_.springs()) {
+        const Vector3<double> along = reach(spring, state.x);
+        const double length = norm(along);
+        Eigen::Matrix3d block = static_cast<double>(spring.stiffness) * Eigen::Matrix3d::Identity();
+        if (length > 0) {
+            const auto answer = response(spring, length);
+            const double across = answer.tension / length;
+            const Vector3<double> u = along / length;
+            block = across * Eigen::Matrix3d::Identity() + (answer.stiffness - across) * u * u.transpose();
+        }
+        system.add(spring.first, spring.first, block);
+        system.add(spring.second, spring.second, block);
+        system.add(spring.first, spring.second, -block);
+    }
+    for (Index v = 0; v < state.x.cols(); ++v) {
+        system.add(v, v, backing_stiffness_[static_cast<std::size_t>(v)] * Eigen::Matrix3d::Identity());
+    }
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
+double Elasticity<Scalar, Law, Volume>::largest_stiffness(const ElasticState& state) const {
+    double largest = 0;
+    for (const auto& spring : network_.springs()) {
+        largest = (std::max)(largest, response(spring, norm(reach(spring, state.x))).stiffness);
+    }
+    for (const double k : backing_stiffness_) largest = (std::max)(largest, k);
+    return largest;
+}
+
+}  // namespace membrane

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include <membrane/accuracy/elasticity.hpp>
+#include <membrane/accuracy/rest_scene.hpp>
+#include <membrane/accuracy/rest_search.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/solve/propagation_queue.hpp>
+
+/// Where the membrane really comes to rest, and what it then pushes back with: the reference for one's own scenes.
+///
+///     #include <membrane/accuracy/equilibrium.hpp>
+///     const auto rest = membrane::equilibrium(x, mesh, network, backing, {}, press(tool, contact), pull(7, target));
+///     if (!rest.converged) ...
+///     (x - rest.x).colwise().norm().maxCoeff();                              // error of a step's positions [m]
+///     rest.reactions[0];                                                     // force of the membrane on the tool [N]
+namespace membrane {
+
+/// The equilibrium near `x` (3 x V [m]) under the constraints of a step, to the last digits of a double, whatever the
+/// network's scalar; reactions are as in `StepReport`. Not `converged` if none was found: then `x` is how far it came.
+///
+/// All vertices at once by Newton's method, with exact second derivatives and sparse factors; what is near a tool is
+/// an inequality with a curvature of its own, sequential quadratic programming [Nocedal06] 18. A line search on the
+/// energy, and on the deepest overlap with a weight that makes the penalty exact, leads there from afar. Tools press the
+/// whole surface, not only `contact.touched`; of a contact it uses where it is, its normal and its radius. A tool that
+/// is far in comes from outside, in as many increments as it is half radii deep. Where nothing can move, a tool may
+/// overlap and a point need not be held, as in a step.
+///
+/// Where a membrane can rest in several ways, the start decides, and increments may.
+///
+/// @throws InvalidInput for points that are not one finite for each vertex, a mesh, network and backing that do not
+/// belong together, an option out of its range, a constraint that is not sound. Offline.
+/// Cost: some 5 to 20 sparse factorisations for each increment.
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, RestConstraint... Constraints>
+[[nodiscard]] Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                      const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
+                                      const Volume& volume, const EquilibriumOptions& options,
+                                      const Constraints&... constraints);
+
+namespace detail {
+
+inline void check_count(Eigen::Index found, Index vertices, std::string_view what) {
+    if (found == vertices) return;
+    refuse(equilibrium_name, what, " must have as many vertices as the mesh, ", vertices, ", got ", found);
+}
+
+template <Real Scalar, class Network, class Volume>
+void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh, const Network& network,
+               const Volume& volume) {
+    check_count(network.vertex_count(), mesh.vertex_count(), "the network");
+    check_count(x.cols(), mesh.vertex_count(), "x");
+    if constexpr (requires { volume.anchors().cols(); }) {
+        check_count(volume.anchors().cols(), mesh.vertex_count(), "the backing");
+    }
+    for (Index v = 0; v < x.cols(); ++v) {
+        for (Index k = 0; k < 3; ++k) {
+            if (is_finite(x(k, v))) continue;
+            refuse(equilibrium_name, std::string_view("xyz").substr(static_cast<std::size_t>(k), 1), " of vertex ", v,
+                   " must be finite [m], got ", x(k, v));
+        }
+        const auto here = point(x, v);
+        if (is_finite(volume.pull(v, here, here, std::numeric_limits<Scalar>::infinity()).force)) continue;
+        refuse(equilibrium_name, "the backing of vertex ", v,
+               " must pull with a finite force [N], got one that is not");
+    }
+}
+
+/// Where the constraints say that a force enters, and what tools touch at the start.
+[[nodiscard]] inline std::vector<Index> seeds_of(const RestScene& scene, const Triangles& triangles,
+                                                 const Points<double>& x) {
+    std::vector<Index> seeds = scene.seeds();
+    for (const auto& pressing : scene.tools()) {
+        const double far = pressing.tool.radius + pressing.reach;
+        for (const auto& corners : triangles.colwise()) {
+            if (distance_from_axis(triangle_at(x, corners), pressing.tool) > far) continue;
+            seeds.insert(seeds.end(), corners.begin(), corners.end());
+        }
+    }
+    return seeds;
+}
+
+}  // namespace detail
+
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, RestConstraint... Constraints>
+Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, const TriangleMesh<Scalar>& mesh,
+                        const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                        const EquilibriumOptions& options, const Constraints&... constraints) {
+    options.check();
+    detail::check_fit(x, mesh, network, volume);
+    std::vector<unsigned char> fixed(static_cast<std::size_t>(network.vertex_count()));
+    for (Index v = 0; v < network.vertex_count(); ++v) fixed[static_cast<std::size_t>(v)] = network.pinned(v) ? 1 : 0;
+    const Points<double> start = x.template cast<double>();
+    RestScene scene(start, fixed);
+    std::size_t count = 0;
+    ((scene.turn_to(count++), describe(constraints, scene)), ...);
+
+    PropagationQueue queue(network.vertex_count());
+    queue.build(network, detail::seeds_of(scene, mesh.triangles(), start), options.layers);
+    for (Index v = 0; v < network.vertex_count(); ++v) {
+        const bool stays = options.layers != unlimited && !queue.contains(v);
+        if (stays || scene.fixed(v)) fixed[static_cast<std::size_t>(v)] = 1;
+    }
+    const Elasticity elasticity(network, volume);
+    return RestSearch(start, mesh.triangles(), elasticity, scene, fixed, options).run(count);
+}
+
+}  // namespace membrane

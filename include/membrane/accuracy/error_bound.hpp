@@ -1,0 +1,288 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include <membrane/accuracy/convexity.hpp>
+#include <membrane/accuracy/linearised.hpp>
+#include <membrane/accuracy/rest_problem.hpp>
+
+/// How far a membrane is from rest, proven.
+///
+///     membrane::ErrorBound bound(network);                                          // offline: allocates all it needs
+///     const auto report = solver.step(x, dt, network, backing, pull(7, target));
+///     const auto error = bound.of(x, network, backing, pull(7, target));
+///     if (error.certified()) {
+///         error.position                                                            // no vertex is farther off [m]
+///         error.reactions[0].farthest_from(report.reactions[0])                     // the force is no farther off [N]
+///     }
+namespace membrane {
+
+struct ErrorBoundOptions {
+    Index refinements = 200;  ///< products with the stiffness at the most; soft backings need more
+
+    /// @throws InvalidInput for an option out of its range
+    void check() const;
+};
+
+enum class BoundStatus {
+    certified,
+    not_convex,      ///< the energy could not be shown to be convex as far as the equilibrium seems to be
+    did_not_refine,  ///< the equilibrium was not neared enough to say anything
+    contact,         ///< a tool touches: not treated
+    unsupported,     ///< a constraint of one's own, or held points with a corner that something else holds too
+    bad_input,       ///< a number is not finite, an index names no vertex, counts do not agree
+};
+
+/// A force that is not known exactly: within `radius` of `centre` [N].
+struct EnclosedForce {
+    Vector3<double> centre = Vector3<double>::Zero();
+    double radius = std::numeric_limits<double>::infinity();
+
+    /// Upper bound of the distance to `force` [N].
+    template <class Force>
+    [[nodiscard]] double farthest_from(const Eigen::MatrixBase<Force>& force) const noexcept {
+        return norm<double>(force.template cast<double>() - centre) * (1 + 1e-15) + radius;
+    }
+};
+
+/// What is known of the equilibrium near a state. The span is the `ErrorBound`'s and valid until its next call.
+struct ErrorReport {
+    BoundStatus status = BoundStatus::bad_input;
+
+    /// If certified: exactly one equilibrium has every vertex within `position` of where it is now; else infinite [m].
+    double position = std::numeric_limits<double>::infinity();
+
+    /// If certified: the reaction of each constraint in turn at that equilibrium.
+    std::span<const EnclosedForce> reactions;
+
+    /// Where no bound is known, how far the equilibrium seems to be [m]; not proven. The centres of `reactions` are
+    /// then estimates too.
+    double estimate = std::numeric_limits<double>::infinity();
+
+    double convexity = 0;   ///< lower bound of the smallest eigenvalue of the stiffness around [N/m], where positive
+    Index refinements = 0;  ///< that were done
+
+    [[nodiscard]] bool certified() const noexcept { return status == BoundStatus::certified; }
+};
+
+/// Proves how far a membrane of linear springs is from rest, whoever brought it where it is, and whether the solver
+/// has moved all of its vertices or some: the equilibrium meant is that of all that is free.
+///
+/// Let E be the energy of springs, backing and loads, x the state (with what is held in its place), and C all states
+/// whose free vertices are within rho of x: a convex set. If the stiffness has no eigenvalue below mu > 0 on C, as
+/// `Convexity` shows, then (grad E(a) - grad E(b)) . (a - b) >= mu |a - b|^2 for a and b in C, which so has one
+/// equilibrium at the most. Take any y, its unbalanced forces r = -grad E(y), and the ball B around it of radius
+/// e = |r| / mu. If B lies in C, then on its surface grad E(z) . (z - y) >= mu e^2 - |r| e = 0. The least point of E in
+/// B is therefore an equilibrium: on the surface its gradient, if there were one, would point straight inwards, and the
+/// product would be negative. So there is exactly one equilibrium x* in C, and |x* - y| <= e. No vertex of it is
+/// farther from x than max |y_v - x_v| + e; if that is no more than rho, B does lie in C and all is shown.
+///
+/// y comes from Newton's method, begun at x, by conjugate gradients (inexact, [Dembo82]): near the equilibrium e is
+/// small beside the distance, and the bound hardly more than that. But the proof takes y as it is, and its forces, with
+/// rounding, as they are. What is held at a point of a triangle leaves C a plane part, on which all of this holds for
+/// the projected forces.
+///
+/// A reaction q changes by no more than the sum of k |w_i - w_j| over the springs at each free vertex, w the share of
+/// each vertex in q, no spring being stiffer than k in C: it is q(y) within sqrt(sum of squares of these) e.
+///
+/// Rounding is that of IEEE double: with -ffast-math this is no proof. The equilibrium is at rest: damping has no
+/// force. A reaction in a step's report may have some that is due to damping; its distance from the equilibrium's is
+/// bounded all the same. A press that touches nothing, or holds nothing, counts as none.
+///
+/// Remembers nothing from call to call. One thread at a time for each.
+template <ConvexityModel Convexity = BlockConvexity>
+class ErrorBound {
+  public:
+    /// @throws InvalidInput for an option out of its range. Cost: O(V + springs) memory.
+    template <Real Scalar, class Law>
+    explicit ErrorBound(const MassSpringNetwork<Scalar, Law>& network, const ErrorBoundOptions& options = {});
+
+    /// Of the state `x` (3 x V [m]) under the constraints of a step. Online.
+    /// Cost: O(V + springs) for each refinement, and what `Convexity` costs, as a rule twice or three times.
+    template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar>... Constraints>
+    [[nodiscard]] ErrorReport of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                 const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                 const Constraints&... constraints) noexcept;
+
+  private:
+    static constexpr std::size_t most_constraints = Workspace<double>::most_constraints;
+    static constexpr int most_attempts = 4;
+
+    void locate() noexcept;
+    bool refine() noexcept;
+    void look() noexcept;
+    bool convex_within(double radius) noexcept;
+    [[nodiscard]] double enclosure() const noexcept;
+    template <class C>
+    [[nodiscard]] EnclosedForce enclose_reaction(const C& constraint) noexcept;
+
+    ErrorBoundOptions options_;
+    RestProblem problem_;
+    Linearised stiffness_;
+    Convexity convexity_;
+    Points<double> y_, force_, rest_, way_;  // y, its forces on all vertices, those that are unbalanced, a step
+    std::vector<double> magnitude_, weights_, slopes_;
+    double distance_ = 0, unbalanced_ = 0;  // of y: from x [m], norm of the forces with rounding [N]
+    double radius_ = -1;                    // of C [m]
+    ErrorReport error_;
+    std::array<EnclosedForce, most_constraints> reactions_{};
+};
+
+template <Real Scalar, class Law>
+ErrorBound(const MassSpringNetwork<Scalar, Law>&) -> ErrorBound<>;
+template <Real Scalar, class Law>
+ErrorBound(const MassSpringNetwork<Scalar, Law>&, const ErrorBoundOptions&) -> ErrorBound<>;
+
+inline void ErrorBoundOptions::check() const {
+    if (refinements < 1) refuse("ErrorBound", "refinements must be at least 1, got ", refinements);
+}
+
+template <ConvexityModel Convexity>
+template <Real Scalar, class Law>
+ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network, const ErrorBoundOptions& options)
+    : options_((options.check(), options)),
+      problem_(network),
+      stiffness_(problem_),
+      convexity_(problem_),
+      y_(Points<double>::Zero(3, network.vertex_count())),
+      force_(y_),
+      rest_(y_),
+      way_(y_),
+      magnitude_(static_cast<std::size_t>(network.vertex_count())),
+      weights_(magnitude_),
+      slopes_(magnitude_) {}
+
+template <ConvexityModel Convexity>
+template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar>... Constraints>
+ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                      const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                      const Constraints&... constraints) noexcept {
+    static_assert(sizeof...(Constraints) <= most_constraints, "16 constraints at most, as in a step");
+    error_ = {};
+    reactions_.fill({});
+    error_.reactions = {reactions_.data(), sizeof...(Constraints)};
+    switch (problem_.take(x, network, volume, constraints...)) {
+        case ProblemStatus::sound: break;
+        case ProblemStatus::contact: error_.status = BoundStatus::contact; return error_;
+        case ProblemStatus::unsupported: error_.status = BoundStatus::unsupported; return error_;
+        default: return error_;
+    }
+    locate();
+    [[maybe_unused]] std::size_t i = 0;
+    ((reactions_[i++] = enclose_reaction(constraints)), ...);
+    return error_;
+}
+
+// The equilibrium, by Newton's method, until what is left is small beside the way there; then a radius for C that the
+// bound it gives is not above.
+template <ConvexityModel Convexity>
+void ErrorBound<Convexity>::locate() noexcept {
+    y_ = problem_.centre();
+    problem_.places().settle(y_);
+    look();
+    error_.status = BoundStatus::did_not_refine;
+    radius_ = -1;
+    for (double before = std::numeric_limits<double>::infinity(); unbalanced_ < before / 2;) {
+        before = unbalanced_;
+        const bool convex = refine();
+        look();
+        if (!is_finite(unbalanced_) || !is_finite(distance_)) return;
+        error_.estimate = distance_;
+        const bool fits = distance_ <= radius_ && radius_ <= 1.1 * distance_;
+        if (!convex || !(fits || convex_within(1.05 * distance_))) {
+            error_.status = BoundStatus::not_convex;
+            return;
+        }
+        if (enclosure() <= 0.01 * distance_ || error_.refinements >= options_.refinements) break;
+    }
+    for (int attempt = 0; !(distance_ + enclosure() <= radius_); ++attempt) {
+        if (attempt == most_attempts || !convex_within(1.125 * (distance_ + enclosure()))) return;
+    }
+    error_.status = BoundStatus::certified;
+    error_.position = (1 + 1e-12) * (distance_ + enclosure());
+}
+
+// A step of Newton's method; false where the energy is not convex.
+template <ConvexityModel Convexity>
+bool ErrorBound<Convexity>::refine() noexcept {
+    stiffness_.at(problem_, y_);
+    way_.setZero();
+    const auto report = stiffness_.solve(problem_, rest_, way_,
+                                         {.tolerance = 1e-2, .iterations = options_.refinements - error_.refinements});
+    error_.refinements += report.iterations;
+    y_ += way_;
+    problem_.places().settle(y_);
+    return report.convex;
+}
+
+// The unbalanced forces at y, and its distance from x, both rounded up.
+template <ConvexityModel Convexity>
+void ErrorBound<Convexity>::look() noexcept {
+    problem_.forces(y_, force_, magnitude_);
+    rest_ = force_;
+    problem_.project(rest_);
+    double rounding = 0, farthest = 0;
+    for (Index v = 0; v < problem_.vertex_count(); ++v) {
+        farthest = (std::max)(farthest, norm<double>(point(y_, v) - point(problem_.given(), v)));
+        const double magnitude = magnitude_[static_cast<std::size_t>(v)];
+        if (!problem_.fixed(v)) rounding += magnitude * magnitude;
+    }
+    distance_ = (1 + 1e-12) * farthest;
+    unbalanced_ = (1 + 1e-9) * std::sqrt(inner(rest_, rest_)) + problem_.rounding() * std::sqrt(rounding);
+}
+
+// Takes the states within `radius` for C.
+template <ConvexityModel Convexity>
+bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
+    radius_ = radius;
+    error_.convexity = convexity_.around(problem_, radius * (1 + 1e-12));
+    return error_.convexity > 0;
+}
+
+// The radius e of the ball around y; or, as a held point may be off its place by rounding, around the nearest state in
+// which none is.
+template <ConvexityModel Convexity>
+double ErrorBound<Convexity>::enclosure() const noexcept {
+    const double slip = problem_.places().slip(y_);
+    return (1 + 1e-9) * ((unbalanced_ + stiffness_.largest() * slip) / error_.convexity + slip);
+}
+
+// A spring between vertices of shares a and b adds (a - b) times its change of force.
+template <ConvexityModel Convexity>
+template <class C>
+EnclosedForce ErrorBound<Convexity>::enclose_reaction(const C& constraint) noexcept {
+    if constexpr (requires { constraint.force; }) return {-constraint.force.template cast<double>(), 0};
+    std::fill(weights_.begin(), weights_.end(), 0.0);
+    problem_.share(constraint, weights_);
+    for (std::size_t v = 0; v < weights_.size(); ++v)
+        slopes_[v] = weights_[v] * problem_.backing(static_cast<Index>(v));
+    for (const auto& spring : problem_.springs()) {
+        const auto a = static_cast<std::size_t>(spring.first), b = static_cast<std::size_t>(spring.second);
+        const double slope = spring.stiffness * std::abs(weights_[a] - weights_[b]);
+        slopes_[a] += slope;
+        slopes_[b] += slope;
+    }
+    EnclosedForce result{Vector3<double>::Zero(), 0};
+    double squares = 0, rounding = 0;
+    for (Index v = 0; v < problem_.vertex_count(); ++v) {
+        const auto i = static_cast<std::size_t>(v);
+        result.centre += weights_[i] * force_.col(v);
+        rounding += weights_[i] * magnitude_[i];
+        if (!problem_.fixed(v)) squares += slopes_[i] * slopes_[i];
+    }
+    if (!is_finite(result.centre)) return {};
+    const double moved = error_.certified() ? enclosure() : std::numeric_limits<double>::infinity();
+    result.radius = (1 + 1e-9) * std::sqrt(squares) * moved + 2 * problem_.rounding() * rounding;
+    return result;
+}
+
+}  // namespace membrane

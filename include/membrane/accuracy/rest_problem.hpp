@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include <membrane/accuracy/held_places.hpp>
+#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/network/volume_springs.hpp>
+#include <membrane/solve/constraints.hpp>
+
+/// What has to balance where a membrane of linear springs is at rest.
+///
+///     membrane::RestProblem problem(network);                                            // offline
+///     if (problem.take(x, network, backing, pull(7, target)) != ProblemStatus::sound) ...
+///     problem.forces(problem.centre(), force, magnitude);                                // [N]
+namespace membrane {
+
+/// A backing that pulls in proportion to the distance from an anchor, or not at all.
+template <class Volume>
+concept LinearBacking = std::same_as<Volume, NoVolumeSprings> || std::same_as<Volume, VirtualVolumeSprings<float>> ||
+    std::same_as<Volume, VirtualVolumeSprings<double>> || std::same_as<Volume, MovedVolumeSprings<float>> ||
+    std::same_as<Volume, MovedVolumeSprings<double>>;
+
+/// From the first end of a spring to the second [m].
+[[nodiscard]] inline Vector3<double> reach_of(const Spring<double>& spring, const Points<double>& x) noexcept {
+    return point(x, spring.second) - point(x, spring.first);
+}
+
+enum class ProblemStatus {
+    sound,
+    bad_input,    ///< a number is not finite, an index names no vertex, counts do not agree
+    contact,      ///< a tool touches
+    unsupported,  ///< a constraint of one's own, or held points with a corner that something else holds too
+};
+
+/// Springs, backing, loads and what is held, in double whatever the network's scalar. Damping is left out: at rest it
+/// has no force. Made of what a step is handed, and good until that changes; it keeps no reference.
+class RestProblem {
+  public:
+    /// Cost: O(V + springs) memory.
+    template <Real Scalar, class Law>
+    explicit RestProblem(const MassSpringNetwork<Scalar, Law>& network);
+
+    /// Takes in the membrane at `x` (3 x V [m]) and what acts on it. Online. Cost: O(V + springs).
+    template <Real Scalar, class Law, LinearBacking Volume, class... Constraints>
+    [[nodiscard]] ProblemStatus take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                     const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                     const Constraints&... constraints) noexcept;
+
+    /// Fixes every other vertex as well. Online. Cost: O(V).
+    [[nodiscard]] ProblemStatus fix_all_but(std::span<const Index> free) noexcept;
+
+    [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed_.size()); }
+    [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
+    [[nodiscard]] double backing(Index v) const noexcept { return backing_[at(v)]; }
+    [[nodiscard]] bool fixed(Index v) const noexcept { return fixed_[at(v)] != 0; }
+    [[nodiscard]] int free_ends(const Spring<double>& spring) const noexcept {
+        return (fixed(spring.first) ? 0 : 1) + (fixed(spring.second) ? 0 : 1);
+    }
+
+    /// The x that was handed in, and the same with held vertices in their places [m].
+    [[nodiscard]] const Points<double>& given() const noexcept { return given_; }
+    [[nodiscard]] const Points<double>& centre() const noexcept { return centre_; }
+
+    /// Springs, backing and loads on every vertex at `y` [N], and the sum of the magnitudes that went into it: rounding
+    /// changes the force by no more than `rounding()` times that.
+    void forces(const Points<double>& y, Points<double>& force, std::vector<double>& magnitude) const noexcept;
+    [[nodiscard]] double rounding() const noexcept { return rounding_; }
+
+    /// Takes out of `f` what does not move, or changes, anything that is held: the orthogonal projection onto the ways
+    /// that are left to the membrane.
+    void project(Points<double>& f) const noexcept;
+
+    /// Held points: their places.
+    [[nodiscard]] const HeldPlaces& places() const noexcept { return places_; }
+
+    /// Adds to `weights` (V) how the reaction of a constraint is made of the forces on the vertices.
+    template <class C>
+    void share(const C& constraint, std::vector<double>& weights) const noexcept;
+
+  private:
+    static constexpr unsigned char by_network = 1, by_constraint = 2, by_caller = 4;
+
+    [[nodiscard]] static std::size_t at(Index v) noexcept { return static_cast<std::size_t>(v); }
+    [[nodiscard]] bool is_vertex(Index v) const noexcept { return v >= 0 && v < vertex_count(); }
+    template <class Springs>
+    void take_springs(const Springs& springs) noexcept;
+    template <class Scalar, class Volume>
+    bool take_backing(const Volume& volume) noexcept;
+    void fix(Index v, unsigned char by) noexcept { fixed_[at(v)] = static_cast<unsigned char>(fixed_[at(v)] | by); }
+    template <class C>
+    [[nodiscard]] ProblemStatus act(const C& constraint) noexcept;
+    template <Real Scalar>
+    [[nodiscard]] ProblemStatus act_on(const HeldVertex<Scalar>& held) noexcept;
+    template <Real Scalar>
+    [[nodiscard]] ProblemStatus act_on(const HeldPoint<Scalar>& held) noexcept;
+    template <Real Scalar>
+    [[nodiscard]] ProblemStatus act_on(const Load<Scalar>& load) noexcept;
+    [[nodiscard]] ProblemStatus act_on(const Pinned& pinned) noexcept;
+    [[nodiscard]] ProblemStatus check_places() const noexcept;
+
+    std::vector<Spring<double>> springs_;
+    std::vector<double> backing_;
+    std::vector<unsigned char> fixed_;  // by whom, see below
+    Points<double> anchors_, load_, given_, centre_;
+    HeldPlaces places_;
+    double rounding_ = 0;
+};
+
+template <Real Scalar, class Law>
+RestProblem::RestProblem(const MassSpringNetwork<Scalar, Law>& network)
+    : springs_(network.springs().size()),
+      backing_(static_cast<std::size_t>(network.vertex_count())),
+      fixed_(backing_.size()),
+      anchors_(Points<double>::Zero(3, network.vertex_count())),
+      load_(anchors_),
+      given_(anchors_),
+      centre_(anchors_) {
+    static_assert(std::same_as<Law, LinearSpring>,
+                  "the springs must follow LinearSpring: nothing is proven for others");
+    take_springs(network.springs());
+    std::size_t most = 0;
+    for (Index v = 0; v < network.vertex_count(); ++v) most = (std::max)(most, network.springs_of(v).size());
+    // A spring's force is off by 9 units of rounding, half an epsilon each, times k (l + r) at the most; each sum of n
+    // adds n of all magnitudes. Loads and backing are two more, and the magnitudes are rounded as well.
+    rounding_ = std::numeric_limits<double>::epsilon() * static_cast<double>(8 + most);
+}
+
+template <Real Scalar, class Law, LinearBacking Volume, class... Constraints>
+ProblemStatus RestProblem::take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                const Constraints&... constraints) noexcept {
+    if (x.cols() != vertex_count() || network.vertex_count() != vertex_count()) return ProblemStatus::bad_input;
+    if (network.springs().size() != springs_.size()) return ProblemStatus::bad_input;
+    take_springs(network.springs());
+    for (Index v = 0; v < vertex_count(); ++v) {
+        fixed_[at(v)] = network.pinned(v) ? by_network : static_cast<unsigned char>(0);
+        given_.col(v) = centre_.col(v) = point(x, v).template cast<double>();
+    }
+    load_.setZero();
+    places_.clear();
+    if (!take_backing<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::bad_input;
+    ProblemStatus status = ProblemStatus::sound;
+    ((status = status == ProblemStatus::sound ? act(constraints) : status), ...);
+    return status == ProblemStatus::sound ? check_places() : status;
+}
+
+template <class Springs>
+void RestProblem::take_springs(const Springs& springs) noexcept {
+    std::transform(springs.begin(), springs.end(), springs_.begin(), [](const auto& spring) {
+        return Spring<double>{spring.first, spring.second, static_cast<double>(spring.stiffness),
+                              static_cast<double>(spring.rest_length)};
+    });
+}
+
+template <class Scalar, class Volume>
+bool RestProblem::take_backing(const Volume& volume) noexcept {
+    if constexpr (std::same_as<Volume, NoVolumeSprings>) {
+        std::fill(backing_.begin(), backing_.end(), 0.0);
+        return true;
+    } else {
+        if (volume.anchors().cols() != vertex_count()) return false;
+        for (Index v = 0; v < vertex_count(); ++v) {
+            const Vector3<Scalar> anchor = point(volume.anchors(), v);
+            const auto at_rest = volume.pull(v, anchor, anchor, std::numeric_limits<Scalar>::infinity());
+            backing_[at(v)] = static_cast<double>(at_rest.stiffness);
+            anchors_.col(v) = anchor.template cast<double>();
+        }
+        return is_finite(anchors_);
+    }
+}
+
+template <class C>
+ProblemStatus RestProblem::act(const C& constraint) noexcept {
+    if (!constraint.sound()) return ProblemStatus::bad_input;
+    if constexpr (requires { this->act_on(constraint); }) {
+        return act_on(constraint);
+    } else if constexpr (requires { constraint.contact.touching(); }) {
+        return constraint.contact.touching() ? ProblemStatus::contact : ProblemStatus::sound;
+    } else {
+        return ProblemStatus::unsupported;
+    }
+}
+
+template <Real Scalar>
+ProblemStatus RestProblem::act_on(const HeldVertex<Scalar>& held) noexcept {
+    if (!is_vertex(held.vertex)) return ProblemStatus::bad_input;
+    fix(held.vertex, by_constraint);
+    if ((fixed_[at(held.vertex)] & by_network) == 0) centre_.col(held.vertex) = held.target.template cast<double>();
+    return ProblemStatus::sound;
+}
+
+template <Real Scalar>
+ProblemStatus RestProblem::act_on(const HeldPoint<Scalar>& held) noexcept {
+    if (held.triangle == no_index) return ProblemStatus::sound;
+    for (const Index v : held.corners) {
+        if (!is_vertex(v)) return ProblemStatus::bad_input;
+    }
+    const bool added =
+        places_.add({held.corners, held.barycentric.template cast<double>(), held.target.template cast<double>()});
+    return added ? ProblemStatus::sound : ProblemStatus::unsupported;
+}
+
+template <Real Scalar>
+ProblemStatus RestProblem::act_on(const Load<Scalar>& load) noexcept {
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (!is_vertex(load.corners[k])) return ProblemStatus::bad_input;
+        const auto weight = static_cast<double>(load.barycentric[static_cast<Eigen::Index>(k)]);
+        load_.col(load.corners[k]) += weight * load.force.template cast<double>();
+    }
+    return ProblemStatus::sound;
+}
+
+inline ProblemStatus RestProblem::act_on(const Pinned& pinned) noexcept {
+    for (const Index v : pinned.vertices) {
+        if (!is_vertex(v)) return ProblemStatus::bad_input;
+        fix(v, by_constraint);
+    }
+    return ProblemStatus::sound;
+}
+
+inline ProblemStatus RestProblem::fix_all_but(std::span<const Index> free) noexcept {
+    for (Index v = 0; v < vertex_count(); ++v) fix(v, by_caller);
+    for (const Index v : free) {
+        if (!is_vertex(v)) return ProblemStatus::bad_input;
+        fixed_[at(v)] = static_cast<unsigned char>(fixed_[at(v)] & ~by_caller);
+    }
+    return check_places();
+}
+
+inline ProblemStatus RestProblem::check_places() const noexcept {
+    const bool independent = places_.independent([&](Index v) { return fixed(v); });
+    return independent ? ProblemStatus::sound : ProblemStatus::unsupported;
+}
+
+inline void RestProblem::forces(const Points<double>& y, Points<double>& force,
+                                std::vector<double>& magnitude) const noexcept {
+    for (Index v = 0; v < vertex_count(); ++v) {
+        const Vector3<double> pull = backing(v) * (point(anchors_, v) - point(y, v));
+        force.col(v) = pull + load_.col(v);
+        magnitude[at(v)] = norm(pull) + norm(point(load_, v));
+    }
+    for (const auto& spring : springs_) {
+        const Vector3<double> reach = reach_of(spring, y);
+        const double length = norm(reach);
+        if (!(length > 0)) continue;
+        const Vector3<double> pull = (spring.stiffness * (1 - spring.rest_length / length)) * reach;
+        force.col(spring.first) += pull;
+        force.col(spring.second) -= pull;
+        const double most = spring.stiffness * (length + spring.rest_length);
+        magnitude[at(spring.first)] += most;
+        magnitude[at(spring.second)] += most;
+    }
+}
+
+inline void RestProblem::project(Points<double>& f) const noexcept {
+    for (Index v = 0; v < vertex_count(); ++v) {
+        if (fixed(v)) f.col(v).setZero();
+    }
+    places_.project(f);
+}
+
+template <class C>
+void RestProblem::share(const C& constraint, std::vector<double>& weights) const noexcept {
+    if constexpr (requires { constraint.vertex; }) {
+        weights[at(constraint.vertex)] += 1;
+    } else if constexpr (requires { constraint.vertices; }) {
+        for (const Index v : constraint.vertices) weights[at(v)] += 1;
+    } else if constexpr (requires { constraint.target; }) {
+        if (constraint.triangle == no_index) return;
+        const Vector3<double> barycentric = constraint.barycentric.template cast<double>();
+        for (int k = 0; k < 3; ++k) {
+            weights[at(constraint.corners[static_cast<std::size_t>(k)])] += barycentric[k] / squared_norm(barycentric);
+        }
+    }
+}
+
+}  // namespace membrane

@@ -1,0 +1,289 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/press.hpp>
+
+/// What acts on a membrane at rest, told by the constraints of a step, and by those of one's own:
+///
+///     void describe(const Clamp& clamp, membrane::RestScene& scene) { scene.hold(clamp.vertex, clamp.target); }
+namespace membrane {
+
+struct EquilibriumOptions {
+    Index increments = 1;        ///< targets, loads and tools are brought on in so many parts; more for a start far off
+    Index layers = unlimited;    ///< vertices farther than this from where forces enter stay where they are
+    Index most_iterations = 60;  ///< of Newton's method, in each increment
+    double tolerance = 1e-12;    ///< of forces, in parts of the largest that one spring, backing or load exerts, and of
+                                 ///< lengths, in parts of the mean edge; neither is asked for below rounding
+
+    /// @throws InvalidInput for an option out of its range
+    void check() const;
+};
+
+struct Equilibrium {
+    Points<double> x;                        ///< 3 x V [m]
+    std::vector<Vector3<double>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]
+    double residual = 0;                     ///< largest unbalanced force on a free vertex [N]
+    double overlap = 0;                      ///< how deep the surface is in a tool [m]
+    Index iterations = 0;                    ///< of Newton's method, in all increments
+    bool converged = false;                  ///< forces balance, what is held is in its place, no tool overlaps
+};
+
+/// A point of a triangle that is held.
+struct HeldPlace {
+    std::size_t constraint;
+    std::array<Index, 3> corners;
+    Vector3<double> barycentric, target;  ///< [m]
+};
+
+/// A point of a triangle that something pulls at.
+struct LoadedPlace {
+    std::size_t constraint;
+    std::array<Index, 3> corners;
+    Vector3<double> barycentric, force;  ///< [N]
+};
+
+/// A tool that the surface stays outside of.
+struct PressingTool {
+    std::size_t constraint;
+    Tool<double> tool;
+    Vector3<double> way_out;  ///< moved so far, it just touches the surface from its own side [m]
+    double reach;             ///< triangles up to this far from it count as touched [m]
+};
+
+/// Where everything is to be, and what pulls.
+struct RestGoals {
+    Points<double> targets;               ///< of fixed vertices; the others, where they were at the start, 3 x V [m]
+    Points<double> loads;                 ///< on each vertex, 3 x V [N]
+    std::vector<Vector3<double>> places;  ///< targets of the held places [m]
+    std::vector<Tool<double>> tools;      ///< that press
+};
+
+/// The constraints of one membrane, in double. All it is told is checked.
+/// @throws InvalidInput for a vertex that is none, weights that are not barycentric, a number that is not finite
+class RestScene {
+  public:
+    /// The membrane is at `start` (3 x V [m]); `pinned[v]` where vertex `v` never moves.
+    RestScene(Points<double> start, std::vector<unsigned char> pinned)
+        : start_(std::move(start)), targets_(start_), pinned_(std::move(pinned)), held_(pinned_.size(), 0) {}
+
+    // For `describe`.
+
+    /// Holds `v` at `target` [m]; a pinned vertex stays where it is. The last one to hold a vertex decides where.
+    void hold(Index v, const Vector3<double>& target);
+
+    /// Holds `v` where it is. No force enters there: no vertices move on its account.
+    void hold(Index v);
+
+    /// Holds a point of a triangle at `target` [m].
+    void hold(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& target);
+
+    /// Pulls at a point of a triangle with `force` [N].
+    void load(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& force);
+
+    /// Keeps the surface outside `tool`, which touches it as `contact` says; nothing where it does not.
+    void press(const Tool<double>& tool, const Contact<double>& contact);
+
+    // For `equilibrium`.
+
+    /// What is told from now on comes from constraint number `constraint`.
+    void turn_to(std::size_t constraint) noexcept { constraint_ = constraint; }
+
+    [[nodiscard]] bool fixed(Index v) const noexcept {
+        return pinned_[static_cast<std::size_t>(v)] != 0 || held_[static_cast<std::size_t>(v)] != 0;
+    }
+
+    /// Targets and loads, brought on from the start by this part, and tools that have come in from outside so far.
+    [[nodiscard]] RestGoals goals(double part) const;
+
+    /// Constraint and vertex.
+    [[nodiscard]] const std::vector<std::pair<std::size_t, Index>>& holds() const noexcept { return holds_; }
+    [[nodiscard]] const std::vector<HeldPlace>& held_places() const noexcept { return held_places_; }
+    [[nodiscard]] const std::vector<LoadedPlace>& loaded_places() const noexcept { return loaded_places_; }
+    [[nodiscard]] const std::vector<PressingTool>& tools() const noexcept { return tools_; }
+
+    /// Vertices where a force enters.
+    [[nodiscard]] const std::vector<Index>& seeds() const noexcept { return seeds_; }
+
+  private:
+    void check(Index v) const;
+    void check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const;
+    void check(const Vector3<double>& vector, std::string_view what, std::string_view unit) const;
+
+    Points<double> start_, targets_;
+    std::vector<unsigned char> pinned_, held_;
+    std::vector<std::pair<std::size_t, Index>> holds_;
+    std::vector<HeldPlace> held_places_;
+    std::vector<LoadedPlace> loaded_places_;
+    std::vector<PressingTool> tools_;
+    std::vector<Index> seeds_;
+    std::size_t constraint_ = 0;
+};
+
+template <Real Scalar>
+void describe(const HeldVertex<Scalar>& held, RestScene& scene) {
+    scene.hold(held.vertex, held.target.template cast<double>());
+}
+
+template <Real Scalar>
+void describe(const HeldPoint<Scalar>& held, RestScene& scene) {
+    if (held.triangle == no_index) return;
+    scene.hold(held.corners, held.barycentric.template cast<double>(), held.target.template cast<double>());
+}
+
+inline void describe(const Pinned& pinned, RestScene& scene) {
+    for (const Index v : pinned.vertices) scene.hold(v);
+}
+
+template <Real Scalar>
+void describe(const Load<Scalar>& load, RestScene& scene) {
+    scene.load(load.corners, load.barycentric.template cast<double>(), load.force.template cast<double>());
+}
+
+template <Real Scalar>
+void describe(const Press<Scalar>& press, RestScene& scene) {
+    Tool<double> tool;
+    tool.position = press.tool.position.template cast<double>();
+    tool.axis = press.tool.axis.template cast<double>();
+    tool.radius = press.tool.radius;
+    Contact<double> contact;
+    contact.phase = press.contact.phase;
+    contact.corners = press.contact.corners;
+    contact.point = press.contact.point.template cast<double>();
+    contact.normal = press.contact.normal.template cast<double>();
+    contact.on_axis = press.contact.on_axis.template cast<double>();
+    contact.gap = press.contact.gap;
+    contact.reach = press.contact.reach;
+    contact.radius = press.contact.radius;
+    scene.press(tool, contact);
+}
+
+/// What `describe(constraint, scene)` tells a scene about.
+template <class C>
+concept RestConstraint = requires(const C& constraint, RestScene& scene) {
+    describe(constraint, scene);
+};
+static_assert(RestConstraint<HeldVertex<float>> && RestConstraint<HeldPoint<double>> && RestConstraint<Pinned>);
+static_assert(RestConstraint<Load<float>> && RestConstraint<Press<double>>);
+
+namespace detail {
+inline constexpr std::string_view equilibrium_name = "equilibrium";
+}
+
+inline void EquilibriumOptions::check() const {
+    const auto at_least = [](Index number, Index least, std::string_view name) {
+        if (number < least) refuse(detail::equilibrium_name, name, " must be at least ", least, ", got ", number);
+    };
+    at_least(increments, 1, "increments");
+    at_least(layers, 0, "layers");
+    at_least(most_iterations, 1, "most_iterations");
+    if (!is_finite(tolerance) || !(tolerance > 0)) {
+        refuse(detail::equilibrium_name, "tolerance must be finite and positive, got ", tolerance);
+    }
+}
+
+inline void RestScene::check(Index v) const {
+    if (v >= 0 && v < targets_.cols()) return;
+    refuse(detail::equilibrium_name, "constraint ", constraint_, " names vertex ", v, ", expected 0 to ",
+           targets_.cols() - 1);
+}
+
+inline void RestScene::check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const {
+    for (const Index v : corners) check(v);
+    // Whoever brings weights of floats, brings their rounding.
+    const bool is_float = (barycentric.cast<float>().cast<double>() - barycentric).isZero(0);
+    if (is_float ? detail::is_barycentric<float>(barycentric.cast<float>()) : detail::is_barycentric(barycentric))
+        return;
+    refuse(detail::equilibrium_name, "barycentric weights of constraint ", constraint_,
+           " must not be negative and have the sum 1, got ", barycentric[0], " ", barycentric[1], " ", barycentric[2]);
+}
+
+inline void RestScene::check(const Vector3<double>& vector, std::string_view what, std::string_view unit) const {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+        if (is_finite(vector[k])) continue;
+        refuse(detail::equilibrium_name, std::string_view("xyz").substr(static_cast<std::size_t>(k), 1), " of the ",
+               what, " of constraint ", constraint_, " must be finite [", unit, "], got ", vector[k]);
+    }
+}
+
+inline void RestScene::hold(Index v, const Vector3<double>& target) {
+    check(v);
+    check(target, "target", "m");
+    hold(v);
+    seeds_.push_back(v);
+    if (pinned_[static_cast<std::size_t>(v)] == 0) targets_.col(v) = target;
+}
+
+inline void RestScene::hold(Index v) {
+    check(v);
+    held_[static_cast<std::size_t>(v)] = 1;
+    holds_.emplace_back(constraint_, v);
+}
+
+inline void RestScene::hold(const std::array<Index, 3>& corners, const Vector3<double>& barycentric,
+                            const Vector3<double>& target) {
+    check(corners, barycentric);
+    check(target, "target", "m");
+    held_places_.push_back({constraint_, corners, barycentric, target});
+    seeds_.insert(seeds_.end(), corners.begin(), corners.end());
+}
+
+inline void RestScene::load(const std::array<Index, 3>& corners, const Vector3<double>& barycentric,
+                            const Vector3<double>& force) {
+    check(corners, barycentric);
+    check(force, "force", "N");
+    loaded_places_.push_back({constraint_, corners, barycentric, force});
+    seeds_.insert(seeds_.end(), corners.begin(), corners.end());
+}
+
+inline void RestScene::press(const Tool<double>& tool, const Contact<double>& contact) {
+    check(tool.position, "tool's position", "m");
+    check(tool.axis, "tool's axis", "m");
+    if (!is_finite(tool.radius) || tool.radius < 0) {
+        refuse(detail::equilibrium_name, "radius of the tool of constraint ", constraint_,
+               " must be finite and not negative [m], got ", tool.radius);
+    }
+    if (!contact.touching()) return;
+    for (const Index v : contact.corners) check(v);
+    check(contact.point, "contact's point", "m");
+    check(contact.normal, "contact's normal", "1");
+    check(contact.on_axis, "contact's point of the axis", "m");
+    if (!is_finite(contact.radius) || !(contact.radius > 0)) {
+        refuse(detail::equilibrium_name, "radius of the contact of constraint ", constraint_,
+               " must be finite and positive [m], got ", contact.radius);
+    }
+    PressingTool pressing{constraint_, tool, Vector3<double>::Zero(), contact.reach};
+    pressing.tool.radius = contact.radius;
+    if (contact.gap < 0) pressing.way_out = contact.point + contact.radius * contact.normal - contact.on_axis;
+    tools_.push_back(pressing);
+    seeds_.insert(seeds_.end(), contact.corners.begin(), contact.corners.end());
+}
+
+inline RestGoals RestScene::goals(double part) const {
+    const auto on_the_way = [&](const auto& from, const auto& to) {  // exact for what stays, and at the end
+        return part == 1 ? to : (from + part * (to - from)).eval();
+    };
+    RestGoals goals{on_the_way(start_, targets_), Points<double>::Zero(3, start_.cols()), {}, {}};
+    for (const auto& place : loaded_places_) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            goals.loads.col(place.corners[k]) += part * place.barycentric[static_cast<Eigen::Index>(k)] * place.force;
+        }
+    }
+    for (const auto& place : held_places_) {
+        const Vector3<double> from = point_at(triangle_at(start_, place.corners), place.barycentric);
+        goals.places.push_back(on_the_way(from, place.target));
+    }
+    for (const auto& pressing : tools_) {
+        goals.tools.push_back(pressing.tool);
+        goals.tools.back().position += (1 - part) * pressing.way_out;
+    }
+    return goals;
+}
+
+}  // namespace membrane
