@@ -32,7 +32,7 @@ void play(std::vector<membrane::Waypoint<double>> script, const LimitedReaction&
     const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});                     // [m]
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
     const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
-    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
     membrane::NullDevice<double> device(std::move(script), {.tick = dt, .radius = 2e-3});

@@ -77,7 +77,7 @@ Outcome run_both(const Scene& scene, double pace, const membrane::SolverOptions<
 int main(int argc, char** argv) {
     auto pictures = std::filesystem::path(argv[0]).parent_path() / "pictures";
     std::string json, csv;
-    membrane::SolverOptions<double> options{.layers = 6, .sweeps = 4};
+    membrane::SolverOptions<double> options{.layers = 6, .sweeps = 2};
     bool quick = false;
     CLI::App app("Presses, grasps, pulls and lets go membranes, with virtual volume springs and without.");
     app.add_option("--out", pictures, "folder for the pictures and index.html")->capture_default_str();

@@ -12,7 +12,7 @@ int main(int argc, char** argv) {
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
     const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};                 // [N/m], [N s/m]
-    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
     auto normals = membrane::VertexNormals(mesh);

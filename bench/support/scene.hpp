@@ -128,7 +128,7 @@ struct Loop {
     membrane::TriangleMesh<double> mesh;
     membrane::MassSpringNetwork<double, membrane::LinearSpring> network{mesh, {}, {.stiffness = stiffness}};
     membrane::VirtualVolumeSprings<double> volume{mesh, {.stiffness = backing, .damping = 0.02}};
-    membrane::QuasiStaticSolver<double> solver{network, {.layers = 6, .sweeps = 4}};
+    membrane::QuasiStaticSolver<double> solver{network, {.layers = 6, .sweeps = 2}};
     membrane::AabbTree<double> tree{mesh};
     membrane::ContactTracker<double> tracker{mesh};
     membrane::VertexNormals<double> normals{mesh};

@@ -21,7 +21,7 @@
 
 /// Where the membrane comes to rest, and what it pushes back with.
 ///
-///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4});
+///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
 ///     const auto report = solver.step(x, dt, network, backing, press(tool, contact));
 ///     // report.reactions[0] [N], report.moved
 namespace membrane {

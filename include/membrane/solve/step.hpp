@@ -8,7 +8,7 @@
 
 /// What a step of the solver may cost, and what it says of itself.
 ///
-///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4});
+///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
 ///     const auto report = solver.step(x, dt, network, backing, press(tool, contact));
 ///     if (report.status != membrane::StepStatus::advanced) { /* nothing has moved */ }
 namespace membrane {
@@ -17,7 +17,7 @@ namespace membrane {
 template <Real Scalar>
 struct SolverOptions {
     Index layers = 6;               ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
-    Index sweeps = 4;               ///< passes over the queue in each step
+    Index sweeps = 2;               ///< passes over the queue in each step
     Index contact_visits = 4;       ///< visits of layer 0 in each sweep: what touches the tool settles last
     Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 and what is held get theirs anyway
     Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
