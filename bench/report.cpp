@@ -55,6 +55,24 @@ Table threshold_table(const std::string& vertices) {
             .scene = "/vertices:" + vertices};
 }
 
+Table trade_table(const std::string& vertices) {
+    return {.topic = "trade",
+            .key = "trade_" + vertices,
+            .title = "Time of a tick, and error of its force in percent: a tool slides, " + vertices + " vertices",
+            .rows = {{"(4) as published", "published"},
+                     {"  error", "published", Row::counter, "force_error", ""},
+                     {"  dt^2 k / m", "published", Row::counter, "part", ""},
+                     {"(4), contact visited 4 x", "published_contact"},
+                     {"  error, 4 x", "published_contact", Row::counter, "force_error", ""},
+                     {"safe step", "safe"},
+                     {"  error, safe", "safe", Row::counter, "force_error", ""},
+                     {"block step, the default", "block"},
+                     {"  error, block", "block", Row::counter, "force_error", ""}},
+            .column = "sweeps",
+            .columns = {1, 2, 4, 8, 16},
+            .scene = "/vertices:" + vertices};
+}
+
 const std::vector<Table> all_tables{
     {"frame",
      "frame",
@@ -88,6 +106,8 @@ const std::vector<Table> all_tables{
       {"first hit, every one", "all_triangles/segment"},
       {"first hit, tree", "tree/segment", Row::gain, "all_triangles/segment"},
       {"build", "tree/build"}}},
+    trade_table("162"),
+    trade_table("642"),
     threshold_table("642"),
     threshold_table("10242"),
     {"tracker",

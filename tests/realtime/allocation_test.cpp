@@ -9,10 +9,15 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/accuracy/factored_convexity.hpp>
+#include <membrane/accuracy/tangent_stiffness.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/whole_loop.hpp"
+
+using namespace membrane;
 
 namespace {
 
@@ -93,6 +98,30 @@ TEMPLATE_TEST_CASE("nor does whatever else a loop can hold", "[allocation]", dou
     CHECK(odd.refused > 0);
     CHECK(usual.x.allFinite());
     CHECK(odd.x.allFinite());
+}
+
+TEMPLATE_TEST_CASE("nor do bounds of the error and slopes of the force", "[allocation]", double, float) {
+    using S = TestType;
+    test::WholeLoop<S> loop(7);
+    ErrorBound quick(loop.network);
+    ErrorBound<FactoredConvexity> sharp(loop.network);
+    TangentStiffness tangent(loop.network);
+    int certified = 0, found = 0;
+    const long allocated = allocated_by([&] {
+        for (int i = 0; i < cases(1000); ++i) {
+            const Vector3<S> target = point(loop.mesh.positions(), 7) * (1 + S(1e-4) * static_cast<S>(i % 200));
+            const auto held = pull(7, target);
+            const auto report = loop.solver.step(loop.x, S(1e-3), loop.network, loop.backing, held);
+            certified += quick.of(loop.x, loop.network, loop.backing, held).certified();
+            certified += sharp.of(loop.x, loop.network, loop.backing, held).certified();
+            const auto feel = tangent.of(loop.solver.queue().vertices(), loop.x, loop.network, loop.backing, held);
+            found += feel.status == TangentStatus::found;
+            used(report.moved.data());
+        }
+    });
+    CHECK(allocated == 0);
+    CHECK(certified > 0);
+    CHECK(found > 0);
 }
 
 TEMPLATE_TEST_CASE("copied and moved parts run on to the same bits, and allocate nothing", "[allocation]",

@@ -142,8 +142,11 @@ TEST_CASE("with little room layer 0 comes first, and the restless keep a turn", 
         List seeds;
         for (Index n = 1 + random.index(3); n > 0; --n) seeds.push_back(random.index(162));
         const std::set<Index> layer0(seeds.begin(), seeds.end());
-        const Options options{.layers = unlimited, .sweeps = 1 + random.index(6), .most_visits = 1 + random.index(500)};
-        const auto room = static_cast<std::size_t>(options.most_visits / (options.sweeps + 1));
+        const Options options{
+            .layers = unlimited, .sweeps = 1 + random.index(6), .most_visits = 1 + random.index(1000)};
+        const Index own = static_cast<Index>(layer0.size()) * (options.sweeps * options.contact_visits + 1);
+        const Index spare = std::max(options.most_visits - own, 0) / (options.sweeps + 1);
+        const std::size_t room = layer0.size() + static_cast<std::size_t>(spare);
         active.arrange(network, seeds, options);
         active.settle(unbalanced);
         (void)active.close();
@@ -154,7 +157,7 @@ TEST_CASE("with little room layer 0 comes first, and the restless keep a turn", 
         std::set<Index> seen;
         for (int i = 0; i < 200; ++i) {
             active.arrange(network, seeds, options);
-            REQUIRE(active.vertices().size() <= std::max({room, layer0.size(), std::size_t(1)}));
+            REQUIRE(active.vertices().size() <= room);
             REQUIRE(active.vertices().size() >= std::min(room - room / 4, std::size_t(162)));
             REQUIRE(active.touched().size() == layer0.size());
             const auto visits = list_of(active.vertices());

@@ -316,6 +316,25 @@ TEST_CASE("a step visits no more than it may, and its seeds in any case", "[solv
     }
 }
 
+TEST_CASE("what layer 0 is visited more often is taken off the rest", "[solver][queue]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Sphere<double> sphere;
+        const Index sweeps = 1 + random.index(5), visits = 1 + random.index(6), most = 1 + random.index(500);
+        QuasiStaticSolver solver(
+            sphere.network, {.layers = unlimited, .sweeps = sweeps, .contact_visits = visits, .most_visits = most});
+        Points<double> x = sphere.mesh.positions();
+        const auto corners = corners_of(sphere.mesh, random.index(320));
+        for (int i = 0; i < 30; ++i) {
+            const auto report = solver.step(x, 1e-3, sphere.network, sphere.backing,
+                                            load<double>(corners, random.barycentric(), 0.1 * random.vector()));
+            REQUIRE(report.status == StepStatus::advanced);
+            REQUIRE(report.visits <= std::max(most, 3 * (sweeps * visits + 1)));
+        }
+    }
+}
+
 TEST_CASE("a step that may not visit all of its queue does not call it converged", "[solver][queue]") {
     const Sphere<double> sphere;
     QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 4, .most_visits = 100});

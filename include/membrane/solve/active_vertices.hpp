@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <utility>
 
@@ -92,7 +93,10 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
         queue_.build(network, seeds, options.layers);
     }
     const Index touched = queue_.layer_count() > 0 ? static_cast<Index>(queue_.layer(0).size()) : 0;
-    const Index room = (std::max)({touched, Index(1), options.most_visits / (options.sweeps + 1)});
+    const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_visits + 1);
+    const auto spare =
+        static_cast<Index>((std::max)(options.most_visits - own, std::int64_t{0}) / (options.sweeps + 1));
+    const Index room = (std::max)(touched + spare, Index(1));
     const Index others = (std::min)(restless_.count() + left_.count(), room / 4);  // their turn under a lasting contact
     visited_.clear();
     const auto line_up = [&](std::span<const Index> vertices, Index most) {

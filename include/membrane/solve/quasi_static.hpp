@@ -46,7 +46,8 @@ class QuasiStaticSolver {
                                const Rule& rule = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
-    /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, each of its springs.
+    /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, in layer 0 `contact_visits` in each
+    /// sweep; a visit costs the vertex's springs.
     template <class Law, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const MassSpringNetwork<Scalar, Law>& network,
                                           const Volume& volume, const Constraints&... constraints) noexcept;
