@@ -7,9 +7,9 @@ set multiplot layout 1,2 title 'What accuracy costs: a tool slides, 1 to 16 swee
 set xlabel 'time of a tick [µs]'
 set logscale xy
 set xrange [20:800]
-set yrange [0.002:30]
+set yrange [0.0005:30]
 set xtics nomirror (20, 50, 100, 200, 500)
-set ytics nomirror (0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30)
+set ytics nomirror (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30)
 set grid lc '#d8d8d8' lw 0.7
 set border 3 lc '#444444'
 set key bottom left opaque reverse Left spacing 1.2 samplen 2

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 #include <vector>
 
@@ -122,5 +123,67 @@ TEST_CASE("without volume springs the shape does not come back from a press", "[
             WARN("without volume springs, " << pressed.mesh.vertex_count() << " vertices: off by " << after_press.second
                                             << " R after the press, " << after_pull.second << " R after the pull");
         }
+    }
+}
+
+namespace {
+
+/// A tool that is somewhere else every ten ticks, in the sphere or up to a million radii away.
+std::vector<Tool<double>> jumping_tool(test::Random& random) {
+    std::vector<Tool<double>> way;
+    Tool<double> tool{.position = {0, 0, 5 * radius}};
+    if (random.chance(0.8)) tool.radius = radius * 0.02 * std::pow(50, random.number());
+    for (int tick = 0; tick < 40; ++tick) {
+        const double far = random.chance(0.5) ? 1 : std::pow(10, random.number(-1.0, 6.0));
+        if (tick % 10 == 9) tool.position = radius * far * random.vector();
+        way.push_back(tool);
+    }
+    return way;
+}
+
+}  // namespace
+
+TEST_CASE("after a tool that jumps anywhere, the membrane comes back where its backing is as stiff as its springs",
+          "[recovery]") {
+    const Membrane fresh(2);
+    const VirtualVolumeSprings backing(fresh.mesh, {.stiffness = stiffness});
+    for (int seed = 1; seed <= cases(1000, 20'000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane membrane = fresh;
+        auto& x = membrane.x;
+        for (const auto& tool : jumping_tool(random)) {
+            const auto contact = membrane.tracker.update(membrane.tree, x, tool);
+            const Points<double> before = x;
+            const auto report = membrane.solver.step(x, dt, membrane.network, backing, press(tool, contact));
+            REQUIRE(is_finite(x));
+            if (report.status != StepStatus::advanced) REQUIRE(x == before);
+            for (const auto& reaction : report.reactions) REQUIRE(is_finite(reaction));
+            membrane.tree.refit(x, report.moved);
+        }
+        REQUIRE(test::settle(membrane.solver, x, dt, membrane.network, backing).converged);
+        REQUIRE((x - membrane.mesh.positions()).cwiseAbs().maxCoeff() < 1e-6 * radius);
+    }
+}
+
+TEST_CASE("a tool that jumps through the membrane drags it along with a force that soon is a membrane's",
+          "[recovery]") {
+    for (const double backing_stiffness : {4.0, 8.0, 40.0}) {
+        CAPTURE(backing_stiffness);
+        Membrane membrane(3);
+        const VirtualVolumeSprings backing(membrane.mesh, {.stiffness = backing_stiffness, .damping = 0.02});
+        Vector3<double> force;
+        for (int tick = 0; tick < 50; ++tick) {
+            Tool<double> tool{.position = {0, 0, 0.02}, .radius = 1e-3};
+            if (tick > 0) tool.position = {0.003, 0.002, -0.012};
+            const auto contact = membrane.tracker.update(membrane.tree, membrane.x, tool);
+            const auto report = membrane.solver.step(membrane.x, dt, membrane.network, backing, press(tool, contact));
+            REQUIRE(report.status == StepStatus::advanced);
+            membrane.tree.refit(membrane.x, report.moved);
+            force = report.reactions[0];
+        }
+        // What springs and backing of a hundred vertices can pull with over that way.
+        CHECK(norm(force) < 100 * (stiffness + backing_stiffness) * 0.032);
+        CHECK((membrane.x - membrane.mesh.positions()).cwiseAbs().maxCoeff() < 2 * 0.032);
     }
 }

@@ -83,8 +83,8 @@ class NewtonSystem {
     double shift_ = 0;  // of the last step that needed one
 };
 
-/// The y of least y.Wy / 2 + q.y with y >= 0 but for `equality`, W positive semidefinite [Lawson74].
-[[nodiscard]] inline Eigen::VectorXd least_multipliers(const Eigen::MatrixXd& W, const Eigen::VectorXd& q,
+/// The y of least y.Wy / 2 + q.y with y >= 0 but for `equality`, W the `coupling`, positive semidefinite [Lawson74].
+[[nodiscard]] inline Eigen::VectorXd least_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
                                                        const std::vector<unsigned char>& equality);
 
 inline NewtonSystem::NewtonSystem(const std::vector<unsigned char>& fixed) {
@@ -140,18 +140,18 @@ inline void NewtonSystem::add(const ConstraintRow& row) {
 
 // [Nocedal06] 3.4, algorithm 3.3; what is hardly positive, as of a membrane that is free to turn, is no better than zero.
 inline void NewtonSystem::factorise(double scale) {
-    Sparse H(size_, size_);
-    H.setFromTriplets(triplets_.begin(), triplets_.end());
+    Sparse matrix(size_, size_);
+    matrix.setFromTriplets(triplets_.begin(), triplets_.end());
     const auto is_definite = [&] {
         return factors_.info() == Eigen::Success && factors_.vectorD().minCoeff() > 1e-12 * scale;
     };
     factors_.setShift(0);
-    factors_.compute(H);
+    factors_.compute(matrix);
     if (is_definite()) return;
     shift_ = (std::max)(shift_ / 16, 1e-9 * scale);
     for (; shift_ < 1e12 * scale; shift_ *= 4) {
         factors_.setShift(shift_);
-        factors_.factorize(H);
+        factors_.factorize(matrix);
         if (is_definite()) return;
     }
 }
@@ -225,16 +225,16 @@ inline void NewtonSystem::extend(Eigen::MatrixXd& answers, const std::vector<std
 inline Eigen::VectorXd NewtonSystem::multipliers_of(const std::vector<std::size_t>& work,
                                                     const Eigen::MatrixXd& answers,
                                                     const Eigen::VectorXd& alone) const {
-    Eigen::MatrixXd W(answers.cols(), answers.cols());
+    Eigen::MatrixXd coupling(answers.cols(), answers.cols());
     Eigen::VectorXd q(answers.cols());
     std::vector<unsigned char> equality;
     for (Eigen::Index i = 0; i < q.size(); ++i) {
         const auto& row = rows_[work[static_cast<std::size_t>(i)]];
-        for (Eigen::Index j = 0; j < q.size(); ++j) W(i, j) = change(row, answers.col(j));
+        for (Eigen::Index j = 0; j < q.size(); ++j) coupling(i, j) = change(row, answers.col(j));
         q[i] = can_change(row) ? row.value + change(row, alone) : 0;
         equality.push_back(row.equality ? 1 : 0);
     }
-    return least_multipliers((W + W.transpose()) / 2, q, equality);
+    return least_multipliers((coupling + coupling.transpose()) / 2, q, equality);
 }
 
 inline double NewtonSystem::change(const ConstraintRow& row, const Eigen::Ref<const Eigen::VectorXd>& step) const {
@@ -255,27 +255,27 @@ inline bool NewtonSystem::can_change(const ConstraintRow& row) const noexcept {
 namespace detail {
 
 /// Least y.Wy / 2 + q.y over the y that are zero where nothing is at `work`.
-[[nodiscard]] inline Eigen::VectorXd least_at_work(Eigen::MatrixXd W, Eigen::VectorXd q,
+[[nodiscard]] inline Eigen::VectorXd least_at_work(Eigen::MatrixXd coupling, Eigen::VectorXd q,
                                                    const std::vector<unsigned char>& work) {
     for (Eigen::Index i = 0; i < q.size(); ++i) {
         if (work[static_cast<std::size_t>(i)] != 0) continue;
-        W.row(i).setZero();
-        W.col(i).setZero();
-        W(i, i) = 1;
+        coupling.row(i).setZero();
+        coupling.col(i).setZero();
+        coupling(i, i) = 1;
         q[i] = 0;
     }
-    return -W.ldlt().solve(q);
+    return -coupling.ldlt().solve(q);
 }
 
 }  // namespace detail
 
-inline Eigen::VectorXd least_multipliers(const Eigen::MatrixXd& W, const Eigen::VectorXd& q,
+inline Eigen::VectorXd least_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
                                          const std::vector<unsigned char>& equality) {
     const double slack = 1e-15 * q.lpNorm<Eigen::Infinity>();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(q.size());
     std::vector<unsigned char> work = equality;
     for (Eigen::Index round = 0; round < 10 * (q.size() + 1); ++round) {
-        const Eigen::VectorXd best = detail::least_at_work(W, q, work);
+        const Eigen::VectorXd best = detail::least_at_work(coupling, q, work);
         double part = 1;
         Eigen::Index first = no_index;  // to come to zero on the way there
         for (Eigen::Index i = 0; i < q.size(); ++i) {
@@ -289,7 +289,7 @@ inline Eigen::VectorXd least_multipliers(const Eigen::MatrixXd& W, const Eigen::
             work[static_cast<std::size_t>(first)] = 0;
             continue;
         }
-        Eigen::VectorXd slope = W * y + q;
+        Eigen::VectorXd slope = coupling * y + q;
         for (Eigen::Index i = 0; i < q.size(); ++i) slope[i] *= work[static_cast<std::size_t>(i)] != 0 ? 0 : 1;
         Eigen::Index next = 0;
         if (slope.minCoeff(&next) >= -slack) break;

@@ -200,6 +200,7 @@ bool QuasiStaticSolver<Scalar, Rule>::visit(Index v, const Handed& scene, Region
     if (region.fixed(v)) return false;
     ++report_.visits;
     const auto state = state_of<Rule>(scene, v);
+    if (state.touched) region.set_resistance(v, norm<Scalar>(state.force - point(work_.external, v)));
     const auto compliance = rule_.compliance(state);
     if constexpr (gives_numbers) {
         if (compliance * state.stiffness >= 2 && diverges(scene, v, compliance)) {

@@ -53,7 +53,7 @@ struct Workspace {
     Points<Scalar> unbalanced;      // of visited vertices, the force on them at the end of the step
     Points<Scalar> kept;            // of saved vertices, where they were when a constraint kept them, or at the start
     std::vector<Scalar> stiffness;  // of pushed vertices, what touches add to it
-    std::vector<Scalar> compliance;
+    std::vector<Scalar> compliance, resistance;
     std::vector<Symmetric3<Scalar>> block_compliance;  // for rules that give blocks, else empty
     BoundedList<Touch<Scalar>> touches, touches_before;
     std::array<Range, most_constraints> ranges{}, ranges_before{};
@@ -136,6 +136,9 @@ class Region {
         return fixed(v) ? Scalar(0) : work_.compliance[static_cast<std::size_t>(v)];
     }
 
+    /// What springs and backing of `v` pulled with at its last visit in layer 0 [N].
+    [[nodiscard]] Scalar resistance(Index v) const noexcept { return work_.resistance[static_cast<std::size_t>(v)]; }
+
     /// At the end of the step: springs, backing and external forces on `v` [N].
     [[nodiscard]] Vector3<Scalar> unbalanced(Index v) const noexcept { return point(work_.unbalanced, v); }
 
@@ -168,6 +171,7 @@ class Region {
         last_recalled_ = 0;
     }
 
+    void set_resistance(Index v, Scalar force) noexcept { work_.resistance[static_cast<std::size_t>(v)] = force; }
     void set_compliance(Index v, Scalar compliance) noexcept {
         work_.compliance[static_cast<std::size_t>(v)] = compliance;
     }
@@ -216,6 +220,7 @@ Workspace<Scalar>::Workspace(Index vertices, IsPinned is_pinned, Index most_touc
       kept(start),
       stiffness(pinned.size(), Scalar(0)),
       compliance(pinned.size(), Scalar(0)),
+      resistance(compliance),
       touches(static_cast<std::size_t>(most_touches)),
       touches_before(touches) {
     for (Index v = 0; v < vertices; ++v) pinned[static_cast<std::size_t>(v)] = is_pinned(v) ? 1 : 0;
