@@ -325,7 +325,8 @@ TEST_CASE("what layer 0 is visited more often is taken off the rest", "[solver][
         QuasiStaticSolver solver(
             sphere.network, {.layers = unlimited, .sweeps = sweeps, .contact_visits = visits, .most_visits = most});
         Points<double> x = sphere.mesh.positions();
-        const auto corners = corners_of(sphere.mesh, random.index(320));
+        const auto triangle = sphere.mesh.triangles().col(random.index(320));
+        const std::array<Index, 3> corners{triangle[0], triangle[1], triangle[2]};
         for (int i = 0; i < 30; ++i) {
             const auto report = solver.step(x, 1e-3, sphere.network, sphere.backing,
                                             load<double>(corners, random.barycentric(), 0.1 * random.vector()));
