@@ -1,7 +1,4 @@
 // SPDX-License-Identifier: MIT
-#include <array>
-#include <string>
-
 #include <membrane/accuracy/equilibrium.hpp>
 
 #include "support/scene.hpp"
@@ -42,8 +39,7 @@ const std::vector<Vector3>& equilibrium_forces(std::int64_t vertices) {
     auto& forces = known[vertices];
     if (!forces.empty()) return forces;
     const Scene scene(vertices);
-    const membrane::AabbTree<double> fresh(scene.mesh);
-    auto tree = fresh;
+    membrane::AabbTree<double> tree(scene.mesh);
     membrane::ContactTracker<double> tracker(scene.mesh);
     Points x = scene.mesh.positions();
     for (Index t = 1; t <= ticks; ++t) {
@@ -61,7 +57,8 @@ const std::vector<Vector3>& equilibrium_forces(std::int64_t vertices) {
 /// What a run of the scene comes to: the time of a tick (contact, solve, refit) and the error of the force while the tool
 /// slides, root of the mean square, as a part of it.
 struct Outcome {
-    double time = 0, error = 0;  ///< [s]
+    double time = 0;  ///< [s]
+    double error = 0;
     bool stable = true;
 };
 
@@ -104,7 +101,7 @@ void measure(benchmark::State& state, const Rule& rule, Index contact_visits, do
     state.counters["force_error"] = 100 * outcome.error;
 }
 
-/// (4) with its mass as light as is stable for all of the scene, to a fiftieth.
+/// (4) with its mass as light as is stable for all of the scene, to a fortieth.
 void measure_published(benchmark::State& state, Index contact_visits) {
     const auto sweeps = static_cast<Index>(state.range(1));
     double part = 0.5;  // dt^2 stiffness / mass

@@ -95,13 +95,13 @@ TEST_CASE("a way on which springs stiffen is halved until the energy does not ri
             const Index v = step.v;
             const Vector3<double> pull = pull_on(step.scene, v).force, start = point(step.x, v);
             const Vector3<double> way = step.random.number(0.0, 0.5) * direction<double>(pull, pull);
-            const Vector3<double> found = held_back<BlockStep, double>(step.scene, v, way);
+            const Vector3<double> found = held_back<BlockStep>(step.scene, v, way);
             const auto others = others_on(step.scene, v);
             const auto energy = [&](const Vector3<double>& by) {
                 return step.network.energy(v, start + by, step.x) - dot<double>(others.force, by) +
                        others.stiffness * squared_norm(by) / 2;
             };
-            REQUIRE(held_back<MassStep, double>(step.scene, v, way) == way);
+            REQUIRE(held_back<MassStep>(step.scene, v, way) == way);
             if (found == way) return;
             ++halved;
             const double times = std::log2(norm(way) / norm(found));
@@ -114,7 +114,7 @@ TEST_CASE("a way on which springs stiffen is halved until the energy does not ri
         check(MidStep<test::CubicSpring>(static_cast<std::uint64_t>(seed)));
         MidStep<LinearSpring> linear(static_cast<std::uint64_t>(seed));
         const Vector3<double> far(9, 9, 9);
-        REQUIRE(held_back<BlockStep, double>(linear.scene, linear.v, far) == far);
+        REQUIRE(held_back<BlockStep>(linear.scene, linear.v, far) == far);
     }
     CHECK(halved > cases(30));
 }

@@ -58,9 +58,6 @@ class Elasticity {
                                                   static_cast<double>(spring.rest_length),
                                                   (std::max)(length, shortest)});
     }
-    [[nodiscard]] static Vector3<double> reach(const Spring<Scalar>& spring, const Points<double>& x) noexcept {
-        return point(x, spring.second) - point(x, spring.first);
-    }
     void ask_backing(const Points<double>& x);
 
     const MassSpringNetwork<Scalar, Law>& network_;
@@ -74,7 +71,7 @@ template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
 ElasticState Elasticity<Scalar, Law, Volume>::at(const Points<double>& x) {
     ElasticState state{x, Points<double>::Zero(3, x.cols()), Points<double>::Zero(3, x.cols())};
     for (const auto& spring : network_.springs()) {
-        const Vector3<double> along = reach(spring, x);
+        const Vector3<double> along = reach_of(spring, x);
         const double length = norm(along);
         const auto answer = response(spring, length);
         state.energy += answer.energy;
@@ -118,7 +115,7 @@ void Elasticity<Scalar, Law, Volume>::ask_backing(const Points<double>& x) {
 template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
 void Elasticity<Scalar, Law, Volume>::add_stiffness(const ElasticState& state, NewtonSystem& system) const {
     for (const auto& spring : network_.springs()) {
-        const Vector3<double> along = reach(spring, state.x);
+        const Vector3<double> along = reach_of(spring, state.x);
         const double length = norm(along);
         Eigen::Matrix3d block = static_cast<double>(spring.stiffness) * Eigen::Matrix3d::Identity();
         if (length > 0) {
@@ -140,7 +137,7 @@ template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
 double Elasticity<Scalar, Law, Volume>::largest_stiffness(const ElasticState& state) const {
     double largest = 0;
     for (const auto& spring : network_.springs()) {
-        largest = (std::max)(largest, response(spring, norm(reach(spring, state.x))).stiffness);
+        largest = (std::max)(largest, response(spring, norm(reach_of(spring, state.x))).stiffness);
     }
     for (const double k : backing_stiffness_) largest = (std::max)(largest, k);
     return largest;

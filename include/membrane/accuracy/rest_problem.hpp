@@ -28,11 +28,6 @@ concept LinearBacking = std::same_as<Volume, NoVolumeSprings> || std::same_as<Vo
     std::same_as<Volume, VirtualVolumeSprings<double>> || std::same_as<Volume, MovedVolumeSprings<float>> ||
     std::same_as<Volume, MovedVolumeSprings<double>>;
 
-/// From the first end of a spring to the second [m].
-[[nodiscard]] inline Vector3<double> reach_of(const Spring<double>& spring, const Points<double>& x) noexcept {
-    return point(x, spring.second) - point(x, spring.first);
-}
-
 enum class ProblemStatus {
     sound,
     bad_input,    ///< a number is not finite, an index names no vertex, counts do not agree

@@ -51,6 +51,22 @@ struct SpringEnd {
     Scalar rest_length;  ///< [m]
 };
 
+/// From the first end of a spring to the second [m].
+template <Real Scalar, class Positions>
+[[nodiscard]] Vector3<typename Positions::Scalar> reach_of(const Spring<Scalar>& spring, const Positions& x) noexcept {
+    return point(x, spring.second) - point(x, spring.first);
+}
+
+/// What one spring does to the vertex at one end. One of length zero has no direction and no force: it curves the energy
+/// alike in all directions.
+template <Real Scalar>
+struct SpringPull {
+    Vector3<Scalar> reach;  ///< to the other end [m]
+    Scalar length;          ///< [m]
+    Scalar tension;         ///< [N]
+    Scalar along, across;   ///< curvature of the energy along the spring, and at right angles to it [N/m]
+};
+
 /// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1): constant once built, no positions in it.
 template <Real Scalar_, SpringLaw<Scalar_> Law>
 class MassSpringNetwork {
@@ -76,7 +92,11 @@ class MassSpringNetwork {
         return viscosity_.empty() ? Scalar(0) : viscosity_[static_cast<std::size_t>(v)];
     }
 
-    /// Sum of the spring forces on vertex `v` at positions `x`. A spring of length zero has no direction and no force.
+    /// Calls `act(pull)` with the `SpringPull` of each spring of vertex `v` at positions `x`.
+    template <class Act>
+    void for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept;
+
+    /// Sum of the spring forces on vertex `v` at positions `x`.
     [[nodiscard]] Pull<Scalar> pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
     /// The same, and a bound of the energy. A spring of stiffness k and tension T that is l long stores
@@ -107,8 +127,7 @@ class MassSpringNetwork {
   private:
     [[nodiscard]] SpringResponse<Scalar> response(const Spring<Scalar>& s,
                                                   const ConstPointsRef<Scalar>& x) const noexcept {
-        const Scalar length = norm<Scalar>(point(x, s.second) - point(x, s.first));
-        return law_(SpringState<Scalar>{s.stiffness, s.rest_length, length});
+        return law_(SpringState<Scalar>{s.stiffness, s.rest_length, norm(reach_of(s, x))});
     }
     void build_springs(const Adjacency& adjacency, const Points<Scalar>& x, const NetworkOptions<Scalar>& options);
 
@@ -183,48 +202,47 @@ void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, c
 }
 
 template <Real Scalar, SpringLaw<Scalar> Law>
-Pull<Scalar> MassSpringNetwork<Scalar, Law>::pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
+template <class Act>
+void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
     const Vector3<Scalar> here = point(x, v);
-    Pull<Scalar> sum{Vector3<Scalar>::Zero(), 0};
     for (const auto& end : springs_of(v)) {
         const Vector3<Scalar> reach = point(x, end.other) - here;
-        const Scalar length = norm(reach);
-        if (length == 0) {
-            sum.stiffness += end.stiffness;
-            continue;
+        SpringPull<Scalar> pull{reach, norm(reach), 0, end.stiffness, end.stiffness};
+        if (pull.length != 0) {
+            const auto answer = law_(SpringState<Scalar>{end.stiffness, end.rest_length, pull.length});
+            pull.tension = answer.tension;
+            pull.along = answer.stiffness;
+            pull.across = answer.tension / pull.length;
         }
-        const auto answer = law_(SpringState<Scalar>{end.stiffness, end.rest_length, length});
-        const Scalar across = answer.tension / length;  // curvature at right angles to the spring
-        sum.force += across * reach;
-        sum.stiffness += (std::max)(answer.stiffness, across);
+        act(pull);
     }
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law>
+Pull<Scalar> MassSpringNetwork<Scalar, Law>::pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
+    Pull<Scalar> sum{Vector3<Scalar>::Zero(), 0};
+    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) {
+        sum.force += spring.across * spring.reach;
+        sum.stiffness += (std::max)(spring.along, spring.across);
+    });
     return sum;
 }
 
 template <Real Scalar, SpringLaw<Scalar> Law>
 CurvedPull<Scalar> MassSpringNetwork<Scalar, Law>::curved_pull(Index v,
                                                                const ConstPointsRef<Scalar>& x) const noexcept {
-    const Vector3<Scalar> here = point(x, v);
     CurvedPull<Scalar> sum;
-    for (const auto& end : springs_of(v)) {
-        const Vector3<Scalar> reach = point(x, end.other) - here;
-        const Scalar length = norm(reach);
-        if (length == 0) {
-            sum.stiffness += end.stiffness;
-            continue;
-        }
-        const auto answer = law_(SpringState<Scalar>{end.stiffness, end.rest_length, length});
-        const Scalar across = answer.tension / length;
-        const Scalar stiffness = (std::max)(answer.stiffness, across);
-        const Scalar relief = (std::min)(stiffness - across, stiffness);
-        sum.force += across * reach;
+    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) {
+        const Scalar stiffness = (std::max)(spring.along, spring.across);
+        const Scalar relief = (std::min)(stiffness - spring.across, stiffness);
+        sum.force += spring.across * spring.reach;
         sum.stiffness += stiffness;
-        if (!(relief > 0)) continue;
-        const Vector3<Scalar> u = reach / length;
+        if (!(relief > 0)) return;
         sum.relief += diagonal3(relief);
-        sum.relief += outer(-relief, u);
-        sum.size = (std::min)(sum.size, length + (std::max)(-answer.tension / stiffness, Scalar(0)));
-    }
+        sum.relief += outer<Scalar>(-relief, spring.reach / spring.length);
+        const Scalar rest_beyond = (std::max)(-spring.tension / stiffness, Scalar(0));
+        sum.size = (std::min)(sum.size, spring.length + rest_beyond);
+    });
     return sum;
 }
 

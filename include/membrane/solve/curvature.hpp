@@ -29,18 +29,10 @@ template <Real Scalar, class Law>
 Scalar largest_curvature(const MassSpringNetwork<Scalar, Law>& network, Index v,
                          const ConstPointsRef<Scalar>& x) noexcept {
     Symmetric3<Scalar> block;
-    for (const auto& end : network.springs_of(v)) {
-        const Vector3<Scalar> reach = point(x, end.other) - point(x, v);
-        const Scalar length = norm(reach);
-        if (length == 0) {
-            block += diagonal3(end.stiffness);
-            continue;
-        }
-        const auto answer = network.law()(SpringState<Scalar>{end.stiffness, end.rest_length, length});
-        const Scalar across = answer.tension / length;
-        block += diagonal3(across);
-        block += outer<Scalar>(answer.stiffness - across, reach / length);
-    }
+    network.for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) {
+        block += diagonal3(spring.across);
+        if (spring.length != 0) block += outer<Scalar>(spring.along - spring.across, spring.reach / spring.length);
+    });
     return largest_eigenvalue(block);
 }
 

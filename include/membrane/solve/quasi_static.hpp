@@ -212,7 +212,7 @@ bool QuasiStaticSolver<Scalar, Rule>::visit(Index v, const Handed& scene, Region
         region.set_compliance(v, compliance, state.stiffness > 0 ? 1 / state.stiffness : Scalar(0));
     }
     if (!(norm(state.force) > work_.negligible_force)) return false;
-    scene.x.col(v) += held_back<Rule, Scalar>(scene, v, compliance * state.force);
+    scene.x.col(v) += held_back<Rule>(scene, v, compliance * state.force);
     return true;
 }
 

@@ -85,7 +85,7 @@ template <class Scalar, class Network, class Volume>
 /// half of that, until the energy is no higher than before, as far as rounding lets one tell.
 template <class Rule, class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> held_back(const StepInput<Scalar, Network, Volume>& scene, Index v,
-                                        Vector3<Scalar> way) noexcept {
+                                        std::type_identity_t<Vector3<Scalar>> way) noexcept {
     const auto& network = scene.network;
     using Law = std::remove_cvref_t<decltype(network.law())>;
     if constexpr (!never_stiffens<Law>() && requires { requires Rule::is_safe; }) {
@@ -93,11 +93,9 @@ template <class Rule, class Scalar, class Network, class Volume>
         const Vector3<Scalar> here = point(scene.x, v);
         const Scalar before = network.energy(v, here, scene.x), far = here.cwiseAbs().maxCoeff();
         Scalar size = before;  // of what is added up and taken off again
-        for (const auto& end : network.springs_of(v)) {
-            const Scalar length = norm<Scalar>(point(scene.x, end.other) - here);
-            const auto answer = network.law()(SpringState<Scalar>{end.stiffness, end.rest_length, length});
-            size += std::abs(answer.tension) * (length + far);
-        }
+        network.for_each_pull(v, scene.x, [&](const SpringPull<Scalar>& spring) {
+            size += std::abs(spring.tension) * (spring.length + far);
+        });
         const Scalar rounding = 16 * std::numeric_limits<Scalar>::epsilon() * size;
         for (int i = 0; i < std::numeric_limits<Scalar>::digits; ++i, way /= 2) {
             const Scalar work = dot(others.force, way) - others.stiffness * squared_norm(way) / 2;
