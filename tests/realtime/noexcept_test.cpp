@@ -82,15 +82,16 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(volume.at(x, x).pull(0, p, p, s))&& noexcept(largest_curvature(network, 0, x)));
         static_assert(
             noexcept(queue.build(network, vertices, 4))&& noexcept(queue.vertices())&& noexcept(queue.layer(0)));
-        static_assert(noexcept(queue.contains(0))&& noexcept(queue.clear()));
+        static_assert(noexcept(queue.contains(0))&& noexcept(queue.clear())&& noexcept(queue.grow(network)));
     });
     static_cast<void>([](ActiveVertices& active, const Network& network, std::span<const Index> vertices,
                          const SolverOptions<S>& options, bool (*is_balanced)(Index)) {
         static_assert(noexcept(active.arrange(network, vertices, options))&& noexcept(active.vertices()));
         static_assert(noexcept(active.touched())&& noexcept(active.beyond())&& noexcept(active.queue()));
         static_assert(noexcept(active.settle(is_balanced))&& noexcept(active.stir_neighbours(network, 0)));
-        static_assert(noexcept(active.close())&& noexcept(active.cancel(network, 4))&& noexcept(active.clear()));
-        static_assert(noexcept(active.wake(0)));
+        static_assert(noexcept(active.close())&& noexcept(active.cancel(network))&& noexcept(active.clear()));
+        static_assert(noexcept(active.wake(0))&& noexcept(active.grow(network, options)));
+        static_assert(noexcept(active.frontier()));
     });
     static_cast<void>([](const Tool<S>& tool, const Contact<S>& contact, const Grasp<S>& grasp, const Vector3<S>& p,
                          const std::array<Index, 3>& corners, std::span<const Index> vertices) {
@@ -102,6 +103,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
     static_assert(is_noexcept<decltype(&Solver::template step<LinearSpring, Volume>)>);
     static_assert(is_noexcept<decltype(&Solver::template step<LinearSpring, NoVolumeSprings, Press<S>, HeldPoint<S>,
                                                               HeldVertex<S>, Load<S>, Pinned>)>);
+    static_assert(is_noexcept<decltype(&Solver::template step_until<S (*)(), LinearSpring, Volume, Press<S>>)>);
     static_assert(is_noexcept<decltype(&Solver::wake)> && is_noexcept<decltype(&Solver::wake_all)>);
     static_assert(is_noexcept<decltype(&Solver::reset)>);
     using Euler = ExplicitEuler<S>;

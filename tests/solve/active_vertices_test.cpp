@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/solve/active_vertices.hpp>
 
+#include <algorithm>
 #include <set>
 #include <vector>
 
@@ -123,12 +124,78 @@ TEST_CASE("a step that is cancelled was never arranged", "[active]") {
     ActiveVertices spared = active;
     for (const List& seeds : {List{3}, List{}, List{0}, List{0, 3}}) {
         active.arrange(chain.network, seeds, Options{.layers = 1});
-        active.cancel(chain.network, 1);
+        active.cancel(chain.network);
         CHECK(list_of(active.queue().vertices()) == list_of(spared.queue().vertices()));
         ActiveVertices other = active, like = spared;
         other.arrange(chain.network, List{2}, Options{.layers = 1});
         like.arrange(chain.network, List{2}, Options{.layers = 1});
         CHECK(list_of(other.vertices()) == list_of(like.vertices()));
+    }
+}
+
+TEST_CASE("layers as needed: one after the other, and nothing stands still", "[active]") {
+    const Chain chain;
+    const Options options{.layers = 3, .layers_as_needed = true};
+    ActiveVertices active(12);
+    active.arrange(chain.network, List{1}, options);
+    CHECK(list_of(active.vertices()) == List{1});
+    CHECK(list_of(active.frontier()) == List{0, 2});
+    active.grow(chain.network, options);
+    CHECK(list_of(active.vertices()) == List{1, 0, 2});
+    CHECK(list_of(active.frontier()) == List{3});
+    active.settle([](Index v) { return v != 0; });
+    for (const Index v : {1, 0, 2}) active.stir_neighbours(chain.network, v);  // all of them are looked at
+    CHECK_FALSE(active.close());
+
+    // What was not in balance is visited; the layers begin anew.
+    active.arrange(chain.network, List{4}, options);
+    CHECK(list_of(active.vertices()) == List{4, 0});
+    CHECK(list_of(active.frontier()) == List{3, 5});
+    active.settle([](Index v) { return v != 5; });
+    active.stir_neighbours(chain.network, 0);  // 1 has not been seen
+    CHECK_FALSE(active.close());
+    ActiveVertices spared = active;
+    active.arrange(chain.network, List{2}, options);
+    active.grow(chain.network, options);
+    active.cancel(chain.network);
+    CHECK(list_of(active.queue().vertices()) == list_of(spared.queue().vertices()));
+    CHECK(active.frontier().empty());
+    active.arrange(chain.network, List{}, options);
+    CHECK(list_of(active.vertices()) == List{5, 1});
+    CHECK(active.frontier().empty());
+    active.settle(balanced);
+    CHECK(active.close());
+
+    // Up to the threshold, and to the end of what the springs join.
+    for (const Index layers : {0, 1, 2, 9}) {
+        const Options few{.layers = layers, .layers_as_needed = true};
+        active.arrange(chain.network, List{0}, few);
+        while (!active.frontier().empty()) active.grow(chain.network, few);
+        CHECK(active.vertices().size() == static_cast<std::size_t>(std::min(layers, 5) + 1));
+        active.settle(balanced);
+        CHECK(active.close());
+    }
+}
+
+TEST_CASE("layers as needed: who there is no room for keeps a turn", "[active]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
+    for (Index most = 1; most <= 600; most += 7) {
+        CAPTURE(most);
+        const Options options{
+            .layers = unlimited, .layers_as_needed = true, .sweeps = 1, .contact_visits = 1, .most_visits = most};
+        ActiveVertices active(162);
+        std::set<Index> seen;
+        for (int i = 0; i < 2000 && seen.size() < 162; ++i) {
+            active.arrange(network, List{3}, options);
+            while (!active.frontier().empty()) active.grow(network, options);
+            REQUIRE(static_cast<Index>(active.vertices().size()) <= 1 + std::max(most - 2, 0) / 4);
+            seen.insert(active.vertices().begin(), active.vertices().end());
+            active.settle([&](Index v) { return i > 0 && v != 3; });
+            for (const Index v : active.vertices()) active.stir_neighbours(network, v);
+            REQUIRE_FALSE(active.close());
+        }
+        if (most >= 30) REQUIRE(seen.size() == 162);
     }
 }
 

@@ -21,6 +21,9 @@ namespace membrane {
 /// The vertices at work: the propagation queue, and outside it the restless ones, which a contact that has moved on or
 /// ended has left out of balance. A vertex is restless until it is seen to be in balance; it becomes restless again
 /// when a neighbour moves, unless it has never been part of what is going on: beyond the layers the membrane stands still.
+///
+/// With `layers_as_needed` the queue begins each step with layer 0, `grow` adds a layer, and nothing stands still: all
+/// the others are restless until seen to be in balance.
 class ActiveVertices {
   public:
     explicit ActiveVertices(Index vertex_count);
@@ -39,13 +42,23 @@ class ActiveVertices {
     [[nodiscard]] std::span<const Index> beyond() const noexcept { return vertices().subspan(touched().size()); }
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return queue_; }
 
+    /// The layer that is looked at, but not visited yet: the first beyond the queue, if it may `grow`.
+    [[nodiscard]] std::span<const Index> frontier() const noexcept {
+        return has_frontier_ ? queue_.layer(queue_.layer_count() - 1) : std::span<const Index>();
+    }
+
+    /// Adds the frontier to what is visited, those of it that had not been so far at the end. Online.
+    template <class Network, class Options>
+    void grow(const Network& network, const Options& options) noexcept;
+
     /// Makes `v` restless from the next `arrange` on. @pre a vertex (asserted) that is not pinned
     void wake(Index v) noexcept {
         restless_.insert(v);
         stirred_.insert(v);
     }
 
-    /// Ends a step: who of the visited is not balanced, `is_balanced(v)`, and who was not visited, is restless now.
+    /// Ends a step: who of the visited and the frontier is not balanced, `is_balanced(v)`, and who was not visited, is
+    /// restless now.
     template <class IsBalanced>
     void settle(IsBalanced is_balanced) noexcept;
 
@@ -56,19 +69,25 @@ class ActiveVertices {
     /// After all stirring: whether everyone is at rest.
     [[nodiscard]] bool close() noexcept;
 
-    /// As if `arrange` had not been called, with up to the same `layers`.
+    /// As if `arrange` had not been called.
     template <class Network>
-    void cancel(const Network& network, Index layers) noexcept;
+    void cancel(const Network& network) noexcept;
 
     void clear() noexcept;
 
   private:
+    template <class Network, class Options>
+    void extend(const Network& network, const Options& options) noexcept;
+
     PropagationQueue queue_;
     IndexSet seeds_, next_seeds_;
     IndexSet restless_, next_restless_;
-    IndexSet left_;     // by the queue, which has gone elsewhere
+    IndexSet left_;     // by the queue, which has gone elsewhere, or has no room
     IndexSet visited_;  // in this step
     IndexSet stirred_;  // visited since everyone was last at rest
+    Index room_ = 0;    // of those visited
+    Index layers_before_ = 0;
+    bool as_needed_ = false, has_frontier_ = false;
     bool queue_at_rest_ = true;
 };
 
@@ -84,20 +103,25 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
 
 template <class Network, class Options>
 void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
+    as_needed_ = options.layers_as_needed;
+    layers_before_ = queue_.layer_count() - 1;
     next_seeds_.clear();
     for (const Index v : seeds) next_seeds_.insert(v);
     left_.clear();
     const auto before = seeds_.items(), now = next_seeds_.items();
-    if (!std::equal(now.begin(), now.end(), before.begin(), before.end())) {
+    if (as_needed_) {
+        queue_.build(network, seeds, 0);
+    } else if (!std::equal(now.begin(), now.end(), before.begin(), before.end())) {
         for (const Index v : queue_.vertices()) left_.insert(v);
         queue_.build(network, seeds, options.layers);
     }
     const Index touched = queue_.layer_count() > 0 ? static_cast<Index>(queue_.layer(0).size()) : 0;
     const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_visits + 1);
-    const auto spare =
-        static_cast<Index>((std::max)(options.most_visits - own, std::int64_t{0}) / (options.sweeps + 1));
-    const Index room = (std::max)(touched + spare, Index(1));
-    const Index others = (std::min)(restless_.count() + left_.count(), room / 4);  // their turn under a lasting contact
+    const auto passes = (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // a look before a layer is added
+    const auto spare = (std::max)(options.most_visits - own, std::int64_t{0}) / passes;
+    room_ = (std::max)(touched + static_cast<Index>(spare), Index(1));
+    const Index others =
+        (std::min)(restless_.count() + left_.count(), room_ / 4);  // their turn under a lasting contact
     visited_.clear();
     const auto line_up = [&](std::span<const Index> vertices, Index most) {
         for (const Index v : vertices) {
@@ -105,9 +129,25 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
             visited_.insert(v);
         }
     };
-    line_up(queue_.vertices(), (std::max)(touched, room - others));
-    line_up(restless_.items(), room);
-    line_up(left_.items(), room);
+    line_up(queue_.vertices(), (std::max)(touched, room_ - others));
+    line_up(restless_.items(), room_);
+    line_up(left_.items(), room_);
+    extend(network, options);
+}
+
+template <class Network, class Options>
+void ActiveVertices::grow(const Network& network, const Options& options) noexcept {
+    for (const Index v : frontier()) visited_.insert(v);
+    extend(network, options);
+}
+
+// A next layer, to be looked at; one that there is no room for has to wait for its turn among the restless.
+template <class Network, class Options>
+void ActiveVertices::extend(const Network& network, const Options& options) noexcept {
+    has_frontier_ = as_needed_ && queue_.layer_count() <= options.layers && queue_.grow(network);
+    if (vertices().size() + frontier().size() <= static_cast<std::size_t>(room_)) return;
+    for (const Index v : frontier()) left_.insert(v);
+    has_frontier_ = false;
 }
 
 template <class IsBalanced>
@@ -119,11 +159,15 @@ void ActiveVertices::settle(IsBalanced is_balanced) noexcept {
         }
     }
     std::size_t balanced = 0;
-    for (const Index v : vertices()) {
+    const auto judge = [&](Index v) {
         stirred_.insert(v);
         const bool rests = is_balanced(v), in_queue = queue_.contains(v);
         if (rests && in_queue) ++balanced;
-        if (!rests && !in_queue) next_restless_.insert(v);
+        if (!rests && (as_needed_ || !in_queue)) next_restless_.insert(v);
+    };
+    for (const Index v : vertices()) judge(v);
+    for (const Index v : frontier()) {
+        if (!visited_.contains(v)) judge(v);
     }
     queue_at_rest_ = balanced == queue_.vertices().size();
 }
@@ -131,7 +175,9 @@ void ActiveVertices::settle(IsBalanced is_balanced) noexcept {
 template <class Network>
 void ActiveVertices::stir_neighbours(const Network& network, Index v) noexcept {
     for (const auto& end : network.springs_of(v)) {
-        if (stirred_.contains(end.other) && !visited_.contains(end.other)) next_restless_.insert(end.other);
+        const bool takes_part =
+            as_needed_ ? !network.pinned(end.other) && !queue_.contains(end.other) : stirred_.contains(end.other);
+        if (takes_part && !visited_.contains(end.other)) next_restless_.insert(end.other);
     }
 }
 
@@ -143,8 +189,9 @@ inline bool ActiveVertices::close() noexcept {
 }
 
 template <class Network>
-void ActiveVertices::cancel(const Network& network, Index layers) noexcept {
-    queue_.build(network, seeds_.items(), layers);
+void ActiveVertices::cancel(const Network& network) noexcept {
+    queue_.build(network, seeds_.items(), layers_before_);
+    has_frontier_ = false;
 }
 
 inline void ActiveVertices::clear() noexcept {

@@ -27,6 +27,10 @@ class PropagationQueue {
     template <Real Scalar, class Law>
     void build(const MassSpringNetwork<Scalar, Law>& network, std::span<const Index> seeds, Index layers) noexcept;
 
+    /// Adds a layer; false if there is nobody left to add. Online. Cost: the springs of the last layer.
+    template <Real Scalar, class Law>
+    bool grow(const MassSpringNetwork<Scalar, Law>& network) noexcept;
+
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
     [[nodiscard]] bool contains(Index v) const noexcept { return reached_.contains(v); }
 
@@ -58,17 +62,24 @@ void PropagationQueue::build(const MassSpringNetwork<Scalar, Law>& network, std:
     for (const Index v : seeds) {
         if (!network.pinned(v)) reached_.insert(v);
     }
-    std::size_t begin = 0;
-    for (Index k = 0; begin < vertices().size(); ++k) {
-        const std::size_t end = vertices().size();
-        layer_ends_.push(end);
-        if (k == layers) break;
-        for (; begin < end; ++begin) {
-            for (const auto& spring : network.springs_of(vertices()[begin])) {
-                if (!network.pinned(spring.other)) reached_.insert(spring.other);
-            }
+    if (vertices().empty()) return;
+    layer_ends_.push(vertices().size());
+    while (layer_count() <= layers && grow(network)) {
+    }
+}
+
+template <Real Scalar, class Law>
+bool PropagationQueue::grow(const MassSpringNetwork<Scalar, Law>& network) noexcept {
+    if (layer_count() == 0) return false;
+    const std::size_t end = vertices().size();
+    for (const Index v : layer(layer_count() - 1)) {
+        for (const auto& spring : network.springs_of(v)) {
+            if (!network.pinned(spring.other)) reached_.insert(spring.other);
         }
     }
+    if (vertices().size() == end) return false;
+    layer_ends_.push(vertices().size());
+    return true;
 }
 
 }  // namespace membrane

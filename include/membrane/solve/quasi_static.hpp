@@ -14,9 +14,11 @@
 #include <membrane/network/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/constraints.hpp>
+#include <membrane/solve/deadline.hpp>
 #include <membrane/solve/region.hpp>
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
+#include <membrane/solve/sweeps.hpp>
 #include <membrane/solve/visit.hpp>
 
 /// Where the membrane comes to rest, and what it pushes back with.
@@ -50,7 +52,19 @@ class QuasiStaticSolver {
     /// sweep; a visit costs the vertex's springs.
     template <class Law, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const MassSpringNetwork<Scalar, Law>& network,
-                                          const Volume& volume, const Constraints&... constraints) noexcept;
+                                          const Volume& volume, const Constraints&... constraints) noexcept {
+        return step_in(NoHurry{}, x, dt, network, volume, constraints...);
+    }
+
+    /// The same, over at `deadline`, or later by what it misjudged its end by; or by what comes in any case, one
+    /// round over layer 0, 32 vertices beyond, and a look at all that are at work. The next step goes on where time ran
+    /// out, so that a membrane comes to rest however little time its steps have.
+    template <class Now, class Law, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
+    [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
+                                                const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                                const Constraints&... constraints) noexcept {
+        return step_in(Hurry<Now>(deadline, costs_), x, dt, network, volume, constraints...);
+    }
 
     /// Has a look at these vertices in the next steps: what moved them, or their anchors, was not a step of this solver.
     /// An index that is no vertex is passed over.
@@ -64,17 +78,13 @@ class QuasiStaticSolver {
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return active_.queue(); }
 
   private:
+    template <class Pace, class Law, class Volume, class... Constraints>
+    [[nodiscard]] StepReport<Scalar> step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
+                                             const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                             const Constraints&... constraints) noexcept;
     void open(std::size_t constraint_count) noexcept;
-    template <class Handed, class Enforce>
-    [[nodiscard]] StepStatus advance(const Handed& scene, Region<Scalar>& region, Enforce enforce) noexcept;
-    template <class Handed, class Enforce>
-    bool sweep(const Handed& scene, Region<Scalar>& region, Enforce enforce) noexcept;
     template <class Handed>
-    bool visit(Index v, const Handed& scene, Region<Scalar>& region) noexcept;
-    template <class Handed>
-    bool look(const Handed& scene) noexcept;
-    template <class Handed>
-    void settle(const Handed& scene) noexcept;
+    void settle(const Handed& scene, bool mended) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept;
 
     static constexpr bool gives_numbers =
@@ -88,7 +98,8 @@ class QuasiStaticSolver {
     BoundedList<Index> moved_;
     std::array<Vector3<Scalar>, Workspace<Scalar>::most_constraints> reactions_{};
     StepReport<Scalar> report_;
-    bool mended_ = false;  // by constraints, at the end of the step
+    std::size_t resume_ = 0;  // the vertex beyond layer 0 at which the last sweep ran out of time
+    StepCosts costs_;
 };
 
 template <Real Scalar, StepRule<Scalar> Rule>
@@ -111,11 +122,11 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const MassSpringNetwork<Scala
 }
 
 template <Real Scalar, StepRule<Scalar> Rule>
-template <class Law, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
-StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step(PointsRef<Scalar> x, Scalar dt,
-                                                         const MassSpringNetwork<Scalar, Law>& network,
-                                                         const Volume& volume,
-                                                         const Constraints&... constraints) noexcept {
+template <class Pace, class Law, class Volume, class... Constraints>
+StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
+                                                            const MassSpringNetwork<Scalar, Law>& network,
+                                                            const Volume& volume,
+                                                            const Constraints&... constraints) noexcept {
     static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints, "a step takes 16 constraints at most");
     MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());
     open(sizeof...(Constraints));
@@ -139,20 +150,26 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step(PointsRef<Scalar> x, Sc
         if (!region.fixed(v)) active_.wake(v);
     }
     active_.arrange(network, work_.seeds.items(), options_);
-    for (const Index v : active_.vertices()) region.save(v);
+    for (const auto vertices : {active_.vertices(), active_.frontier()}) {
+        for (const Index v : vertices) region.save(v);
+    }
     const auto enforce = [&] {
         bool mended = false;
         for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(region); });
         return mended;
     };
-    if (const StepStatus status = advance(scene, region, enforce); status != StepStatus::advanced) {
-        active_.cancel(network, options_.layers);
+    std::size_t resume = resume_;
+    Sweeps sweeps(rule_, options_, scene, region, enforce, active_, pace, report_);
+    if (const StepStatus status = sweeps.run(resume); status != StepStatus::advanced) {
+        active_.cancel(network);
         return refuse_step(status, x);
     }
+    resume_ = resume;
     for_each(
         [&](const auto& constraint, std::size_t i) { reactions_[i] = constraint.reaction(std::as_const(region)); });
-    settle(scene);
+    settle(scene, sweeps.mended());
     work_.close();
+    pace.done();
     return report_;
 }
 
@@ -165,91 +182,22 @@ void QuasiStaticSolver<Scalar, Rule>::open(std::size_t constraint_count) noexcep
     report_.reactions = {reactions_.data(), constraint_count};
 }
 
-// All sweeps, and a look at what has come of them.
-template <Real Scalar, StepRule<Scalar> Rule>
-template <class Handed, class Enforce>
-StepStatus QuasiStaticSolver<Scalar, Rule>::advance(const Handed& scene, Region<Scalar>& region,
-                                                    Enforce enforce) noexcept {
-    bool changed = true;
-    for (Index i = 0; i < options_.sweeps && changed; ++i) {
-        changed = sweep(scene, region, enforce);
-        if (report_.status != StepStatus::advanced) return report_.status;
-    }
-    mended_ = changed && enforce();
-    if (look(scene)) return StepStatus::advanced;
-    region.put_back([&](Index v) { return !work_.held.contains(v); });
-    return look(scene) ? StepStatus::unstable : StepStatus::bad_input;  // no better: what was handed in is to blame
-}
-
-template <Real Scalar, StepRule<Scalar> Rule>
-template <class Handed, class Enforce>
-bool QuasiStaticSolver<Scalar, Rule>::sweep(const Handed& scene, Region<Scalar>& region, Enforce enforce) noexcept {
-    bool changed = false;
-    for (Index i = 0; i < options_.contact_visits; ++i) {
-        for (const Index v : active_.touched()) changed |= visit(v, scene, region);
-        if (report_.status != StepStatus::advanced || !enforce()) break;
-        changed = true;
-    }
-    for (const Index v : active_.beyond()) changed |= visit(v, scene, region);
-    return changed;
-}
-
-template <Real Scalar, StepRule<Scalar> Rule>
-template <class Handed>
-bool QuasiStaticSolver<Scalar, Rule>::visit(Index v, const Handed& scene, Region<Scalar>& region) noexcept {
-    if (region.fixed(v)) return false;
-    ++report_.visits;
-    const auto state = state_of<Rule>(scene, v);
-    if (state.touched) region.set_resistance(v, norm<Scalar>(state.force - point(work_.external, v)));
-    const auto compliance = rule_.compliance(state);
-    if constexpr (gives_numbers) {
-        if (compliance * state.stiffness >= 2 && diverges(scene, v, compliance)) {
-            report_.status = StepStatus::unstable;
-            return false;
-        }
-        region.set_compliance(v, compliance);
-    } else {
-        region.set_compliance(v, compliance, state.stiffness > 0 ? 1 / state.stiffness : Scalar(0));
-    }
-    if (!(norm(state.force) > work_.negligible_force)) return false;
-    scene.x.col(v) += held_back<Rule>(scene, v, compliance * state.force);
-    return true;
-}
-
-// The forces at the end; false if any is not finite.
-template <Real Scalar, StepRule<Scalar> Rule>
-template <class Handed>
-bool QuasiStaticSolver<Scalar, Rule>::look(const Handed& scene) noexcept {
-    const auto look_at = [&](Index v, bool free) {
-        const auto force = pull_on(scene, v).force;
-        work_.unbalanced.col(v) = force;
-        ++report_.visits;
-        if (free) report_.residual = (std::max)(report_.residual, norm(force));
-        return is_finite(force);
-    };
-    bool finite = true;
-    for (const Index v : active_.vertices()) {
-        if (!work_.held.contains(v)) finite &= look_at(v, true);
-    }
-    for (const Index v : work_.held.items()) finite &= look_at(v, false);
-    return finite;
-}
-
 // Who has moved, and who has to be looked at again.
 template <Real Scalar, StepRule<Scalar> Rule>
 template <class Handed>
-void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene) noexcept {
+void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene, bool mended) noexcept {
     active_.settle(
         [&](Index v) { return work_.held.contains(v) || norm(lasting_force(scene, v)) <= work_.negligible_force; });
     for (const Index v : work_.saved.items()) {
         const Vector3<Scalar> way = point(scene.x, v) - point(work_.start, v);
         if (way.isZero(0)) continue;
         moved_.push(v);
-        const Scalar negligible = work_.compliance[static_cast<std::size_t>(v)] * work_.negligible_force;
+        const Scalar compliance = work_.compliance[static_cast<std::size_t>(v)];
+        const Scalar negligible = options_.layers_as_needed ? Scalar(0) : compliance * work_.negligible_force;
         if (norm(way) > negligible) active_.stir_neighbours(scene.network, v);
     }
     report_.moved = moved_.items();
-    report_.converged = active_.close() && !mended_ && report_.residual <= work_.negligible_force;
+    report_.converged = active_.close() && !mended && report_.residual <= work_.negligible_force;
     std::swap(last_held_, work_.held);
 }
 
@@ -277,6 +225,7 @@ void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     active_.clear();
     work_.forget();
     last_held_.clear();
+    resume_ = 0;
 }
 
 }  // namespace membrane

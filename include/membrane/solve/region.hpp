@@ -80,8 +80,9 @@ class Region {
 
     /// Whether nothing moves `v` in this step but `hold`.
     [[nodiscard]] bool fixed(Index v) const noexcept {
-        return work_.pinned[static_cast<std::size_t>(v)] != 0 || work_.held.contains(v);
+        return work_.pinned[static_cast<std::size_t>(v)] != 0 || held(v);
     }
+    [[nodiscard]] bool held(Index v) const noexcept { return work_.held.contains(v); }
 
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept { return point(x_, v); }
 
@@ -171,6 +172,7 @@ class Region {
         last_recalled_ = 0;
     }
 
+    void set_unbalanced(Index v, const Vector3<Scalar>& force) noexcept { work_.unbalanced.col(v) = force; }
     void set_resistance(Index v, Scalar force) noexcept { work_.resistance[static_cast<std::size_t>(v)] = force; }
     void set_compliance(Index v, Scalar compliance) noexcept {
         work_.compliance[static_cast<std::size_t>(v)] = compliance;

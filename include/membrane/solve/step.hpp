@@ -17,6 +17,7 @@ namespace membrane {
 template <Real Scalar>
 struct SolverOptions {
     Index layers = 6;               ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
+    bool layers_as_needed = false;  ///< a layer, up to `layers`, only while a force on it is not negligible
     Index sweeps = 2;               ///< passes over the queue in each step
     Index contact_visits = 4;       ///< visits of layer 0 in each sweep: what touches the tool settles last
     Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 and what is held get theirs anyway
@@ -39,9 +40,10 @@ enum class StepStatus {
 template <Real Scalar>
 struct StepReport {
     StepStatus status = StepStatus::advanced;
-    bool converged = false;  ///< nothing is left to do: no force above the negligible one on any vertex that may move
-    Scalar residual = 0;     ///< largest unbalanced force on a free vertex that was visited, at the end [N]
-    Index visits = 0;        ///< of vertices, those that only look included
+    bool converged = false;    ///< nothing is left to do: no force above the negligible one on any vertex that may move
+    bool out_of_time = false;  ///< the deadline came before that, and before the last sweep had ended
+    Scalar residual = 0;       ///< largest unbalanced force on a free vertex at work, at the end [N]
+    Index visits = 0;          ///< of vertices, those that only look included
     std::span<const Index> moved;                ///< vertices whose position changed
     std::span<const Vector3<Scalar>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]
 

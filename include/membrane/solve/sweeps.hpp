@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <concepts>
+#include <cstddef>
+#include <span>
+#include <utility>
+
+#include <membrane/solve/active_vertices.hpp>
+#include <membrane/solve/deadline.hpp>
+#include <membrane/solve/region.hpp>
+#include <membrane/solve/step.hpp>
+#include <membrane/solve/visit.hpp>
+
+/// What a step spends its time with.
+///
+///     membrane::Sweeps sweeps(rule, options, scene, region, enforce, active, pace, report);
+///     if (sweeps.run(resume) == membrane::StepStatus::advanced) ...      // positions moved, forces looked at
+namespace membrane {
+
+/// The visits of one step: layer 0 and what the constraints then mend, in rounds, and all the vertices beyond; again until
+/// nothing changes, the sweeps are done, or time is up. In the end a look at the forces on all of them.
+template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+class Sweeps {
+  public:
+    /// `enforce()` lets all constraints mend what they find broken, and says whether there was anything.
+    Sweeps(const Rule& rule, const SolverOptions<Scalar>& options, const Scene& scene, Region<Scalar>& region,
+           Enforce enforce, ActiveVertices& active, Pace& pace, StepReport<Scalar>& report) noexcept
+        : rule_(rule),
+          options_(options),
+          scene_(scene),
+          region_(region),
+          enforce_(enforce),
+          active_(active),
+          pace_(pace),
+          report_(report) {}
+
+    /// All of it, and what came of it. The first sweep begins at place `resume` of the vertices beyond layer 0; there the
+    /// next step is to go on. Where it is not `advanced`, positions are to be put back.
+    [[nodiscard]] StepStatus run(std::size_t& resume) noexcept;
+
+    /// Whether the constraints had something to mend, or may have had, at the very end.
+    [[nodiscard]] bool mended() const noexcept { return mended_; }
+
+  private:
+    bool sweep(std::size_t& resume) noexcept;
+    bool rounds() noexcept;
+    bool pass(std::span<const Index> vertices) noexcept;
+    bool grow() noexcept;
+    bool visit(Index v) noexcept;
+    bool look() noexcept;
+
+    const Rule& rule_;
+    const SolverOptions<Scalar>& options_;
+    const Scene& scene_;
+    Region<Scalar>& region_;
+    Enforce enforce_;
+    ActiveVertices& active_;
+    Pace& pace_;
+    StepReport<Scalar>& report_;
+    const Index* next_ = nullptr;  // where time ran out
+    bool mended_ = false;
+};
+
+template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+StepStatus Sweeps<Rule, Scalar, Scene, Enforce, Pace>::run(std::size_t& resume) noexcept {
+    pace_.begin(active_.vertices().size() + active_.frontier().size());
+    bool changed = true;
+    for (Index i = 0; i < options_.sweeps && changed && !report_.out_of_time; ++i) {
+        changed = sweep(resume);
+        if (report_.status != StepStatus::advanced) return report_.status;
+    }
+    mended_ = changed && (report_.out_of_time || !pace_.has_time_to_enforce() || enforce_());
+    if (look()) return StepStatus::advanced;
+    region_.put_back([&](Index v) { return !region_.held(v); });
+    return look() ? StepStatus::unstable : StepStatus::bad_input;  // no better: what was handed in is to blame
+}
+
+template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::sweep(std::size_t& resume) noexcept {
+    bool changed = rounds();
+    if (report_.status != StepStatus::advanced) return changed;
+    const auto beyond = active_.beyond();
+    const std::size_t begin = (std::min)(std::exchange(resume, 0), beyond.size());
+    changed |= pass(beyond.subspan(begin));
+    changed |= pass(beyond.first(begin));
+    while (grow()) changed = true;
+    if (report_.out_of_time) resume = static_cast<std::size_t>(next_ - beyond.data());
+    return changed;
+}
+
+template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::rounds() noexcept {
+    const auto touched = active_.touched();
+    bool changed = false;
+    for (Index i = 0; i < options_.contact_visits && pace_.has_time_for_round(touched.size()); ++i) {
+        for (const Index v : touched) changed |= visit(v);
+        pace_.visited(touched.size());
+        if (report_.status != StepStatus::advanced) break;
+        const bool mended = enforce_();
+        pace_.enforced();
+        if (!mended) break;
+        changed = true;
+    }
+    return changed;
+}
+
+template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::pass(std::span<const Index> vertices) noexcept {
+    bool changed = false;
+    while (!vertices.empty() && !report_.out_of_time) {
+        report_.out_of_time = !pace_.has_time_for_batch();
+        if (report_.out_of_time) {
+            next_ = vertices.data();
+            break;
+        }
+        const auto batch = vertices.first((std::min)(visits_in_batch, vertices.size()));
+        for (const Index v : batch) changed |= visit(v);
+        pace_.visited(batch.size());
+        vertices = vertices.subspan(batch.size());
+    }
+    return changed;
+}
+
+// Where layers are added as needed: adds the next one, and visits it, if a force on it is not negligible.
+template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::grow() noexcept {
+    const auto frontier = active_.frontier();
+    if (frontier.empty() || report_.out_of_time || !pace_.has_time_for_batch()) return false;
+    report_.visits += static_cast<Index>(frontier.size());
+    const bool needed = std::any_of(frontier.begin(), frontier.end(), [&](Index v) {
+        return !region_.fixed(v) && norm(pull_on(scene_, v).force) > scene_.work.negligible_force;
+    });
+    pace_.visited(frontier.size());
+    const std::size_t before = active_.vertices().size();
+    if (!needed) return false;
+    active_.grow(scene_.network, options_);
+    for (const Index v : active_.frontier()) region_.save(v);
+    pace_.looks_at(active_.vertices().size() + active_.frontier().size());
+    pass(active_.vertices().subspan(before));
+    return true;
+}
+
+template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::visit(Index v) noexcept {
+    if (region_.fixed(v)) return false;
+    ++report_.visits;
+    const auto state = state_of<Rule>(scene_, v);
+    if (state.touched) region_.set_resistance(v, norm<Scalar>(state.force - point(scene_.work.external, v)));
+    const auto compliance = rule_.compliance(state);
+    if constexpr (std::same_as<Scalar, std::remove_cv_t<decltype(compliance)>>) {
+        if (compliance * state.stiffness >= 2 && diverges(scene_, v, compliance)) {
+            report_.status = StepStatus::unstable;
+            return false;
+        }
+        region_.set_compliance(v, compliance);
+    } else {
+        region_.set_compliance(v, compliance, state.stiffness > 0 ? 1 / state.stiffness : Scalar(0));
+    }
+    if (!(norm(state.force) > scene_.work.negligible_force)) return false;
+    scene_.x.col(v) += held_back<Rule>(scene_, v, compliance * state.force);
+    return true;
+}
+
+// The forces at the end; false if any is not finite.
+template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::look() noexcept {
+    bool finite = true;
+    const auto look_at = [&](Index v, bool free) {
+        const auto force = pull_on(scene_, v).force;
+        region_.set_unbalanced(v, force);
+        ++report_.visits;
+        if (free) report_.residual = (std::max)(report_.residual, norm(force));
+        finite &= is_finite(force);
+    };
+    for (const auto vertices : {active_.vertices(), active_.frontier()}) {
+        for (const Index v : vertices) {
+            if (!region_.held(v)) look_at(v, true);
+        }
+    }
+    for (const Index v : scene_.work.held.items()) look_at(v, false);
+    return finite;
+}
+
+}  // namespace membrane
