@@ -132,8 +132,8 @@ inline bool BlockConvexity::gather(const RestProblem& problem, double radius) no
     push_count_ = 0;
     most_ = 0;
     for (Index v = 0; v < problem.vertex_count(); ++v) {
-        own_[static_cast<std::size_t>(v)] = diagonal3(problem.backing(v));
-        own_sizes_[static_cast<std::size_t>(v)] = 3 * problem.backing(v);
+        own_[static_cast<std::size_t>(v)] = diagonal3(problem.support(v));
+        own_sizes_[static_cast<std::size_t>(v)] = 3 * (problem.backing(v) + std::abs(problem.support(v)));
         most_ = (std::max)(most_, problem.backing(v));
     }
     for (const auto& spring : problem.springs()) {

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <span>
-#include <string_view>
 #include <type_traits>
 #include <vector>
 
 #include <membrane/accuracy/convexity.hpp>
+#include <membrane/accuracy/error_report.hpp>
 #include <membrane/accuracy/linearised.hpp>
+#include <membrane/accuracy/pressed_places.hpp>
 #include <membrane/accuracy/rest_problem.hpp>
 
 /// How far a membrane is from rest, proven.
@@ -24,6 +24,10 @@
 ///         error.position                                                            // no vertex is farther off [m]
 ///         error.reactions[0].farthest_from(report.reactions[0])                     // the force is no farther off [N]
 ///     }
+///
+/// With a tool in contact, from the equilibrium that Newton's method found:
+///     const auto rest = membrane::equilibrium(x, mesh, network, backing, {}, press(tool, contact));
+///     const auto error = bound.of(rest, x, mesh, network, backing, press(tool, contact));
 namespace membrane {
 
 struct ErrorBoundOptions {
@@ -31,47 +35,6 @@ struct ErrorBoundOptions {
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
-};
-
-enum class BoundStatus {
-    certified,
-    not_convex,      ///< the energy could not be shown to be convex as far as the equilibrium seems to be
-    did_not_refine,  ///< the equilibrium was not neared enough to say anything
-    contact,         ///< a tool touches: not treated
-    unsupported,     ///< a constraint of one's own, or held points with a corner that something else holds too
-    bad_input,       ///< a number is not finite, an index names no vertex, counts do not agree
-};
-
-/// A force that is not known exactly: within `radius` of `centre` [N].
-struct EnclosedForce {
-    Vector3<double> centre = Vector3<double>::Zero();
-    double radius = std::numeric_limits<double>::infinity();
-
-    /// Upper bound of the distance to `force` [N].
-    template <class Force>
-    [[nodiscard]] double farthest_from(const Eigen::MatrixBase<Force>& force) const noexcept {
-        return norm<double>(force.template cast<double>() - centre) * (1 + 1e-15) + radius;
-    }
-};
-
-/// What is known of the equilibrium near a state. The span is the `ErrorBound`'s and valid until its next call.
-struct ErrorReport {
-    BoundStatus status = BoundStatus::bad_input;
-
-    /// If certified: exactly one equilibrium has every vertex within `position` of where it is now; else infinite [m].
-    double position = std::numeric_limits<double>::infinity();
-
-    /// If certified: the reaction of each constraint in turn at that equilibrium.
-    std::span<const EnclosedForce> reactions;
-
-    /// Where no bound is known, how far the equilibrium seems to be [m]; not proven. The centres of `reactions` are
-    /// then estimates too.
-    double estimate = std::numeric_limits<double>::infinity();
-
-    double convexity = 0;   ///< lower bound of the smallest eigenvalue of the stiffness around [N/m], where positive
-    Index refinements = 0;  ///< that were done
-
-    [[nodiscard]] bool certified() const noexcept { return status == BoundStatus::certified; }
 };
 
 /// Proves how far a membrane of linear springs is from rest, whoever brought it where it is, and whether the solver
@@ -94,6 +57,14 @@ struct ErrorReport {
 /// A reaction q changes by no more than the sum of k |w_i - w_j| over the springs at each free vertex, w the share of
 /// each vertex in q, no spring being stiffer than k in C: it is q(y) within sqrt(sum of squares of these) e.
 ///
+/// Where tools press, y and the pressures there are those of an equilibrium found before, r is what is left over with
+/// them, and mu a bound for the stiffness less what pressures may take away. What they do to the energy beyond that is
+/// work across gaps and overlaps, no more than some w (`PressedPlaces`): mu |x - y|^2 <= |r| |x - y| + w for an
+/// equilibrium x in C, and two in C are one. The least point of E outside the tools within a ball B in C around y is one:
+/// if it were on the surface, a force would hold it there, which only adds to the left side; so e, the radius, is where
+/// both sides are equal. (What the force adds to the pressures there is outweighed too while e is below the least
+/// distance from the axis times the least cosine, and above what it takes to clear the overlaps.)
+///
 /// Rounding is that of IEEE double: with -ffast-math this is no proof. The equilibrium is at rest: damping has no
 /// force. A reaction in a step's report may have some that is due to damping; its distance from the equilibrium's is
 /// bounded all the same. A press that touches nothing, or holds nothing, counts as none.
@@ -113,26 +84,38 @@ class ErrorBound {
                                  const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                  const Constraints&... constraints) noexcept;
 
+    /// The same with tools in contact; `rest` is the equilibrium of just these. No tool may touch what is held, nor a
+    /// vertex that another may touch, and no point of a triangle be held beside.
+    /// @throws InvalidInput for a constraint that is not sound. Offline.
+    template <Real Scalar, class Law, LinearBacking Volume, RestConstraint... Constraints>
+    [[nodiscard]] ErrorReport of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                 const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
+                                 const Volume& volume, const Constraints&... constraints);
+
   private:
     static constexpr std::size_t most_constraints = Workspace<double>::most_constraints;
     static constexpr int most_attempts = 4;
 
+    void open(std::size_t constraint_count) noexcept;
+    template <class... Constraints>
+    [[nodiscard]] ErrorReport report(const Constraints&... constraints) noexcept;
     void locate() noexcept;
+    void enclose() noexcept;
     bool refine() noexcept;
     void look() noexcept;
     bool convex_within(double radius) noexcept;
     [[nodiscard]] double enclosure() const noexcept;
     template <class C>
-    [[nodiscard]] EnclosedForce enclose_reaction(const C& constraint) noexcept;
+    [[nodiscard]] EnclosedForce enclose_reaction(const C& constraint, std::size_t& tool) noexcept;
 
     ErrorBoundOptions options_;
     RestProblem problem_;
     Linearised stiffness_;
     Convexity convexity_;
+    PressedPlaces pressed_;
     Points<double> y_, force_, rest_, way_;  // y, its forces on all vertices, those that are unbalanced, a step
     std::vector<double> magnitude_, weights_, slopes_;
-    double distance_ = 0, unbalanced_ = 0;  // of y: from x [m], norm of the forces with rounding [N]
-    double radius_ = -1;                    // of C [m]
+    double distance_ = 0, unbalanced_ = 0, radius_ = -1;  // of y: from x [m], norm of the forces [N]; of C [m]
     ErrorReport error_;
     std::array<EnclosedForce, most_constraints> reactions_{};
 };
@@ -153,6 +136,7 @@ ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network,
       problem_(network),
       stiffness_(problem_),
       convexity_(problem_),
+      pressed_(problem_),
       y_(Points<double>::Zero(3, network.vertex_count())),
       force_(y_),
       rest_(y_),
@@ -166,19 +150,57 @@ template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar>... Co
 ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                       const Constraints&... constraints) noexcept {
-    static_assert(sizeof...(Constraints) <= most_constraints, "16 constraints at most, as in a step");
-    error_ = {};
-    reactions_.fill({});
-    error_.reactions = {reactions_.data(), sizeof...(Constraints)};
+    open(sizeof...(Constraints));
     switch (problem_.take(x, network, volume, constraints...)) {
-        case ProblemStatus::sound: break;
+        case ProblemStatus::sound: locate(); break;
         case ProblemStatus::contact: error_.status = BoundStatus::contact; return error_;
         case ProblemStatus::unsupported: error_.status = BoundStatus::unsupported; return error_;
         default: return error_;
     }
-    locate();
-    [[maybe_unused]] std::size_t i = 0;
-    ((reactions_[i++] = enclose_reaction(constraints)), ...);
+    return report(constraints...);
+}
+
+template <ConvexityModel Convexity>
+template <Real Scalar, class Law, LinearBacking Volume, RestConstraint... Constraints>
+ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                      const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
+                                      const Volume& volume, const Constraints&... constraints) {
+    open(sizeof...(Constraints));
+    const ProblemStatus status = problem_.take(x, network, volume, constraints...);
+    if (rest.x.cols() != x.cols() || mesh.vertex_count() != x.cols() || !is_finite(rest.x)) return error_;
+    if (status == ProblemStatus::bad_input) return error_;
+    if (status == ProblemStatus::unsupported || !problem_.places().empty()) {
+        error_.status = BoundStatus::unsupported;
+        return error_;
+    }
+    RestScene scene(problem_.given(), std::vector<unsigned char>(magnitude_.size()));
+    (describe(constraints, scene), ...);
+    for (const auto& touch : rest.touches) {
+        if (touch.tool >= scene.tools().size()) return error_;
+    }
+    y_ = rest.x;
+    pressed_.take(problem_, mesh.triangles(), y_, scene.tools(), rest.touches);
+    look();
+    error_.estimate = distance_;
+    enclose();
+    return report(constraints...);
+}
+
+template <ConvexityModel Convexity>
+void ErrorBound<Convexity>::open(std::size_t constraint_count) noexcept {
+    error_ = {};
+    reactions_.fill({});
+    error_.reactions = {reactions_.data(), constraint_count};
+    pressed_.clear();
+    radius_ = -1;
+}
+
+template <ConvexityModel Convexity>
+template <class... Constraints>
+ErrorReport ErrorBound<Convexity>::report(const Constraints&... constraints) noexcept {
+    static_assert(sizeof...(Constraints) <= most_constraints, "16 constraints at most, as in a step");
+    [[maybe_unused]] std::size_t i = 0, tool = 0;
+    ((reactions_[i++] = enclose_reaction(constraints, tool)), ...);
     return error_;
 }
 
@@ -190,7 +212,6 @@ void ErrorBound<Convexity>::locate() noexcept {
     problem_.places().settle(y_);
     look();
     error_.status = BoundStatus::did_not_refine;
-    radius_ = -1;
     for (double before = std::numeric_limits<double>::infinity(); unbalanced_ < before / 2;) {
         before = unbalanced_;
         const bool convex = refine();
@@ -204,7 +225,18 @@ void ErrorBound<Convexity>::locate() noexcept {
         }
         if (enclosure() <= 0.01 * distance_ || error_.refinements >= options_.refinements) break;
     }
-    for (int attempt = 0; !(distance_ + enclosure() <= radius_); ++attempt) {
+    enclose();
+}
+
+// A radius for C that the bound it gives is not above.
+template <ConvexityModel Convexity>
+void ErrorBound<Convexity>::enclose() noexcept {
+    error_.status = BoundStatus::did_not_refine;
+    if (radius_ < 0 && !convex_within(1.05 * distance_ + pressed_.overlap())) {
+        error_.status = BoundStatus::not_convex;
+        return;
+    }
+    for (int attempt = 0; !(distance_ + enclosure() <= radius_ && enclosure() <= pressed_.most_radius()); ++attempt) {
         if (attempt == most_attempts || !convex_within(1.125 * (distance_ + enclosure()))) return;
     }
     error_.status = BoundStatus::certified;
@@ -229,6 +261,7 @@ template <ConvexityModel Convexity>
 void ErrorBound<Convexity>::look() noexcept {
     problem_.forces(y_, force_, magnitude_);
     rest_ = force_;
+    pressed_.push(rest_, magnitude_);
     problem_.project(rest_);
     double rounding = 0, farthest = 0;
     for (Index v = 0; v < problem_.vertex_count(); ++v) {
@@ -244,6 +277,9 @@ void ErrorBound<Convexity>::look() noexcept {
 template <ConvexityModel Convexity>
 bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
     radius_ = radius;
+    error_.convexity = -std::numeric_limits<double>::infinity();
+    if (!pressed_.around(problem_, force_, magnitude_, distance_ + radius)) return false;
+    for (Index v = 0; v < problem_.vertex_count(); ++v) problem_.soften(v, pressed_.softening(v));
     error_.convexity = convexity_.around(problem_, radius * (1 + 1e-12));
     return error_.convexity > 0;
 }
@@ -253,16 +289,22 @@ bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
 template <ConvexityModel Convexity>
 double ErrorBound<Convexity>::enclosure() const noexcept {
     const double slip = problem_.places().slip(y_);
-    return (1 + 1e-9) * ((unbalanced_ + stiffness_.largest() * slip) / error_.convexity + slip);
+    const double mu = error_.convexity;
+    const double half = (unbalanced_ + (slip > 0 ? stiffness_.largest() * slip : 0.0)) / (2 * mu);
+    const double radius = half + std::sqrt(half * half + pressed_.work() / mu);
+    return (1 + 1e-9) * ((std::max)(radius, pressed_.least_radius()) + slip);
 }
 
 // A spring between vertices of shares a and b adds (a - b) times its change of force.
 template <ConvexityModel Convexity>
 template <class C>
-EnclosedForce ErrorBound<Convexity>::enclose_reaction(const C& constraint) noexcept {
+EnclosedForce ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::size_t& tool) noexcept {
     if constexpr (requires { constraint.force; }) return {-constraint.force.template cast<double>(), 0};
     std::fill(weights_.begin(), weights_.end(), 0.0);
     problem_.share(constraint, weights_);
+    if constexpr (requires { constraint.contact.touching(); }) {
+        if (constraint.contact.touching()) pressed_.share(tool++, weights_);
+    }
     for (std::size_t v = 0; v < weights_.size(); ++v)
         slopes_[v] = weights_[v] * problem_.backing(static_cast<Index>(v));
     for (const auto& spring : problem_.springs()) {

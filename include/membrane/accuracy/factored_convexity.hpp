@@ -49,8 +49,8 @@ inline bool FactoredConvexity::gather(const RestProblem& problem, double radius)
     Index free = 0;
     for (Index v = 0; v < problem.vertex_count(); ++v) {
         if (problem.fixed(v)) continue;
-        factors_.add(v, diagonal3(problem.backing(v)));
-        sum += 3 * problem.backing(v);
+        factors_.add(v, diagonal3(problem.support(v)));
+        sum += 3 * problem.support(v);
         ++free;
     }
     for (std::size_t s = 0; s < problem.springs().size(); ++s) {

@@ -31,6 +31,7 @@ class HeldPlaces {
         return true;
     }
     void clear() noexcept { count_ = 0; }
+    [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
 
     /// Whether no corner that counts is part of two places, or `fixed(v)`. What is below needs that.
     template <class IsFixed>

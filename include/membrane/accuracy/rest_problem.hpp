@@ -31,7 +31,7 @@ concept LinearBacking = std::same_as<Volume, NoVolumeSprings> || std::same_as<Vo
 enum class ProblemStatus {
     sound,
     bad_input,    ///< a number is not finite, an index names no vertex, counts do not agree
-    contact,      ///< a tool touches
+    contact,      ///< a tool touches; everything else has been taken in
     unsupported,  ///< a constraint of one's own, or held points with a corner that something else holds too
 };
 
@@ -55,6 +55,11 @@ class RestProblem {
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed_.size()); }
     [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
     [[nodiscard]] double backing(Index v) const noexcept { return backing_[at(v)]; }
+
+    /// The backing's stiffness less what something else takes away of it, until the next `take` [N/m].
+    [[nodiscard]] double support(Index v) const noexcept { return backing_[at(v)] - softening_[at(v)]; }
+    void soften(Index v, double by) noexcept { softening_[at(v)] = by; }
+
     [[nodiscard]] bool fixed(Index v) const noexcept { return fixed_[at(v)] != 0; }
     [[nodiscard]] int free_ends(const Spring<double>& spring) const noexcept {
         return (fixed(spring.first) ? 0 : 1) + (fixed(spring.second) ? 0 : 1);
@@ -102,17 +107,19 @@ class RestProblem {
     [[nodiscard]] ProblemStatus check_places() const noexcept;
 
     std::vector<Spring<double>> springs_;
-    std::vector<double> backing_;
+    std::vector<double> backing_, softening_;
     std::vector<unsigned char> fixed_;  // by whom, see below
     Points<double> anchors_, load_, given_, centre_;
     HeldPlaces places_;
     double rounding_ = 0;
+    bool touched_ = false;  // by a tool
 };
 
 template <Real Scalar, class Law>
 RestProblem::RestProblem(const MassSpringNetwork<Scalar, Law>& network)
     : springs_(network.springs().size()),
       backing_(static_cast<std::size_t>(network.vertex_count())),
+      softening_(backing_.size()),
       fixed_(backing_.size()),
       anchors_(Points<double>::Zero(3, network.vertex_count())),
       load_(anchors_),
@@ -141,10 +148,13 @@ ProblemStatus RestProblem::take(const std::type_identity_t<ConstPointsRef<Scalar
     }
     load_.setZero();
     places_.clear();
+    std::fill(softening_.begin(), softening_.end(), 0.0);
+    touched_ = false;
     if (!take_backing<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::bad_input;
     ProblemStatus status = ProblemStatus::sound;
     ((status = status == ProblemStatus::sound ? act(constraints) : status), ...);
-    return status == ProblemStatus::sound ? check_places() : status;
+    if (status == ProblemStatus::sound) status = check_places();
+    return status == ProblemStatus::sound && touched_ ? ProblemStatus::contact : status;
 }
 
 template <class Springs>
@@ -178,7 +188,8 @@ ProblemStatus RestProblem::act(const C& constraint) noexcept {
     if constexpr (requires { this->act_on(constraint); }) {
         return act_on(constraint);
     } else if constexpr (requires { constraint.contact.touching(); }) {
-        return constraint.contact.touching() ? ProblemStatus::contact : ProblemStatus::sound;
+        touched_ |= constraint.contact.touching();
+        return ProblemStatus::sound;
     } else {
         return ProblemStatus::unsupported;
     }

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include <membrane/accuracy/tool_gap.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/press.hpp>
 
@@ -29,6 +30,7 @@ struct EquilibriumOptions {
 struct Equilibrium {
     Points<double> x;                        ///< 3 x V [m]
     std::vector<Vector3<double>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]
+    std::vector<ToolGap> touches;            ///< what tools press on; tools are counted from 0, those that touch
     double residual = 0;                     ///< largest unbalanced force on a free vertex [N]
     double overlap = 0;                      ///< how deep the surface is in a tool [m]
     Index iterations = 0;                    ///< of Newton's method, in all increments

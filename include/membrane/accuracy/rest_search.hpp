@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -113,6 +114,8 @@ Equilibrium RestSearch<ElasticModel>::run(std::size_t constraint_count) {
     }
     rest.x = here_.elastic.x;
     rest.reactions = reactions(constraint_count);
+    std::copy_if(here_.gaps.begin(), here_.gaps.end(), std::back_inserter(rest.touches),
+                 [](const ToolGap& gap) { return gap.pressure > 0; });
     rest.residual = residual(here_);
     rest.overlap = here_.overlap;
     rest.iterations = iterations_;

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/accuracy/error_report.hpp>
+
+#include <limits>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+using namespace membrane;
+
+TEST_CASE("nothing is known until something is", "[error_bound]") {
+    const ErrorReport report;
+    CHECK_FALSE(report.certified());
+    CHECK(report.status == BoundStatus::bad_input);
+    CHECK(report.position == std::numeric_limits<double>::infinity());
+    CHECK(report.estimate == std::numeric_limits<double>::infinity());
+    CHECK(report.reactions.empty());
+    CHECK(EnclosedForce{}.farthest_from(Vector3<double>(1, 2, 3)) == std::numeric_limits<double>::infinity());
+}
+
+TEMPLATE_TEST_CASE("no force that is enclosed is farther off than said", "[error_bound]", double, float) {
+    test::Random random(1);
+    for (int i = 0; i < 1000; ++i) {
+        CAPTURE(i);
+        const EnclosedForce force{random.vector<double>(), random.number(0.0, 0.1)};
+        const Vector3<TestType> given = random.vector<TestType>();
+        const double farthest = force.farthest_from(given);
+        for (int k = 0; k < 10; ++k) {
+            const Vector3<double> within = force.centre + force.radius * random.unit_vector();
+            CHECK(norm<double>(given.template cast<double>() - within) <= farthest + 1e-15);
+        }
+        CHECK(farthest <= norm<double>(given.template cast<double>() - force.centre) * (1 + 1e-14) + force.radius);
+    }
+}
