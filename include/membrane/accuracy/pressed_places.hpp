@@ -157,7 +157,7 @@ inline void PressedPlaces::find_near(std::size_t i, const Triangles& triangles, 
         const Vector3<double> reach = nearest.on_triangle.point - tool.position - nearest.along * tool.axis;
         const Vector3<double> u = direction<double>(reach, Vector3<double>::Zero());
         const Wide wide_u = u.cast<long double>(), axis = tool.axis.cast<long double>();
-        long double distance = std::numeric_limits<double>::infinity(), size = axis.norm() + tool.radius;
+        long double distance = std::numeric_limits<long double>::infinity(), size = axis.norm() + tool.radius;
         for (const Index v : corners) {
             const Wide corner = seen_from(tool, y, v);
             distance = (std::min)(distance, wide_u.dot(corner));

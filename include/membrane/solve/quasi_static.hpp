@@ -83,6 +83,8 @@ class QuasiStaticSolver {
                                              const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                              const Constraints&... constraints) noexcept;
     void open(std::size_t constraint_count) noexcept;
+    template <class Network>
+    void line_up(const Network& network, Region<Scalar>& region) noexcept;
     template <class Handed>
     void settle(const Handed& scene, bool mended) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept;
@@ -146,13 +148,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
     if (work_.invalid) return refuse_step(StepStatus::bad_input, x);
     if (work_.full) return refuse_step(StepStatus::too_many_touches, x);
 
-    for (const Index v : last_held_.items()) {
-        if (!region.fixed(v)) active_.wake(v);
-    }
-    active_.arrange(network, work_.seeds.items(), options_);
-    for (const auto vertices : {active_.vertices(), active_.frontier()}) {
-        for (const Index v : vertices) region.save(v);
-    }
+    line_up(network, region);
     const auto enforce = [&] {
         bool mended = false;
         for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(region); });
@@ -180,6 +176,19 @@ void QuasiStaticSolver<Scalar, Rule>::open(std::size_t constraint_count) noexcep
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {};
     report_.reactions = {reactions_.data(), constraint_count};
+}
+
+// Who is at work in this step, what has been let go of as well.
+template <Real Scalar, StepRule<Scalar> Rule>
+template <class Network>
+void QuasiStaticSolver<Scalar, Rule>::line_up(const Network& network, Region<Scalar>& region) noexcept {
+    for (const Index v : last_held_.items()) {
+        if (!region.fixed(v)) active_.wake(v);
+    }
+    active_.arrange(network, work_.seeds.items(), options_);
+    for (const auto vertices : {active_.vertices(), active_.frontier()}) {
+        for (const Index v : vertices) region.save(v);
+    }
 }
 
 // Who has moved, and who has to be looked at again.
