@@ -73,6 +73,24 @@ Table trade_table(const std::string& vertices) {
             .scene = "/vertices:" + vertices};
 }
 
+Table stability_table(const std::string& column, const std::string& title, const std::vector<int>& columns) {
+    const auto row = [&](const std::string& name, const std::string& rule) {
+        return Row{name, column + "/" + rule, Row::counter, "diverging", ""};
+    };
+    Table table{.topic = "stability",
+                .key = "stability_" + column,
+                .title = title,
+                .rows = {row("explicit Euler", "euler"), row("all at once", "at_once"),
+                         row("(4), one by one", "one_by_one"), row("(4), with refusal", "published")},
+                .column = column,
+                .columns = columns};
+    if (column == "dt") {
+        table.rows.push_back(row("safe step", "safe"));
+        table.rows.push_back(row("block step", "block"));
+    }
+    return table;
+}
+
 const std::vector<Table> all_tables{
     {"frame",
      "frame",
@@ -108,6 +126,10 @@ const std::vector<Table> all_tables{
       {"build", "tree/build"}}},
     trade_table("162"),
     trade_table("642"),
+    stability_table("dt", "Of 200 scenes, percent that diverge; dt in hundredths of sqrt(m / k)",
+                    {20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 90, 100, 200, 500, 1000}),
+    stability_table("limit", "The same; dt in hundredths of what theory allows each scene",
+                    {80, 85, 90, 95, 98, 99, 100, 101, 102, 105, 110, 115, 120, 125, 130}),
     threshold_table("642"),
     threshold_table("10242"),
     {"tracker",

@@ -119,12 +119,14 @@ CapsuleProbe<Scalar>::CapsuleProbe(const Vector3<Scalar>& from, const Vector3<Sc
                                    const Box<Scalar>& all) noexcept {
     using std::abs;
     using Limits = std::numeric_limits<Scalar>;
-    const Scalar margin = radius + 64 * Limits::epsilon() * (reach(all, from) + radius);
+    const Scalar size = reach(all, from) + radius, margin = radius + 64 * Limits::epsilon() * size;
+    // A step below the rounding is lost in the margin; taken for no shorter, nothing times its pace overflows.
+    const Scalar shortest = (std::max)(Limits::epsilon() * size, (Limits::min)());
     for (int k = 0; k < 3; ++k) {
         const Scalar step = to[k] - from[k];
         from_low_[k] = from[k] + margin;
         from_high_[k] = from[k] - margin;
-        pace_[k] = abs(step) >= (Limits::min)() ? 1 / step : (Limits::max)();  // infinite times zero would be a NaN
+        pace_[k] = 1 / (abs(step) >= shortest ? step : shortest);
     }
 }
 

@@ -26,14 +26,19 @@ template <Real Scalar>
     return between(between(ab, bc), between(bc, cd));
 }
 
+/// `part / whole` between 0 and 1, whatever the two are.
+template <Real Scalar>
+[[nodiscard]] Scalar quotient_inside(Scalar part, Scalar whole) noexcept {
+    return whole < 0 ? fraction(-part, -whole) : fraction(part, whole);
+}
+
 /// 0, 1, and the times between where the cubic may turn, ascending: it is monotonic from each to the next.
 template <Real Scalar>
 [[nodiscard]] std::array<Scalar, 4> turning_times(const std::array<Scalar, 4>& p) noexcept {
     const Scalar c = p[1] - p[0], b = (p[2] - p[1]) - c, a = (p[3] - p[2]) - (p[2] - p[1]) - b;  // a t^2 + 2 b t + c
     const Scalar root = std::sqrt((std::max)(b * b - a * c, Scalar(0)));
     const Scalar sum = b < 0 ? b - root : b + root;
-    const auto inside = [](Scalar t) { return (std::min)((std::max)(Scalar(0), t), Scalar(1)); };  // NaN: 0
-    const auto [first, second] = std::minmax({inside(-sum / a), inside(-c / sum)});
+    const auto [first, second] = std::minmax({quotient_inside(-sum, a), quotient_inside(-c, sum)});
     return {0, first, second, 1};
 }
 

@@ -124,13 +124,14 @@ void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
 template <Real Scalar>
 void Press<Scalar>::take_along(Region<Scalar>& region) const noexcept {
     const Vector3<Scalar> way = contact.on_axis - contact.before;
+    const Scalar length = norm(way);
     for (const Index v : region.corners_of(contact.touched)) region.keep(v);
     for (const auto& touched : contact.touched) {
         const auto& v = touched.corners;
         const Triangle<Scalar> before{region.kept(v[0]), region.kept(v[1]), region.kept(v[2])};
         const auto hit = first_hit(before, contact.before, contact.on_axis);
         if (!hit) continue;
-        const Scalar part = 1 - (std::max)(hit->along - contact.radius / norm(way), Scalar(0));
+        const Scalar part = 1 - detail::fraction(hit->along * length - contact.radius, length);
         for (const Index corner : v) {
             if (region.fixed(corner)) continue;
             const Vector3<Scalar> so_far = region.position(corner) - region.kept(corner);

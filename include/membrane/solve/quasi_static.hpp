@@ -213,6 +213,7 @@ void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene, bool mended) n
 template <Real Scalar, StepRule<Scalar> Rule>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept {
     Region<Scalar>(x, work_).put_back([](Index) { return true; });
+    if (status == StepStatus::unstable) work_.forget();  // what ran away may be a force from the step before
     report_.status = status;
     return report_;
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <concepts>
+#include <limits>
 #include <string_view>
 
 #include <membrane/core/check.hpp>
@@ -120,17 +121,20 @@ template <Real Scalar>
 Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) const noexcept {
     if (!(vertex.stiffness > 0)) return {};
     // With t = rho / size: (1 + t) push = t (1 + t - part), in units of stiffness and size.
-    const Scalar part = vertex.relief.trace() / (2 * vertex.stiffness);
+    const Scalar per_stiffness = 1 / vertex.stiffness;
+    const Scalar part = per_stiffness * vertex.relief.trace() / 2;
     const Scalar relaxation = detail::relaxation(omega, vertex);
     const Scalar longest = (std::max)(relaxation, Scalar(1)) * norm(vertex.force);
-    const Scalar push = longest / (vertex.stiffness * vertex.size);
+    // Beyond 1 / epsilon nothing is left of the relief, however short the spring.
+    const Scalar whole = vertex.stiffness * vertex.size, most = 1 / std::numeric_limits<Scalar>::epsilon();
+    const Scalar push = longest < most * whole ? longest / whole : most;
     const Scalar slack = 1 - part - push, root = std::sqrt(slack * slack + 4 * push);
     const Scalar t = slack > 0 ? 2 * push / (slack + root) : (root - slack) / 2;
     // Nearly flat springs leave H nearly singular: cbrt(epsilon) keeps the determinant out of the rounding.
     const auto flattest = static_cast<Scalar>(sizeof(Scalar) == 4 ? 4e-3 : 6e-6);
-    Symmetric3<Scalar> stiffness = (-1 / (1 + (std::max)(t, flattest))) * vertex.relief;
-    stiffness += diagonal3(vertex.stiffness);
-    return relaxation * inverse(stiffness);
+    Symmetric3<Scalar> block = (-per_stiffness / (1 + (std::max)(t, flattest))) * vertex.relief;
+    block += diagonal3(Scalar(1));
+    return (relaxation * per_stiffness) * inverse(block);
 }
 
 }  // namespace membrane

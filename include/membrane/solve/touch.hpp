@@ -101,7 +101,8 @@ template <Real Scalar>
     const Vector3<Scalar> y = answer_of<Scalar>(region, touch, Vector3<Scalar>::UnitY());
     const Vector3<Scalar> z = answer_of<Scalar>(region, touch, Vector3<Scalar>::UnitZ());
     if (!(x[0] > 0)) return Vector3<Scalar>::Zero();
-    return inverse(Symmetric3<Scalar>{x[0], y[1], z[2], x[1], x[2], y[2]}) * way;
+    const Scalar stiffness = 1 / x[0];  // the determinant of compliances is their cube, and soon out of a float's range
+    return inverse(stiffness * Symmetric3<Scalar>{x[0], y[1], z[2], x[1], x[2], y[2]}) * (stiffness * way);
 }
 
 /// Brings what the touch does to its corners into the region, and takes it out again.

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/quasi_static.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/guarded_loop.hpp"
+#include "support/random.hpp"
+#include "support/refusal.hpp"
+#include "support/settle.hpp"
+
+// The same scene in other units, elsewhere, or in float is the same scene.
+
+using namespace membrane;
+using test::GuardedLoop;
+using test::Random;
+
+namespace {
+
+template <class S>
+const TriangleMesh<S>& unit_sphere() {
+    static const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
+    return mesh;
+}
+
+/// The units that a scene is told in, and where it is.
+template <class S>
+struct Units {
+    S stiffness = 1, size = 1;
+    Vector3<S> origin = Vector3<S>::Zero();  ///< in sizes
+};
+
+/// Positions and forces, over the units that they are told in.
+template <class S>
+struct Outcome {
+    Points<S> x;
+    std::array<Vector3<S>, 4> reactions;
+    bool settled = true;
+
+    double distance_to(const Outcome& other) const {
+        return static_cast<double>((x - other.x).colwise().norm().maxCoeff());
+    }
+    double force_distance_to(const Outcome& other) const {
+        double most = 0, largest = 0;
+        for (std::size_t i = 0; i < reactions.size(); ++i) {
+            most = std::max(most, static_cast<double>(norm<S>(reactions[i] - other.reactions[i])));
+            largest = std::max(largest, static_cast<double>(norm(other.reactions[i])));
+        }
+        return most / largest;
+    }
+};
+
+/// A vertex of a sphere is held and a triangle loaded: `seed` says how, `units` in what numbers. Most are left after a
+/// few ticks; against one in four a tool presses, whose touches come and go by the last bit, until all is at rest.
+template <class S, class Rule>
+Outcome<S> scene_of(int seed, const Units<S>& units) {
+    Random random(static_cast<std::uint64_t>(seed));
+    const auto k = [&](S stiffness) { return 40 * stiffness * units.stiffness; };
+    const auto at = [&](const Vector3<S>& place) { return Vector3<S>(units.size * (units.origin + place)); };
+    Points<S> start = unit_sphere<S>().positions();
+    start = units.size * (start.colwise() + units.origin);
+    std::vector<S> stiffness(120);
+    for (S& each : stiffness) each = k(random.number<S>(S(0.5), 2));
+    const NetworkOptions<S> springs{.stiffness = stiffness, .mass = k(S(1e-5))};
+    const VolumeOptions<S> volume{.stiffness = k(random.number<S>(S(0.3), 1)), .damping = k(S(2e-4))};
+    const bool pressing = seed % 4 == 0;
+    const S rounding = 4 * std::numeric_limits<S>::epsilon() * (1 + norm(units.origin));
+    GuardedLoop<S, Rule> loop({start, unit_sphere<S>().triangles()}, springs, volume,
+                              {.layers = pressing ? unlimited : 3,
+                               .sweeps = 4,
+                               .negligible_force = k(units.size) * (std::max)(rounding, S(1e-13))});
+    const auto& sphere = unit_sphere<S>();
+    const auto corners = [&](Index f) {
+        return std::array<Index, 3>{sphere.triangles()(0, f), sphere.triangles()(1, f), sphere.triangles()(2, f)};
+    };
+    const Index held = random.index(42), loaded = random.index(80);
+    const Vector3<S> target = point(sphere.positions(), held) + random.vector<S>(S(-0.1), S(0.1));
+    // A point is held on the same side, and the tool is on the other: what is held does not give way.
+    const Vector3<S> weights(S(0.25), S(0.25), S(0.5));
+    Index grasped = random.index(80);
+    const auto middle = [&] { return point_at<S>(triangle_at(sphere.positions(), corners(grasped)), weights); };
+    while (!(dot<S>(middle(), target) > S(0.3)) || (sphere.triangles().col(grasped).array() == held).any()) {
+        grasped = random.index(80);
+    }
+    const Vector3<S> place = middle() + random.vector<S>(S(-0.1), S(0.1));
+    const Vector3<S> force = k(units.size) * random.vector<S>(S(-0.1), S(0.1));
+    const S radius = random.number<S>(S(0.1), S(0.4));
+    const Vector3<S> from = direction<S>(S(0.7) * random.vector<S>() - target - place, -target);
+    StepReport<S> report;
+    Points<S> before;
+    Tool<S> tool{.radius = units.size * radius};
+    const Index ticks = pressing ? 300 : 10;
+    for (Index tick = 1; tick <= ticks && !(tick > 20 && report.converged); ++tick) {
+        const S in = (std::min)(S(0.02) * static_cast<S>(tick), S(0.2));
+        before = loop.x;
+        tool.position = at((1 + radius + (pressing ? -in : S(1))) * from);
+        report = loop.tick(tool, pull(held, at(target)), load<S>(corners(loaded), weights, force),
+                           HeldPoint<S>{grasped, corners(grasped), weights, at(place)});
+        REQUIRE(report.status == StepStatus::advanced);
+    }
+    Outcome<S> outcome{(loop.x / units.size).colwise() - units.origin, {}};
+    for (std::size_t i = 0; i < 4; ++i) outcome.reactions[i] = report.reactions[i] / k(units.size);
+    // A tool at an edge may rock for good.
+    outcome.settled = !pressing || (loop.x - before).cwiseAbs().maxCoeff() <= 100 * rounding * units.size;
+    return outcome;
+}
+
+template <class S>
+S tenth_power(double low, double high, Random& random) {
+    return static_cast<S>(std::pow(10, random.number(low, high)));
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE(
+    "all stiffnesses, dampings and tolerances times a factor: the same positions, forces times the factor",
+    "[extremes]", double, float) {
+    using S = TestType;
+    const double tolerance = sizeof(S) == 4 ? 1e-4 : 1e-9;
+    int seen = 0, settled = 0;
+    for (int seed = 1; seed <= cases(1000, 20'000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed) + 1'000'000);
+        const Units<S> units{.stiffness = tenth_power<S>(-12, 12, random)};
+        CAPTURE(units.stiffness);
+        const auto check = [&]<class Rule>(const Rule&) {
+            const auto expected = scene_of<S, Rule>(seed, {}), found = scene_of<S, Rule>(seed, units);
+            if (++seen; !(expected.settled && found.settled)) return;
+            ++settled;
+            REQUIRE(found.distance_to(expected) < tolerance);
+            REQUIRE(found.force_distance_to(expected) < 10 * tolerance);
+        };
+        switch (seed % 3) {
+            case 0: check(BlockStep{}); break;
+            case 1: check(SafeStep{}); break;
+            default: check(MassStep{});
+        }
+    }
+    CHECK(settled >= 0.9 * seen);
+}
+
+TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same mesh", "[extremes]", double, float) {
+    using S = TestType;
+    const double tolerance = sizeof(S) == 4 ? 1e-4 : 1e-9;
+    int seen = 0, settled = 0;
+    for (int seed = 1; seed <= cases(1000, 20'000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed) + 2'000'000);
+        const Units<S> units{.size = tenth_power<S>(-6, 6, random)};
+        CAPTURE(units.size);
+        const auto expected = scene_of<S, BlockStep>(seed, {}), found = scene_of<S, BlockStep>(seed, units);
+        if (++seen; !(expected.settled && found.settled)) continue;
+        ++settled;
+        REQUIRE(found.distance_to(expected) < tolerance);
+        REQUIRE(found.force_distance_to(expected) < 10 * tolerance);
+    }
+    CHECK(settled >= 0.9 * seen);
+}
+
+TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, and too far is refused by name",
+                   "[extremes]", double, float) {
+    using S = TestType;
+    const double epsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
+    int refused = 0, accepted = 0, seen = 0, settled = 0;
+    for (int seed = 1; seed <= cases(1000, 20'000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed) + 3'000'000);
+        const S far = tenth_power<S>(-1, 6, random);
+        const Units<S> units{.size = tenth_power<S>(-6, 6, random), .origin = far * random.unit_vector<S>()};
+        CAPTURE(far, units.size);
+        Points<S> x = unit_sphere<S>().positions();
+        x = units.size * (x.colwise() + units.origin);
+        const std::string message = test::refusal([&] { (void)TriangleMesh<S>(x, unit_sphere<S>().triangles()); });
+        if (!message.empty()) {
+            ++refused;
+            const bool overflows = message.find("or squares of areas overflow") != std::string::npos;
+            if (overflows) continue;
+            REQUIRE_THAT(message, ContainsSubstring("a hundred times the spacing of numbers"));
+            REQUIRE(100 * epsilon * static_cast<double>(far) > 0.3);  // edges are 0.5 to 0.6 sizes
+            continue;
+        }
+        ++accepted;
+        const double spacing = epsilon * (1 + static_cast<double>(far));
+        REQUIRE(100 * epsilon * static_cast<double>(far) < 1.1);
+        const auto expected = scene_of<S, BlockStep>(seed, {}), found = scene_of<S, BlockStep>(seed, units);
+        if (++seen; !(expected.settled && found.settled)) continue;
+        ++settled;
+        REQUIRE(found.distance_to(expected) < (sizeof(S) == 4 ? 100 : 1000) * spacing);
+    }
+    CHECK(accepted > 0);
+    CHECK(settled >= 0.9 * seen);
+    CHECK((refused > 0) == (sizeof(S) == 4));
+}
+
+// ---- float against double
+
+namespace {
+
+/// Scene `scene` of 24: four backings, two tools, and what happens: a tool presses, slides, or presses beside a pull.
+template <class S>
+Outcome<S> run_scene(int scene, int seed) {
+    Random random(static_cast<std::uint64_t>(seed));
+    const std::array<double, 4> backings{0.1, 0.3, 1, 3};
+    const auto size = S(0.01), k = S(40);
+    const auto kind = scene / 8;
+    const auto mesh = icosphere<S>({.radius = 0.01, .subdivisions = 2});
+    const auto part = static_cast<S>(backings[static_cast<std::size_t>(scene % 4)]);
+    GuardedLoop<S> loop(mesh, {.stiffness = k}, {.stiffness = part * k, .damping = S(0.01)},
+                        {.layers = unlimited, .sweeps = 4});
+    const Vector3<S> from = random.unit_vector().cast<S>(), beside = S(0.3) * random.vector().cast<S>();
+    Index held = random.index(162);
+    while (dot<S>(point(mesh.positions(), held), from) > 0) held = random.index(162);  // what is held does not give way
+    const Vector3<S> target = point(mesh.positions(), held) + size * S(0.15) * random.vector().cast<S>();
+    Tool<S> tool{.radius = size * (scene / 4 % 2 == 0 ? S(0.1) : S(0.3))};
+    Outcome<S> outcome;
+    StepReport<S> report;
+    for (int tick = 1; tick <= 400; ++tick) {
+        const S in = std::min(static_cast<S>(tick) / 20, S(1));
+        const S along = kind == 1 ? std::min(std::max(static_cast<S>(tick - 20) / 20, S(0)), S(1)) : S(0);
+        const Vector3<S> towards = direction<S>(from + along * beside, from);
+        tool.position = (size * (1 - S(0.15) * in) + tool.radius) * towards;
+        report = kind == 2 ? loop.tick(tool, pull(held, target)) : loop.tick(tool);
+        REQUIRE(report.status == StepStatus::advanced);
+        if (tick > 60 && report.converged) break;
+    }
+    outcome.x = loop.x / (2 * size);
+    for (std::size_t i = 0; i < 4; ++i) {
+        outcome.reactions[i] = i < report.reactions.size() ? report.reactions[i] : Vector3<S>(Vector3<S>::Zero());
+    }
+    return outcome;
+}
+
+}  // namespace
+
+TEST_CASE("in 24 scenes float is double, positions to a thousandth of the sphere, forces to a hundredth",
+          "[extremes]") {
+    for (int seed = 1; seed <= cases(240, 2400); ++seed) {
+        const int scene = seed % 24;
+        CAPTURE(seed, scene);
+        const auto exact = run_scene<double>(scene, seed);
+        const auto single = run_scene<float>(scene, seed);
+        Outcome<double> rounded{single.x.cast<double>(), {}};
+        for (std::size_t i = 0; i < 4; ++i) rounded.reactions[i] = single.reactions[i].cast<double>();
+        REQUIRE(rounded.distance_to(exact) < 1e-3);
+        REQUIRE(rounded.force_distance_to(exact) < 0.01);
+    }
+}

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#ifdef __GLIBC__
+#include <fenv.h>
+#endif
+
+namespace test {
+
+#ifdef __GLIBC__
+
+/// While it lives, a division by zero, an operation without a result (0/0, inf - inf, a comparison with NaN) or an
+/// overflow ends the test with SIGFPE, which names test case and seed.
+///
+///     {
+///         const test::FloatingPointTraps traps;
+///         report = solver.step(x, dt, network, backing);
+///     }
+class FloatingPointTraps {
+  public:
+    static constexpr int all = FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW;
+    static constexpr int only_division = FE_DIVBYZERO;
+
+    explicit FloatingPointTraps(int which = all) : before_(fegetexcept()) {
+        feclearexcept(FE_ALL_EXCEPT);
+        fedisableexcept(FE_ALL_EXCEPT);
+        feenableexcept(which);
+    }
+    ~FloatingPointTraps() {
+        fedisableexcept(FE_ALL_EXCEPT);
+        feclearexcept(FE_ALL_EXCEPT);
+        feenableexcept(before_);
+    }
+    FloatingPointTraps(const FloatingPointTraps&) = delete;
+    FloatingPointTraps& operator=(const FloatingPointTraps&) = delete;
+
+  private:
+    int before_;
+};
+
+#else
+
+/// Other C libraries have no traps to set.
+struct FloatingPointTraps {
+    static constexpr int all = 0, only_division = 0;
+    explicit FloatingPointTraps(int = all) {}
+    ~FloatingPointTraps() {}
+};
+
+#endif
+
+}  // namespace test
