@@ -40,7 +40,7 @@ struct Press {
     void keep_side(Region<Scalar>& region) const noexcept;
     Scalar aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept;
     [[nodiscard]] static Scalar most_pressure(const Region<Scalar>& region, const Touch<Scalar>& touch,
-                                              Scalar change) noexcept;
+                                              Scalar gap) noexcept;
     [[nodiscard]] static bool on_face(const Touch<Scalar>& touch) noexcept {
         return touch.pair < 2 && touch.barycentric.minCoeff() > 0;
     }
@@ -197,13 +197,16 @@ Scalar Press<Scalar>::aim(Region<Scalar>& region, Touch<Scalar>& touch) const no
     return dot(nearest->reach, touch.normal) - contact.radius;
 }
 
-// In balance the pressure is what springs and backing at the corners resist with, or what it changes by now. Touches that
-// press much harder, where a tool has jumped to the wrong side of some, press against one another, and ever harder.
+// In balance the pressure is what springs and backing at the corners resist with, or will once the gap is mended. Touches
+// that press much harder, where a tool has jumped to the wrong side of some, press against one another, and ever harder.
 template <Real Scalar>
-Scalar Press<Scalar>::most_pressure(const Region<Scalar>& region, const Touch<Scalar>& touch, Scalar change) noexcept {
-    Scalar sum = std::abs(change);
-    for (const Index v : touch.corners) sum += region.resistance(v);
-    return 32 * sum;
+Scalar Press<Scalar>::most_pressure(const Region<Scalar>& region, const Touch<Scalar>& touch, Scalar gap) noexcept {
+    Scalar sum = 0, firmness = 0;
+    for (const Index v : touch.corners) {
+        sum += region.resistance(v);
+        firmness += region.firmness(v);
+    }
+    return 8 * (sum + std::abs(gap) * firmness);
 }
 
 // However far vertices have jumped, the surface has not passed the tool: if it would have, all go back to where on their
@@ -242,7 +245,7 @@ bool Press<Scalar>::enforce(Region<Scalar>& region) const noexcept {
             const Scalar pressure = -dot(touch.force, touch.normal);
             if (!(compliance > 0) || (pressure == 0 && gap >= 0)) continue;
             Scalar more = (std::max)(-gap / compliance, -pressure);
-            if (pressure + more > most_pressure(region, touch, gap / compliance)) more = -pressure;  // wedged: let go
+            if (pressure + more > most_pressure(region, touch, gap)) more = -pressure;  // wedged: let go
             if (!(std::abs(more) * compliance > negligible_shift(region, touch))) continue;
             change_force<Scalar>(region, touch, -more * touch.normal);
             largest = (std::max)(largest, std::abs(more));

@@ -53,7 +53,9 @@ struct Workspace {
     Points<Scalar> unbalanced;      // of visited vertices, the force on them at the end of the step
     Points<Scalar> kept;            // of saved vertices, where they were when a constraint kept them, or at the start
     std::vector<Scalar> stiffness;  // of pushed vertices, what touches add to it
-    std::vector<Scalar> compliance, resistance;
+    std::vector<Scalar> compliance;
+    std::vector<Scalar> resistance,
+        firmness;  // of vertices in layer 0: what pulls on them, and how stiff, without touches
     std::vector<Symmetric3<Scalar>> block_compliance;  // for rules that give blocks, else empty
     BoundedList<Touch<Scalar>> touches, touches_before;
     std::array<Range, most_constraints> ranges{}, ranges_before{};
@@ -140,6 +142,9 @@ class Region {
     /// What springs and backing of `v` pulled with at its last visit in layer 0 [N].
     [[nodiscard]] Scalar resistance(Index v) const noexcept { return work_.resistance[static_cast<std::size_t>(v)]; }
 
+    /// And how stiff they were [N/m].
+    [[nodiscard]] Scalar firmness(Index v) const noexcept { return work_.firmness[static_cast<std::size_t>(v)]; }
+
     /// At the end of the step: springs, backing and external forces on `v` [N].
     [[nodiscard]] Vector3<Scalar> unbalanced(Index v) const noexcept { return point(work_.unbalanced, v); }
 
@@ -173,7 +178,10 @@ class Region {
     }
 
     void set_unbalanced(Index v, const Vector3<Scalar>& force) noexcept { work_.unbalanced.col(v) = force; }
-    void set_resistance(Index v, Scalar force) noexcept { work_.resistance[static_cast<std::size_t>(v)] = force; }
+    void set_resistance(Index v, Scalar force, Scalar stiffness) noexcept {
+        work_.resistance[static_cast<std::size_t>(v)] = force;
+        work_.firmness[static_cast<std::size_t>(v)] = stiffness;
+    }
     void set_compliance(Index v, Scalar compliance) noexcept {
         work_.compliance[static_cast<std::size_t>(v)] = compliance;
     }
@@ -223,6 +231,7 @@ Workspace<Scalar>::Workspace(Index vertices, IsPinned is_pinned, Index most_touc
       stiffness(pinned.size(), Scalar(0)),
       compliance(pinned.size(), Scalar(0)),
       resistance(compliance),
+      firmness(compliance),
       touches(static_cast<std::size_t>(most_touches)),
       touches_before(touches) {
     for (Index v = 0; v < vertices; ++v) pinned[static_cast<std::size_t>(v)] = is_pinned(v) ? 1 : 0;

@@ -147,7 +147,11 @@ bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::visit(Index v) noexcept {
     if (region_.fixed(v)) return false;
     ++report_.visits;
     const auto state = state_of<Rule>(scene_, v);
-    if (state.touched) region_.set_resistance(v, norm<Scalar>(state.force - point(scene_.work.external, v)));
+    if (state.touched) {
+        const Scalar touches = scene_.work.stiffness[static_cast<std::size_t>(v)];
+        region_.set_resistance(v, norm<Scalar>(state.force - point(scene_.work.external, v)),
+                               state.stiffness - (std::max)(touches, Scalar(0)));
+    }
     const auto compliance = rule_.compliance(state);
     if constexpr (std::same_as<Scalar, std::remove_cv_t<decltype(compliance)>>) {
         if (compliance * state.stiffness >= 2 && diverges(scene_, v, compliance)) {
