@@ -6,6 +6,7 @@
 #include <fstream>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -13,7 +14,7 @@
 #include <nlohmann/json.hpp>
 
 // report FOLDER TOPIC...: prints tables of what the benchmarks of these topics left in FOLDER, and leaves the same
-// figures there as summary.json and, for the plots, a .tsv for each table.
+// figures there as summary.json and, for the plots, a .tsv for each table; of `trade`, all that was tried as trade.csv.
 
 namespace {
 
@@ -24,11 +25,11 @@ using Results = std::map<std::string, Json>;
 
 /// One line of a table: a benchmark in all columns.
 struct Row {
-    enum Kind { time, share, gain, rate, each, counter };
+    enum Kind { time, share, gain, rate, each, counter, percent };
 
     std::string name, benchmark;
     Kind kind = time;
-    std::string other = {};  ///< share, gain: the benchmark it is set against; each, counter: a counter of its own
+    std::string other = {};  ///< share, gain: the benchmark it is set against; the last three: a counter of its own
     std::string unit = "s";
 };
 
@@ -56,18 +57,22 @@ Table threshold_table(const std::string& vertices) {
 }
 
 Table trade_table(const std::string& vertices) {
+    const auto of = [](const std::string& rule, const std::string& visits) {
+        return "scene:slide/backing:0.1/scalar:double/rule:" + rule + "/layers:3/contact_visits:" + visits;
+    };
     return {.topic = "trade",
             .key = "trade_" + vertices,
-            .title = "Time of a tick, and error of its force in percent: a tool slides, " + vertices + " vertices",
-            .rows = {{"(4) as published", "published"},
-                     {"  error", "published", Row::counter, "force_error", ""},
-                     {"  dt^2 k / m", "published", Row::counter, "part", ""},
-                     {"(4), contact visited 4 x", "published_contact"},
-                     {"  error, 4 x", "published_contact", Row::counter, "force_error", ""},
-                     {"safe step", "safe"},
-                     {"  error, safe", "safe", Row::counter, "force_error", ""},
-                     {"block step, the default", "block"},
-                     {"  error, block", "block", Row::counter, "force_error", ""}},
+            .title =
+                "Time of a tick, and error of its force in percent: a tool slides, 3 layers, " + vertices + " vertices",
+            .rows = {{"(4) as published", of("published", "1")},
+                     {"  error", of("published", "1"), Row::percent, "force_error", ""},
+                     {"  dt^2 k / m", of("published", "1"), Row::counter, "part", ""},
+                     {"(4), contact visited 4 x", of("published", "4")},
+                     {"  error, 4 x", of("published", "4"), Row::percent, "force_error", ""},
+                     {"safe step", of("safe", "4")},
+                     {"  error, safe", of("safe", "4"), Row::percent, "force_error", ""},
+                     {"block step, the default", of("block", "4")},
+                     {"  error, block", of("block", "4"), Row::percent, "force_error", ""}},
             .column = "sweeps",
             .columns = {1, 2, 4, 8, 16},
             .scene = "/vertices:" + vertices};
@@ -179,6 +184,7 @@ std::optional<double> value_in(const Results& results, const Table& table, const
         case Row::rate: return 1 / time_of(run);
         case Row::each: return time_of(run) / run.at(row.other).get<double>();
         case Row::counter: return run.at(row.other).get<double>();
+        case Row::percent: return 100 * run.at(row.other).get<double>();
         default: return time_of(run);
     }
 }
@@ -274,6 +280,54 @@ void write_tsv(const std::string& path, const Results& results, const Table& tab
     }
 }
 
+/// A setting of the solver in a scene, and what it comes to.
+struct Trial {
+    std::map<std::string, std::string> setting;  ///< by the words of its name, as in "rule:block/sweeps:2"
+    double time, force_error, position_error;
+
+    [[nodiscard]] bool same_scene(const Trial& other) const {
+        return std::all_of(scene_words.begin(), scene_words.end(),
+                           [&](const std::string& word) { return setting.at(word) == other.setting.at(word); });
+    }
+
+    static inline const std::vector<std::string> scene_words{"scene", "vertices", "backing", "scalar", "rule"};
+    static inline const std::vector<std::string> words{"scene", "vertices", "backing", "scalar",
+                                                       "rule",  "layers",   "sweeps",  "contact_visits"};
+};
+
+std::vector<Trial> trials_in(const Results& results) {
+    std::vector<Trial> trials;
+    for (const auto& [name, run] : results) {
+        if (name.rfind("trade/", 0) != 0) continue;
+        Trial trial{{}, time_of(run), run.at("force_error"), run.at("position_error")};
+        std::istringstream words(name);
+        for (std::string word; std::getline(words, word, '/');) {
+            if (const auto colon = word.find(':'); colon != std::string::npos) {
+                trial.setting[word.substr(0, colon)] = word.substr(colon + 1);
+            }
+        }
+        trials.push_back(trial);
+    }
+    std::stable_sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.time < b.time; });
+    return trials;
+}
+
+/// All settings in SI units, from the fastest to the slowest. On the front are those that no other of the same scene
+/// and rule beats in both time and force; errors of the position are parts of the depth.
+void write_trials(const std::string& path, const std::vector<Trial>& trials) {
+    std::ofstream file(path);
+    for (const auto& word : Trial::words) file << word << ',';
+    file << "time,force_error,position_error,front\n";
+    for (const Trial& trial : trials) {
+        const bool beaten = std::any_of(trials.begin(), trials.end(), [&](const Trial& other) {
+            return other.time < trial.time && other.force_error <= trial.force_error && trial.same_scene(other);
+        });
+        for (const auto& word : Trial::words) file << trial.setting.at(word) << ',';
+        file << trial.time << ',' << trial.force_error << ',' << trial.position_error << ',' << (beaten ? 0 : 1)
+             << '\n';
+    }
+}
+
 void report(const std::string& folder, const std::vector<std::string>& topics) {
     Results results;
     Json summary{{"context", {}}, {"tables", Json::object()}};
@@ -293,6 +347,7 @@ void report(const std::string& folder, const std::vector<std::string>& topics) {
         summary["tables"][table.key] = summary_of(results, table);
         write_tsv(folder + "/" + table.key + ".tsv", results, table);
     }
+    if (const auto trials = trials_in(results); !trials.empty()) write_trials(folder + "/trade.csv", trials);
     std::ofstream(folder + "/summary.json") << summary.dump(2) << '\n';
 }
 

@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <membrane/accuracy/equilibrium.hpp>
+#include <membrane/collision/contact_tracker.hpp>
+#include <membrane/collision/grasper.hpp>
+#include <membrane/solve/quasi_static.hpp>
+
+/// What a setting of the solver costs, and how far off it is, in a scene of one's own.
+///
+///     #include <membrane/accuracy/trial.hpp>
+///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: a tool for each tick of 1 ms
+///     const auto rests = membrane::equilibria(mesh, network, backing, stroke);
+///     const auto outcome = membrane::trial(mesh, network, backing, stroke, rests, {.layers = 6, .sweeps = 2});
+///     outcome.force_error;                                                    // as a part of the force
+///     outcome.time;                                                           // of a tick [s]
+namespace membrane {
+
+namespace detail {
+
+template <class Constraints, class Scalar>
+inline constexpr bool are_constraints = false;
+template <class... Each, class Scalar>
+inline constexpr bool are_constraints<std::tuple<Each...>, Scalar> = ((Constraint<Each, Scalar> &&
+                                                                       RestConstraint<Each>)&&...);
+
+}  // namespace detail
+
+/// What acts on a membrane over the ticks of a scene: called once for each tick in turn, with the positions as they are
+/// (3 x V [m]) and the vertices that have moved since the call before, it gives the constraints of the tick in a
+/// std::tuple. What the compiler cannot see: a copy of one that has not been called begins with tick 0, and what comes
+/// of it depends on nothing but what it is handed.
+template <class History, class Scalar>
+concept LoadHistory = Real<Scalar> && std::copyable<History> &&
+    requires(History& history, const History& idle, Index tick, const ConstPointsRef<Scalar>& x,
+             std::span<const Index> moved) {
+    { idle.ticks() } -> std::same_as<Index>;
+    { idle.dt() } -> std::same_as<Scalar>;  // [s]
+    requires detail::are_constraints<std::remove_cvref_t<decltype(history(tick, x, moved))>, Scalar>;
+};
+
+/// A tool that presses, slides, grasps and pulls as it was recorded.
+template <Real Scalar>
+class Stroke {
+  public:
+    /// A tool for each tick of `dt` [s], on the mesh as it stands there.
+    /// @throws InvalidInput for no tools, one that is not sound, or a `dt` that is not finite and positive
+    Stroke(const TriangleMesh<Scalar>& mesh, const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
+           std::type_identity_t<Scalar> dt);
+
+    [[nodiscard]] Index ticks() const noexcept { return static_cast<Index>(tools_.size()); }
+    [[nodiscard]] Scalar dt() const noexcept { return dt_; }
+
+    /// The contact of the tick, and what the forceps hold. The contact is valid until the next call.
+    [[nodiscard]] std::tuple<Press<Scalar>, HeldPoint<Scalar>> operator()(Index tick, const ConstPointsRef<Scalar>& x,
+                                                                          std::span<const Index> moved) noexcept;
+
+  private:
+    std::vector<Tool<Scalar>> tools_;
+    Scalar dt_;
+    AabbTree<Scalar> tree_;
+    ContactTracker<Scalar> tracker_;
+    Grasper<Scalar> grasper_;
+};
+static_assert(LoadHistory<Stroke<float>, float> && LoadHistory<Stroke<double>, double>);
+
+/// Where the membrane rests in a tick, and what it pushes back with.
+struct TickAtRest {
+    Index tick;
+    Points<double> x;                        ///< 3 x V [m]
+    std::vector<Vector3<double>> reactions;  ///< for each constraint in turn [N]
+    double force;                            ///< that is felt, root of the sum of squares over the constraints [N]
+};
+
+/// The equilibrium of every tick, or of every `every`-th, each from the tick before; the solver, with many sweeps,
+/// follows the history between them. A tick for which none was found is left out. Equilibria know no damping: a setting
+/// is off by what a damped backing lags behind.
+/// @throws InvalidInput for what `equilibrium` refuses, a history without ticks, or an `every` below 1. Offline.
+/// Cost: an `equilibrium` for each tick of the result.
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History>
+[[nodiscard]] std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh,
+                                                 const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                                 History history, Index every = 1);
+
+/// What a setting comes to. Forces that count are those that somebody feels: all but what loads and pins answer with.
+struct Outcome {
+    double force_error = 0;     ///< root mean square over the ticks, as a part of the root mean square of the force
+    double position_error = 0;  ///< of the vertex that is the farthest off, root mean square over the ticks [m]
+    double time = 0;            ///< of a tick in which a force is felt, contact and step, on average [s]
+    Index layers_reached = 0;   ///< by the queue: fewer than asked for where the mesh ends before
+    Index judged = 0;           ///< ticks that the errors are of
+    bool advanced = true;       ///< no step was refused; if one was, errors and time are infinite
+};
+
+/// Seconds by the steady clock. Where others keep the processor busy, one of processor time tells more.
+struct SteadySeconds {
+    [[nodiscard]] double operator()() const noexcept {
+        return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+    }
+};
+
+/// Plays `history` with a solver of these options, from the mesh at rest, each tick from where the one before ended, and
+/// sets it against `rests`. `clock()` gives the time [s].
+/// @throws InvalidInput for options that the solver refuses, and `rests` of another scene. Offline.
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
+          StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
+[[nodiscard]] Outcome trial(const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
+                            const Volume& volume, History history, std::span<const TickAtRest> rests,
+                            const SolverOptions<Scalar>& options, const Rule& rule = {}, const Clock& clock = {});
+
+namespace detail {
+
+template <class C>
+inline constexpr bool is_felt = !std::same_as<C, Pinned>;
+template <Real Scalar>
+inline constexpr bool is_felt<Load<Scalar>> = false;
+
+/// The sum of `square(i)` over the constraints whose force is felt.
+template <class... Each, class Square>
+[[nodiscard]] double sum_of_felt(const std::tuple<Each...>&, Square square) {
+    constexpr std::array<bool, sizeof...(Each)> felt{is_felt<Each>...};
+    double sum = 0;
+    for (std::size_t i = 0; i < felt.size(); ++i) {
+        if (felt[i]) sum += square(i);
+    }
+    return sum;
+}
+
+template <Real Scalar, LoadHistory<Scalar> History>
+void check_history(std::string_view component, const History& history) {
+    if (history.ticks() < 1) refuse(component, "the history must have a tick, got ", history.ticks());
+    if (!is_finite(history.dt()) || !(history.dt() > 0)) {
+        refuse(component, "dt of the history must be finite and positive [s], got ", history.dt());
+    }
+}
+
+/// What is summed up over a trial.
+struct TrialSums {
+    double errors = 0, squares = 0;  // of forces [N^2]
+    double ways = 0;                 // of the farthest vertices [m^2]
+    double time = 0;                 // of the ticks with a force [s]
+    Index judged = 0, felt = 0;      // ticks
+
+    template <class Constraints, class Reactions, class Positions>
+    void judge(const TickAtRest& rest, const Constraints& constraints, const Reactions& reactions, const Positions& x) {
+        if (rest.x.cols() != x.cols() || rest.reactions.size() != reactions.size()) {
+            refuse("trial", "the rest of tick ", rest.tick, " must have ", x.cols(), " vertices and ", reactions.size(),
+                   " reactions, got ", rest.x.cols(), " and ", rest.reactions.size());
+        }
+        errors += sum_of_felt(constraints, [&](std::size_t i) {
+            return (reactions[i].template cast<double>() - rest.reactions[i]).squaredNorm();
+        });
+        squares += rest.force * rest.force;
+        ways += (x.template cast<double>() - rest.x).colwise().squaredNorm().maxCoeff();
+        ++judged;
+    }
+
+    [[nodiscard]] Outcome outcome(Index layers) const {
+        const auto part = [](double sum, double of) { return sum == 0 ? 0.0 : sum / of; };
+        return {.force_error = std::sqrt(part(errors, squares)),
+                .position_error = std::sqrt(part(ways, judged)),
+                .time = part(time, felt),
+                .layers_reached = layers,
+                .judged = judged};
+    }
+};
+
+}  // namespace detail
+
+template <Real Scalar>
+Stroke<Scalar>::Stroke(const TriangleMesh<Scalar>& mesh,
+                       const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
+                       std::type_identity_t<Scalar> dt)
+    : tools_(tools.begin(), tools.end()), dt_(dt), tree_(mesh), tracker_(mesh), grasper_(mesh) {
+    detail::check_history<Scalar>("Stroke", *this);
+    for (std::size_t tick = 0; tick < tools_.size(); ++tick) {
+        if (!is_sound(tools_[tick])) {
+            refuse("Stroke", "the tool of tick ", tick,
+                   " must be finite, its radius not negative, got one that is not");
+        }
+    }
+}
+
+template <Real Scalar>
+std::tuple<Press<Scalar>, HeldPoint<Scalar>> Stroke<Scalar>::operator()(Index tick, const ConstPointsRef<Scalar>& x,
+                                                                        std::span<const Index> moved) noexcept {
+    const auto& tool = tools_[static_cast<std::size_t>(tick)];
+    tree_.refit(x, moved);
+    const auto contact = tracker_.update(tree_, x, tool);
+    const auto grasp = grasper_.update(contact, x, tool);
+    return {press(tool, contact, grasp), pull(tool, grasp)};
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History>
+std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
+                                   const Volume& volume, History history, Index every) {
+    detail::check_history<Scalar>("equilibria", history);
+    if (every < 1) refuse("equilibria", "every must be at least 1, got ", every);
+    std::vector<Index> all(static_cast<std::size_t>(mesh.vertex_count()));
+    std::iota(all.begin(), all.end(), 0);
+    QuasiStaticSolver<Scalar> between(network, {.layers = unlimited, .sweeps = 16});
+    std::vector<TickAtRest> rests;
+    Points<Scalar> x = mesh.positions();
+    for (Index tick = 0; tick < history.ticks(); ++tick) {
+        const auto constraints = history(tick, x, all);
+        const auto apply = [&](auto act) { return std::apply(act, constraints); };
+        if ((tick + 1) % every == 0) {
+            auto rest = apply([&](const auto&... each) { return equilibrium(x, mesh, network, volume, {}, each...); });
+            if (rest.converged) {
+                const double force = std::sqrt(
+                    detail::sum_of_felt(constraints, [&](std::size_t i) { return rest.reactions[i].squaredNorm(); }));
+                x = rest.x.template cast<Scalar>();
+                between.wake_all();
+                rests.push_back({tick, std::move(rest.x), std::move(rest.reactions), force});
+                continue;
+            }
+        }
+        apply([&](const auto&... each) { static_cast<void>(between.step(x, history.dt(), network, volume, each...)); });
+    }
+    return rests;
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
+          StepRule<Scalar> Rule, class Clock>
+Outcome trial(const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+              History history, std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options,
+              const Rule& rule, const Clock& clock) {
+    detail::check_history<Scalar>("trial", history);
+    QuasiStaticSolver<Scalar, Rule> solver(network, options, rule);
+    Points<Scalar> x = mesh.positions();
+    std::vector<Index> moved;
+    detail::TrialSums sums;
+    Index layers = 0;
+    auto rest = rests.begin();
+    for (Index tick = 0; tick < history.ticks(); ++tick) {
+        const double begin = clock();
+        const auto constraints = history(tick, x, moved);
+        const auto report = std::apply(
+            [&](const auto&... each) { return solver.step(x, history.dt(), network, volume, each...); }, constraints);
+        const double end = clock();
+        if (report.status != StepStatus::advanced) {
+            constexpr double infinite = std::numeric_limits<double>::infinity();
+            return {.force_error = infinite, .position_error = infinite, .time = infinite, .advanced = false};
+        }
+        moved.assign(report.moved.begin(), report.moved.end());
+        layers = (std::max)(layers, solver.queue().layer_count() - 1);
+        const auto square = [&](std::size_t i) { return static_cast<double>(squared_norm(report.reactions[i])); };
+        if (detail::sum_of_felt(constraints, square) > 0) {
+            sums.time += end - begin;
+            ++sums.felt;
+        }
+        if (rest == rests.end() || rest->tick != tick) continue;
+        sums.judge(*rest++, constraints, report.reactions, x);
+    }
+    if (sums.judged == 0 || rest != rests.end()) {
+        refuse("trial", "rests must be of ticks of the history, one at least, in their order, got others");
+    }
+    return sums.outcome(layers);
+}
+
+}  // namespace membrane

@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/accuracy/choose_settings.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/refusal.hpp"
+
+using namespace membrane;
+using test::Random;
+using test::refusal;
+
+namespace {
+
+using Point = Vector3<double>;
+
+/// Time that passes with the work done, in place of a clock that others hold up: about what the library takes [s].
+struct WorkClock {
+    static inline double now = 0;
+    static void add(double seconds) { now += seconds; }
+    double operator()() const { return now; }
+};
+
+struct CountedSpring {
+    template <Real Scalar>
+    SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
+        WorkClock::add(11e-9);
+        return LinearSpring{}(spring);
+    }
+};
+
+struct CountedPress : Press<double> {
+    bool enforce(Region<double>& region) const noexcept {
+        WorkClock::add(3e-6);
+        return Press<double>::enforce(region);
+    }
+};
+
+/// A history of a user's own.
+struct CountedStroke {
+    Stroke<double> stroke;
+
+    Index ticks() const { return stroke.ticks(); }
+    double dt() const { return stroke.dt(); }
+    std::tuple<CountedPress> operator()(Index tick, const ConstPointsRef<double>& x, std::span<const Index> moved) {
+        WorkClock::add(13e-6);
+        return {CountedPress{std::get<0>(stroke(tick, x, moved))}};
+    }
+};
+static_assert(LoadHistory<CountedStroke, double>);
+
+constexpr double radius = 0.01;  // of the surfaces [m]
+
+/// A closed surface, or a cap.
+TriangleMesh<double> random_mesh(Random& random) {
+    const double size = random.number();
+    const Index level = size < 0.15 ? 1 : size < 0.95 ? 2 : 3;
+    if (random.chance(0.2))
+        return spherical_cap<double>({.radius = radius, .diameter = 1.7 * radius, .rings = 3 + 2 * level});
+    const auto sphere = icosphere<double>({.radius = radius, .subdivisions = level});
+    Points<double> x = sphere.positions();
+    if (random.chance(0.3)) x = random.vector<double>(0.7, 1.3).asDiagonal() * x;
+    const double edge = radius * std::sqrt(4 * std::numbers::pi / static_cast<double>(x.cols()));
+    if (random.chance(0.4)) x = test::jittered(x, 0.1 * edge, random);
+    return {x, sphere.triangles()};
+}
+
+/// A membrane, and how a tool is used on it.
+struct Scene {
+    explicit Scene(Random& random) : mesh(random_mesh(random)) {
+        backing = VirtualVolumeSprings(mesh, {.stiffness = stiffness * std::pow(10, random.number(-2.0, 1.0))});
+        tool_radius = radius * random.number(0.15, 0.4);
+        depth = radius * random.number(0.05, 0.15);
+        way = 1e-3 * random.number(0.05, 0.2);
+    }
+
+    /// Presses here and there, each with a slide; between them the tool goes around the membrane.
+    CountedStroke stroke(Random& random) const {
+        constexpr int presses = 12, ticks_along = 10;
+        std::vector<Tool<double>> tools;
+        const auto go = [&](const Point& to) { tools.push_back({.position = to, .radius = tool_radius}); };
+        for (int i = 0; i < presses; ++i) {
+            const auto [place, normal, along] = place_on(random, 1.2 * ticks_along * way);
+            const Point above = 3 * radius * place.normalized();
+            if (!tools.empty()) {
+                const Point from = tools.back().position;
+                const Point aside = 6 * radius * cross<double>(from, random.unit_vector()).normalized();
+                for (const double t : {0.25, 0.5, 0.75}) {
+                    go(3 * radius * ((1 - t) * from + t * above + t * (1 - t) * aside).normalized());
+                }
+            }
+            go(above);
+            const double deep = depth * random.number(0.8, 1.2), step = way * random.number(0.8, 1.2);
+            double height = tool_radius - step * random.number();
+            for (; height > tool_radius - deep; height -= step) go(place + height * normal);
+            for (int t = 1; t <= ticks_along; ++t) go(place + height * normal + step * t * along);
+            go(above);
+        }
+        return {Stroke(mesh, tools, 1e-3)};
+    }
+
+    static constexpr double stiffness = 40;
+
+    TriangleMesh<double> mesh;
+    MassSpringNetwork<double, CountedSpring> network{mesh, {}, {.stiffness = stiffness, .pinned = border(mesh)}};
+    VirtualVolumeSprings<double> backing{mesh, {.stiffness = stiffness}};
+    double tool_radius, depth;  // [m]
+    double way;                 // in a tick [m]
+
+  private:
+    struct Place {
+        Point point, normal, along;
+    };
+
+    /// Somewhere on the surface, and a way along it that does not come near a border.
+    Place place_on(Random& random, double length) const {
+        for (;;) {
+            const Index f = random.index(mesh.triangle_count());
+            const auto corners = triangle_at(mesh.positions(), mesh.triangles().col(f));
+            const Point place = point_at(corners, random.barycentric()), normal = area_vector(corners).normalized();
+            const Point along = cross<double>(normal, random.unit_vector()).normalized();
+            const double lowest = std::min(place.z(), place.z() + length * along.z());
+            if (!open || lowest > 0.75 * radius) return {place, normal, along};
+        }
+    }
+    bool open = !border(mesh).empty();
+};
+
+/// What the settings come to on one stroke.
+struct Judge {
+    const Scene& scene;
+    CountedStroke stroke;
+    std::vector<TickAtRest> rests = equilibria(scene.mesh, scene.network, scene.backing, stroke, every);
+
+    static constexpr Index every = 4;
+    Outcome operator()(const SolverOptions<double>& options) const {
+        return trial(scene.mesh, scene.network, scene.backing, stroke, rests, options, BlockStep{}, WorkClock{});
+    }
+
+    /// Whether any setting of the experiment takes less than `time` and is off by no more than `error`: all are tried
+    /// but those with more sweeps than one that takes as long.
+    bool any_within(double error, double time) const {
+        return any([&](const SolverOptions<double>& setting, bool& go_on) {
+            const auto outcome = (*this)(setting);
+            go_on = outcome.time < time;
+            return go_on && outcome.force_error <= error;
+        });
+    }
+
+    /// Whether any setting with the most sweeps of all is off by no more than `error`.
+    bool any_with_most_sweeps(double error) const {
+        return any([&](const SolverOptions<double>& setting, bool&) {
+            return setting.sweeps == ExperimentOptions<double>{}.sweeps.back() && (*this)(setting).force_error <= error;
+        });
+    }
+
+  private:
+    template <class Found>
+    bool any(Found found) const {
+        const ExperimentOptions<double> all;
+        for (const Index layers : all.layers) {
+            for (const Index visits : all.contact_visits) {
+                bool go_on = true;
+                for (std::size_t i = 0; i < all.sweeps.size() && go_on; ++i) {
+                    if (found({.layers = layers, .sweeps = all.sweeps[i], .contact_visits = visits}, go_on))
+                        return true;
+                }
+            }
+        }
+        return false;
+    }
+};
+
+/// Which setting is the best if errors and times are known.
+struct KnownOutcomes {
+    double a, b, c, d, e, f;
+
+    explicit KnownOutcomes(Random& random)
+        : a(random.number(0.2, 2.0)),
+          b(random.number(0.2, 2.0)),
+          c(random.number(0.2, 2.0)),
+          d(random.number(0.2, 2.0)),
+          e(random.number(0.2, 2.0)),
+          f(random.number(0.2, 2.0)) {}
+
+    Outcome of(const SolverOptions<double>& o) const {
+        return {
+            .force_error = std::exp(-a * o.sweeps) + std::exp(-b * o.layers) + 0.1 * std::exp(-c * o.contact_visits),
+            .time = 1e-6 * (std::pow(o.sweeps, d) * (std::pow(o.layers, 1 + e) + std::pow(o.contact_visits, f))),
+            .layers_reached = o.layers};
+    }
+    template <class IsBetter, class Keeps>
+    SolverOptions<double> best(IsBetter is_better, Keeps keeps) const {
+        const ExperimentOptions<double> all;
+        std::vector<SolverOptions<double>> kept;
+        for (const Index layers : all.layers) {
+            for (const Index sweeps : all.sweeps) {
+                for (const Index visits : all.contact_visits) {
+                    const SolverOptions<double> options{.layers = layers, .sweeps = sweeps, .contact_visits = visits};
+                    if (keeps(of(options))) kept.push_back(options);
+                }
+            }
+        }
+        if (kept.empty()) return {.layers = no_index};
+        return *std::min_element(kept.begin(), kept.end(),
+                                 [&](const auto& p, const auto& q) { return is_better(of(p), of(q)); });
+    }
+};
+
+bool by_time(const Outcome& p, const Outcome& q) { return p.time < q.time; }
+bool by_error(const Outcome& p, const Outcome& q) { return p.force_error < q.force_error; }
+
+void check_same(const Choice<double>& choice, const SolverOptions<double>& expected) {
+    CHECK(choice.options.layers == expected.layers);
+    CHECK(choice.options.sweeps == expected.sweeps);
+    CHECK(choice.options.contact_visits == expected.contact_visits);
+}
+
+/// A sphere, and a short press on it.
+struct SmallScene {
+    TriangleMesh<double> mesh = icosphere<double>({.radius = radius, .subdivisions = 1});
+    MassSpringNetwork<double, CountedSpring> network{mesh, {}, {.stiffness = 40.0}};
+    VirtualVolumeSprings<double> backing{mesh, {.stiffness = 8.0}};
+    std::vector<Tool<double>> tools;
+
+    explicit SmallScene(double height = radius) {
+        for (int t = 0; t < 40; ++t) {
+            tools.push_back({.position = {0, 5e-5 * t, height - 5e-5 * std::min(t, 20) + 3e-3}, .radius = 3e-3});
+        }
+    }
+    CountedStroke stroke() const { return {Stroke(mesh, tools, 1e-3)}; }
+    Choice<double> choose(const Wanted& wanted, const ExperimentOptions<double>& experiment = {.plays = 1}) const {
+        return choose_settings(mesh, network, backing, stroke(), wanted, experiment, BlockStep{}, WorkClock{});
+    }
+};
+
+}  // namespace
+
+// In five parts, for the time a long run takes.
+TEMPLATE_TEST_CASE_SIG("a chosen setting keeps the wanted error on unseen strokes, at hardly more than it takes", "",
+                       ((int part), part), 0, 1, 2, 3, 4) {
+    int judged = 0, kept = 0, cheap = 0, out_of_reach = 0;
+    const int count = cases(3, 100);
+    for (int seed = 100 * part + 1; seed <= 100 * part + count; ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Scene scene(random);
+        const double error = std::pow(10, random.number(-3.0, -1.0));
+        const auto choice =
+            choose_settings(scene.mesh, scene.network, scene.backing, scene.stroke(random), {.force_error = error},
+                            {.every = Judge::every, .plays = 1}, BlockStep{}, WorkClock{});
+        if (!choice.met) continue;
+        CHECK(choice.force_error <= error / ExperimentOptions<double>{}.margin);
+        const Judge unseen{scene, scene.stroke(random)};
+        const auto outcome = unseen(choice.options);
+        if (outcome.force_error <= error) {
+            ++judged;
+            ++kept;
+            if (!unseen.any_within(error, outcome.time / 1.5)) ++cheap;
+        } else if (unseen.any_with_most_sweeps(error)) {
+            ++judged;
+        } else {
+            ++out_of_reach;
+        }
+    }
+    WARN(count << " scenes, " << judged << " judged: " << kept << " keep the error, " << cheap << " of these cheaply; "
+               << out_of_reach << " out of reach of any setting");
+    CHECK(judged - kept <= std::max(0.05 * judged, 1.0));
+    CHECK(judged - cheap <= std::max(0.2 * judged, 1.0));
+    CHECK(judged >= count / 2 - 1);
+}
+
+TEST_CASE("of all settings the cheapest that keeps the error, the most accurate that keeps the time") {
+    int most_tried = 0, all_tried = 0;
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const KnownOutcomes known(random);
+        const double error = std::pow(10, random.number(-4.0, 0.0)), time = std::pow(10, random.number(-6.0, -3.0));
+        int tried = 0;
+        const auto attempt = [&](const SolverOptions<double>& options) {
+            ++tried;
+            return known.of(options);
+        };
+
+        const auto cheapest = choose_settings(ExperimentOptions<double>{}, {.force_error = error}, attempt);
+        const double most = error / ExperimentOptions<double>{}.margin;
+        const auto expected = known.best(by_time, [&](const Outcome& o) { return o.force_error <= most; });
+        CHECK(cheapest.met == (expected.layers != no_index));
+        CHECK(cheapest.met == (cheapest.force_error <= most));
+        if (cheapest.met) check_same(cheapest, expected);
+        most_tried = std::max(most_tried, tried);
+        all_tried += tried;
+
+        const auto finest = choose_settings(ExperimentOptions<double>{}, {.time = time}, attempt);
+        const auto in_time = known.best(by_error, [&](const Outcome& o) { return o.time <= time; });
+        CHECK(finest.met == (in_time.layers != no_index));
+        CHECK(finest.met == (finest.time <= time));
+        if (finest.met) CHECK(finest.force_error == known.of(in_time).force_error);
+    }
+    CHECK(most_tried < 256);
+    CHECK(all_tried <= 64 * cases(200));
+}
+
+TEST_CASE("what is chosen is what the solver then does, in any tick") {
+    const SmallScene scene;
+    const auto rests = equilibria(scene.mesh, scene.network, scene.backing, scene.stroke());
+    for (const Wanted wanted : {Wanted{.force_error = 0.01}, Wanted{.force_error = 2e-3}, Wanted{.time = 100e-6}}) {
+        const auto choice = scene.choose(wanted);
+        REQUIRE(choice.met);
+        const auto outcome = trial(scene.mesh, scene.network, scene.backing, scene.stroke(), rests, choice.options,
+                                   BlockStep{}, WorkClock{});
+        CHECK(outcome.force_error == choice.force_error);
+        CHECK(outcome.position_error == choice.position_error);
+        CHECK(outcome.time == Approx(choice.time).epsilon(1e-9));
+        if (wanted.time > 0) CHECK(choice.time <= wanted.time);
+    }
+}
+
+TEST_CASE("what cannot be kept is said, and the nearest to it given") {
+    const SmallScene scene;
+    const auto dear = scene.choose({.time = 1e-6});
+    CHECK_FALSE(dear.met);
+    CHECK(dear.options.layers == 1);
+    CHECK(dear.options.sweeps == 1);
+    CHECK(dear.options.contact_visits == 1);
+    const auto coarse = scene.choose({.force_error = 1e-3}, {.layers = {1, 2}, .sweeps = {1}, .plays = 1});
+    CHECK_FALSE(coarse.met);
+    CHECK(coarse.force_error > 1e-3 / 1.8);
+    CHECK(coarse.options.sweeps == 1);
+    CHECK(coarse.options.contact_visits == 8);
+}
+
+TEST_CASE("the shortest of several plays counts") {
+    const SmallScene scene;
+    const auto once = scene.choose({.force_error = 0.02});
+    const auto thrice = scene.choose({.force_error = 0.02}, {.plays = 3});
+    check_same(thrice, once.options);
+    CHECK(thrice.time == Approx(once.time).epsilon(1e-9));
+}
+
+TEST_CASE("by default the clock is a real one, the options besides are kept") {
+    const SmallScene scene;
+    const Stroke stroke(scene.mesh, scene.tools, 1e-3);
+    const auto choice = choose_settings(scene.mesh, scene.network, scene.backing, stroke, {.force_error = 0.02},
+                                        {.others = {.negligible_force = 1e-7}});
+    CHECK(choice.met);
+    CHECK(choice.time > 0);
+    CHECK(choice.time < 1);
+    CHECK(choice.options.negligible_force == 1e-7);
+}
+
+TEST_CASE("another rule is tried as it is, one that diverges is never chosen") {
+    const auto mesh = icosphere<double>({.radius = radius, .subdivisions = 1});
+    const VirtualVolumeSprings<double> backing(mesh, {.stiffness = 8.0});
+    const Stroke stroke(mesh, SmallScene().tools, 1e-3);
+    const MassSpringNetwork heavy(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 4e-4});
+    const MassSpringNetwork light(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 4e-7});
+    const auto stable = choose_settings(mesh, heavy, backing, stroke, {.force_error = 0.05}, {.plays = 1}, MassStep{});
+    CHECK(stable.met);
+    const auto wild = choose_settings(mesh, light, backing, stroke, {.force_error = 0.05}, {.plays = 1}, MassStep{});
+    CHECK_FALSE(wild.met);
+    CHECK_FALSE(wild.advanced);
+    const auto late = choose_settings(mesh, light, backing, stroke, {.time = 1.0}, {.plays = 1}, MassStep{});
+    CHECK_FALSE(late.met);
+}
+
+TEST_CASE("what makes no sense is refused") {
+    const SmallScene scene;
+    const auto refused = [&](const Wanted& wanted, const ExperimentOptions<double>& experiment = {}) {
+        return refusal([&] { (void)scene.choose(wanted, experiment); });
+    };
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    CHECK(refused({}) == "choose_settings: either a force_error or a time must be wanted, got 0 and 0 s");
+    CHECK(refused({.force_error = 0.1, .time = 0.2}) ==
+          "choose_settings: either a force_error or a time must be wanted, got 0.1 and 0.2 s");
+    CHECK(refused({.force_error = -1}) ==
+          "choose_settings: the wanted force_error must be finite and positive, got -1");
+    CHECK_THAT(refused({.force_error = nan}), ContainsSubstring("force_error must be finite and positive, got"));
+    CHECK(refused({.time = -2}) == "choose_settings: the wanted time must be finite and positive [s], got -2");
+
+    const Wanted percent{.force_error = 0.01};
+    CHECK(refused(percent, {.layers = {}}) == "choose_settings: layers must hold a number to try, got none");
+    CHECK(refused(percent, {.layers = {3, -1}}) == "choose_settings: layers must be at least 0, got -1");
+    CHECK(refused(percent, {.sweeps = {}}) == "choose_settings: sweeps must hold a number to try, got none");
+    CHECK(refused(percent, {.sweeps = {0}}) == "choose_settings: sweeps must be at least 1, got 0");
+    CHECK(refused(percent, {.contact_visits = {}}) ==
+          "choose_settings: contact_visits must hold a number to try, got none");
+    CHECK(refused(percent, {.contact_visits = {0}}) == "choose_settings: contact_visits must be at least 1, got 0");
+    CHECK(refused(percent, {.others = {.most_visits = 0}}) ==
+          "QuasiStaticSolver: most_visits must be at least 1, got 0");
+    CHECK(refused(percent, {.margin = 0.5}) == "choose_settings: margin must be finite and at least 1, got 0.5");
+    CHECK_THAT(refused(percent, {.margin = nan}), ContainsSubstring("margin must be finite and at least 1, got"));
+    CHECK(refused(percent, {.every = 0}) == "choose_settings: every must be at least 1, got 0");
+    CHECK(refused(percent, {.plays = 0}) == "choose_settings: plays must be at least 1, got 0");
+
+    const SmallScene apart(2 * radius);
+    CHECK(refusal([&] { (void)apart.choose(percent); }) ==
+          "choose_settings: the history must have a tick with a force that is felt, got none in equilibrium");
+}
