@@ -6,6 +6,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -132,7 +133,9 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
     static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints, "a step takes 16 constraints at most");
     MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());
     open(sizeof...(Constraints));
-    if (!is_finite(dt) || !(dt > 0)) return refuse_step(StepStatus::bad_time_step, x);
+    if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) {
+        return refuse_step(StepStatus::bad_time_step, x);
+    }
     if (!(constraints.sound() && ...)) return refuse_step(StepStatus::bad_input, x);
 
     Region<Scalar> region(x, work_);
@@ -156,13 +159,16 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
     };
     std::size_t resume = resume_;
     Sweeps sweeps(rule_, options_, scene, region, enforce, active_, pace, report_);
-    if (const StepStatus status = sweeps.run(resume); status != StepStatus::advanced) {
+    StepStatus status = sweeps.run(resume);
+    for_each([&](const auto& constraint, std::size_t i) {
+        reactions_[i] = constraint.reaction(std::as_const(region));
+        if (status == StepStatus::advanced && !is_finite(reactions_[i])) status = StepStatus::unstable;
+    });
+    if (status != StepStatus::advanced) {
         active_.cancel(network);
         return refuse_step(status, x);
     }
     resume_ = resume;
-    for_each(
-        [&](const auto& constraint, std::size_t i) { reactions_[i] = constraint.reaction(std::as_const(region)); });
     settle(scene, sweeps.mended());
     work_.close();
     pace.done();
@@ -214,6 +220,7 @@ template <Real Scalar, StepRule<Scalar> Rule>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept {
     Region<Scalar>(x, work_).put_back([](Index) { return true; });
     if (status == StepStatus::unstable) work_.forget();  // what ran away may be a force from the step before
+    reactions_.fill(Vector3<Scalar>::Zero());
     report_.status = status;
     return report_;
 }

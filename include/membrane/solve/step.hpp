@@ -30,9 +30,9 @@ struct SolverOptions {
 
 enum class StepStatus {
     advanced,          ///< the positions are the new ones
-    bad_time_step,     ///< dt is not finite and positive: nothing has moved
+    bad_time_step,     ///< dt is not finite, positive and a normal number: nothing has moved
     bad_input,         ///< a tool, target, load, anchor, index or position is not valid: nothing has moved
-    unstable,          ///< the rule may diverge for this dt: nothing has moved
+    unstable,          ///< the rule may diverge for this dt, or a force has no bound: nothing has moved
     too_many_touches,  ///< more touched triangles than there is room for: nothing has moved
 };
 
