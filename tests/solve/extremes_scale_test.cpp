@@ -114,6 +114,22 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
     return outcome;
 }
 
+/// How many scenes were compared, and how many of them had come to rest.
+struct Count {
+    int seen = 0, settled = 0;
+};
+
+/// The scene told in `units` is the one told in none.
+template <class S, class Rule>
+void compare(int seed, const Units<S>& units, Count& count) {
+    const double tolerance = sizeof(S) == 4 ? 1e-4 : 1e-9;
+    const auto expected = scene_of<S, Rule>(seed, {}), found = scene_of<S, Rule>(seed, units);
+    if (++count.seen; !(expected.settled && found.settled)) return;
+    ++count.settled;
+    REQUIRE(found.distance_to(expected) < tolerance);
+    REQUIRE(found.force_distance_to(expected) < 10 * tolerance);
+}
+
 template <class S>
 S tenth_power(double low, double high, Random& random) {
     return static_cast<S>(std::pow(10, random.number(low, high)));
@@ -125,45 +141,32 @@ TEMPLATE_TEST_CASE(
     "all stiffnesses, dampings and tolerances times a factor: the same positions, forces times the factor",
     "[extremes]", double, float) {
     using S = TestType;
-    const double tolerance = sizeof(S) == 4 ? 1e-4 : 1e-9;
-    int seen = 0, settled = 0;
+    Count count;
     for (int seed = 1; seed <= cases(1000, 20'000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed) + 1'000'000);
         const Units<S> units{.stiffness = tenth_power<S>(-12, 12, random)};
         CAPTURE(units.stiffness);
-        const auto check = [&]<class Rule>(const Rule&) {
-            const auto expected = scene_of<S, Rule>(seed, {}), found = scene_of<S, Rule>(seed, units);
-            if (++seen; !(expected.settled && found.settled)) return;
-            ++settled;
-            REQUIRE(found.distance_to(expected) < tolerance);
-            REQUIRE(found.force_distance_to(expected) < 10 * tolerance);
-        };
         switch (seed % 3) {
-            case 0: check(BlockStep{}); break;
-            case 1: check(SafeStep{}); break;
-            default: check(MassStep{});
+            case 0: compare<S, BlockStep>(seed, units, count); break;
+            case 1: compare<S, SafeStep>(seed, units, count); break;
+            default: compare<S, MassStep>(seed, units, count);
         }
     }
-    CHECK(settled >= 0.9 * seen);
+    CHECK(count.settled >= 0.9 * count.seen);
 }
 
 TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same mesh", "[extremes]", double, float) {
     using S = TestType;
-    const double tolerance = sizeof(S) == 4 ? 1e-4 : 1e-9;
-    int seen = 0, settled = 0;
+    Count count;
     for (int seed = 1; seed <= cases(1000, 20'000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed) + 2'000'000);
         const Units<S> units{.size = tenth_power<S>(-6, 6, random)};
         CAPTURE(units.size);
-        const auto expected = scene_of<S, BlockStep>(seed, {}), found = scene_of<S, BlockStep>(seed, units);
-        if (++seen; !(expected.settled && found.settled)) continue;
-        ++settled;
-        REQUIRE(found.distance_to(expected) < tolerance);
-        REQUIRE(found.force_distance_to(expected) < 10 * tolerance);
+        compare<S, BlockStep>(seed, units, count);
     }
-    CHECK(settled >= 0.9 * seen);
+    CHECK(count.settled >= 0.9 * count.seen);
 }
 
 TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, and too far is refused by name",

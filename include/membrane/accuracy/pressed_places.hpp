@@ -16,8 +16,8 @@
 /// What tools may press on in a neighbourhood of a state, how hard, and what that takes away of the stiffness.
 ///
 ///     membrane::PressedPlaces pressed(problem);
-///     pressed.take(triangles, y, scene.tools(), rest.touches);
-///     if (pressed.around(problem, force, way)) ... pressed.softening(v) ...
+///     pressed.take(problem, triangles, y, scene.tools(), rest.touches);
+///     if (pressed.around(problem, force, magnitude, way)) ... pressed.softening(v) ...
 namespace membrane {
 
 /// Tools in contact, for a proof that holds at all states whose vertices are within `way` of y.
@@ -48,8 +48,8 @@ class PressedPlaces {
               std::span<const PressingTool> tools, std::span<const ToolGap> touches);
 
     /// Finds what is below for all states within `way` [m] of y, where the membrane acts on its vertices with `force`,
-    /// made of numbers of this `magnitude` [N]. False where a tool may touch a vertex that is fixed or that another tool may touch, or
-    /// is so small, or the way so long, that it may be pressed from anywhere.
+    /// made of numbers of this `magnitude` [N]. False where a tool may touch a vertex that is fixed or that another tool
+    /// may touch, or is so small, or the way so long, that it may be pressed from anywhere.
     bool around(const RestProblem& problem, const Points<double>& force, std::span<const double> magnitude,
                 double way) noexcept;
 
