@@ -405,3 +405,50 @@ TEMPLATE_TEST_CASE("constraints that make no sense are told from others", "[cons
         CHECK_FALSE(held_at(weights, somewhere));
     }
 }
+
+namespace {
+
+/// Answers as it is told to, and counts what it is asked.
+struct Told {
+    bool is_sound = true;
+    bool mends = false;
+    double force = 0;
+    Index* begun;
+
+    bool sound() const noexcept { return is_sound; }
+    void begin(Region<double>&) const noexcept { ++*begun; }
+    bool enforce(Region<double>&) const noexcept { return mends; }
+    Vector3<double> reaction(const Region<double>&) const noexcept { return {force, 0, 0}; }
+};
+
+}  // namespace
+
+TEST_CASE("a set of constraints is sound if all are, mends if any does, finite if all forces are") {
+    Workspace<double> work(
+        1, [](Index) { return false; }, 8);
+    Points<double> positions = Points<double>::Zero(3, 1);
+    PointsRef<double> x = positions;
+    work.open();
+    Region<double> region(x, work);
+    Index begun = 0;
+    std::array<Vector3<double>, 2> reactions{};
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const bool first : {false, true}) {
+        for (const bool second : {false, true}) {
+            const Told a{first, first, first ? 1 : nan, &begun}, b{second, second, second ? 2 : nan, &begun};
+            const ConstraintSet<double, Told, Told> both(region, a, b);
+            CHECK(both.sound() == (first && second));
+            CHECK(both.enforce() == (first || second));
+            CHECK(both.react(reactions) == (first && second));
+            both.begin();
+        }
+    }
+    CHECK(begun == 8);
+    CHECK(reactions[0].x() == 1);
+    CHECK(reactions[1].x() == 2);
+
+    const ConstraintSet<double> none(region);
+    CHECK(none.sound());
+    CHECK_FALSE(none.enforce());
+    CHECK(none.react({}));
+}

@@ -5,8 +5,11 @@
 #include <array>
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <limits>
 #include <span>
+#include <tuple>
+#include <utility>
 
 #include <membrane/collision/grasper.hpp>
 #include <membrane/collision/tool.hpp>
@@ -31,6 +34,48 @@ concept Constraint = Real<Scalar> && requires(const C& constraint, Region<Scalar
     noexcept->std::same_as<bool>;
     { constraint.reaction(done) }
     noexcept->std::same_as<Vector3<Scalar>>;
+};
+
+/// All constraints of one step, in the order they were handed in.
+template <Real Scalar, Constraint<Scalar>... Constraints>
+class ConstraintSet {
+  public:
+    explicit ConstraintSet(Region<Scalar>& region, const Constraints&... constraints) noexcept
+        : region_(region), constraints_(constraints...) {}
+
+    [[nodiscard]] bool sound() const noexcept {
+        return std::apply([](const auto&... constraint) { return (constraint.sound() && ...); }, constraints_);
+    }
+    void begin() const noexcept {
+        for_each([this](const auto& constraint, std::size_t) {
+            region_.open();
+            constraint.begin(region_);
+        });
+    }
+    [[nodiscard]] bool enforce() const noexcept {
+        bool mended = false;
+        for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(region_); });
+        return mended;
+    }
+    /// The forces on those who act; false if any is not finite.
+    [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {
+        bool finite = true;
+        for_each([&](const auto& constraint, std::size_t i) {
+            reactions[i] = constraint.reaction(std::as_const(region_));
+            finite &= is_finite(reactions[i]);
+        });
+        return finite;
+    }
+
+  private:
+    void for_each(auto act) const noexcept {
+        std::size_t i = 0;
+        std::apply([&](const auto&... constraint) { ((region_.turn_to(i), act(constraint, i), ++i), ...); },
+                   constraints_);
+    }
+
+    Region<Scalar>& region_;
+    std::tuple<const Constraints&...> constraints_;
 };
 
 /// Holds a point of a triangle at `target`; its corners are free otherwise.

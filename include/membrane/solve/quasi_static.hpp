@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <limits>
 #include <span>
@@ -90,9 +89,6 @@ class QuasiStaticSolver {
     void settle(const Handed& scene, bool mended) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept;
 
-    static constexpr bool gives_numbers =
-        std::same_as<Scalar, decltype(std::declval<Rule>().compliance(VertexState<Scalar>{}))>;
-
     Rule rule_;
     SolverOptions<Scalar> options_;
     ActiveVertices active_;
@@ -120,7 +116,9 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const MassSpringNetwork<Scala
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
     }
-    if constexpr (!gives_numbers) work_.block_compliance.resize(static_cast<std::size_t>(network.vertex_count()));
+    if constexpr (!moves_along_force<Rule, Scalar>) {
+        work_.block_compliance.resize(static_cast<std::size_t>(network.vertex_count()));
+    }
     work_.negligible_force = options.negligible_force > 0 ? options.negligible_force : network.negligible_force();
 }
 
@@ -136,34 +134,20 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) {
         return refuse_step(StepStatus::bad_time_step, x);
     }
-    if (!(constraints.sound() && ...)) return refuse_step(StepStatus::bad_input, x);
 
     Region<Scalar> region(x, work_);
-    const StepInput<Scalar, MassSpringNetwork<Scalar, Law>, Volume> scene{x, dt, network, volume, work_};
-    const auto for_each = [&]([[maybe_unused]] auto act) {  // there may be none
-        std::size_t i = 0;
-        ((region.turn_to(i), act(constraints, i), ++i), ...);
-    };
-    for_each([&](const auto& constraint, std::size_t) {
-        region.open();
-        constraint.begin(region);
-    });
+    const ConstraintSet<Scalar, Constraints...> acting(region, constraints...);
+    if (!acting.sound()) return refuse_step(StepStatus::bad_input, x);
+    acting.begin();
     if (work_.invalid) return refuse_step(StepStatus::bad_input, x);
     if (work_.full) return refuse_step(StepStatus::too_many_touches, x);
 
     line_up(network, region);
-    const auto enforce = [&] {
-        bool mended = false;
-        for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(region); });
-        return mended;
-    };
+    const StepInput<Scalar, MassSpringNetwork<Scalar, Law>, Volume> scene{x, dt, network, volume, work_};
     std::size_t resume = resume_;
-    Sweeps sweeps(rule_, options_, scene, region, enforce, active_, pace, report_);
+    Sweeps sweeps(rule_, options_, scene, region, acting, active_, pace, report_);
     StepStatus status = sweeps.run(resume);
-    for_each([&](const auto& constraint, std::size_t i) {
-        reactions_[i] = constraint.reaction(std::as_const(region));
-        if (status == StepStatus::advanced && !is_finite(reactions_[i])) status = StepStatus::unstable;
-    });
+    if (status == StepStatus::advanced && !acting.react(reactions_)) status = StepStatus::unstable;
     if (status != StepStatus::advanced) {
         active_.cancel(network);
         return refuse_step(status, x);

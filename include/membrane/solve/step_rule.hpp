@@ -6,6 +6,7 @@
 #include <concepts>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include <membrane/core/check.hpp>
 #include <membrane/core/symmetric3.hpp>
@@ -41,6 +42,11 @@ concept StepRule = Real<Scalar> && std::copyable<Rule> &&
     { rule.compliance(vertex) }
     noexcept->Compliance<Scalar>;
 };
+
+/// Whether the compliances of `Rule` are numbers, so that it moves a vertex along the force on it.
+template <class Rule, class Scalar>
+inline constexpr bool moves_along_force =
+    std::same_as<Scalar, decltype(std::declval<const Rule&>().compliance(std::declval<const VertexState<Scalar>&>()))>;
 
 /// The rule as published, [Liu07] (4): dx = F dt^2 / m. It converges while dt^2 / m stays below 2 over the largest
 /// eigenvalue of the 3 x 3 block of every vertex; the solver refuses a step beyond that.

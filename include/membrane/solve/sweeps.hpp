@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <concepts>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -11,27 +10,27 @@
 #include <membrane/solve/deadline.hpp>
 #include <membrane/solve/region.hpp>
 #include <membrane/solve/step.hpp>
+#include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/visit.hpp>
 
 /// What a step spends its time with.
 ///
-///     membrane::Sweeps sweeps(rule, options, scene, region, enforce, active, pace, report);
+///     membrane::Sweeps sweeps(rule, options, scene, region, acting, active, pace, report);
 ///     if (sweeps.run(resume) == membrane::StepStatus::advanced) ...      // positions moved, forces looked at
 namespace membrane {
 
 /// The visits of one step: layer 0 and what the constraints then mend, in rounds, and all the vertices beyond; again until
 /// nothing changes, the sweeps are done, or time is up. In the end a look at the forces on all of them.
-template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 class Sweeps {
   public:
-    /// `enforce()` lets all constraints mend what they find broken, and says whether there was anything.
     Sweeps(const Rule& rule, const SolverOptions<Scalar>& options, const Scene& scene, Region<Scalar>& region,
-           Enforce enforce, ActiveVertices& active, Pace& pace, StepReport<Scalar>& report) noexcept
+           const Acting& acting, ActiveVertices& active, Pace& pace, StepReport<Scalar>& report) noexcept
         : rule_(rule),
           options_(options),
           scene_(scene),
           region_(region),
-          enforce_(enforce),
+          acting_(acting),
           active_(active),
           pace_(pace),
           report_(report) {}
@@ -55,7 +54,7 @@ class Sweeps {
     const SolverOptions<Scalar>& options_;
     const Scene& scene_;
     Region<Scalar>& region_;
-    Enforce enforce_;
+    const Acting& acting_;
     ActiveVertices& active_;
     Pace& pace_;
     StepReport<Scalar>& report_;
@@ -63,22 +62,22 @@ class Sweeps {
     bool mended_ = false;
 };
 
-template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
-StepStatus Sweeps<Rule, Scalar, Scene, Enforce, Pace>::run(std::size_t& resume) noexcept {
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+StepStatus Sweeps<Rule, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) noexcept {
     pace_.begin(active_.vertices().size() + active_.frontier().size());
     bool changed = true;
     for (Index i = 0; i < options_.sweeps && changed && !report_.out_of_time; ++i) {
         changed = sweep(resume);
         if (report_.status != StepStatus::advanced) return report_.status;
     }
-    mended_ = changed && (report_.out_of_time || !pace_.has_time_to_enforce() || enforce_());
+    mended_ = changed && (report_.out_of_time || !pace_.has_time_to_enforce() || acting_.enforce());
     if (look()) return StepStatus::advanced;
     region_.put_back([&](Index v) { return !region_.held(v); });
     return look() ? StepStatus::unstable : StepStatus::bad_input;  // no better: what was handed in is to blame
 }
 
-template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::sweep(std::size_t& resume) noexcept {
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::sweep(std::size_t& resume) noexcept {
     bool changed = rounds();
     if (report_.status != StepStatus::advanced) return changed;
     const auto beyond = active_.beyond();
@@ -90,15 +89,15 @@ bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::sweep(std::size_t& resume) noex
     return changed;
 }
 
-template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::rounds() noexcept {
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::rounds() noexcept {
     const auto touched = active_.touched();
     bool changed = false;
     for (Index i = 0; i < options_.contact_visits && pace_.has_time_for_round(touched.size()); ++i) {
         for (const Index v : touched) changed |= visit(v);
         pace_.visited(touched.size());
         if (report_.status != StepStatus::advanced) break;
-        const bool mended = enforce_();
+        const bool mended = acting_.enforce();
         pace_.enforced();
         if (!mended) break;
         changed = true;
@@ -106,8 +105,8 @@ bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::rounds() noexcept {
     return changed;
 }
 
-template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::pass(std::span<const Index> vertices) noexcept {
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> vertices) noexcept {
     bool changed = false;
     while (!vertices.empty() && !report_.out_of_time) {
         report_.out_of_time = !pace_.has_time_for_batch();
@@ -124,8 +123,8 @@ bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::pass(std::span<const Index> ver
 }
 
 // Where layers are added as needed: adds the next one, and visits it, if a force on it is not negligible.
-template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::grow() noexcept {
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::grow() noexcept {
     const auto frontier = active_.frontier();
     if (frontier.empty() || report_.out_of_time || !pace_.has_time_for_batch()) return false;
     report_.visits += static_cast<Index>(frontier.size());
@@ -142,8 +141,8 @@ bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::grow() noexcept {
     return true;
 }
 
-template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::visit(Index v) noexcept {
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
     if (region_.fixed(v)) return false;
     ++report_.visits;
     const auto state = state_of<Rule>(scene_, v);
@@ -153,7 +152,7 @@ bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::visit(Index v) noexcept {
                                state.stiffness - (std::max)(touches, Scalar(0)));
     }
     const auto compliance = rule_.compliance(state);
-    if constexpr (std::same_as<Scalar, std::remove_cv_t<decltype(compliance)>>) {
+    if constexpr (moves_along_force<Rule, Scalar>) {
         if (compliance * state.stiffness >= 2 && diverges(scene_, v, compliance)) {
             report_.status = StepStatus::unstable;
             return false;
@@ -168,8 +167,8 @@ bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::visit(Index v) noexcept {
 }
 
 // The forces at the end; false if any is not finite.
-template <class Rule, class Scalar, class Scene, class Enforce, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Enforce, Pace>::look() noexcept {
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look() noexcept {
     bool finite = true;
     const auto look_at = [&](Index v, bool free) {
         const auto force = pull_on(scene_, v).force;
