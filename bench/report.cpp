@@ -57,22 +57,24 @@ Table threshold_table(const std::string& vertices) {
 }
 
 Table trade_table(const std::string& vertices) {
-    const auto of = [](const std::string& rule, const std::string& visits) {
-        return "scene:slide/backing:0.1/scalar:double/rule:" + rule + "/layers:3/contact_visits:" + visits;
+    const auto of = [](const std::string& rule, const std::string& visits, const std::string& predicted = "1") {
+        return "scene:slide/backing:0.1/scalar:double/rule:" + rule + "/predicted:" + predicted +
+               "/layers:3/contact_visits:" + visits;
     };
     return {.topic = "trade",
             .key = "trade_" + vertices,
             .title =
                 "Time of a tick, and error of its force in percent: a tool slides, 3 layers, " + vertices + " vertices",
-            .rows = {{"(4) as published", of("published", "1")},
-                     {"  error", of("published", "1"), Row::percent, "force_error", ""},
-                     {"  dt^2 k / m", of("published", "1"), Row::counter, "part", ""},
-                     {"(4), contact visited 4 x", of("published", "4")},
+            .rows = {{"(4) as published", of("published", "1", "0")},
+                     {"  error", of("published", "1", "0"), Row::percent, "force_error", ""},
+                     {"  dt^2 k / m", of("published", "1", "0"), Row::counter, "part", ""},
+                     {"(4), contact 4 x, predicted", of("published", "4")},
                      {"  error, 4 x", of("published", "4"), Row::percent, "force_error", ""},
                      {"safe step", of("safe", "4")},
                      {"  error, safe", of("safe", "4"), Row::percent, "force_error", ""},
                      {"block step, the default", of("block", "4")},
-                     {"  error, block", of("block", "4"), Row::percent, "force_error", ""}},
+                     {"  error, block", of("block", "4"), Row::percent, "force_error", ""},
+                     {"  error, not predicted", of("block", "4", "0"), Row::percent, "force_error", ""}},
             .column = "sweeps",
             .columns = {1, 2, 4, 8, 16},
             .scene = "/vertices:" + vertices};
@@ -290,9 +292,10 @@ struct Trial {
                            [&](const std::string& word) { return setting.at(word) == other.setting.at(word); });
     }
 
-    static inline const std::vector<std::string> scene_words{"scene", "vertices", "backing", "scalar", "rule"};
-    static inline const std::vector<std::string> words{"scene", "vertices", "backing", "scalar",
-                                                       "rule",  "layers",   "sweeps",  "contact_visits"};
+    static inline const std::vector<std::string> scene_words{"scene",  "vertices", "backing",
+                                                             "scalar", "rule",     "predicted"};
+    static inline const std::vector<std::string> words{"scene",     "vertices", "backing", "scalar",        "rule",
+                                                       "predicted", "layers",   "sweeps",  "contact_visits"};
 };
 
 std::vector<Trial> trials_in(const Results& results) {

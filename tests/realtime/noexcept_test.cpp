@@ -93,6 +93,9 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(active.wake(0))&& noexcept(active.grow(network, options)));
         static_assert(noexcept(active.frontier()));
     });
+    static_cast<void>([](Predictor<S, 4>& predictor, std::span<const Lead<S>> leads) {
+        static_assert(noexcept(predictor.expect(leads))&& noexcept(predictor.forget()));
+    });
     static_cast<void>([](const Tool<S>& tool, const Contact<S>& contact, const Grasp<S>& grasp, const Vector3<S>& p,
                          const std::array<Index, 3>& corners, std::span<const Index> vertices) {
         static_assert(noexcept(press(tool, contact, grasp)));

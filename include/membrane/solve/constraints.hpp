@@ -13,6 +13,7 @@
 
 #include <membrane/collision/grasper.hpp>
 #include <membrane/collision/tool.hpp>
+#include <membrane/solve/predictor.hpp>
 #include <membrane/solve/touch.hpp>
 
 /// What acts on the membrane from outside, as arguments of a step.
@@ -24,6 +25,7 @@ namespace membrane {
 /// Something that acts on the membrane during one step. `begin` names the vertices where its force enters and puts in
 /// place what it holds; `enforce` is called in every sweep once layer 0 has moved, and once more at the end; it
 /// mends what they broke and says whether there was anything to mend; `reaction` is the force of the membrane on whoever acts [N].
+/// One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> && requires(const C& constraint, Region<Scalar>& region, const Region<Scalar>& done) {
     { constraint.sound() }
@@ -45,6 +47,12 @@ class ConstraintSet {
 
     [[nodiscard]] bool sound() const noexcept {
         return std::apply([](const auto&... constraint) { return (constraint.sound() && ...); }, constraints_);
+    }
+    /// Where those that are led are led to.
+    void tell(std::span<Lead<Scalar>> leads) const noexcept {
+        for_each([&]([[maybe_unused]] const auto& constraint, [[maybe_unused]] std::size_t i) {
+            if constexpr (requires { constraint.lead(); }) leads[i] = constraint.lead();
+        });
     }
     void begin() const noexcept {
         for_each([this](const auto& constraint, std::size_t) {
@@ -87,6 +95,9 @@ struct HeldPoint {
     Vector3<Scalar> target = Vector3<Scalar>::Zero();  ///< [m]
 
     [[nodiscard]] bool sound() const noexcept;
+    [[nodiscard]] Lead<Scalar> lead() const noexcept {
+        return triangle == no_index ? std::nullopt : Lead<Scalar>(target);
+    }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>& region) const noexcept;
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
@@ -99,6 +110,7 @@ struct HeldVertex {
     Vector3<Scalar> target;  ///< [m]
 
     [[nodiscard]] bool sound() const noexcept { return is_finite(target); }
+    [[nodiscard]] Lead<Scalar> lead() const noexcept { return target; }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept {
@@ -129,6 +141,7 @@ struct Load {
     Vector3<Scalar> force;  ///< [N]
 
     [[nodiscard]] bool sound() const noexcept;
+    [[nodiscard]] Lead<Scalar> lead() const noexcept { return force; }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>&) const noexcept { return -force; }

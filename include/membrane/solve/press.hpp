@@ -29,6 +29,9 @@ struct Press {
     Contact<Scalar> contact;
 
     [[nodiscard]] bool sound() const noexcept { return is_sound(tool) && is_sound(contact); }
+    [[nodiscard]] Lead<Scalar> lead() const noexcept {
+        return contact.touching() && !contact.crossed ? Lead<Scalar>(contact.on_axis) : std::nullopt;
+    }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>& region) const noexcept;
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
@@ -97,7 +100,7 @@ void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
     }
     for (const auto& touched : contact.touched) seed_corners(region, touched.corners);
     if (contact.crossed) take_along(region);
-    for (const Index v : region.corners_of(contact.watched)) region.keep(v);
+    for (const Index v : region.corners_of(contact.watched)) contact.crossed ? region.keep(v) : region.save(v);
     const Scalar slack = region.negligible_force() * region.compliance(contact.corners[0]);
     if (!contact.crossed && contact.gap < -slack) give_way(region);
     find_touches(region);
@@ -140,12 +143,12 @@ void Press<Scalar>::take_along(Region<Scalar>& region) const noexcept {
     }
 }
 
-// The surface gives way at the contact point first, to where it just touches the tool.
+// The surface gives way at the contact point first, to where it just touches the tool, if it is not there already.
 template <Real Scalar>
 void Press<Scalar>::give_way(Region<Scalar>& region) const noexcept {
     const Vector3<Scalar> now = point_at(triangle_of(region, contact.corners), contact.barycentric);
     const Vector3<Scalar> way = contact.on_axis - contact.radius * contact.normal - now;
-    shift_point<Scalar>(region, contact.corners, contact.barycentric, way);
+    if (dot(way, contact.normal) < 0) shift_point<Scalar>(region, contact.corners, contact.barycentric, way);
 }
 
 template <Real Scalar>

@@ -15,6 +15,7 @@
 #include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/deadline.hpp>
+#include <membrane/solve/predictor.hpp>
 #include <membrane/solve/region.hpp>
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
@@ -31,9 +32,9 @@ namespace membrane {
 /// The quasi-static solver, [Liu07] 2.2: every step is taken to be at rest, and the vertices of the propagation queue
 /// move one after the other, nearest to the contact first, by (4) or another rule, each seeing those that have moved.
 ///
-/// Beyond the paper: a step may sweep the queue several times; what a contact leaves behind stays at work until it is
-/// at rest, and then costs nothing; constraints keep the forces they act with from step to step, so that a sweep ends
-/// with forces that balance. A step that is refused leaves the positions as they were, to the bit: it keeps the
+/// Beyond the paper: a step begins where the last one leads to, if what acts goes on; it may sweep the queue several
+/// times; what a contact leaves behind stays at work until it is at rest, and then costs nothing; constraints keep the
+/// forces they act with from step to step, so that a sweep ends with forces that balance. A step that is refused leaves the positions as they were, to the bit: it keeps the
 /// positions of the vertices it works on, three numbers for each.
 ///
 /// Positions, network and backing are handed in at each step, always those of one membrane; what is remembered (queue,
@@ -83,6 +84,8 @@ class QuasiStaticSolver {
                                              const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                              const Constraints&... constraints) noexcept;
     void open(std::size_t constraint_count) noexcept;
+    template <class Acting>
+    void predict(const Acting& acting, Region<Scalar>& region) noexcept;
     template <class Network>
     void line_up(const Network& network, Region<Scalar>& region) noexcept;
     template <class Handed>
@@ -94,7 +97,9 @@ class QuasiStaticSolver {
     ActiveVertices active_;
     Workspace<Scalar> work_;
     IndexSet last_held_;
-    BoundedList<Index> moved_;
+    BoundedList<Index> moved_;  // in the last step that advanced, and how far [m]
+    Points<Scalar> ways_;
+    Predictor<Scalar, Workspace<Scalar>::most_constraints> predictor_;
     std::array<Vector3<Scalar>, Workspace<Scalar>::most_constraints> reactions_{};
     StepReport<Scalar> report_;
     std::size_t resume_ = 0;  // the vertex beyond layer 0 at which the last sweep ran out of time
@@ -111,7 +116,8 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const MassSpringNetwork<Scala
       work_(
           network.vertex_count(), [&](Index v) { return network.pinned(v); }, options.most_touches),
       last_held_(network.vertex_count()),
-      moved_(static_cast<std::size_t>(network.vertex_count())) {
+      moved_(static_cast<std::size_t>(network.vertex_count())),
+      ways_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
     if constexpr (requires { rule.check(); }) rule.check();
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
@@ -138,6 +144,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
     Region<Scalar> region(x, work_);
     const ConstraintSet<Scalar, Constraints...> acting(region, constraints...);
     if (!acting.sound()) return refuse_step(StepStatus::bad_input, x);
+    predict(acting, region);
     acting.begin();
     if (work_.invalid) return refuse_step(StepStatus::bad_input, x);
     if (work_.full) return refuse_step(StepStatus::too_many_touches, x);
@@ -162,10 +169,24 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
 template <Real Scalar, StepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::open(std::size_t constraint_count) noexcept {
     work_.open();
-    moved_.clear();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {};
     report_.reactions = {reactions_.data(), constraint_count};
+}
+
+// Those that moved go on, as far as what leads them does. They are to be visited, wherever they are now.
+template <Real Scalar, StepRule<Scalar> Rule>
+template <class Acting>
+void QuasiStaticSolver<Scalar, Rule>::predict(const Acting& acting, Region<Scalar>& region) noexcept {
+    if (!options_.predict) return;
+    std::array<Lead<Scalar>, Workspace<Scalar>::most_constraints> leads{};
+    acting.tell(leads);
+    const Scalar part = predictor_.expect(leads);
+    if (part == 0) return;
+    for (const Index v : moved_.items()) {
+        region.shift(v, part * point(ways_, v));
+        active_.wake(v);
+    }
 }
 
 // Who is at work in this step, what has been let go of as well.
@@ -185,12 +206,14 @@ void QuasiStaticSolver<Scalar, Rule>::line_up(const Network& network, Region<Sca
 template <Real Scalar, StepRule<Scalar> Rule>
 template <class Handed>
 void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene, bool mended) noexcept {
+    moved_.clear();
     active_.settle(
         [&](Index v) { return work_.held.contains(v) || norm(lasting_force(scene, v)) <= work_.negligible_force; });
     for (const Index v : work_.saved.items()) {
         const Vector3<Scalar> way = point(scene.x, v) - point(work_.start, v);
         if (way.isZero(0)) continue;
         moved_.push(v);
+        if (options_.predict) ways_.col(v) = way;
         const Scalar compliance = work_.compliance[static_cast<std::size_t>(v)];
         const Scalar negligible = options_.layers_as_needed ? Scalar(0) : compliance * work_.negligible_force;
         if (norm(way) > negligible) active_.stir_neighbours(scene.network, v);
@@ -204,6 +227,7 @@ template <Real Scalar, StepRule<Scalar> Rule>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept {
     Region<Scalar>(x, work_).put_back([](Index) { return true; });
     if (status == StepStatus::unstable) work_.forget();  // what ran away may be a force from the step before
+    predictor_.forget();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_.status = status;
     return report_;
@@ -225,6 +249,7 @@ template <Real Scalar, StepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     active_.clear();
     work_.forget();
+    predictor_.forget();
     last_held_.clear();
     resume_ = 0;
 }

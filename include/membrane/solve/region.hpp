@@ -76,9 +76,12 @@ class Region {
     /// Puts `v` into layer 0 of the queue.
     void seed(Index v) noexcept { work_.seeds.insert(v); }
 
-    /// Holds `v` at `target`, or where it is, until the step ends. A pinned vertex stays where it is.
+    /// Holds `v` at `target`, or where the step began, until it ends. A pinned vertex stays where it is, a held one too
+    /// if there is no target.
     void hold(Index v, const Vector3<Scalar>& target) noexcept;
-    void hold(Index v) noexcept { work_.held.insert(v); }
+    void hold(Index v) noexcept {
+        if (work_.held.insert(v) && work_.saved.contains(v)) x_.col(v) = work_.start.col(v);
+    }
 
     /// Whether nothing moves `v` in this step but `hold`.
     [[nodiscard]] bool fixed(Index v) const noexcept {

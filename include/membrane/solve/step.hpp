@@ -20,6 +20,7 @@ struct SolverOptions {
     bool layers_as_needed = false;  ///< a layer, up to `layers`, only while a force on it is not negligible
     Index sweeps = 2;               ///< passes over the queue in each step
     Index contact_visits = 4;       ///< visits of layer 0 in each sweep: what touches the tool settles last
+    bool predict = true;            ///< a step begins with the ways of the last one, as far as what leads goes on
     Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 and what is held get theirs anyway
     Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
     Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time

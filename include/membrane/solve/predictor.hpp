@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include <membrane/core/types.hpp>
+
+/// How much of the last step is to be expected again.
+///
+///     const double part = predictor.expect(leads);        // 1: what leads goes on as it did; 0: it has stopped
+///     for (v : moved) x.col(v) += part * last_way(v);
+namespace membrane {
+
+/// What a constraint is led by, a hand or a script, as a point of its path: a position [m] or a force [N]; nothing where
+/// it does not act.
+template <Real Scalar>
+using Lead = std::optional<Vector3<Scalar>>;
+
+/// Under a tool that slides on, a membrane goes on as it did in the tick before, but for how the tool speeds up or turns: a
+/// step that begins there has no more than that to mend.
+///
+/// The part that is expected again is the least, over all that leads, of the new way along the last one, at most
+/// all of it; nothing where something comes, goes, stops or turns back. Sweeps that leave the part q of an error, 0 <= q < 1,
+/// then leave sqrt(q) of it at most from tick to tick, since z^2 = q ((1 + p) z - p) has no larger root for 0 <= p <= 1: what
+/// converges without a prediction converges with it.
+template <Real Scalar, std::size_t most_leads>
+class Predictor {
+  public:
+    /// The part of the last step's ways to begin this one with, 0 to 1. @pre finite, `most_leads` at most
+    [[nodiscard]] Scalar expect(std::span<const Lead<Scalar>> leads) noexcept;
+
+    /// Expects nothing in the next two steps.
+    void forget() noexcept { paths_ = {}; }
+
+  private:
+    struct Path {
+        Lead<Scalar> at, way;  // in the last step
+    };
+    [[nodiscard]] static Scalar part_of(const Vector3<Scalar>& now, const Vector3<Scalar>& before) noexcept;
+
+    std::array<Path, most_leads> paths_{};
+};
+
+template <Real Scalar, std::size_t most_leads>
+Scalar Predictor<Scalar, most_leads>::expect(std::span<const Lead<Scalar>> leads) noexcept {
+    Scalar part = 1;
+    bool led = false;
+    for (std::size_t i = 0; i < most_leads; ++i) {
+        const Path before = paths_[i];
+        const Lead<Scalar> at = i < leads.size() ? leads[i] : std::nullopt;
+        paths_[i] = {at, {}};
+        if (at && before.at) paths_[i].way = *at - *before.at;
+        if (at.has_value() != before.at.has_value() || before.at.has_value() != before.way.has_value()) {
+            part = 0;  // it comes or goes, or has only just come
+        } else if (at && squared_norm(*before.way) > 0) {
+            led = true;
+            part = (std::min)(part, part_of(*paths_[i].way, *before.way));
+        }
+    }
+    return led ? part : Scalar(0);
+}
+
+template <Real Scalar, std::size_t most_leads>
+Scalar Predictor<Scalar, most_leads>::part_of(const Vector3<Scalar>& now, const Vector3<Scalar>& before) noexcept {
+    const Scalar along = dot(now, before), all = squared_norm(before);
+    if (!(along > 0)) return 0;
+    return along < all ? along / all : Scalar(1);
+}
+
+}  // namespace membrane

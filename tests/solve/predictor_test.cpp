@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/predictor.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <membrane/accuracy/trial.hpp>
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/solve/press.hpp>
+#include <membrane/solve/quasi_static.hpp>
+
+#include "support/bits.hpp"
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+using namespace membrane;
+using test::Random;
+using test::same_bits;
+
+namespace {
+
+using Leads = std::array<Lead<double>, 2>;
+
+Lead<double> at(double x, double y = 0) { return Vector3<double>(x, y, 0); }
+
+constexpr double radius = 0.01, stiffness = 40, dt = 1e-3;  // [m], [N/m], [s]
+
+struct Membrane {
+    TriangleMesh<double> mesh = icosphere({.radius = radius, .subdivisions = 2});
+    MassSpringNetwork<double, LinearSpring> network{mesh, {}, {.stiffness = stiffness}};
+    VirtualVolumeSprings<double> backing{mesh, {.stiffness = stiffness / 4}};
+};
+
+/// A tool of 3 mm, 1.5 mm deep after 30 ticks, slides along at 50 mm/s.
+std::vector<Tool<double>> slide(Index ticks) {
+    std::vector<Tool<double>> tools;
+    for (Index t = 1; t <= ticks; ++t) {
+        const double angle = 0.05 * dt * std::max(t - 30, 0) / radius;
+        const double from_centre = radius + 3e-3 - 1.5e-3 * std::min(t, 30) / 30;
+        tools.push_back({.position = from_centre * Vector3<double>(std::sin(angle), 0.1, std::cos(angle)).normalized(),
+                         .radius = 3e-3});
+    }
+    return tools;
+}
+
+/// Sees where the vertices are when a step begins, before anything is held.
+struct Witness {
+    Points<double>* seen;
+
+    bool sound() const noexcept { return true; }
+    void begin(Region<double>& region) const noexcept {
+        for (Index v = 0; v < seen->cols(); ++v) seen->col(v) = region.position(v);
+    }
+    bool enforce(Region<double>&) const noexcept { return false; }
+    Vector3<double> reaction(const Region<double>&) const noexcept { return Vector3<double>::Zero(); }
+};
+
+/// A vertex is led outward, 0.2 mm in a tick.
+struct Led {
+    explicit Led(const SolverOptions<double>& options = {}) : solver(membrane.network, options) {}
+
+    template <class... Others>
+    StepReport<double> go_on(const Others&... others) {
+        ++ticks;
+        return stay(others...);
+    }
+    template <class... Others>
+    StepReport<double> stay(const Others&... others) {
+        const Vector3<double> from = point(membrane.mesh.positions(), 0);
+        return solver.step(x, dt, membrane.network, membrane.backing, Witness{&begin},
+                           pull(0, Vector3<double>((1 + 0.02 * ticks) * from)), others...);
+    }
+    Index neighbour() const { return membrane.network.springs_of(0)[0].other; }
+
+    Membrane membrane;
+    QuasiStaticSolver<double> solver;
+    Points<double> x = membrane.mesh.positions(), begin = x;
+    int ticks = 0;
+};
+
+}  // namespace
+
+TEST_CASE("nothing is expected before something has gone on for two steps") {
+    Predictor<double, 2> predictor;
+    CHECK(predictor.expect(Leads{at(1)}) == 0);
+    CHECK(predictor.expect(Leads{at(2)}) == 0);
+    CHECK(predictor.expect(Leads{at(3)}) == 1);
+    predictor.forget();
+    CHECK(predictor.expect(Leads{at(4)}) == 0);
+    CHECK(predictor.expect(Leads{at(5)}) == 0);
+    CHECK(predictor.expect(Leads{at(6)}) == 1);
+}
+
+TEST_CASE("what is expected is how far the lead goes on along its last way, at most as far as then") {
+    const auto expected = [](const Lead<double>& next) {
+        Predictor<double, 2> predictor;
+        static_cast<void>(predictor.expect(Leads{at(1)}));
+        static_cast<void>(predictor.expect(Leads{at(3)}));
+        return predictor.expect(Leads{next});
+    };
+    CHECK(expected(at(5)) == 1);
+    CHECK(expected(at(100)) == 1);
+    CHECK(expected(at(4)) == 0.5);
+    CHECK(expected(at(4, 7)) == 0.5);
+    CHECK(expected(at(3)) == 0);
+    CHECK(expected(at(3, 2)) == 0);
+    CHECK(expected(at(2)) == 0);
+    CHECK(expected(std::nullopt) == 0);
+}
+
+TEST_CASE("of several leads the one that goes on least counts, those that stay do not") {
+    Predictor<double, 2> predictor;
+    static_cast<void>(predictor.expect(Leads{at(1), at(1)}));
+    static_cast<void>(predictor.expect(Leads{at(2), at(1)}));
+    CHECK(predictor.expect(Leads{at(3), at(1)}) == 1);
+    CHECK(predictor.expect(Leads{at(4), at(2)}) == 1);
+    CHECK(predictor.expect(Leads{at(5), at(2.5)}) == 0.5);
+    CHECK(predictor.expect(Leads{at(6), at(2.5)}) == 0);
+    CHECK(predictor.expect(Leads{at(7), at(2.5)}) == 1);
+    CHECK(predictor.expect(Leads{at(8), std::nullopt}) == 0);
+    CHECK(predictor.expect(Leads{at(9), std::nullopt}) == 1);
+    CHECK(predictor.expect(std::span<const Lead<double>>()) == 0);
+    CHECK(predictor.expect(std::span<const Lead<double>>()) == 0);
+}
+
+TEST_CASE("ways too small or too large for their square end in a part from 0 to 1") {
+    const double tiny = std::numeric_limits<double>::denorm_min(), small = 1e-160, huge = 1e150;
+    for (const double first : {tiny, small, 1.0, huge}) {
+        for (const double second : {-huge, -1.0, -tiny, 0.0, tiny, small, 1.0, huge}) {
+            Predictor<double, 1> predictor;
+            static_cast<void>(predictor.expect(std::array{at(0)}));
+            static_cast<void>(predictor.expect(std::array{at(first)}));
+            const double part = predictor.expect(std::array{at(first + second)});
+            CAPTURE(first, second);
+            CHECK(part >= 0);
+            CHECK(part <= 1);
+        }
+    }
+}
+
+TEST_CASE("what converges by itself converges with the prediction") {
+    for (int seed = 1; seed <= cases(1000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const double q = random.number(0.0, 1.0), p = random.number(0.0, 1.0);
+        const std::complex<double> root = std::sqrt(std::complex<double>(q * q * (1 + p) * (1 + p) - 4 * q * p));
+        CHECK(std::abs(q * (1 + p) + root) / 2 <= std::sqrt(q) * (1 + 1e-14));
+        CHECK(std::abs(q * (1 + p) - root) / 2 <= std::sqrt(q) * (1 + 1e-14));
+    }
+}
+
+TEST_CASE("a tool that slides on is felt with a third of the error, or less") {
+    const Membrane membrane;
+    const Stroke<double> stroke(membrane.mesh, slide(90), dt);
+    const auto rests = equilibria(membrane.mesh, membrane.network, membrane.backing, stroke, 6);
+    REQUIRE(rests.size() == 15);
+    const auto error = [&](Index sweeps, bool predict) {
+        const SolverOptions<double> options{.layers = unlimited, .sweeps = sweeps, .predict = predict};
+        return trial(membrane.mesh, membrane.network, membrane.backing, stroke, rests, options).force_error;
+    };
+    for (const Index sweeps : {1, 2, 4}) {
+        CAPTURE(sweeps);
+        CHECK(error(sweeps, true) < error(sweeps, false) / 3);
+    }
+}
+
+TEST_CASE("a step begins where its vertices were on their way to, if what leads goes on") {
+    Led led;
+    for (int tick = 0; tick < 3; ++tick) led.go_on();
+    const Points<double> before = led.x;
+    led.go_on();
+    const Points<double> way = led.x - before, there = led.x + way;
+    led.go_on();
+    CHECK(way.col(led.neighbour()).norm() > 1e-3 * radius);
+    CHECK((led.begin.rightCols(161) - there.rightCols(161)).norm() <= 1e-12 * radius);
+
+    const Points<double> last = led.x;
+    led.stay();
+    CHECK(same_bits(led.begin, last));
+}
+
+TEST_CASE("a vertex that is pinned on its way stays where it is") {
+    Led led;
+    for (int tick = 0; tick < 4; ++tick) led.go_on();
+    const Points<double> before = led.x;
+    const Index v = led.neighbour();
+    led.go_on(pin({&v, 1}));
+    CHECK(same_bits(point(led.x, v), point(before, v)));
+    CHECK_FALSE(same_bits(led.x, before));
+}
+
+TEST_CASE("a step that is refused is not predicted, nor the next one") {
+    Led led;
+    for (int tick = 0; tick < 4; ++tick) led.go_on();
+    const Points<double> before = led.x;
+    const Vector3<double> somewhere = Vector3<double>::Zero();
+    CHECK(led.go_on(pull(no_index, somewhere)).status == StepStatus::bad_input);
+    CHECK(same_bits(led.x, before));
+    led.go_on();
+    CHECK(same_bits(led.begin, before));
+}
+
+TEST_CASE("without the option nothing is predicted") {
+    Led led({.predict = false});
+    for (int tick = 0; tick < 4; ++tick) led.go_on();
+    const Points<double> before = led.x;
+    led.go_on();
+    CHECK(same_bits(led.begin, before));
+}
