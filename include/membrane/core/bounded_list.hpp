@@ -28,6 +28,7 @@ class BoundedList {
     }
     void clear() noexcept { count_ = 0; }
 
+    [[nodiscard]] std::size_t room() const noexcept { return slots_.size(); }
     [[nodiscard]] std::size_t size() const noexcept { return count_; }
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
 

@@ -41,6 +41,11 @@ class IndexSet {
     [[nodiscard]] Index count() const noexcept { return static_cast<Index>(items_.size()); }
     [[nodiscard]] bool empty() const noexcept { return items_.empty(); }
 
+    /// The items from number `begin` on come in this order. @pre the same ones
+    void reorder(std::size_t begin, std::span<const Index> order) noexcept {
+        std::copy(order.begin(), order.end(), items_.items().begin() + static_cast<std::ptrdiff_t>(begin));
+    }
+
     void clear() noexcept {
         items_.clear();
         if (++current_ == 0) {  // every 2^32 times the old marks would come back to life

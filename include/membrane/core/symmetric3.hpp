@@ -13,7 +13,7 @@ namespace membrane {
 ///     membrane::Symmetric3<double> stiffness = membrane::diagonal3(8.0);            // [N/m]
 ///     stiffness += membrane::outer(40.0, u);                                        // 40 u u^T
 ///     const auto way = inverse(stiffness) * force;                                  // [m]
-template <Real Scalar>
+template <Number Scalar>
 struct Symmetric3 {
     Scalar xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
 
@@ -32,13 +32,13 @@ struct Symmetric3 {
 };
 
 /// `s` times the identity.
-template <Real Scalar>
+template <Number Scalar>
 [[nodiscard]] Symmetric3<Scalar> diagonal3(Scalar s) noexcept {
     return {s, s, s, 0, 0, 0};
 }
 
 /// s u u^T.
-template <Real Scalar>
+template <Number Scalar>
 [[nodiscard]] Symmetric3<Scalar> outer(Scalar s, const Vector3<Scalar>& u) noexcept {
     const Scalar x = s * u[0], y = s * u[1], z = s * u[2];
     return {x * u[0], y * u[1], z * u[2], x * u[1], x * u[2], y * u[2]};
@@ -46,7 +46,7 @@ template <Real Scalar>
 
 /// @pre positive definite. Cost: one division; half the digits are left where the largest eigenvalue is a cube root of
 /// epsilon's inverse times the smallest.
-template <Real Scalar>
+template <Number Scalar>
 [[nodiscard]] Symmetric3<Scalar> inverse(const Symmetric3<Scalar>& a) noexcept {
     const Scalar xx = a.yy * a.zz - a.yz * a.yz, xy = a.xz * a.yz - a.xy * a.zz, xz = a.xy * a.yz - a.xz * a.yy;
     const Scalar scale = 1 / ((a.xx * xx + a.xy * xy) + a.xz * xz);

@@ -21,6 +21,29 @@ namespace membrane {
 template <class T>
 concept Real = std::same_as<T, float> || std::same_as<T, double>;
 
+/// A `Real`, or several of them side by side: `Lanes`.
+template <class N>
+concept Number = Real<N> || requires {
+    requires Real<typename N::Each>;
+};
+
+namespace detail {
+
+template <class N>
+struct EachOf {
+    using Type = typename N::Each;
+};
+template <Real N>
+struct EachOf<N> {
+    using Type = N;
+};
+
+}  // namespace detail
+
+/// The `Real` that a number is made of.
+template <Number N>
+using Each = typename detail::EachOf<N>::Type;
+
 /// Number of a vertex, a triangle or a spring.
 using Index = std::int32_t;
 
@@ -30,7 +53,7 @@ inline constexpr Index no_index = -1;
 /// In place of a count: no limit.
 inline constexpr Index unlimited = (std::numeric_limits<Index>::max)();
 
-template <Real Scalar>
+template <Number Scalar>
 using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
 
 /// One point a column, 3 x V.
@@ -52,17 +75,17 @@ using ConstPointsRef = Eigen::Ref<const Points<Scalar>, 0, Eigen::OuterStride<>>
 // Eigen's own dot() and norm() add in an order that depends on the instruction set. These do not, so that every
 // compiler and processor comes to the same bits as long as it does not contract a * b + c.
 
-template <Real Scalar>
+template <Number Scalar>
 [[nodiscard]] constexpr Scalar dot(const Vector3<Scalar>& a, const Vector3<Scalar>& b) noexcept {
     return (a.x() * b.x() + a.y() * b.y()) + a.z() * b.z();
 }
 
-template <Real Scalar>
+template <Number Scalar>
 [[nodiscard]] constexpr Scalar squared_norm(const Vector3<Scalar>& a) noexcept {
     return dot(a, a);
 }
 
-template <Real Scalar>
+template <Number Scalar>
 [[nodiscard]] Scalar norm(const Vector3<Scalar>& a) noexcept {
     using std::sqrt;
     return sqrt(squared_norm(a));

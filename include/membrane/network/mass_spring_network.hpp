@@ -59,13 +59,51 @@ template <Real Scalar, class Positions>
 
 /// What one spring does to the vertex at one end. One of length zero has no direction and no force: it curves the energy
 /// alike in all directions.
-template <Real Scalar>
+template <Number Scalar>
 struct SpringPull {
-    Vector3<Scalar> reach;  ///< to the other end [m]
-    Scalar length;          ///< [m]
-    Scalar tension;         ///< [N]
-    Scalar along, across;   ///< curvature of the energy along the spring, and at right angles to it [N/m]
+    Vector3<Scalar> reach;      ///< to the other end [m]
+    Scalar length;              ///< [m]
+    Scalar tension;             ///< [N]
+    Scalar along, across;       ///< curvature of the energy along the spring, and at right angles to it [N/m]
+    Vector3<Scalar> direction;  ///< to the other end, zero without a length
 };
+
+/// What a spring of this stiffness [N/m] and rest length [m] does to the vertex from which it reaches by `reach` [m].
+template <Number Scalar, class Law>
+[[gnu::always_inline, nodiscard]] inline SpringPull<Scalar> pull_of(const Law& law, const Vector3<Scalar>& reach,
+                                                                    const Scalar& stiffness,
+                                                                    const Scalar& rest_length) noexcept {
+    const Scalar length = norm(reach);
+    const auto has_length = length != 0;
+    const Scalar divisor = select(has_length, length, Scalar(1)), per_length = 1 / divisor;
+    const auto answer = law(SpringState<Scalar>{stiffness, rest_length, divisor});
+    return {reach,
+            length,
+            select(has_length, answer.tension, Scalar(0)),
+            select(has_length, answer.stiffness, stiffness),
+            select<Scalar>(has_length, answer.tension * per_length, stiffness),
+            per_length * reach};
+}
+
+/// Adds a spring to what pulls on a vertex; to what is known of the energy around it, see `curved_pull`.
+template <Number Scalar>
+[[gnu::always_inline]] inline void add(Pull<Scalar>& sum, const SpringPull<Scalar>& spring) noexcept {
+    sum.force += spring.across * spring.reach;
+    sum.stiffness += larger(spring.along, spring.across);
+}
+template <Number Scalar>
+[[gnu::always_inline]] inline void add(CurvedPull<Scalar>& sum, const SpringPull<Scalar>& spring) noexcept {
+    const Scalar stiffness = larger(spring.along, spring.across);
+    const Scalar relief = smaller(stiffness - spring.across, stiffness);
+    const auto relieves = relief > 0;
+    const Scalar part = select(relieves, relief, Scalar(0));
+    sum.force += spring.across * spring.reach;
+    sum.stiffness += stiffness;
+    sum.relief += diagonal3(part);
+    sum.relief += outer<Scalar>(-part, spring.direction);
+    const Scalar rest_beyond = larger<Scalar>(-spring.tension / select(relieves, stiffness, Scalar(1)), Scalar(0));
+    sum.size = select(relieves, smaller<Scalar>(sum.size, spring.length + rest_beyond), sum.size);
+}
 
 /// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1): constant once built, no positions in it.
 template <Real Scalar_, SpringLaw<Scalar_> Law>
@@ -207,24 +245,14 @@ void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef
     const Vector3<Scalar> here = point(x, v);
     for (const auto& end : springs_of(v)) {
         const Vector3<Scalar> reach = point(x, end.other) - here;
-        SpringPull<Scalar> pull{reach, norm(reach), 0, end.stiffness, end.stiffness};
-        if (pull.length != 0) {
-            const auto answer = law_(SpringState<Scalar>{end.stiffness, end.rest_length, pull.length});
-            pull.tension = answer.tension;
-            pull.along = answer.stiffness;
-            pull.across = answer.tension / pull.length;
-        }
-        act(pull);
+        act(pull_of<Scalar>(law_, reach, end.stiffness, end.rest_length));
     }
 }
 
 template <Real Scalar, SpringLaw<Scalar> Law>
 Pull<Scalar> MassSpringNetwork<Scalar, Law>::pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
     Pull<Scalar> sum{Vector3<Scalar>::Zero(), 0};
-    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) {
-        sum.force += spring.across * spring.reach;
-        sum.stiffness += (std::max)(spring.along, spring.across);
-    });
+    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) { add(sum, spring); });
     return sum;
 }
 
@@ -232,17 +260,7 @@ template <Real Scalar, SpringLaw<Scalar> Law>
 CurvedPull<Scalar> MassSpringNetwork<Scalar, Law>::curved_pull(Index v,
                                                                const ConstPointsRef<Scalar>& x) const noexcept {
     CurvedPull<Scalar> sum;
-    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) {
-        const Scalar stiffness = (std::max)(spring.along, spring.across);
-        const Scalar relief = (std::min)(stiffness - spring.across, stiffness);
-        sum.force += spring.across * spring.reach;
-        sum.stiffness += stiffness;
-        if (!(relief > 0)) return;
-        sum.relief += diagonal3(relief);
-        sum.relief += outer<Scalar>(-relief, spring.reach / spring.length);
-        const Scalar rest_beyond = (std::max)(-spring.tension / stiffness, Scalar(0));
-        sum.size = (std::min)(sum.size, spring.length + rest_beyond);
-    });
+    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) { add(sum, spring); });
     return sum;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include <membrane/core/check.hpp>
+#include <membrane/core/lanes.hpp>
 #include <membrane/core/symmetric3.hpp>
 
 /// What one spring does at a given length: constant stiffness, or stiffness as a function of the elongation.
@@ -19,7 +20,7 @@
 namespace membrane {
 
 /// A spring as the law sees it.
-template <Real Scalar>
+template <Number Scalar>
 struct SpringState {
     Scalar stiffness;    ///< of the spring at rest, k_ij [N/m], > 0
     Scalar rest_length;  ///< r_ij [m], >= 0
@@ -27,7 +28,7 @@ struct SpringState {
 };
 
 /// What the spring answers.
-template <Real Scalar>
+template <Number Scalar>
 struct SpringResponse {
     Scalar tension;    ///< [N], positive where the spring pulls its two ends together
     Scalar stiffness;  ///< derivative of the tension by the length [N/m]
@@ -35,7 +36,8 @@ struct SpringResponse {
 };
 
 /// A law of springs. What the compiler cannot see: no tension and no energy at rest length, `tension` the derivative
-/// of `energy` and `stiffness` that of `tension`, finite for every finite length. Parts that call a law use what they
+/// of `energy` and `stiffness` that of `tension`, finite for every finite length. One that also takes `Lanes` for its
+/// numbers lets a solver visit several vertices at once. Parts that call a law use what they
 /// need of the answer; the rest is not computed once the call is inlined.
 template <class Law, class Scalar>
 concept SpringLaw = Real<Scalar> && std::copyable<Law> && requires(const Law& law, const SpringState<Scalar>& state) {
@@ -52,27 +54,27 @@ template <class Law>
 }
 
 /// What pulls on a vertex: the sum over its springs.
-template <Real Scalar>
+template <Number Scalar>
 struct Pull {
-    Vector3<Scalar> force;  ///< [N]
-    Scalar stiffness;       ///< at least the curvature of the energy in every direction [N/m]
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
+    Scalar stiffness = 0;                             ///< at least the curvature of the energy in every direction [N/m]
 };
 
 /// What pulls on a vertex, and what is known of the energy around it: for a move d of a length up to rho it is at most
 /// E - force . d + d . (stiffness I - relief / (1 + rho / size)) d / 2, see `MassSpringNetwork::curved_pull`.
-template <Real Scalar>
+template <Number Scalar>
 struct CurvedPull {
-    Vector3<Scalar> force = Vector3<Scalar>::Zero();        ///< [N]
-    Scalar stiffness = 0;                                   ///< [N/m]
-    Symmetric3<Scalar> relief;                              ///< no eigenvalue below zero [N/m]
-    Scalar size = std::numeric_limits<Scalar>::infinity();  ///< [m]
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();              ///< [N]
+    Scalar stiffness = 0;                                         ///< [N/m]
+    Symmetric3<Scalar> relief;                                    ///< no eigenvalue below zero [N/m]
+    Scalar size = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m]
 };
 
 /// Tension proportional to the elongation, [Liu07] 2.2: k (l - r).
 struct LinearSpring {
     static constexpr bool never_stiffens = true;
 
-    template <Real Scalar>
+    template <Number Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
         const Scalar elongation = spring.length - spring.rest_length;
         const Scalar tension = spring.stiffness * elongation;

@@ -30,7 +30,8 @@ static_assert(std::is_default_constructible_v<VolumeOptions<float>>);
 static_assert(std::is_default_constructible_v<VolumeOptions<double>>);
 
 /// A model of the body under the membrane: the pull on vertex `v` at `position`, which was at `start` when the tick of
-/// length `dt` began. What the compiler cannot see: the pull does no work on the membrane over a closed path.
+/// length `dt` began. What the compiler cannot see: the pull does no work on the membrane over a closed path. One that
+/// hands out its springs, `spring(v, start, dt)`, lets a solver visit several vertices at once.
 template <class Volume, class Scalar>
 concept VolumeModel = Real<Scalar> &&
     requires(const Volume& volume, Index v, const Vector3<Scalar>& position, Scalar dt) {
@@ -46,6 +47,28 @@ struct NoVolumeSprings {
     }
 };
 static_assert(VolumeModel<NoVolumeSprings, float> && VolumeModel<NoVolumeSprings, double>);
+
+/// One virtual volume spring, [Liu07] (5), for the length of a tick: of rest length zero, from an anchor to its vertex.
+template <Number Scalar>
+struct VolumeSpring {
+    Vector3<Scalar> anchor = Vector3<Scalar>::Zero();  ///< [m]
+    Scalar stiffness = 0;                              ///< k'_s [N/m]
+    Scalar rate = 0;                                   ///< damping over the length of the tick, k'_d / dt [N/m]
+    Scalar before = 0;                                 ///< its length when the tick began [m]
+
+    /// Its pull on the vertex at `position`. The velocity along the spring in (5) is by how much its length has changed
+    /// over the tick: how often a solver visits the vertex within the tick does not change the damping, and
+    /// the damping force, like that of a spring, has an energy: k'_d (change of length)^2 / (2 dt).
+    [[nodiscard]] Pull<Scalar> pull(const Vector3<Scalar>& position) const noexcept {
+        const Vector3<Scalar> length = position - anchor;
+        const Scalar square = squared_norm(length);
+        const auto damps = (rate != 0) & (square != 0);  // the spring acts only while it has a length
+        if (!any(damps)) return {-stiffness * length, stiffness + rate};
+        const Scalar now = select(damps, root_of(square), Scalar(1));
+        const Scalar drag = select<Scalar>(damps, rate * (now - before) / now, Scalar(0));
+        return {-stiffness * length - drag * length, stiffness + rate};
+    }
+};
 
 template <Real Scalar>
 class MovedVolumeSprings;
@@ -71,13 +94,14 @@ class VirtualVolumeSprings {
     [[nodiscard]] MovedVolumeSprings<Scalar> at(const ConstPointsRef<Scalar>& anchors,
                                                 const ConstPointsRef<Scalar>& previous) const noexcept;
 
-    /// Force of the spring on vertex `v` at `position`. The velocity along the spring in (5) is by how much its length
-    /// has changed over the tick: how often a solver visits the vertex within the tick does not change the damping, and
-    /// the damping force, like that of a spring, has an energy: k'_d (change of length)^2 / (2 dt).
+    /// The spring of vertex `v`, which was at `start` when the tick of length `dt` [s] began.
+    [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept {
+        const Vector3<Scalar> anchor = point(anchors_, v);
+        return spring_from(v, anchor, start - anchor, dt);
+    }
     [[nodiscard]] Pull<Scalar> pull(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                     Scalar dt) const noexcept {
-        const Vector3<Scalar> anchor = point(anchors_, v);
-        return pull_of_length(v, position - anchor, start - anchor, dt);
+        return spring(v, start, dt).pull(position);
     }
 
     /// Energy stored in the spring of vertex `v` at `position` [J].
@@ -88,9 +112,12 @@ class VirtualVolumeSprings {
   private:
     friend class MovedVolumeSprings<Scalar>;
 
-    // Spring of vertex v, `length` from anchor to vertex now, `before` at the start of the tick.
-    [[nodiscard]] Pull<Scalar> pull_of_length(Index v, const Vector3<Scalar>& length, const Vector3<Scalar>& before,
-                                              Scalar dt) const noexcept;
+    [[nodiscard]] VolumeSpring<Scalar> spring_from(Index v, const Vector3<Scalar>& anchor,
+                                                   const Vector3<Scalar>& before, Scalar dt) const noexcept {
+        const Scalar d = damping(v);
+        if (d == 0) return {anchor, stiffness(v), 0, 0};
+        return {anchor, stiffness(v), d / dt, norm(before)};
+    }
 
     Points<Scalar> anchors_;
     std::vector<Scalar> stiffness_, damping_;
@@ -108,9 +135,12 @@ class MovedVolumeSprings {
 
     [[nodiscard]] const ConstPointsRef<Scalar>& anchors() const noexcept { return anchors_; }
 
+    [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept {
+        return springs_->spring_from(v, point(anchors_, v), start - point(previous_, v), dt);
+    }
     [[nodiscard]] Pull<Scalar> pull(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                     Scalar dt) const noexcept {
-        return springs_->pull_of_length(v, position - point(anchors_, v), start - point(previous_, v), dt);
+        return spring(v, start, dt).pull(position);
     }
 
     [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept {
@@ -139,20 +169,6 @@ template <Real Scalar>
 MovedVolumeSprings<Scalar> VirtualVolumeSprings<Scalar>::at(const ConstPointsRef<Scalar>& anchors,
                                                             const ConstPointsRef<Scalar>& previous) const noexcept {
     return {*this, anchors, previous};
-}
-
-template <Real Scalar>
-Pull<Scalar> VirtualVolumeSprings<Scalar>::pull_of_length(Index v, const Vector3<Scalar>& length,
-                                                          const Vector3<Scalar>& before, Scalar dt) const noexcept {
-    const Scalar k = stiffness(v);
-    const Scalar d = damping(v);
-    const Scalar rate = d == 0 ? Scalar(0) : d / dt;
-    Pull<Scalar> answer{-k * length, k + rate};
-    const Scalar square = squared_norm(length);
-    if (rate == 0 || square == 0) return answer;  // the spring acts only while it has a length
-    const Scalar now = std::sqrt(square);
-    answer.force -= (rate * (now - norm(before)) / now) * length;
-    return answer;
 }
 
 }  // namespace membrane

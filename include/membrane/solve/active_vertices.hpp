@@ -9,6 +9,7 @@
 
 #include <membrane/core/index_set.hpp>
 #include <membrane/solve/propagation_queue.hpp>
+#include <membrane/solve/step.hpp>
 
 /// Which vertices a step visits.
 ///
@@ -41,6 +42,12 @@ class ActiveVertices {
     }
     [[nodiscard]] std::span<const Index> beyond() const noexcept { return vertices().subspan(touched().size()); }
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return queue_; }
+
+    /// How many of `vertices`, the first, are the queue's.
+    [[nodiscard]] std::size_t from_queue() const noexcept { return from_queue_; }
+
+    /// Whether the queue is another one than at the last call.
+    [[nodiscard]] bool has_new_queue() noexcept { return std::exchange(has_new_queue_, false); }
 
     /// The layer that is looked at, but not visited yet: the first beyond the queue, if it may `grow`.
     [[nodiscard]] std::span<const Index> frontier() const noexcept {
@@ -76,6 +83,8 @@ class ActiveVertices {
     void clear() noexcept;
 
   private:
+    template <class Network>
+    void build_queue(const Network& network, std::span<const Index> seeds, Index layers) noexcept;
     template <class Network, class Options>
     void extend(const Network& network, const Options& options) noexcept;
 
@@ -86,8 +95,10 @@ class ActiveVertices {
     IndexSet visited_;  // in this step
     IndexSet stirred_;  // visited since everyone was last at rest
     Index room_ = 0;    // of those visited
+    std::size_t from_queue_ = 0;
     Index layers_before_ = 0;
-    bool as_needed_ = false, has_frontier_ = false;
+    bool as_needed_ = false, in_groups_ = false, has_frontier_ = false;
+    bool has_new_queue_ = false;
     bool queue_at_rest_ = true;
 };
 
@@ -104,16 +115,17 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
 template <class Network, class Options>
 void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
     as_needed_ = options.layers_as_needed;
+    in_groups_ = options.order == VisitOrder::groups && !as_needed_;
     layers_before_ = queue_.layer_count() - 1;
     next_seeds_.clear();
     for (const Index v : seeds) next_seeds_.insert(v);
     left_.clear();
     const auto before = seeds_.items(), now = next_seeds_.items();
     if (as_needed_) {
-        queue_.build(network, seeds, 0);
+        build_queue(network, seeds, 0);
     } else if (!std::equal(now.begin(), now.end(), before.begin(), before.end())) {
         for (const Index v : queue_.vertices()) left_.insert(v);
-        queue_.build(network, seeds, options.layers);
+        build_queue(network, seeds, options.layers);
     }
     const Index touched = queue_.layer_count() > 0 ? static_cast<Index>(queue_.layer(0).size()) : 0;
     const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_visits + 1);
@@ -130,9 +142,17 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
         }
     };
     line_up(queue_.vertices(), (std::max)(touched, room_ - others));
+    from_queue_ = static_cast<std::size_t>(visited_.count());
     line_up(restless_.items(), room_);
     line_up(left_.items(), room_);
     extend(network, options);
+}
+
+template <class Network>
+void ActiveVertices::build_queue(const Network& network, std::span<const Index> seeds, Index layers) noexcept {
+    queue_.build(network, seeds, layers);
+    if (in_groups_) queue_.group(network, static_cast<Index>(Lanes<typename Network::Scalar>::count));
+    has_new_queue_ = true;
 }
 
 template <class Network, class Options>
@@ -190,12 +210,13 @@ inline bool ActiveVertices::close() noexcept {
 
 template <class Network>
 void ActiveVertices::cancel(const Network& network) noexcept {
-    queue_.build(network, seeds_.items(), layers_before_);
+    build_queue(network, seeds_.items(), layers_before_);
     has_frontier_ = false;
 }
 
 inline void ActiveVertices::clear() noexcept {
     queue_.clear();
+    has_new_queue_ = true;
     for (IndexSet* set : {&seeds_, &restless_, &left_, &visited_, &stirred_}) set->clear();
 }
 

@@ -22,10 +22,10 @@
 ///     report.reactions[0]                                          // force of the membrane on the pressing tool [N]
 namespace membrane {
 
-/// Something that acts on the membrane during one step. `begin` names the vertices where its force enters and puts in
-/// place what it holds; `enforce` is called in every sweep once layer 0 has moved, and once more at the end; it
-/// mends what they broke and says whether there was anything to mend; `reaction` is the force of the membrane on whoever acts [N].
-/// One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it.
+/// Something that acts on the membrane during one step. `begin` names all vertices where its force enters, and puts in
+/// place what it holds; `enforce` is called in every sweep once layer 0 has moved, and once more at the end; it mends
+/// what they broke and says whether there was anything to mend; `reaction` is the force of the membrane on whoever acts
+/// [N]. One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> && requires(const C& constraint, Region<Scalar>& region, const Region<Scalar>& done) {
     { constraint.sound() }
@@ -96,7 +96,7 @@ struct HeldPoint {
 
     [[nodiscard]] bool sound() const noexcept;
     [[nodiscard]] Lead<Scalar> lead() const noexcept {
-        return triangle == no_index ? std::nullopt : Lead<Scalar>(target);
+        return triangle == no_index ? Lead<Scalar>() : Waypoint<Scalar>{target};
     }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>& region) const noexcept;
@@ -110,7 +110,7 @@ struct HeldVertex {
     Vector3<Scalar> target;  ///< [m]
 
     [[nodiscard]] bool sound() const noexcept { return is_finite(target); }
-    [[nodiscard]] Lead<Scalar> lead() const noexcept { return target; }
+    [[nodiscard]] Lead<Scalar> lead() const noexcept { return Waypoint<Scalar>{target}; }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept {
@@ -141,7 +141,7 @@ struct Load {
     Vector3<Scalar> force;  ///< [N]
 
     [[nodiscard]] bool sound() const noexcept;
-    [[nodiscard]] Lead<Scalar> lead() const noexcept { return force; }
+    [[nodiscard]] Lead<Scalar> lead() const noexcept { return Waypoint<Scalar>{force}; }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>&) const noexcept { return -force; }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -15,16 +16,22 @@
 ///     for (v : moved) x.col(v) += part * last_way(v);
 namespace membrane {
 
-/// What a constraint is led by, a hand or a script, as a point of its path: a position [m] or a force [N]; nothing where
-/// it does not act.
+/// What a constraint is led by, a hand or a script: where that is on its way.
 template <Real Scalar>
-using Lead = std::optional<Vector3<Scalar>>;
+struct Waypoint {
+    Vector3<Scalar> at;                                        ///< a position [m], or a force [N]
+    Scalar longest = std::numeric_limits<Scalar>::infinity();  ///< of the ways in a tick that let one expect the next
+};
+
+/// Nothing where the constraint does not act.
+template <Real Scalar>
+using Lead = std::optional<Waypoint<Scalar>>;
 
 /// Under a tool that slides on, a membrane goes on as it did in the tick before, but for how the tool speeds up or turns: a
 /// step that begins there has no more than that to mend.
 ///
 /// The part that is expected again is the least, over all that leads, of the new way along the last one, at most
-/// all of it; nothing where something comes, goes, stops or turns back. Sweeps that leave the part q of an error, 0 <= q < 1,
+/// all of it; nothing where something comes, goes, jumps, stops or turns back. Sweeps that leave the part q of an error, 0 <= q < 1,
 /// then leave sqrt(q) of it at most from tick to tick, since z^2 = q ((1 + p) z - p) has no larger root for 0 <= p <= 1: what
 /// converges without a prediction converges with it.
 template <Real Scalar, std::size_t most_leads>
@@ -38,7 +45,7 @@ class Predictor {
 
   private:
     struct Path {
-        Lead<Scalar> at, way;  // in the last step
+        std::optional<Vector3<Scalar>> at, way;  // in the last step
     };
     [[nodiscard]] static Scalar part_of(const Vector3<Scalar>& now, const Vector3<Scalar>& before) noexcept;
 
@@ -51,14 +58,17 @@ Scalar Predictor<Scalar, most_leads>::expect(std::span<const Lead<Scalar>> leads
     bool led = false;
     for (std::size_t i = 0; i < most_leads; ++i) {
         const Path before = paths_[i];
-        const Lead<Scalar> at = i < leads.size() ? leads[i] : std::nullopt;
-        paths_[i] = {at, {}};
-        if (at && before.at) paths_[i].way = *at - *before.at;
-        if (at.has_value() != before.at.has_value() || before.at.has_value() != before.way.has_value()) {
+        const Lead<Scalar> lead = i < leads.size() ? leads[i] : std::nullopt;
+        Path& path = paths_[i] = {};
+        if (lead) path.at = lead->at;
+        if (lead && before.at) path.way = lead->at - *before.at;
+        if (lead.has_value() != before.at.has_value() || before.at.has_value() != before.way.has_value()) {
             part = 0;  // it comes or goes, or has only just come
-        } else if (at && squared_norm(*before.way) > 0) {
+        } else if (lead && (norm(*path.way) > lead->longest || norm(*before.way) > lead->longest)) {
+            part = 0;
+        } else if (lead && squared_norm(*before.way) > 0) {
             led = true;
-            part = (std::min)(part, part_of(*paths_[i].way, *before.way));
+            part = (std::min)(part, part_of(*path.way, *before.way));
         }
     }
     return led ? part : Scalar(0);

@@ -13,6 +13,7 @@
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
+#include <membrane/solve/compact_block.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/deadline.hpp>
 #include <membrane/solve/predictor.hpp>
@@ -95,6 +96,7 @@ class QuasiStaticSolver {
     Rule rule_;
     SolverOptions<Scalar> options_;
     ActiveVertices active_;
+    CompactBlock<Scalar> block_;
     Workspace<Scalar> work_;
     IndexSet last_held_;
     BoundedList<Index> moved_;  // in the last step that advanced, and how far [m]
@@ -113,6 +115,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const MassSpringNetwork<Scala
     : rule_(rule),
       options_((options.check(), options)),
       active_(network.vertex_count()),
+      block_(network, detail::most_in_lanes<Scalar, Rule, Law>(options)),
       work_(
           network.vertex_count(), [&](Index v) { return network.pinned(v); }, options.most_touches),
       last_held_(network.vertex_count()),
@@ -152,7 +155,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
     line_up(network, region);
     const StepInput<Scalar, MassSpringNetwork<Scalar, Law>, Volume> scene{x, dt, network, volume, work_};
     std::size_t resume = resume_;
-    Sweeps sweeps(rule_, options_, scene, region, acting, active_, pace, report_);
+    Sweeps sweeps(rule_, options_, scene, region, acting, active_, block_, pace, report_);
     StepStatus status = sweeps.run(resume);
     if (status == StepStatus::advanced && !acting.react(reactions_)) status = StepStatus::unstable;
     if (status != StepStatus::advanced) {

@@ -13,6 +13,12 @@
 ///     if (report.status != membrane::StepStatus::advanced) { /* nothing has moved */ }
 namespace membrane {
 
+/// In what order the vertices of a layer are visited; the layers always from the contact outward.
+enum class VisitOrder {
+    arrival,  ///< as the breadth-first search came to them, [Liu07] 2.2
+    groups,   ///< those together that no spring joins, 8 floats or 4 doubles: the processor moves them all at once
+};
+
 /// What a step may cost. More of everything is more accurate.
 template <Real Scalar>
 struct SolverOptions {
@@ -20,6 +26,7 @@ struct SolverOptions {
     bool layers_as_needed = false;  ///< a layer, up to `layers`, only while a force on it is not negligible
     Index sweeps = 2;               ///< passes over the queue in each step
     Index contact_visits = 4;       ///< visits of layer 0 in each sweep: what touches the tool settles last
+    VisitOrder order = VisitOrder::groups;
     bool predict = true;            ///< a step begins with the ways of the last one, as far as what leads goes on
     Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 and what is held get theirs anyway
     Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any

@@ -25,10 +25,10 @@ concept Compliance = std::same_as<C, Scalar> || std::same_as<C, Symmetric3<Scala
 
 /// What a rule knows of the vertex it is asked about: the pull of springs, backing, damping and constraints, and what
 /// follows.
-template <Real Scalar>
+template <Number Scalar>
 struct VertexState : CurvedPull<Scalar> {
     Scalar mass = 0;       ///< [kg], zero where the network has none
-    Scalar dt = 0;         ///< [s]
+    Each<Scalar> dt = 0;   ///< [s]
     bool touched = false;  ///< a constraint acts on it
 };
 
@@ -53,7 +53,7 @@ inline constexpr bool moves_along_force =
 struct MassStep {
     static constexpr bool needs_mass = true;
 
-    template <Real Scalar>
+    template <Number Scalar>
     [[nodiscard]] Scalar compliance(const VertexState<Scalar>& vertex) const noexcept {
         return vertex.dt * vertex.dt / vertex.mass;
     }
@@ -63,9 +63,9 @@ static_assert(StepRule<MassStep, float> && StepRule<MassStep, double>);
 namespace detail {
 
 /// Where constraints act, they change their forces to what the vertices there answer: no more than that must they move.
-template <Real Scalar>
-[[nodiscard]] Scalar relaxation(double omega, const VertexState<Scalar>& vertex) noexcept {
-    return static_cast<Scalar>(vertex.touched ? (std::min)(omega, 1.0) : omega);
+template <Number Scalar>
+[[nodiscard]] Each<Scalar> relaxation(double omega, const VertexState<Scalar>& vertex) noexcept {
+    return static_cast<Each<Scalar>>(vertex.touched ? (std::min)(omega, 1.0) : omega);
 }
 
 }  // namespace detail
@@ -78,9 +78,11 @@ struct SafeStep {
 
     double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and beyond 1 may swing
 
-    template <Real Scalar>
+    template <Number Scalar>
     [[nodiscard]] Scalar compliance(const VertexState<Scalar>& vertex) const noexcept {
-        return vertex.stiffness > 0 ? detail::relaxation(omega, vertex) / vertex.stiffness : Scalar(0);
+        const auto resists = vertex.stiffness > 0;
+        const Scalar divisor = select(resists, vertex.stiffness, Scalar(1));
+        return select<Scalar>(resists, detail::relaxation(omega, vertex) / divisor, Scalar(0));
     }
 
     /// @throws InvalidInput for an `omega` out of its range
@@ -101,7 +103,7 @@ struct BlockStep {
 
     double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and may swing
 
-    template <Real Scalar>
+    template <Number Scalar>
     [[nodiscard]] Symmetric3<Scalar> compliance(const VertexState<Scalar>& vertex) const noexcept;
 
     /// @throws InvalidInput for an `omega` out of its range
@@ -123,24 +125,28 @@ inline void SafeStep::check() const { detail::check_omega("SafeStep", omega); }
 
 inline void BlockStep::check() const { detail::check_omega("BlockStep", omega); }
 
-template <Real Scalar>
+template <Number Scalar>
 Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) const noexcept {
-    if (!(vertex.stiffness > 0)) return {};
+    const auto resists = vertex.stiffness > 0;
+    const Scalar stiffness = select(resists, vertex.stiffness, Scalar(1));
     // With t = rho / size: (1 + t) push = t (1 + t - part), in units of stiffness and size.
-    const Scalar per_stiffness = 1 / vertex.stiffness;
+    const Scalar per_stiffness = 1 / stiffness;
     const Scalar part = per_stiffness * vertex.relief.trace() / 2;
-    const Scalar relaxation = detail::relaxation(omega, vertex);
-    const Scalar longest = (std::max)(relaxation, Scalar(1)) * norm(vertex.force);
+    const Each<Scalar> relaxation = detail::relaxation(omega, vertex);
+    const Scalar longest = (std::max)(relaxation, Each<Scalar>(1)) * norm(vertex.force);
     // Beyond 1 / epsilon nothing is left of the relief, however short the spring.
-    const Scalar whole = vertex.stiffness * vertex.size, most = 1 / std::numeric_limits<Scalar>::epsilon();
-    const Scalar push = longest < most * whole ? longest / whole : most;
-    const Scalar slack = 1 - part - push, root = std::sqrt(slack * slack + 4 * push);
-    const Scalar t = slack > 0 ? 2 * push / (slack + root) : (root - slack) / 2;
+    const Scalar whole = stiffness * vertex.size, most = 1 / std::numeric_limits<Each<Scalar>>::epsilon();
+    const auto is_short = longest < most * whole;
+    const Scalar push = select<Scalar>(is_short, longest / select(is_short, whole, Scalar(1)), most);
+    const Scalar slack = 1 - part - push, root = root_of<Scalar>(slack * slack + 4 * push);
+    const auto ahead = slack > 0;
+    const Scalar t =
+        select<Scalar>(ahead, 2 * push / select<Scalar>(ahead, slack + root, Scalar(1)), (root - slack) / 2);
     // Nearly flat springs leave H nearly singular: cbrt(epsilon) keeps the determinant out of the rounding.
-    const auto flattest = static_cast<Scalar>(sizeof(Scalar) == 4 ? 4e-3 : 6e-6);
-    Symmetric3<Scalar> block = (-per_stiffness / (1 + (std::max)(t, flattest))) * vertex.relief;
+    const auto flattest = static_cast<Each<Scalar>>(sizeof(Each<Scalar>) == 4 ? 4e-3 : 6e-6);
+    Symmetric3<Scalar> block = (-per_stiffness / (1 + larger<Scalar>(t, flattest))) * vertex.relief;
     block += diagonal3(Scalar(1));
-    return (relaxation * per_stiffness) * inverse(block);
+    return select<Scalar>(resists, relaxation * per_stiffness, Scalar(0)) * inverse(block);
 }
 
 }  // namespace membrane

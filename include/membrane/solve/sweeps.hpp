@@ -7,6 +7,7 @@
 #include <utility>
 
 #include <membrane/solve/active_vertices.hpp>
+#include <membrane/solve/compact_block.hpp>
 #include <membrane/solve/deadline.hpp>
 #include <membrane/solve/region.hpp>
 #include <membrane/solve/step.hpp>
@@ -15,9 +16,22 @@
 
 /// What a step spends its time with.
 ///
-///     membrane::Sweeps sweeps(rule, options, scene, region, acting, active, pace, report);
+///     membrane::Sweeps sweeps(rule, options, scene, region, acting, active, block, pace, report);
 ///     if (sweeps.run(resume) == membrane::StepStatus::advanced) ...      // positions moved, forces looked at
 namespace membrane {
+
+namespace detail {
+
+// Nothing where the visits cannot be in lanes whatever the backing.
+template <class Scalar, class Rule, class Law>
+[[nodiscard]] Index most_in_lanes(const SolverOptions<Scalar>& options) noexcept {
+    constexpr bool possible = VisitsInLanes<Scalar, Rule, Law, NoVolumeSprings>;
+    return possible && options.order == VisitOrder::groups && !options.layers_as_needed
+               ? CompactBlock<Scalar>::most_vertices
+               : 0;
+}
+
+}  // namespace detail
 
 /// The visits of one step: layer 0 and what the constraints then mend, in rounds, and all the vertices beyond; again until
 /// nothing changes, the sweeps are done, or time is up. In the end a look at the forces on all of them.
@@ -25,13 +39,15 @@ template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 class Sweeps {
   public:
     Sweeps(const Rule& rule, const SolverOptions<Scalar>& options, const Scene& scene, Region<Scalar>& region,
-           const Acting& acting, ActiveVertices& active, Pace& pace, StepReport<Scalar>& report) noexcept
+           const Acting& acting, ActiveVertices& active, CompactBlock<Scalar>& block, Pace& pace,
+           StepReport<Scalar>& report) noexcept
         : rule_(rule),
           options_(options),
           scene_(scene),
           region_(region),
           acting_(acting),
           active_(active),
+          block_(block),
           pace_(pace),
           report_(report) {}
 
@@ -43,12 +59,20 @@ class Sweeps {
     [[nodiscard]] bool mended() const noexcept { return mended_; }
 
   private:
+    static constexpr bool can_use_lanes =
+        VisitsInLanes<Scalar, Rule, std::remove_cvref_t<decltype(std::declval<Scene>().network.law())>,
+                      std::remove_cvref_t<decltype(std::declval<Scene>().volume)>>;
+
+    void open_block() noexcept;
     bool sweep(std::size_t& resume) noexcept;
     bool rounds() noexcept;
     bool pass(std::span<const Index> vertices) noexcept;
+    bool pass_in_lanes(std::size_t begin, std::size_t end) noexcept;
+    bool visit_group(std::size_t g) noexcept;
     bool grow() noexcept;
     bool visit(Index v) noexcept;
     bool look() noexcept;
+    bool look_at(Index v, const Vector3<Scalar>& force) noexcept;
 
     const Rule& rule_;
     const SolverOptions<Scalar>& options_;
@@ -56,15 +80,18 @@ class Sweeps {
     Region<Scalar>& region_;
     const Acting& acting_;
     ActiveVertices& active_;
+    CompactBlock<Scalar>& block_;
     Pace& pace_;
     StepReport<Scalar>& report_;
     const Index* next_ = nullptr;  // where time ran out
     bool mended_ = false;
+    bool in_lanes_ = false;  // the groups of the block are visited all at once
 };
 
 template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 StepStatus Sweeps<Rule, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) noexcept {
     pace_.begin(active_.vertices().size() + active_.frontier().size());
+    open_block();
     bool changed = true;
     for (Index i = 0; i < options_.sweeps && changed && !report_.out_of_time; ++i) {
         changed = sweep(resume);
@@ -74,6 +101,18 @@ StepStatus Sweeps<Rule, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) n
     if (look()) return StepStatus::advanced;
     region_.put_back([&](Index v) { return !region_.held(v); });
     return look() ? StepStatus::unstable : StepStatus::bad_input;  // no better: what was handed in is to blame
+}
+
+// The groups of the queue are visited in lanes, if all of them are lined up, and forces of constraints act on layer 0 alone.
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+void Sweeps<Rule, Scalar, Scene, Acting, Pace>::open_block() noexcept {
+    if constexpr (can_use_lanes) {
+        if (active_.has_new_queue()) block_.follow(active_.queue(), scene_.network);
+        const auto pushed = scene_.work.pushed.items();
+        in_lanes_ = block_.size() > 0 && active_.touched().size() + block_.size() <= active_.from_queue() &&
+                    std::all_of(pushed.begin(), pushed.end(), [&](Index v) { return scene_.work.seeds.contains(v); });
+        if (in_lanes_) block_.open(scene_, [&](Index v) { return region_.fixed(v); });
+    }
 }
 
 template <class Rule, class Scalar, class Scene, class Acting, class Pace>
@@ -108,6 +147,12 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::rounds() noexcept {
 template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> vertices) noexcept {
     bool changed = false;
+    const auto begin = static_cast<std::size_t>(vertices.data() - active_.beyond().data());
+    if (in_lanes_ && begin < block_.size()) {
+        const std::size_t end = (std::min)(begin + vertices.size(), block_.size());
+        changed = pass_in_lanes(begin, end);
+        vertices = vertices.subspan(end - begin);
+    }
     while (!vertices.empty() && !report_.out_of_time) {
         report_.out_of_time = !pace_.has_time_for_batch();
         if (report_.out_of_time) {
@@ -120,6 +165,51 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> vert
         vertices = vertices.subspan(batch.size());
     }
     return changed;
+}
+
+// Vertices number `begin` to `end` beyond layer 0, in whole groups.
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass_in_lanes(std::size_t begin, std::size_t end) noexcept {
+    bool changed = false;
+    if constexpr (can_use_lanes) {
+        constexpr std::size_t groups_in_batch = visits_in_batch / Lanes<Scalar>::count;
+        block_.load(scene_.x);
+        std::size_t g = block_.group_from(begin);
+        const std::size_t last = block_.group_from(end);
+        while (g < last && !report_.out_of_time && report_.status == StepStatus::advanced) {
+            report_.out_of_time = !pace_.has_time_for_batch();
+            if (report_.out_of_time) {
+                next_ = active_.beyond().data() + block_.place_of(g);
+                break;
+            }
+            const Index before = report_.visits;
+            const std::size_t batch_end = (std::min)(g + groups_in_batch, last);
+            for (; g < batch_end; ++g) changed |= visit_group(g);
+            pace_.visited(static_cast<std::size_t>(report_.visits - before));
+        }
+        if (changed) block_.store(scene_.x);
+    }
+    return changed;
+}
+
+// Beyond a limit that costs nothing it is looked at closely whether a move is stable.
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit_group(std::size_t g) noexcept {
+    using Visit = typename CompactBlock<Scalar>::Visit;
+    report_.visits += block_.free_count(g);
+    auto visit = block_.visit(g, scene_, rule_);
+    if constexpr (moves_along_force<Rule, Scalar>) {
+        if (visit == Visit::too_far) {
+            block_.store(scene_.x);
+            for (const Index v : block_.group(g)) {
+                if (region_.fixed(v) || !diverges(scene_, v, rule_.compliance(state_of<Rule>(scene_, v)))) continue;
+                report_.status = StepStatus::unstable;
+                return false;
+            }
+            visit = block_.visit(g, scene_, rule_, true);
+        }
+    }
+    return visit == Visit::moved;
 }
 
 // Where layers are added as needed: adds the next one, and visits it, if a force on it is not negligible.
@@ -170,20 +260,40 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
 template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look() noexcept {
     bool finite = true;
-    const auto look_at = [&](Index v, bool free) {
-        const auto force = pull_on(scene_, v).force;
-        region_.set_unbalanced(v, force);
-        ++report_.visits;
-        if (free) report_.residual = (std::max)(report_.residual, norm(force));
-        finite &= is_finite(force);
-    };
-    for (const auto vertices : {active_.vertices(), active_.frontier()}) {
-        for (const Index v : vertices) {
-            if (!region_.held(v)) look_at(v, true);
+    auto others = active_.vertices();
+    if constexpr (can_use_lanes) {
+        if (in_lanes_) {
+            block_.load(scene_.x);
+            for (std::size_t g = 0; g < block_.group_count(); ++g) {
+                const auto forces = block_.forces(g, scene_);
+                const auto vertices = block_.group(g);
+                for (std::size_t i = 0; i < vertices.size(); ++i) {
+                    if (region_.held(vertices[i])) continue;
+                    region_.set_compliance(vertices[i], block_.compliance(g)[i]);
+                    finite &= look_at(vertices[i], {forces[0][i], forces[1][i], forces[2][i]});
+                }
+            }
+            others = active_.beyond().subspan(block_.size());
+            for (const Index v : active_.touched()) {
+                if (!region_.held(v)) finite &= look_at(v, pull_on(scene_, v).force);
+            }
         }
     }
-    for (const Index v : scene_.work.held.items()) look_at(v, false);
+    for (const auto vertices : {others, active_.frontier()}) {
+        for (const Index v : vertices) {
+            if (!region_.held(v)) finite &= look_at(v, pull_on(scene_, v).force);
+        }
+    }
+    for (const Index v : scene_.work.held.items()) finite &= look_at(v, pull_on(scene_, v).force);
     return finite;
+}
+
+template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look_at(Index v, const Vector3<Scalar>& force) noexcept {
+    ++report_.visits;
+    region_.set_unbalanced(v, force);
+    if (!region_.held(v)) report_.residual = (std::max)(report_.residual, norm(force));
+    return is_finite(force);
 }
 
 }  // namespace membrane

@@ -48,6 +48,9 @@ template <class Scalar, class Network, class Volume>
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> lasting_force(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const Vector3<Scalar> here = point(scene.x, v), start = point(scene.work.start, v);
+    if constexpr (requires { scene.volume.spring(v, start, scene.dt); }) {
+        if (scene.volume.spring(v, start, scene.dt).rate == 0) return point(scene.work.unbalanced, v);
+    }
     const Vector3<Scalar> still = scene.volume.pull(v, here, here, scene.dt).force;
     const Vector3<Scalar> moving = scene.volume.pull(v, here, start, scene.dt).force;
     return point(scene.work.unbalanced, v) + (still - moving);
@@ -77,7 +80,7 @@ template <class Rule, class Scalar, class Network, class Volume>
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] bool diverges(const StepInput<Scalar, Network, Volume>& scene, Index v, Scalar compliance) noexcept {
     const Scalar others = others_on(scene, v).stiffness;
-    if (compliance * (curvature_bound<Scalar>(scene.network, v, scene.x) + others) < 2) return false;
+    if (compliance * (curvature_bound(scene.network.curved_pull(v, scene.x)) + others) < 2) return false;
     return compliance * (largest_curvature<Scalar>(scene.network, v, scene.x) + others) >= 2;
 }
 

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstring>
+
+#include <membrane/core/lanes.hpp>
+
+/// Points of which several are read at once from wherever they are.
+///
+///     std::vector<membrane::PaddedPoint<float>> rows;
+///     const auto there = membrane::gather(rows.data(), which);              // a point in every lane
+namespace membrane {
+
+/// A point that is read as a whole.
+template <Real Scalar>
+struct alignas(4 * sizeof(Scalar)) PaddedPoint {
+    std::array<Scalar, 4> number{};  ///< x, y, z, and one for the room it takes
+
+    [[nodiscard]] Vector3<Scalar> point() const noexcept { return {number[0], number[1], number[2]}; }
+    void set(const Vector3<Scalar>& p) noexcept { number = {p.x(), p.y(), p.z(), 0}; }
+};
+
+/// Point `which[i]` of `rows` in lane i.
+template <Real Scalar>
+[[nodiscard]] Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows, const Index* which) noexcept;
+
+/// Lane i into row i.
+template <Real Scalar>
+void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows) noexcept;
+
+namespace detail {
+
+template <class Part, Real Scalar>
+[[nodiscard]] Part load_part(const Scalar* from) noexcept {
+    Part part;
+    std::memcpy(&part, from, sizeof part);
+    return part;
+}
+template <class Part, Real Scalar>
+void store_part(const Part& part, Scalar* to) noexcept {
+    std::memcpy(to, &part, sizeof part);
+}
+
+/// The first three columns of a matrix whose rows are `rows[which[0]]`, `rows[which[1]]` and so on: as many rows as a
+/// register holds numbers, or, of rows twice as wide as it, as the register does.
+template <class Part, Real Scalar>
+[[gnu::always_inline, nodiscard]] inline std::array<Part, 3> columns(const PaddedPoint<Scalar>* rows,
+                                                                     const Index* which) noexcept {
+    constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
+    const auto row = [&](std::size_t i) { return rows[static_cast<std::size_t>(which[i])].number.data(); };
+#if defined(__GNUC__)
+    if constexpr (width == 2) {
+        const auto half = [&](std::size_t i, std::size_t k) { return load_part<Part>(row(i) + 2 * k); };
+        const Part a = half(0, 0), b = half(1, 0), c = half(0, 1), d = half(1, 1);
+        return {__builtin_shufflevector(a, b, 0, 2), __builtin_shufflevector(a, b, 1, 3),
+                __builtin_shufflevector(c, d, 0, 2)};
+    } else if constexpr (width == 4) {
+        const Part a = load_part<Part>(row(0)), b = load_part<Part>(row(1)), c = load_part<Part>(row(2)),
+                   d = load_part<Part>(row(3));
+        const Part ab = __builtin_shufflevector(a, b, 0, 4, 1, 5), cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
+        const Part ab_z = __builtin_shufflevector(a, b, 2, 6, 3, 7), cd_z = __builtin_shufflevector(c, d, 2, 6, 3, 7);
+        return {__builtin_shufflevector(ab, cd, 0, 1, 4, 5), __builtin_shufflevector(ab, cd, 2, 3, 6, 7),
+                __builtin_shufflevector(ab_z, cd_z, 0, 1, 4, 5)};
+    } else if constexpr (width == 8) {
+        using Half __attribute__((vector_size(16))) = float;
+        const auto pair = [&](std::size_t i) {
+            return __builtin_shufflevector(load_part<Half>(row(i)), load_part<Half>(row(i + 4)), 0, 1, 2, 3, 4, 5, 6,
+                                           7);
+        };
+        const Part a = pair(0), b = pair(1), c = pair(2), d = pair(3);
+        const Part ab = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
+        const Part cd = __builtin_shufflevector(c, d, 0, 8, 1, 9, 4, 12, 5, 13);
+        const Part ab_z = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
+        const Part cd_z = __builtin_shufflevector(c, d, 2, 10, 3, 11, 6, 14, 7, 15);
+        return {__builtin_shufflevector(ab, cd, 0, 1, 8, 9, 4, 5, 12, 13),
+                __builtin_shufflevector(ab, cd, 2, 3, 10, 11, 6, 7, 14, 15),
+                __builtin_shufflevector(ab_z, cd_z, 0, 1, 8, 9, 4, 5, 12, 13)};
+    }
+#endif
+    std::array<Part, 3> result{};
+    for (std::size_t i = 0; i < width; ++i) {
+        for (std::size_t k = 0; k < 3; ++k) result[k][i] = row(i)[k];
+    }
+    return result;
+}
+
+/// The other way round: what `columns` reads from rows that follow on one another.
+template <class Part, Real Scalar>
+[[gnu::always_inline]] inline void put_columns(const std::array<Part, 3>& column, PaddedPoint<Scalar>* rows) noexcept {
+    constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
+    const auto row = [&](std::size_t i) { return rows[i].number.data(); };
+#if defined(__GNUC__)
+    const Part x = column[0], y = column[1], z = column[2], none{};
+    if constexpr (width == 2) {
+        store_part(__builtin_shufflevector(x, y, 0, 2), row(0));
+        store_part(__builtin_shufflevector(z, none, 0, 2), row(0) + 2);
+        store_part(__builtin_shufflevector(x, y, 1, 3), row(1));
+        store_part(__builtin_shufflevector(z, none, 1, 3), row(1) + 2);
+        return;
+    } else if constexpr (width == 4) {
+        const Part xy = __builtin_shufflevector(x, y, 0, 4, 1, 5), xy_next = __builtin_shufflevector(x, y, 2, 6, 3, 7);
+        const Part z_ = __builtin_shufflevector(z, none, 0, 4, 1, 5),
+                   z_next = __builtin_shufflevector(z, none, 2, 6, 3, 7);
+        store_part(__builtin_shufflevector(xy, z_, 0, 1, 4, 5), row(0));
+        store_part(__builtin_shufflevector(xy, z_, 2, 3, 6, 7), row(1));
+        store_part(__builtin_shufflevector(xy_next, z_next, 0, 1, 4, 5), row(2));
+        store_part(__builtin_shufflevector(xy_next, z_next, 2, 3, 6, 7), row(3));
+        return;
+    } else if constexpr (width == 8) {
+        const Part xy = __builtin_shufflevector(x, y, 0, 8, 1, 9, 4, 12, 5, 13);
+        const Part xy_next = __builtin_shufflevector(x, y, 2, 10, 3, 11, 6, 14, 7, 15);
+        const Part z_ = __builtin_shufflevector(z, none, 0, 8, 1, 9, 4, 12, 5, 13);
+        const Part z_next = __builtin_shufflevector(z, none, 2, 10, 3, 11, 6, 14, 7, 15);
+        const auto put = [&](const Part& a, const Part& b, std::size_t i) {
+            store_part(__builtin_shufflevector(a, b, 0, 1, 8, 9), row(i));
+            store_part(__builtin_shufflevector(a, b, 2, 3, 10, 11), row(i + 1));
+            store_part(__builtin_shufflevector(a, b, 4, 5, 12, 13), row(i + 4));
+            store_part(__builtin_shufflevector(a, b, 6, 7, 14, 15), row(i + 5));
+        };
+        put(xy, z_, 0);
+        put(xy_next, z_next, 2);
+        return;
+    }
+#endif
+    for (std::size_t i = 0; i < width; ++i) rows[i].number = {column[0][i], column[1][i], column[2][i], 0};
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+[[gnu::always_inline]] inline Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows,
+                                                            const Index* which) noexcept {
+    using Part = typename Lanes<Scalar>::Part;
+    constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
+    Vector3<Lanes<Scalar>> points;
+    for (std::size_t i = 0; i < Lanes<Scalar>::parts; ++i) {
+        const auto part = detail::columns<Part>(rows, which + i * width);
+        for (std::size_t k = 0; k < 3; ++k) points[static_cast<Eigen::Index>(k)].part(i) = part[k];
+    }
+    return points;
+}
+
+template <Real Scalar>
+void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows) noexcept {
+    using Part = typename Lanes<Scalar>::Part;
+    constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
+    for (std::size_t i = 0; i < Lanes<Scalar>::parts; ++i) {
+        detail::put_columns<Part>({points[0].part(i), points[1].part(i), points[2].part(i)}, rows + i * width);
+    }
+}
+
+}  // namespace membrane

@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+#include <membrane/core/types.hpp>
+
+#if defined(__SSE2__)
+#include <immintrin.h>
+#endif
+
+/// Several numbers side by side, for what is reckoned alike with all of them.
+///
+///     const membrane::Lanes<float> length = sqrt(x * x + y * y);
+///     const auto part = x / select(length > 0, length, membrane::Lanes<float>(1));      // every lane for itself
+namespace membrane {
+
+namespace detail {
+
+#if defined(__AVX__)
+inline constexpr std::size_t register_bytes = 32;
+#else
+inline constexpr std::size_t register_bytes = 16;
+#endif
+
+template <class Scalar>
+struct Register {
+    using Type __attribute__((vector_size(register_bytes))) = Scalar;
+};
+
+}  // namespace detail
+
+/// 8 floats or 4 doubles, on every processor: which numbers share a step decides what comes of it. Each lane comes to the
+/// bits that its number would come to by itself.
+template <Real Scalar>
+class Lanes {
+  public:
+    using Each = Scalar;
+    static constexpr std::size_t count = 32 / sizeof(Scalar);
+
+    /// What the processor reckons with at a time; so many make up all lanes.
+    using Part = typename detail::Register<Scalar>::Type;
+    static constexpr std::size_t parts = 32 / detail::register_bytes;
+
+    Lanes() = default;
+    Lanes(Scalar all) noexcept {  // NOLINT(google-explicit-constructor): one number stands for all lanes
+        for (auto& part : parts_) part = Part{} + all;
+    }
+
+    /// `count` numbers, one after the other.
+    [[nodiscard]] static Lanes load(const Scalar* from) noexcept {
+        Lanes lanes;
+        std::memcpy(lanes.parts_.data(), from, sizeof lanes.parts_);
+        return lanes;
+    }
+    void store(Scalar* to) const noexcept { std::memcpy(to, parts_.data(), sizeof parts_); }
+    [[nodiscard]] Scalar operator[](std::size_t i) const noexcept { return parts_[i / width][i % width]; }
+    void set(std::size_t i, Scalar value) noexcept { parts_[i / width][i % width] = value; }
+    [[nodiscard]] Part& part(std::size_t i) noexcept { return parts_[i]; }
+    [[nodiscard]] const Part& part(std::size_t i) const noexcept { return parts_[i]; }
+
+    [[nodiscard]] friend Lanes operator+(const Lanes& a, const Lanes& b) noexcept {
+        return each([](auto x, auto y) { return x + y; }, a, b);
+    }
+    [[nodiscard]] friend Lanes operator-(const Lanes& a, const Lanes& b) noexcept {
+        return each([](auto x, auto y) { return x - y; }, a, b);
+    }
+    [[nodiscard]] friend Lanes operator*(const Lanes& a, const Lanes& b) noexcept {
+        return each([](auto x, auto y) { return x * y; }, a, b);
+    }
+    [[nodiscard]] friend Lanes operator/(const Lanes& a, const Lanes& b) noexcept {
+        return each([](auto x, auto y) { return x / y; }, a, b);
+    }
+    [[nodiscard]] Lanes operator-() const noexcept {
+        return each([](auto x, auto) { return -x; }, *this, *this);
+    }
+    Lanes& operator+=(const Lanes& b) noexcept { return *this = *this + b; }
+    Lanes& operator-=(const Lanes& b) noexcept { return *this = *this - b; }
+    Lanes& operator*=(const Lanes& b) noexcept { return *this = *this * b; }
+    Lanes& operator/=(const Lanes& b) noexcept { return *this = *this / b; }
+
+    /// A yes or no for each lane.
+    class Mask {
+      public:
+        [[nodiscard]] friend Mask operator&(const Mask& a, const Mask& b) noexcept {
+            Mask both;
+            for (std::size_t i = 0; i < parts; ++i) both.parts_[i] = a.parts_[i] & b.parts_[i];
+            return both;
+        }
+        [[nodiscard]] friend bool any(const Mask& mask) noexcept {
+            std::array<std::uint64_t, 4> bits;
+            std::memcpy(bits.data(), &mask, sizeof bits);
+            return ((bits[0] | bits[1]) | (bits[2] | bits[3])) != 0;
+        }
+
+      private:
+        friend Lanes;
+        std::array<decltype(Part{} < Part{}), parts> parts_;
+    };
+
+    [[nodiscard]] friend Mask operator<(const Lanes& a, const Lanes& b) noexcept {
+        return compare([](auto x, auto y) { return x < y; }, a, b);
+    }
+    [[nodiscard]] friend Mask operator>(const Lanes& a, const Lanes& b) noexcept { return b < a; }
+    [[nodiscard]] friend Mask operator>=(const Lanes& a, const Lanes& b) noexcept {
+        return compare([](auto x, auto y) { return x >= y; }, a, b);
+    }
+    [[nodiscard]] friend Mask operator!=(const Lanes& a, const Lanes& b) noexcept {
+        return compare([](auto x, auto y) { return x != y; }, a, b);
+    }
+
+    /// `yes` in the lanes of `mask`, `no` in the others.
+    [[nodiscard]] static Lanes choose(const Mask& mask, const Lanes& yes, const Lanes& no) noexcept {
+        Lanes chosen;
+        for (std::size_t i = 0; i < parts; ++i) chosen.parts_[i] = mask.parts_[i] ? yes.parts_[i] : no.parts_[i];
+        return chosen;
+    }
+
+    /// Correctly rounded.
+    [[nodiscard]] friend Lanes sqrt(const Lanes& a) noexcept {
+        return each([](auto x, auto) { return root(x); }, a, a);
+    }
+
+  private:
+    template <class Operation>
+    static Lanes each(Operation operation, const Lanes& a, const Lanes& b) noexcept {
+        Lanes result;
+        for (std::size_t i = 0; i < parts; ++i) result.parts_[i] = operation(a.parts_[i], b.parts_[i]);
+        return result;
+    }
+    template <class Relation>
+    static Mask compare(Relation relation, const Lanes& a, const Lanes& b) noexcept {
+        Mask mask;
+        for (std::size_t i = 0; i < parts; ++i) mask.parts_[i] = relation(a.parts_[i], b.parts_[i]);
+        return mask;
+    }
+    // Compilers take the root of a vector only where nobody asks for errno.
+    static Part root(const Part& a) noexcept {
+#if defined(__AVX__)
+        if constexpr (sizeof(Scalar) == 4)
+            return _mm256_sqrt_ps(a);
+        else
+            return _mm256_sqrt_pd(a);
+#elif defined(__SSE2__)
+        if constexpr (sizeof(Scalar) == 4)
+            return _mm_sqrt_ps(a);
+        else
+            return _mm_sqrt_pd(a);
+#else
+        Part roots;
+        for (std::size_t i = 0; i < sizeof(Part) / sizeof(Scalar); ++i) roots[i] = std::sqrt(a[i]);
+        return roots;
+#endif
+    }
+
+    static constexpr std::size_t width = count / parts;
+    std::array<Part, parts> parts_;
+};
+
+namespace detail {
+
+template <Number N>
+struct ChoiceOf {
+    using Type = typename N::Mask;
+};
+template <Real N>
+struct ChoiceOf<N> {
+    using Type = bool;
+};
+
+}  // namespace detail
+
+/// choice ? yes : no, in every lane.
+template <Number N>
+[[nodiscard]] N select(const typename detail::ChoiceOf<N>::Type& choice, const N& yes, const N& no) noexcept {
+    if constexpr (Real<N>)
+        return choice ? yes : no;
+    else
+        return N::choose(choice, yes, no);
+}
+[[nodiscard]] constexpr bool any(bool choice) noexcept { return choice; }
+
+/// The square root of a number, or of every lane.
+template <Number N>
+[[nodiscard]] N root_of(const N& a) noexcept {
+    using std::sqrt;
+    return sqrt(a);
+}
+
+/// std::max and std::min, of every lane.
+template <Number N>
+[[nodiscard]] N larger(const N& a, const N& b) noexcept {
+    return select(a < b, b, a);
+}
+template <Number N>
+[[nodiscard]] N smaller(const N& a, const N& b) noexcept {
+    return select(b < a, b, a);
+}
+
+}  // namespace membrane
+
+namespace Eigen {
+
+template <class Scalar>
+struct NumTraits<membrane::Lanes<Scalar>> : GenericNumTraits<membrane::Lanes<Scalar>> {
+    using Real = membrane::Lanes<Scalar>;
+    using NonInteger = Real;
+    using Nested = Real;
+    using Literal = Scalar;
+    enum {
+        IsInteger = 0,
+        IsSigned = 1,
+        IsComplex = 0,
+        RequireInitialization = 0,
+        ReadCost = 1,
+        AddCost = 1,
+        MulCost = 1
+    };
+};
+
+}  // namespace Eigen

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/compact_block.hpp>
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/quasi_static.hpp>
+
+#include "support/bits.hpp"
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/meshes.hpp"
+#include "support/random.hpp"
+
+using namespace membrane;
+using test::Random;
+using test::same_bits;
+
+namespace {
+
+/// A backing that keeps its springs to itself: its vertices are visited one by one.
+template <class Volume>
+struct Opaque {
+    Volume volume;
+
+    template <Real S>
+    Pull<S> pull(Index v, const Vector3<S>& position, const Vector3<S>& start, S dt) const noexcept {
+        return volume.pull(v, position, start, dt);
+    }
+};
+static_assert(VisitsInLanes<double, BlockStep, LinearSpring, VirtualVolumeSprings<double>>);
+static_assert(VisitsInLanes<float, SafeStep, LinearSpring, NoVolumeSprings>);
+static_assert(VisitsInLanes<float, MassStep, LinearSpring, MovedVolumeSprings<float>>);
+static_assert(!VisitsInLanes<double, BlockStep, LinearSpring, Opaque<VirtualVolumeSprings<double>>>);
+static_assert(!VisitsInLanes<double, BlockStep, ExponentialSpring, NoVolumeSprings>);
+
+/// A mesh with holes, springs and backing of all kinds, some left out.
+template <Real S>
+struct Membrane {
+    explicit Membrane(Random& random)
+        : mesh(test::with_holes(test::random_surface<S>(random), random).mesh()),
+          network(mesh, {}, springs(random)),
+          backing(mesh, volume(random)) {}
+
+    NetworkOptions<S> springs(Random& random) const {
+        std::vector<S> stiffness(Adjacency(mesh).edges().size());
+        for (S& k : stiffness) k = random.chance(0.1) ? S(0) : random.number(S(1), S(10));
+        std::vector<S> mass(static_cast<std::size_t>(mesh.vertex_count()));
+        // Near to what is stable at 1 ms, on either side.
+        for (S& m : mass) m = S(1e-6) * random.number(S(20), S(80));
+        return {.stiffness = stiffness, .mass = mass, .pinned = {random.index(mesh.vertex_count())}};
+    }
+    VolumeOptions<S> volume(Random& random) const {
+        std::vector<S> stiffness(static_cast<std::size_t>(mesh.vertex_count()));
+        for (S& k : stiffness) k = random.number(S(0.1), S(2));
+        return {.stiffness = stiffness, .damping = random.chance(0.5) ? S(0) : random.number(S(1e-4), S(1e-2))};
+    }
+
+    TriangleMesh<S> mesh;
+    MassSpringNetwork<S, LinearSpring> network;
+    VirtualVolumeSprings<S> backing;
+};
+
+/// Ten ticks in which a vertex is pulled about, another held, a third loaded; what the steps said is added to `log`.
+template <Real S, class Rule, class Volume>
+Points<S> play(const Membrane<S>& membrane, const Rule& rule, const Volume& volume, const SolverOptions<S>& options,
+               int seed, std::vector<double>& log) {
+    Random random(static_cast<std::uint64_t>(seed));
+    const Index vertices = membrane.mesh.vertex_count();
+    QuasiStaticSolver<S, Rule> solver(membrane.network, options, rule);
+    Points<S> x = membrane.mesh.positions();
+    Index v = random.index(vertices);
+    const Index still = random.index(vertices), f = random.index(membrane.mesh.triangle_count());
+    const auto corners = membrane.mesh.triangles().col(f);
+    for (int tick = 0; tick < 10; ++tick) {
+        if (random.chance(0.3)) v = random.index(vertices);
+        const Vector3<S> target = point(x, v) + S(0.1) * random.vector<S>();
+        const auto report = solver.step(
+            x, S(1e-3), membrane.network, volume, pull(v, target), pin({&still, 1}),
+            load<S>({corners[0], corners[1], corners[2]}, random.barycentric<S>(), S(0.1) * random.vector<S>()));
+        log.insert(log.end(), {static_cast<double>(report.status),
+                               report.status == StepStatus::advanced ? static_cast<double>(report.visits) : 0.0,
+                               static_cast<double>(report.residual), static_cast<double>(report.moved.size()),
+                               static_cast<double>(norm(report.total_reaction()))});
+    }
+    return x;
+}
+
+template <Real S, class Rule>
+void check_same(const Rule& rule) {
+    int advanced = 0, refused = 0;
+    for (int seed = 1; seed <= cases(150); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Membrane<S> membrane(random);
+        const SolverOptions<S> options{.layers = random.chance(0.2) ? unlimited : random.index(8),
+                                       .sweeps = 1 + random.index(4),
+                                       .contact_visits = 1 + random.index(3),
+                                       .most_visits = random.chance(0.2) ? random.index(200) + 1 : unlimited};
+        std::vector<double> in_lanes, one_by_one;
+        if (random.chance(0.2)) {
+            const auto x = play(membrane, rule, NoVolumeSprings{}, options, seed, in_lanes);
+            REQUIRE(same_bits(x, play(membrane, rule, Opaque<NoVolumeSprings>{}, options, seed, one_by_one)));
+        } else {
+            const Opaque<VirtualVolumeSprings<S>> opaque{membrane.backing};
+            const auto x = play(membrane, rule, membrane.backing, options, seed, in_lanes);
+            REQUIRE(same_bits(x, play(membrane, rule, opaque, options, seed, one_by_one)));
+        }
+        REQUIRE(in_lanes == one_by_one);
+        for (std::size_t i = 0; i < in_lanes.size(); i += 5) ++(in_lanes[i] == 0 ? advanced : refused);
+    }
+    CHECK(advanced > refused);
+    if constexpr (std::same_as<Rule, MassStep>) CHECK((refused > 0 || cases(150) < 150));
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("visits in lanes end in the bits of visits one by one", "[block]", float, double) {
+    SECTION("block") { check_same<TestType>(BlockStep{}); }
+    SECTION("block, over-relaxed") { check_same<TestType>(BlockStep{.omega = 1.3}); }
+    SECTION("safe") { check_same<TestType>(SafeStep{}); }
+    SECTION("as published") { check_same<TestType>(MassStep{}); }
+}
+
+TEMPLATE_TEST_CASE("a block has as many groups as there is room for", "[block]", float, double) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Membrane<S> membrane(random);
+        const Index vertices = membrane.mesh.vertex_count(), most = random.index(vertices + 1);
+        const Index start = random.index(vertices);
+        PropagationQueue queue(vertices);
+        queue.build(membrane.network, {&start, 1}, unlimited);
+        queue.group(membrane.network, static_cast<Index>(Lanes<S>::count));
+        CompactBlock<S> block(membrane.network, most);
+        for (int again = 0; again < 2; ++again) {
+            block.follow(queue, membrane.network);
+            REQUIRE(block.size() <= static_cast<std::size_t>(most));
+            REQUIRE(block.group_count() <= queue.group_ends().size());
+            if (most == vertices) REQUIRE(block.group_count() == queue.group_ends().size());
+            std::size_t place = queue.vertices().empty() ? 0 : queue.layer(0).size();
+            for (std::size_t g = 0; g < block.group_count(); ++g) {
+                REQUIRE(block.place_of(g) == place - queue.layer(0).size());
+                REQUIRE(block.group_from(block.place_of(g)) == g);
+                for (const Index v : block.group(g)) REQUIRE(v == queue.vertices()[place++]);
+                REQUIRE(place == queue.group_ends()[g]);
+            }
+            REQUIRE(block.group_from(block.size()) == block.group_count());
+        }
+    }
+}
