@@ -80,6 +80,22 @@ Table trade_table(const std::string& vertices) {
             .scene = "/vertices:" + vertices};
 }
 
+Table sweep_table(const std::string& topic, const std::string& title) {
+    const auto row = [](const std::string& name, const std::string& benchmark) {
+        return Row{name, benchmark, Row::each, "visits"};
+    };
+    return {
+        .topic = topic,
+        .key = topic,
+        .title = title,
+        .rows = {row("(4), plain loop, double", "plain/double"), row("(4), double", "lanes/double/mass"),
+                 row("safe step, double", "lanes/double/safe"), row("block step, double", "lanes/double/newton"),
+                 row("numbers in a row, double", "contiguous/double"), row("(4), plain loop, float", "plain/float"),
+                 row("(4), float", "lanes/float/mass"), row("safe step, float", "lanes/float/safe"),
+                 row("block step, float", "lanes/float/newton"), row("numbers in a row, float", "contiguous/float")},
+        .columns = {642, 2562, 10242}};
+}
+
 Table stability_table(const std::string& column, const std::string& title, const std::vector<int>& columns) {
     const auto row = [&](const std::string& name, const std::string& rule) {
         return Row{name, column + "/" + rule, Row::counter, "diverging", ""};
@@ -137,6 +153,8 @@ const std::vector<Table> all_tables{
                     {20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 90, 100, 200, 500, 1000}),
     stability_table("limit", "The same; dt in hundredths of what theory allows each scene",
                     {80, 85, 90, 95, 98, 99, 100, 101, 102, 105, 110, 115, 120, 125, 130}),
+    sweep_table("sweep", "A visit, in a sweep over all vertices; registers of 16 bytes"),
+    sweep_table("sweep_avx2", "The same; registers of 32 bytes"),
     threshold_table("642"),
     threshold_table("10242"),
     {"tracker",

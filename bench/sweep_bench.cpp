@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+#include <array>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -26,7 +28,8 @@ struct Field {
               mesh.vertex_count(), [](Index) { return false; }, 0) {
         std::mt19937_64 random(1);
         for (Index v = 0; v < x.cols(); ++v) {
-            for (int k = 0; k < 3; ++k) x(k, v) += static_cast<Scalar>(0.05 * radius * (random() % 2001 / 1000.0 - 1));
+            for (int k = 0; k < 3; ++k)
+                x(k, v) += static_cast<Scalar>(0.05 * radius * (static_cast<double>(random() % 2001) / 1000 - 1));
         }
         work.start = x;
     }
@@ -132,7 +135,7 @@ void contiguous(benchmark::State& state) {
     const auto number = [&] {
         Several lanes;
         for (std::size_t i = 0; i < Several::count; ++i)
-            lanes.set(i, static_cast<Scalar>(1 + random() % 1000 / 1000.0));
+            lanes.set(i, static_cast<Scalar>(1 + static_cast<double>(random() % 1000) / 1000));
         return lanes;
     };
     for (Group& group : groups) {

@@ -29,7 +29,7 @@ namespace {
 
 using Leads = std::array<Lead<double>, 2>;
 
-Lead<double> at(double x, double y = 0) { return Waypoint<double>{{x, y, 0}}; }
+Lead<double> at(double x, double y = 0) { return LeadPoint<double>{{x, y, 0}}; }
 
 constexpr double radius = 0.01, stiffness = 40, dt = 1e-3;  // [m], [N/m], [s]
 
@@ -134,7 +134,7 @@ TEST_CASE("of several leads the one that goes on least counts, those that stay d
 TEST_CASE("a way longer than the lead says lets one expect nothing, nor does the one after it") {
     const auto expected = [](double first, double second) {
         Predictor<double, 1> predictor;
-        const auto no_farther = [](double x) { return std::array{Lead<double>(Waypoint<double>{{x, 0, 0}, 2})}; };
+        const auto no_farther = [](double x) { return std::array{Lead<double>(LeadPoint<double>{{x, 0, 0}, 2})}; };
         static_cast<void>(predictor.expect(no_farther(0)));
         static_cast<void>(predictor.expect(no_farther(first)));
         return predictor.expect(no_farther(first + second));

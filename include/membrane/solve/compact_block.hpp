@@ -132,8 +132,26 @@ class CompactBlock {
     [[nodiscard]] bool add_group(std::span<const Index> vertices, const Network& network) noexcept;
     template <class Network>
     void fill(std::size_t g, const Network& network) noexcept;
-    void forget() noexcept;
-    [[nodiscard]] Index row_of(Index v) noexcept;
+    void forget() noexcept {
+        for (const BoundedList<Index>* known : {&members_, &others_}) {
+            for (const Index v : known->items()) row_[static_cast<std::size_t>(v)] = no_index;
+        }
+        members_.clear();
+        others_.clear();
+        groups_.clear();
+        slot_count_ = 0;
+    }
+    [[nodiscard]] Index row_of(Index v) noexcept {
+        Index& row = row_[static_cast<std::size_t>(v)];
+        if (row != no_index) return row;
+        row = static_cast<Index>(groups_.size() * lanes + others_.size());
+        others_.push(v);
+        return row;
+    }
+    // Groups are half empty at the worst that is made room for.
+    [[nodiscard]] static std::size_t groups_for(std::size_t vertices) noexcept {
+        return vertices == 0 ? 0 : 2 * vertices / lanes + 64;
+    }
 
     BoundedList<Index> members_;
     BoundedList<Index> others_;  // their neighbours that are in no group
@@ -147,23 +165,13 @@ class CompactBlock {
     std::array<Index, lanes> in_a_row_;
 };
 
-namespace detail {
-
-// Groups are half empty at the worst that is made room for.
-template <Real Scalar>
-[[nodiscard]] constexpr std::size_t groups_of(std::size_t count) noexcept {
-    return count == 0 ? 0 : 2 * count / Lanes<Scalar>::count + 64;
-}
-
-}  // namespace detail
-
 template <Real Scalar>
 template <class Law>
 CompactBlock<Scalar>::CompactBlock(const MassSpringNetwork<Scalar, Law>& network, Index most)
     : members_(static_cast<std::size_t>((std::min)(network.vertex_count(), most))),
       others_(most > 0 ? static_cast<std::size_t>(network.vertex_count()) : 0),
-      groups_(detail::groups_of<Scalar>(members_.room())),
-      ties_(detail::groups_of<Scalar>(members_.room())),
+      groups_(groups_for(members_.room())),
+      ties_(groups_for(members_.room())),
       answers_(ties_.size()),
       rows_(ties_.size() * lanes + others_.room()),
       row_(others_.room(), no_index) {
@@ -184,17 +192,6 @@ void CompactBlock<Scalar>::follow(const PropagationQueue& queue, const Network& 
         begin = end;
     }
     for (std::size_t g = 0; g < groups_.size(); ++g) fill(g, network);
-}
-
-template <Real Scalar>
-void CompactBlock<Scalar>::forget() noexcept {
-    for (const auto known : {std::as_const(members_).items(), std::as_const(others_).items()}) {
-        for (const Index v : known) row_[static_cast<std::size_t>(v)] = no_index;
-    }
-    members_.clear();
-    others_.clear();
-    groups_.clear();
-    slot_count_ = 0;
 }
 
 // False if there is no room.
@@ -235,16 +232,6 @@ void CompactBlock<Scalar>::fill(std::size_t g, const Network& network) noexcept 
             slot.other[i] = is_spring ? row_of(springs[s].other) : static_cast<Index>(own_row);
         }
     }
-}
-
-template <Real Scalar>
-Index CompactBlock<Scalar>::row_of(Index v) noexcept {
-    Index& row = row_[static_cast<std::size_t>(v)];
-    if (row == no_index) {
-        row = static_cast<Index>(groups_.size() * lanes + others_.size());
-        others_.push(v);
-    }
-    return row;
 }
 
 template <Real Scalar>

@@ -96,7 +96,7 @@ struct HeldPoint {
 
     [[nodiscard]] bool sound() const noexcept;
     [[nodiscard]] Lead<Scalar> lead() const noexcept {
-        return triangle == no_index ? Lead<Scalar>() : Waypoint<Scalar>{target};
+        return triangle == no_index ? Lead<Scalar>() : LeadPoint<Scalar>{target};
     }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>& region) const noexcept;
@@ -110,7 +110,7 @@ struct HeldVertex {
     Vector3<Scalar> target;  ///< [m]
 
     [[nodiscard]] bool sound() const noexcept { return is_finite(target); }
-    [[nodiscard]] Lead<Scalar> lead() const noexcept { return Waypoint<Scalar>{target}; }
+    [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{target}; }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept {
@@ -141,7 +141,7 @@ struct Load {
     Vector3<Scalar> force;  ///< [N]
 
     [[nodiscard]] bool sound() const noexcept;
-    [[nodiscard]] Lead<Scalar> lead() const noexcept { return Waypoint<Scalar>{force}; }
+    [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{force}; }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>&) const noexcept { return -force; }

@@ -18,14 +18,14 @@ namespace membrane {
 
 /// What a constraint is led by, a hand or a script: where that is on its way.
 template <Real Scalar>
-struct Waypoint {
+struct LeadPoint {
     Vector3<Scalar> at;                                        ///< a position [m], or a force [N]
     Scalar longest = std::numeric_limits<Scalar>::infinity();  ///< of the ways in a tick that let one expect the next
 };
 
 /// Nothing where the constraint does not act.
 template <Real Scalar>
-using Lead = std::optional<Waypoint<Scalar>>;
+using Lead = std::optional<LeadPoint<Scalar>>;
 
 /// Under a tool that slides on, a membrane goes on as it did in the tick before, but for how the tool speeds up or turns: a
 /// step that begins there has no more than that to mend.

@@ -31,7 +31,7 @@ struct Press {
     [[nodiscard]] bool sound() const noexcept { return is_sound(tool) && is_sound(contact); }
     [[nodiscard]] Lead<Scalar> lead() const noexcept {
         if (!contact.touching() || contact.crossed) return {};
-        return Waypoint<Scalar>{contact.on_axis, contact.radius / 2};  // farther, the surface might pass the tool
+        return LeadPoint<Scalar>{contact.on_axis, contact.radius / 2};  // farther, the surface might pass the tool
     }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>& region) const noexcept;
