@@ -10,7 +10,7 @@
 /// Points of which several are read at once from wherever they are.
 ///
 ///     std::vector<membrane::PaddedPoint<float>> rows;
-///     const auto there = membrane::gather(rows.data(), which);              // a point in every lane
+///     const auto there = membrane::gather(rows.data(), begins);             // a point in every lane
 namespace membrane {
 
 /// A point that is read as a whole.
@@ -22,9 +22,19 @@ struct alignas(4 * sizeof(Scalar)) PaddedPoint {
     void set(const Vector3<Scalar>& p) noexcept { number = {p.x(), p.y(), p.z(), 0}; }
 };
 
-/// Point `which[i]` of `rows` in lane i.
+/// How many numbers a point takes: row r begins at number 4 r.
+inline constexpr Index numbers_in_point = 4;
+
+/// In lane i the point of `rows` that begins at number `begins[i]`.
 template <Real Scalar>
-[[nodiscard]] Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows, const Index* which) noexcept;
+[[nodiscard]] Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
+
+/// Row i in lane i.
+template <Real Scalar>
+[[gnu::always_inline, nodiscard]] inline Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows) noexcept {
+    constexpr std::array<Index, 8> begins{0, 4, 8, 12, 16, 20, 24, 28};
+    return gather(rows, begins.data());
+}
 
 /// Lane i into row i.
 template <Real Scalar>
@@ -43,13 +53,12 @@ void store_part(const Part& part, Scalar* to) noexcept {
     std::memcpy(to, &part, sizeof part);
 }
 
-/// The first three columns of a matrix whose rows are `rows[which[0]]`, `rows[which[1]]` and so on: as many rows as a
-/// register holds numbers, or, of rows twice as wide as it, as the register does.
+/// The first three columns of a matrix whose rows begin at these numbers of `rows`; as many as a register holds numbers.
 template <class Part, Real Scalar>
 [[gnu::always_inline, nodiscard]] inline std::array<Part, 3> columns(const PaddedPoint<Scalar>* rows,
-                                                                     const Index* which) noexcept {
+                                                                     const Index* begins) noexcept {
     constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
-    const auto row = [&](std::size_t i) { return rows[static_cast<std::size_t>(which[i])].number.data(); };
+    const auto row = [&](std::size_t i) { return rows->number.data() + begins[i]; };
 #if defined(__GNUC__)
     if constexpr (width == 2) {
         const auto half = [&](std::size_t i, std::size_t k) { return load_part<Part>(row(i) + 2 * k); };
@@ -131,12 +140,12 @@ template <class Part, Real Scalar>
 
 template <Real Scalar>
 [[gnu::always_inline]] inline Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows,
-                                                            const Index* which) noexcept {
+                                                            const Index* begins) noexcept {
     using Part = typename Lanes<Scalar>::Part;
     constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
     Vector3<Lanes<Scalar>> points;
     for (std::size_t i = 0; i < Lanes<Scalar>::parts; ++i) {
-        const auto part = detail::columns<Part>(rows, which + i * width);
+        const auto part = detail::columns<Part>(rows, begins + i * width);
         for (std::size_t k = 0; k < 3; ++k) points[static_cast<Eigen::Index>(k)].part(i) = part[k];
     }
     return points;

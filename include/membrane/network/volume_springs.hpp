@@ -56,14 +56,19 @@ struct VolumeSpring {
     Scalar rate = 0;                                   ///< damping over the length of the tick, k'_d / dt [N/m]
     Scalar before = 0;                                 ///< its length when the tick began [m]
 
-    /// Its pull on the vertex at `position`. The velocity along the spring in (5) is by how much its length has changed
+    /// Its pull on the vertex at `position` but for the drag.
+    [[nodiscard]] Pull<Scalar> elastic_pull(const Vector3<Scalar>& position) const noexcept {
+        return {-stiffness * (position - anchor), stiffness + rate};
+    }
+
+    /// All of it. The velocity along the spring in (5) is by how much its length has changed
     /// over the tick: how often a solver visits the vertex within the tick does not change the damping, and
     /// the damping force, like that of a spring, has an energy: k'_d (change of length)^2 / (2 dt).
     [[nodiscard]] Pull<Scalar> pull(const Vector3<Scalar>& position) const noexcept {
         const Vector3<Scalar> length = position - anchor;
         const Scalar square = squared_norm(length);
         const auto damps = (rate != 0) & (square != 0);  // the spring acts only while it has a length
-        if (!any(damps)) return {-stiffness * length, stiffness + rate};
+        if (!any(damps)) return elastic_pull(position);
         const Scalar now = select(damps, root_of(square), Scalar(1));
         const Scalar drag = select<Scalar>(damps, rate * (now - before) / now, Scalar(0));
         return {-stiffness * length - drag * length, stiffness + rate};

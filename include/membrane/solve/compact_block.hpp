@@ -5,7 +5,6 @@
 #include <array>
 #include <concepts>
 #include <cstddef>
-#include <numeric>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -105,12 +104,11 @@ class CompactBlock {
 
   private:
     static constexpr std::size_t lanes = Several::count;
-
     struct Group {
         std::size_t first, size;  // of the members
         std::size_t slot, slot_count;
     };
-    /// One spring of each vertex of a group, and the row of its other end.
+    /// One spring of each vertex of a group, and where the row of its other end begins.
     struct Slot {
         Several stiffness, rest_length;
         std::array<Index, lanes> other;
@@ -121,13 +119,13 @@ class CompactBlock {
         Several mass = 1;
         Several free = 0;  // 1 where it may move
         Index free_count = 0;
+        bool damps = false;
     };
 
     template <class Sum, class Scene>
-    [[nodiscard]] Sum pull(std::size_t g, const Vector3<Several>& here, const Scene& scene) const noexcept;
-    [[nodiscard]] Vector3<Several> own(std::size_t g) const noexcept {
-        return gather(rows_.data() + g * lanes, in_a_row_.data());
-    }
+    [[gnu::always_inline, nodiscard]] inline Sum pull(std::size_t g, const Vector3<Several>& here,
+                                                      const Scene& scene) const noexcept;
+    [[nodiscard]] Vector3<Several> own(std::size_t g) const noexcept { return gather(rows_.data() + g * lanes); }
     template <class Network>
     [[nodiscard]] bool add_group(std::span<const Index> vertices, const Network& network) noexcept;
     template <class Network>
@@ -162,7 +160,6 @@ class CompactBlock {
     std::vector<Several> answers_;
     std::vector<PaddedPoint<Scalar>> rows_;  // of the groups, `lanes` each, then of the others
     std::vector<Index> row_;                 // of every vertex, if it is there
-    std::array<Index, lanes> in_a_row_;
 };
 
 template <Real Scalar>
@@ -175,7 +172,6 @@ CompactBlock<Scalar>::CompactBlock(const MassSpringNetwork<Scalar, Law>& network
       answers_(ties_.size()),
       rows_(ties_.size() * lanes + others_.room()),
       row_(others_.room(), no_index) {
-    std::iota(in_a_row_.begin(), in_a_row_.end(), 0);
     std::size_t ends = 2 * network.springs().size(), longest = 0;
     for (Index v = 0; v < network.vertex_count(); ++v) longest = (std::max)(longest, network.springs_of(v).size());
     ends = (std::min)(ends, longest * members_.room());
@@ -229,7 +225,8 @@ void CompactBlock<Scalar>::fill(std::size_t g, const Network& network) noexcept 
             Slot& slot = slots_[groups_[g].slot + s];
             slot.stiffness.set(i, is_spring ? springs[s].stiffness : Scalar(0));
             slot.rest_length.set(i, is_spring ? springs[s].rest_length : Scalar(0));
-            slot.other[i] = is_spring ? row_of(springs[s].other) : static_cast<Index>(own_row);
+            const Index row = is_spring ? row_of(springs[s].other) : static_cast<Index>(own_row);
+            slot.other[i] = numbers_in_point * row;
         }
     }
 }
@@ -240,6 +237,7 @@ void CompactBlock<Scalar>::open(const Scene& scene, IsFixed is_fixed) noexcept {
     for (std::size_t g = 0; g < groups_.size(); ++g) {
         Ties& ties = ties_[g];
         ties.free_count = 0;
+        ties.damps = false;
         const auto vertices = group(g);
         for (std::size_t i = 0; i < vertices.size(); ++i) {
             const Index v = vertices[i];
@@ -252,6 +250,7 @@ void CompactBlock<Scalar>::open(const Scene& scene, IsFixed is_fixed) noexcept {
                 for (Eigen::Index k = 0; k < 3; ++k) ties.spring.anchor[k].set(i, spring.anchor[k]);
                 ties.spring.stiffness.set(i, spring.stiffness);
                 ties.spring.rate.set(i, spring.rate);
+                ties.damps = ties.damps || spring.rate != 0;
                 ties.spring.before.set(i, spring.before);
             }
         }
@@ -285,7 +284,8 @@ Sum CompactBlock<Scalar>::pull(std::size_t g, const Vector3<Several>& here, cons
         add(sum, pull_of<Several>(scene.network.law(), reach, slot.stiffness, slot.rest_length));
     }
     if constexpr (!std::same_as<std::remove_cvref_t<decltype(scene.volume)>, NoVolumeSprings>) {
-        const auto backing = ties_[g].spring.pull(here);
+        const auto& spring = ties_[g].spring;
+        const auto backing = ties_[g].damps ? spring.pull(here) : spring.elastic_pull(here);
         sum.force += backing.force;
         sum.stiffness += backing.stiffness;
     }
