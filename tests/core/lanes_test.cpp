@@ -102,6 +102,9 @@ TEMPLATE_TEST_CASE("lanes are set one by one, all at once, and from numbers in a
     sum -= 2;
     sum /= 5;
     for (std::size_t i = 0; i < x.size(); ++i) CHECK(sum[i] == 2);
+    for (const S all : {S(0), -S(0), wild<S>(random), std::numeric_limits<S>::infinity()}) {
+        for (std::size_t i = 0; i < x.size(); ++i) CHECK(bits(Lanes<S>(all)[i]) == bits(all));
+    }
     CHECK_FALSE(any(sum != 2));
     CHECK(any(sum >= 2));
     CHECK(any(true));

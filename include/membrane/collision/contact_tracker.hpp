@@ -84,7 +84,8 @@ class ContactTracker {
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
 
-    static constexpr int rings_watched = 2;
+    // What a tool has gone through springs back, and may fold over it: for some ticks it is looked at from farther off.
+    static constexpr int rings_watched = 2, rings_after_crossing = 6, ticks_after_crossing = 16;
     static constexpr Scalar negligible_way = Scalar(1e-6);  // part of the tool's way in a tick
 
     Points<Scalar> origins_;
@@ -102,6 +103,7 @@ class ContactTracker {
     // Where on the surface without the tool its two ends and its contact point are nearest to.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
     Index ticks_ = 0, tree_checks_ = 0;
+    int lively_ticks_ = 0;
 };
 
 template <Real Scalar>
@@ -126,6 +128,7 @@ void ContactTracker<Scalar>::reset() noexcept {
     last_ = {};
     last_tool_.reset();
     origin_triangles_.fill(no_index);
+    lively_ticks_ = 0;
 }
 
 template <Real Scalar>
@@ -174,7 +177,7 @@ bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact
     std::swap(near_, near_before_);
     near_.clear();
     for (const Index f : near_before_.items()) gather(scene, f);
-    if (++ticks_ % check_every_ == 0) {
+    if (++ticks_ % check_every_ == 0 || lively_ticks_ > 0) {
         ++tree_checks_;
         gather_from_tree(scene);
     }
@@ -297,7 +300,8 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
     listed_.clear();
     for (const Index f : near_.items()) watched_.insert(f);
     std::size_t next = 0;
-    for (int ring = 0; ring < rings_watched; ++ring) {
+    lively_ticks_ = contact.crossed ? ticks_after_crossing : (std::max)(lively_ticks_ - 1, 0);
+    for (int ring = lively_ticks_ > 0 ? rings_after_crossing : rings_watched; ring > 0; --ring) {
         for (const std::size_t end = watched_.items().size(); next < end; ++next) {
             surface_.around_corners(watched_.items()[next], [&](Index f) { watched_.insert(f); });
         }

@@ -49,7 +49,7 @@ class Lanes {
 
     Lanes() = default;
     Lanes(Scalar all) noexcept {  // NOLINT(google-explicit-constructor): one number stands for all lanes
-        for (auto& part : parts_) part = Part{} + all;
+        for (auto& part : parts_) part = all - Part{};  // keeps the sign of a zero
     }
 
     /// `count` numbers, one after the other.
