@@ -110,17 +110,17 @@ template <class Part, Real Scalar>
         return;
     } else if constexpr (width == 4) {
         const Part xy = __builtin_shufflevector(x, y, 0, 4, 1, 5), xy_next = __builtin_shufflevector(x, y, 2, 6, 3, 7);
-        const Part z_ = __builtin_shufflevector(z, none, 0, 4, 1, 5),
+        const Part z_first = __builtin_shufflevector(z, none, 0, 4, 1, 5),
                    z_next = __builtin_shufflevector(z, none, 2, 6, 3, 7);
-        store_part(__builtin_shufflevector(xy, z_, 0, 1, 4, 5), row(0));
-        store_part(__builtin_shufflevector(xy, z_, 2, 3, 6, 7), row(1));
+        store_part(__builtin_shufflevector(xy, z_first, 0, 1, 4, 5), row(0));
+        store_part(__builtin_shufflevector(xy, z_first, 2, 3, 6, 7), row(1));
         store_part(__builtin_shufflevector(xy_next, z_next, 0, 1, 4, 5), row(2));
         store_part(__builtin_shufflevector(xy_next, z_next, 2, 3, 6, 7), row(3));
         return;
     } else if constexpr (width == 8) {
         const Part xy = __builtin_shufflevector(x, y, 0, 8, 1, 9, 4, 12, 5, 13);
         const Part xy_next = __builtin_shufflevector(x, y, 2, 10, 3, 11, 6, 14, 7, 15);
-        const Part z_ = __builtin_shufflevector(z, none, 0, 8, 1, 9, 4, 12, 5, 13);
+        const Part z_first = __builtin_shufflevector(z, none, 0, 8, 1, 9, 4, 12, 5, 13);
         const Part z_next = __builtin_shufflevector(z, none, 2, 10, 3, 11, 6, 14, 7, 15);
         const auto put = [&](const Part& a, const Part& b, std::size_t i) {
             store_part(__builtin_shufflevector(a, b, 0, 1, 8, 9), row(i));
@@ -128,7 +128,7 @@ template <class Part, Real Scalar>
             store_part(__builtin_shufflevector(a, b, 4, 5, 12, 13), row(i + 4));
             store_part(__builtin_shufflevector(a, b, 6, 7, 14, 15), row(i + 5));
         };
-        put(xy, z_, 0);
+        put(xy, z_first, 0);
         put(xy_next, z_next, 2);
         return;
     }

@@ -212,15 +212,7 @@ struct NumTraits<membrane::Lanes<Scalar>> : GenericNumTraits<membrane::Lanes<Sca
     using NonInteger = Real;
     using Nested = Real;
     using Literal = Scalar;
-    enum {
-        IsInteger = 0,
-        IsSigned = 1,
-        IsComplex = 0,
-        RequireInitialization = 0,
-        ReadCost = 1,
-        AddCost = 1,
-        MulCost = 1
-    };
+    enum { IsSigned = 1, RequireInitialization = 0 };  // NOLINT(readability-identifier-naming): Eigen's names
 };
 
 }  // namespace Eigen

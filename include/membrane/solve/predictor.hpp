@@ -62,9 +62,10 @@ Scalar Predictor<Scalar, most_leads>::expect(std::span<const Lead<Scalar>> leads
         Path& path = paths_[i] = {};
         if (lead) path.at = lead->at;
         if (lead && before.at) path.way = lead->at - *before.at;
-        if (lead.has_value() != before.at.has_value() || before.at.has_value() != before.way.has_value()) {
-            part = 0;  // it comes or goes, or has only just come
-        } else if (lead && (norm(*path.way) > lead->longest || norm(*before.way) > lead->longest)) {
+        const bool comes_or_goes =
+            lead.has_value() != before.at.has_value() || before.at.has_value() != before.way.has_value();
+        const auto jumps = [&] { return norm(*path.way) > lead->longest || norm(*before.way) > lead->longest; };
+        if (comes_or_goes || (lead && jumps())) {
             part = 0;
         } else if (lead && squared_norm(*before.way) > 0) {
             led = true;
