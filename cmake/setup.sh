@@ -33,6 +33,9 @@ require() {
         apt-get install -qq --yes --no-install-recommends "${missing[@]}" > /dev/null
 }
 
+# runs_here BENCHMARK: whether this processor has what the benchmark is built for.
+runs_here() { [[ $1 != *_avx2* ]] || grep -qs avx2 /proc/cpuinfo; }
+
 # build PRESET PART... [-- CMAKE ARGUMENT...]: configures build/PRESET with these parts (tests, examples, benchmarks) and
 # builds them. A part that was asked for before stays, so that nothing is built twice.
 build() {

@@ -5,7 +5,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <optional>
 
 #include <membrane/collision/aabb_tree.hpp>
@@ -224,8 +223,7 @@ bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& conta
         const auto hit = scene.tree.first_hit(scene.x, from, now);
         if (hit.triangle == no_index) return false;
         auto passed = contact_where_passed(surface_, scene.x, hit.triangle, hit.barycentric, from, now, side);
-        const Scalar rounding = 16 * std::numeric_limits<Scalar>::epsilon() * detail::largest_magnitude(now);
-        if (std::abs(passed.gap) <= rounding) return false;  // it has only come to it
+        if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it has only come to it
         if (passed.gap > 0) {
             if (hit.along < negligible_way) return false;  // it leaves what it rests on
             passed.normal = -passed.normal;                // of a crease, or an open surface from its other side

@@ -162,22 +162,9 @@ class Lanes {
     std::array<Part, parts> parts_;
 };
 
-namespace detail {
-
-template <Number N>
-struct ChoiceOf {
-    using Type = typename N::Mask;
-};
-template <Real N>
-struct ChoiceOf<N> {
-    using Type = bool;
-};
-
-}  // namespace detail
-
 /// choice ? yes : no, in every lane.
-template <Number N>
-[[nodiscard]] N select(const typename detail::ChoiceOf<N>::Type& choice, const N& yes, const N& no) noexcept {
+template <Number N, class Choice>
+[[nodiscard]] N select(const Choice& choice, const N& yes, const N& no) noexcept {
     if constexpr (Real<N>)
         return choice ? yes : no;
     else

@@ -105,6 +105,12 @@ template <Real Scalar>
     return (std::max)((std::max)(abs(a.x()), abs(a.y())), abs(a.z()));
 }
 
+/// What a few roundings come to at a point as far out as `a`.
+template <Real Scalar>
+[[nodiscard]] Scalar rounding_at(const Vector3<Scalar>& a) noexcept {
+    return 16 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude(a);
+}
+
 /// Corner 0, 1, 2, and 0 again.
 template <Real Scalar>
 [[nodiscard]] const Vector3<Scalar>& corner(const Triangle<Scalar>& triangle, int k) noexcept {

@@ -251,7 +251,7 @@ void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef
 
 template <Real Scalar, SpringLaw<Scalar> Law>
 Pull<Scalar> MassSpringNetwork<Scalar, Law>::pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
-    Pull<Scalar> sum{Vector3<Scalar>::Zero(), 0};
+    Pull<Scalar> sum;
     for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) { add(sum, spring); });
     return sum;
 }

@@ -222,7 +222,7 @@ void Press<Scalar>::keep_side(Region<Scalar>& region) const noexcept {
         farthest = (std::max)(farthest, squared_norm<Scalar>(region.position(v) - region.kept(v)));
     }
     if (4 * farthest < contact.radius * contact.radius && contact.gap > -contact.radius / 2) return;
-    const Scalar rounding = 16 * std::numeric_limits<Scalar>::epsilon() * detail::largest_magnitude(contact.on_axis);
+    const Scalar rounding = detail::rounding_at(contact.on_axis);
     Scalar first = 1;
     for (const auto& watched : contact.watched) {
         const auto& v = watched.corners;

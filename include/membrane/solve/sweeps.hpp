@@ -260,7 +260,7 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
 template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look() noexcept {
     bool finite = true;
-    auto others = active_.vertices();
+    std::size_t seen = 0;  // beyond layer 0
     if constexpr (can_use_lanes) {
         if (in_lanes_) {
             block_.load(scene_.x);
@@ -273,13 +273,10 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look() noexcept {
                     finite &= look_at(vertices[i], {forces[0][i], forces[1][i], forces[2][i]});
                 }
             }
-            others = active_.beyond().subspan(block_.size());
-            for (const Index v : active_.touched()) {
-                if (!region_.held(v)) finite &= look_at(v, pull_on(scene_, v).force);
-            }
+            seen = block_.size();
         }
     }
-    for (const auto vertices : {others, active_.frontier()}) {
+    for (const auto vertices : {active_.touched(), active_.beyond().subspan(seen), active_.frontier()}) {
         for (const Index v : vertices) {
             if (!region_.held(v)) finite &= look_at(v, pull_on(scene_, v).force);
         }
