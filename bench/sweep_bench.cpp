@@ -94,22 +94,23 @@ void block(benchmark::State& state) {
     const Index seed = 0;
     membrane::PropagationQueue queue(field.mesh.vertex_count());
     queue.build(field.network, std::span(&seed, 1), membrane::unlimited);
-    queue.group(field.network, static_cast<Index>(Lanes<Scalar>::count));
+    queue.group(field.network);
     membrane::CompactBlock<Scalar> compact(field.network);
-    compact.follow(queue, field.network);
-    require(compact.size() + 1 == static_cast<std::size_t>(state.range(0)), "all vertices have room in the block");
+    compact.packs().follow(queue, field.network);
+    require(compact.packs().size() + 1 == static_cast<std::size_t>(state.range(0)),
+            "all vertices have room in the block");
     compact.open(scene, [](Index) { return false; });
     for (auto _ : state) {
-        compact.load(x);
-        for (std::size_t g = 0; g < compact.group_count(); ++g) {
-            benchmark::DoNotOptimize(compact.visit(g, scene, Rule{}, true));
+        compact.packs().load(x);
+        for (std::size_t p = 0; p < compact.packs().count(); ++p) {
+            benchmark::DoNotOptimize(compact.visit(p, scene, Rule{}, true));
         }
-        compact.store(x);
+        compact.packs().store(x);
     }
     require(membrane::is_finite(field.x), "the block must not diverge");
     count_visits(state);
-    state.counters["filled"] =
-        static_cast<double>(compact.size()) / static_cast<double>(compact.group_count() * Lanes<Scalar>::count);
+    state.counters["filled"] = static_cast<double>(compact.packs().size()) /
+                               static_cast<double>(compact.packs().count() * Lanes<Scalar>::count);
 }
 BENCHMARK(block<double, membrane::MassStep>)->Name("lanes/double/mass")->Apply(sizes_in_cache);
 BENCHMARK(block<double, membrane::SafeStep>)->Name("lanes/double/safe")->Apply(sizes_in_cache);

@@ -37,6 +37,19 @@ TEST_CASE("a list takes what it has room for, and says when it is full", "[core]
     CHECK_FALSE(BoundedList<int>(0).push(1));
 }
 
+TEST_CASE("a list is cut to its first items", "[core]") {
+    BoundedList<int> list(3);
+    for (const int item : {5, 7, 9}) list.push(item);
+    list.cut(3);
+    CHECK(items_of(list) == std::vector<int>{5, 7, 9});
+    list.cut(1);
+    CHECK(items_of(list) == std::vector<int>{5});
+    list.push(8);
+    CHECK(items_of(list) == std::vector<int>{5, 8});
+    list.cut(0);
+    CHECK(list.empty());
+}
+
 TEST_CASE("items of a list can be changed in place", "[core]") {
     BoundedList<std::string> list(4);
     list.push("a");
@@ -67,6 +80,8 @@ TEST_CASE("an item beyond the end of a list is a broken precondition", "[core][b
     BoundedList<int> list(4);
     list.push(1);
     CHECK(test::in_child([&] { (void)list[1]; }).signal == SIGABRT);
+    CHECK(test::in_child([&] { list.cut(1); }).signal == 0);
+    CHECK(test::in_child([&] { list.cut(2); }).signal == SIGABRT);
     CHECK(test::in_child([&] { (void)list[0]; }).signal == 0);
 }
 #endif

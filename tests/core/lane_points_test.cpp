@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <vector>
 
 #include "support/cases.hpp"
@@ -12,30 +13,35 @@
 using namespace membrane;
 using test::Random;
 
-TEMPLATE_TEST_CASE("points are gathered from where they are, and scattered in a row", "[lanes]", float, double) {
+TEMPLATE_TEST_CASE("points are gathered from where they are, and scattered to where they belong", "[lanes]", float,
+                   double) {
     using S = TestType;
     constexpr std::size_t lanes = Lanes<S>::count;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        std::vector<PaddedPoint<S>> rows(40);
-        for (auto& row : rows) {
+        std::vector<PaddedPoint<S>> from(40), to(40);
+        for (auto& row : from) {
             row.set(random.vector<S>());
             row.number[3] = random.number<S>();
         }
-        std::array<Index, lanes> begins;
+        std::array<Index, lanes> begins, places;
         for (Index& begin : begins) begin = numbers_in_point * random.index(40);
-        const auto points = gather(rows.data(), begins.data());
-        std::vector<PaddedPoint<S>> in_a_row(lanes + 1);
-        in_a_row[lanes].set({7, 8, 9});
-        scatter(points, in_a_row.data());
-        for (std::size_t i = 0; i < lanes; ++i) {
-            const auto there = rows[static_cast<std::size_t>(begins[i] / numbers_in_point)].point();
-            REQUIRE(there == Vector3<S>(points[0][i], points[1][i], points[2][i]));
-            REQUIRE(in_a_row[i].point() == there);
+        std::vector<Index> free(40);
+        std::iota(free.begin(), free.end(), 0);
+        for (Index& place : places) {
+            const auto chosen = free.begin() + random.index(static_cast<Index>(free.size()));
+            place = numbers_in_point * *chosen;
+            free.erase(chosen);
         }
-        REQUIRE(gather(in_a_row.data())[0][lanes - 1] == points[0][lanes - 1]);
-        REQUIRE(gather(in_a_row.data())[2][0] == points[2][0]);
-        REQUIRE(in_a_row[lanes].point() == Vector3<S>(7, 8, 9));
+        for (auto& row : to) row.set({7, 8, 9});
+        const auto points = gather(from.data(), begins.data());
+        scatter(points, to.data(), places.data());
+        for (std::size_t i = 0; i < lanes; ++i) {
+            const auto there = from[static_cast<std::size_t>(begins[i] / numbers_in_point)].point();
+            REQUIRE(there == Vector3<S>(points[0][i], points[1][i], points[2][i]));
+            REQUIRE(to[static_cast<std::size_t>(places[i] / numbers_in_point)].point() == there);
+        }
+        for (const Index i : free) REQUIRE(to[static_cast<std::size_t>(i)].point() == Vector3<S>(7, 8, 9));
     }
 }

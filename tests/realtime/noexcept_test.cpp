@@ -83,7 +83,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(
             noexcept(queue.build(network, vertices, 4))&& noexcept(queue.vertices())&& noexcept(queue.layer(0)));
         static_assert(noexcept(queue.contains(0))&& noexcept(queue.clear())&& noexcept(queue.grow(network)));
-        static_assert(noexcept(queue.group(network, 8))&& noexcept(queue.group_ends()));
+        static_assert(noexcept(queue.group(network))&& noexcept(queue.group_ends()));
     });
     static_cast<void>([](ActiveVertices& active, const Network& network, std::span<const Index> vertices,
                          const SolverOptions<S>& options, bool (*is_balanced)(Index)) {
@@ -92,14 +92,18 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(active.settle(is_balanced))&& noexcept(active.stir_neighbours(network, 0)));
         static_assert(noexcept(active.close())&& noexcept(active.cancel(network))&& noexcept(active.clear()));
         static_assert(noexcept(active.wake(0))&& noexcept(active.grow(network, options)));
-        static_assert(noexcept(active.frontier()));
+        static_assert(noexcept(active.frontier())&& noexcept(active.group_ends()));
     });
-    static_cast<void>([](CompactBlock<S>& block, const PropagationQueue& queue, const Network& network, PointsRef<S> x,
-                         const StepInput<S, Network, Volume>& scene, bool (*is_fixed)(Index)) {
-        static_assert(noexcept(block.follow(queue, network))&& noexcept(block.open(scene, is_fixed)));
-        static_assert(noexcept(block.load(x))&& noexcept(block.store(x))&& noexcept(block.forces(0, scene)));
+    static_cast<void>([](SpringPacks<S>& packs, const PropagationQueue& queue, const Network& network, PointsRef<S> x) {
+        static_assert(noexcept(packs.follow(queue, network))&& noexcept(packs.load(x))&& noexcept(packs.store(x)));
+        static_assert(noexcept(packs.append(queue.vertices(), 0, queue.group_ends(), network)));
+        static_assert(noexcept(packs.vertices(0))&& noexcept(packs.place_of(0))&& noexcept(packs.pack_from(0)));
+        static_assert(noexcept(packs.move(0, packs.positions(0))));
+    });
+    static_cast<void>([](CompactBlock<S>& block, const StepInput<S, Network, Volume>& scene, bool (*is_fixed)(Index)) {
+        static_assert(noexcept(block.open(scene, is_fixed))&& noexcept(block.forces(0, scene)));
         static_assert(noexcept(block.visit(0, scene, BlockStep{}))&& noexcept(block.visit(0, scene, SafeStep{})));
-        static_assert(noexcept(block.group(0))&& noexcept(block.group_from(0))&& noexcept(block.compliance(0)));
+        static_assert(noexcept(block.compliance(0))&& noexcept(block.free_count(0))&& noexcept(block.packs()));
     });
     static_cast<void>([](Predictor<S, 4>& predictor, std::span<const Lead<S>> leads) {
         static_assert(noexcept(predictor.expect(leads))&& noexcept(predictor.forget()));

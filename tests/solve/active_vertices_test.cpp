@@ -78,6 +78,20 @@ TEST_CASE("visits go through the queue, then to what an earlier contact has left
     CHECK(active.vertices().empty());
 }
 
+TEST_CASE("in groups, what is beyond the queue is ordered so that no two that are joined follow one another",
+          "[active]") {
+    const Chain chain;
+    ActiveVertices active(12);
+    for (const Index v : {2, 3, 4, 5}) active.wake(v);
+    active.arrange(chain.network, List{0}, Options{.layers = 1});
+    CHECK(list_of(active.vertices()) == List{0, 1, 2, 4, 3, 5});
+    CHECK(std::ranges::equal(active.group_ends(), std::vector<std::size_t>{4, 6}));
+    active.settle(unbalanced);
+    CHECK_FALSE(active.close());
+    active.arrange(chain.network, List{0}, Options{.layers = 1, .order = VisitOrder::arrival});
+    CHECK(active.group_ends().empty());
+}
+
 TEST_CASE("beyond the layers nobody is stirred, however far the frontier moves", "[active]") {
     const Chain chain;
     ActiveVertices active(12);

@@ -124,32 +124,3 @@ TEMPLATE_TEST_CASE("visits in lanes end in the bits of visits one by one", "[blo
     SECTION("safe") { check_same<TestType>(SafeStep{}); }
     SECTION("as published") { check_same<TestType>(MassStep{}); }
 }
-
-TEMPLATE_TEST_CASE("a block has as many groups as there is room for", "[block]", float, double) {
-    using S = TestType;
-    for (int seed = 1; seed <= cases(100); ++seed) {
-        CAPTURE(seed);
-        Random random(static_cast<std::uint64_t>(seed));
-        const Membrane<S> membrane(random);
-        const Index vertices = membrane.mesh.vertex_count(), most = random.index(vertices + 1);
-        const Index start = random.index(vertices);
-        PropagationQueue queue(vertices);
-        queue.build(membrane.network, {&start, 1}, unlimited);
-        queue.group(membrane.network, static_cast<Index>(Lanes<S>::count));
-        CompactBlock<S> block(membrane.network, most);
-        for (int again = 0; again < 2; ++again) {
-            block.follow(queue, membrane.network);
-            REQUIRE(block.size() <= static_cast<std::size_t>(most));
-            REQUIRE(block.group_count() <= queue.group_ends().size());
-            if (most == vertices) REQUIRE(block.group_count() == queue.group_ends().size());
-            std::size_t place = queue.vertices().empty() ? 0 : queue.layer(0).size();
-            for (std::size_t g = 0; g < block.group_count(); ++g) {
-                REQUIRE(block.place_of(g) == place - queue.layer(0).size());
-                REQUIRE(block.group_from(block.place_of(g)) == g);
-                for (const Index v : block.group(g)) REQUIRE(v == queue.vertices()[place++]);
-                REQUIRE(place == queue.group_ends()[g]);
-            }
-            REQUIRE(block.group_from(block.size()) == block.group_count());
-        }
-    }
-}

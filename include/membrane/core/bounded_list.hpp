@@ -28,6 +28,12 @@ class BoundedList {
     }
     void clear() noexcept { count_ = 0; }
 
+    /// Keeps the first `count` items. @pre no more than there are (asserted)
+    void cut(std::size_t count) noexcept {
+        MEMBRANE_ASSERT(count <= count_);
+        count_ = count;
+    }
+
     [[nodiscard]] std::size_t room() const noexcept { return slots_.size(); }
     [[nodiscard]] std::size_t size() const noexcept { return count_; }
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }

@@ -29,16 +29,9 @@ inline constexpr Index numbers_in_point = 4;
 template <Real Scalar>
 [[nodiscard]] Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
 
-/// Row i in lane i.
+/// Lane i to the point of `rows` that begins at number `begins[i]`.
 template <Real Scalar>
-[[gnu::always_inline, nodiscard]] inline Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows) noexcept {
-    constexpr std::array<Index, 8> begins{0, 4, 8, 12, 16, 20, 24, 28};
-    return gather(rows, begins.data());
-}
-
-/// Lane i into row i.
-template <Real Scalar>
-void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows) noexcept;
+void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
 
 namespace detail {
 
@@ -95,11 +88,12 @@ template <class Part, Real Scalar>
     return result;
 }
 
-/// The other way round: what `columns` reads from rows that follow on one another.
+/// The other way round.
 template <class Part, Real Scalar>
-[[gnu::always_inline]] inline void put_columns(const std::array<Part, 3>& column, PaddedPoint<Scalar>* rows) noexcept {
+[[gnu::always_inline]] inline void put_columns(const std::array<Part, 3>& column, PaddedPoint<Scalar>* rows,
+                                               const Index* begins) noexcept {
     constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
-    const auto row = [&](std::size_t i) { return rows[i].number.data(); };
+    const auto row = [&](std::size_t i) { return rows->number.data() + begins[i]; };
 #if defined(__GNUC__)
     const Part x = column[0], y = column[1], z = column[2], none{};
     if constexpr (width == 2) {
@@ -133,7 +127,9 @@ template <class Part, Real Scalar>
         return;
     }
 #endif
-    for (std::size_t i = 0; i < width; ++i) rows[i].number = {column[0][i], column[1][i], column[2][i], 0};
+    for (std::size_t i = 0; i < width; ++i) {
+        for (std::size_t k = 0; k < 3; ++k) row(i)[k] = column[k][i];
+    }
 }
 
 }  // namespace detail
@@ -152,11 +148,12 @@ template <Real Scalar>
 }
 
 template <Real Scalar>
-void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows) noexcept {
+[[gnu::always_inline]] inline void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows,
+                                           const Index* begins) noexcept {
     using Part = typename Lanes<Scalar>::Part;
     constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
     for (std::size_t i = 0; i < Lanes<Scalar>::parts; ++i) {
-        detail::put_columns<Part>({points[0].part(i), points[1].part(i), points[2].part(i)}, rows + i * width);
+        detail::put_columns<Part>({points[0].part(i), points[1].part(i), points[2].part(i)}, rows, begins + i * width);
     }
 }
 

@@ -10,6 +10,7 @@
 #include <membrane/core/index_set.hpp>
 #include <membrane/solve/propagation_queue.hpp>
 #include <membrane/solve/step.hpp>
+#include <membrane/solve/vertex_groups.hpp>
 
 /// Which vertices a step visits.
 ///
@@ -45,6 +46,9 @@ class ActiveVertices {
 
     /// How many of `vertices`, the first, are the queue's.
     [[nodiscard]] std::size_t from_queue() const noexcept { return from_queue_; }
+
+    /// Where in `vertices` the groups end that those beyond the queue are in, if they are visited in groups.
+    [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return groups_.ends(); }
 
     /// Whether the queue is another one than at the last call.
     [[nodiscard]] bool has_new_queue() noexcept { return std::exchange(has_new_queue_, false); }
@@ -94,7 +98,8 @@ class ActiveVertices {
     IndexSet left_;     // by the queue, which has gone elsewhere, or has no room
     IndexSet visited_;  // in this step
     IndexSet stirred_;  // visited since everyone was last at rest
-    Index room_ = 0;    // of those visited
+    VertexGroups groups_;
+    Index room_ = 0;  // of those visited
     std::size_t from_queue_ = 0;
     Index layers_before_ = 0;
     bool as_needed_ = false, in_groups_ = false, has_frontier_ = false;
@@ -110,7 +115,8 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
       next_restless_(seeds_),
       left_(seeds_),
       visited_(seeds_),
-      stirred_(seeds_) {}
+      stirred_(seeds_),
+      groups_(vertex_count) {}
 
 template <class Network, class Options>
 void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
@@ -145,13 +151,15 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     from_queue_ = static_cast<std::size_t>(visited_.count());
     line_up(restless_.items(), room_);
     line_up(left_.items(), room_);
+    groups_.clear();
+    if (in_groups_) groups_.add(network, visited_, from_queue_, vertices().size());
     extend(network, options);
 }
 
 template <class Network>
 void ActiveVertices::build_queue(const Network& network, std::span<const Index> seeds, Index layers) noexcept {
     queue_.build(network, seeds, layers);
-    if (in_groups_) queue_.group(network, static_cast<Index>(Lanes<typename Network::Scalar>::count));
+    if (in_groups_) queue_.group(network);
     has_new_queue_ = true;
 }
 

@@ -3,11 +3,10 @@
 
 #include <cstddef>
 #include <span>
-#include <utility>
-#include <vector>
 
 #include <membrane/core/index_set.hpp>
 #include <membrane/network/mass_spring_network.hpp>
+#include <membrane/solve/vertex_groups.hpp>
 
 /// The order in which a force spreads through the springs.
 ///
@@ -21,13 +20,7 @@ namespace membrane {
 class PropagationQueue {
   public:
     explicit PropagationQueue(Index vertex_count)
-        : reached_(vertex_count),
-          layer_ends_(static_cast<std::size_t>(vertex_count)),
-          group_ends_(layer_ends_),
-          group_of_(static_cast<std::size_t>(vertex_count), no_index),
-          fill_(group_of_),
-          barred_(group_of_),
-          order_(group_of_) {}
+        : reached_(vertex_count), layer_ends_(static_cast<std::size_t>(vertex_count)), groups_(vertex_count) {}
 
     /// Builds the queue anew, up to layer `layers` (0 for the seeds alone, `unlimited` for all they are joined to). A
     /// pinned vertex passes no force on: it is never in the queue. Seeds may be named twice.
@@ -39,14 +32,12 @@ class PropagationQueue {
     template <Real Scalar, class Law>
     bool grow(const MassSpringNetwork<Scalar, Law>& network) noexcept;
 
-    /// Orders every layer but layer 0 in groups of up to `size` vertices that no spring joins to each other, so that
-    /// they may be visited all at once; each vertex in the first group with room for it.
-    /// Online. Cost: the springs of the vertices in the queue.
+    /// Orders every layer but layer 0 in groups that no spring joins. Online. Cost: the springs of the vertices in the queue.
     template <Real Scalar, class Law>
-    void group(const MassSpringNetwork<Scalar, Law>& network, Index size) noexcept;
+    void group(const MassSpringNetwork<Scalar, Law>& network) noexcept;
 
     /// Where in `vertices` the groups end: the first begins after layer 0. None before `group` is called.
-    [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return group_ends_.items(); }
+    [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return groups_.ends(); }
 
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
     [[nodiscard]] bool contains(Index v) const noexcept { return reached_.contains(v); }
@@ -65,20 +56,13 @@ class PropagationQueue {
     void clear() noexcept {
         reached_.clear();
         layer_ends_.clear();
-        group_ends_.clear();
+        groups_.clear();
     }
 
   private:
-    template <Real Scalar, class Law>
-    void group_layer(const MassSpringNetwork<Scalar, Law>& network, std::size_t begin, std::size_t end,
-                     Index size) noexcept;
-
     IndexSet reached_;
-    BoundedList<std::size_t> layer_ends_, group_ends_;
-    std::vector<Index> group_of_;  // of each vertex in the queue
-    std::vector<Index> fill_;      // of each group of a layer, how many are in it; then, where its next one goes
-    std::vector<Index> barred_;    // of each group of a layer, the last vertex that has a neighbour there
-    std::vector<Index> order_;
+    BoundedList<std::size_t> layer_ends_;
+    VertexGroups groups_;
 };
 
 template <Real Scalar, class Law>
@@ -109,46 +93,10 @@ bool PropagationQueue::grow(const MassSpringNetwork<Scalar, Law>& network) noexc
 }
 
 template <Real Scalar, class Law>
-void PropagationQueue::group(const MassSpringNetwork<Scalar, Law>& network, Index size) noexcept {
-    group_ends_.clear();
-    for (const Index v : vertices()) group_of_[static_cast<std::size_t>(v)] = no_index;
+void PropagationQueue::group(const MassSpringNetwork<Scalar, Law>& network) noexcept {
+    groups_.clear();
     const auto ends = layer_ends_.items();
-    for (std::size_t k = 1; k < ends.size(); ++k) group_layer(network, ends[k - 1], ends[k], size);
-}
-
-// Places number `begin` to `end`, one layer.
-template <Real Scalar, class Law>
-void PropagationQueue::group_layer(const MassSpringNetwork<Scalar, Law>& network, std::size_t begin, std::size_t end,
-                                   Index size) noexcept {
-    const auto layer = vertices().subspan(begin, end - begin);
-    std::size_t open = 0, groups = 0;  // those before `open` are full
-    for (const Index v : layer) {
-        for (const auto& spring : network.springs_of(v)) {
-            const Index group =
-                reached_.contains(spring.other) ? group_of_[static_cast<std::size_t>(spring.other)] : no_index;
-            if (group != no_index) barred_[static_cast<std::size_t>(group)] = v;
-        }
-        std::size_t g = open;
-        while (g < groups && (fill_[g] == size || barred_[g] == v)) ++g;
-        if (g == groups) {
-            fill_[groups] = 0;
-            barred_[groups++] = no_index;
-        }
-        ++fill_[g];
-        group_of_[static_cast<std::size_t>(v)] = static_cast<Index>(g);
-        while (open < groups && fill_[open] == size) ++open;
-    }
-    Index place = 0;
-    for (std::size_t g = 0; g < groups; ++g) {
-        const Index first = place;
-        place += std::exchange(fill_[g], first);
-        group_ends_.push(begin + static_cast<std::size_t>(place));
-    }
-    for (const Index v : layer) {
-        Index& group = group_of_[static_cast<std::size_t>(v)];
-        order_[static_cast<std::size_t>(fill_[static_cast<std::size_t>(std::exchange(group, no_index))]++)] = v;
-    }
-    reached_.reorder(begin, std::span(order_).first(layer.size()));
+    for (std::size_t k = 1; k < ends.size(); ++k) groups_.add(network, reached_, ends[k - 1], ends[k]);
 }
 
 }  // namespace membrane

@@ -68,7 +68,7 @@ class Sweeps {
     bool rounds() noexcept;
     bool pass(std::span<const Index> vertices) noexcept;
     bool pass_in_lanes(std::size_t begin, std::size_t end) noexcept;
-    bool visit_group(std::size_t g) noexcept;
+    bool visit_pack(std::size_t p) noexcept;
     bool grow() noexcept;
     bool visit(Index v) noexcept;
     bool look() noexcept;
@@ -103,15 +103,17 @@ StepStatus Sweeps<Rule, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) n
     return look() ? StepStatus::unstable : StepStatus::bad_input;  // no better: what was handed in is to blame
 }
 
-// The groups of the queue are visited in lanes, if all of them are lined up, and forces of constraints act on layer 0 alone.
+// Groups are visited in lanes, if all of the queue's are lined up, and forces of constraints act on layer 0 alone.
 template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 void Sweeps<Rule, Scalar, Scene, Acting, Pace>::open_block() noexcept {
     if constexpr (can_use_lanes) {
-        if (active_.has_new_queue()) block_.follow(active_.queue(), scene_.network);
+        if (active_.has_new_queue()) block_.packs().follow(active_.queue(), scene_.network);
         const auto pushed = scene_.work.pushed.items();
-        in_lanes_ = block_.size() > 0 && active_.touched().size() + block_.size() <= active_.from_queue() &&
+        in_lanes_ = active_.from_queue() == active_.queue().vertices().size() &&
                     std::all_of(pushed.begin(), pushed.end(), [&](Index v) { return scene_.work.seeds.contains(v); });
-        if (in_lanes_) block_.open(scene_, [&](Index v) { return region_.fixed(v); });
+        if (!in_lanes_) return;
+        block_.packs().append(active_.vertices(), active_.from_queue(), active_.group_ends(), scene_.network);
+        block_.open(scene_, [&](Index v) { return region_.fixed(v); });
     }
 }
 
@@ -148,8 +150,8 @@ template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> vertices) noexcept {
     bool changed = false;
     const auto begin = static_cast<std::size_t>(vertices.data() - active_.beyond().data());
-    if (in_lanes_ && begin < block_.size()) {
-        const std::size_t end = (std::min)(begin + vertices.size(), block_.size());
+    if (in_lanes_ && begin < block_.packs().size()) {
+        const std::size_t end = (std::min)(begin + vertices.size(), block_.packs().size());
         changed = pass_in_lanes(begin, end);
         vertices = vertices.subspan(end - begin);
     }
@@ -172,41 +174,41 @@ template <class Rule, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass_in_lanes(std::size_t begin, std::size_t end) noexcept {
     bool changed = false;
     if constexpr (can_use_lanes) {
-        constexpr std::size_t groups_in_batch = visits_in_batch / Lanes<Scalar>::count;
-        block_.load(scene_.x);
-        std::size_t g = block_.group_from(begin);
-        const std::size_t last = block_.group_from(end);
-        while (g < last && !report_.out_of_time && report_.status == StepStatus::advanced) {
+        constexpr std::size_t packs_in_batch = visits_in_batch / Lanes<Scalar>::count;
+        block_.packs().load(scene_.x);
+        std::size_t p = block_.packs().pack_from(begin);
+        const std::size_t last = block_.packs().pack_from(end);
+        while (p < last && !report_.out_of_time && report_.status == StepStatus::advanced) {
             report_.out_of_time = !pace_.has_time_for_batch();
             if (report_.out_of_time) {
-                next_ = active_.beyond().data() + block_.place_of(g);
+                next_ = active_.beyond().data() + block_.packs().place_of(p);
                 break;
             }
             const Index before = report_.visits;
-            const std::size_t batch_end = (std::min)(g + groups_in_batch, last);
-            for (; g < batch_end; ++g) changed |= visit_group(g);
+            const std::size_t batch_end = (std::min)(p + packs_in_batch, last);
+            for (; p < batch_end; ++p) changed |= visit_pack(p);
             pace_.visited(static_cast<std::size_t>(report_.visits - before));
         }
-        if (changed) block_.store(scene_.x);
+        if (changed) block_.packs().store(scene_.x);
     }
     return changed;
 }
 
 // Beyond a limit that costs nothing it is looked at closely whether a move is stable.
 template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit_group(std::size_t g) noexcept {
+bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit_pack(std::size_t p) noexcept {
     using Visit = typename CompactBlock<Scalar>::Visit;
-    report_.visits += block_.free_count(g);
-    auto visit = block_.visit(g, scene_, rule_);
+    report_.visits += block_.free_count(p);
+    auto visit = block_.visit(p, scene_, rule_);
     if constexpr (moves_along_force<Rule, Scalar>) {
         if (visit == Visit::too_far) {
-            block_.store(scene_.x);
-            for (const Index v : block_.group(g)) {
+            block_.packs().store(scene_.x);
+            for (const Index v : block_.packs().vertices(p)) {
                 if (region_.fixed(v) || !diverges(scene_, v, rule_.compliance(state_of<Rule>(scene_, v)))) continue;
                 report_.status = StepStatus::unstable;
                 return false;
             }
-            visit = block_.visit(g, scene_, rule_, true);
+            visit = block_.visit(p, scene_, rule_, true);
         }
     }
     return visit == Visit::moved;
@@ -263,17 +265,17 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look() noexcept {
     std::size_t seen = 0;  // beyond layer 0
     if constexpr (can_use_lanes) {
         if (in_lanes_) {
-            block_.load(scene_.x);
-            for (std::size_t g = 0; g < block_.group_count(); ++g) {
-                const auto forces = block_.forces(g, scene_);
-                const auto vertices = block_.group(g);
+            block_.packs().load(scene_.x);
+            for (std::size_t p = 0; p < block_.packs().count(); ++p) {
+                const auto forces = block_.forces(p, scene_);
+                const auto vertices = block_.packs().vertices(p);
                 for (std::size_t i = 0; i < vertices.size(); ++i) {
                     if (region_.held(vertices[i])) continue;
-                    region_.set_compliance(vertices[i], block_.compliance(g)[i]);
+                    region_.set_compliance(vertices[i], block_.compliance(p)[i]);
                     finite &= look_at(vertices[i], {forces[0][i], forces[1][i], forces[2][i]});
                 }
             }
-            seen = block_.size();
+            seen = block_.packs().size();
         }
     }
     for (const auto vertices : {active_.touched(), active_.beyond().subspan(seen), active_.frontier()}) {
