@@ -15,6 +15,7 @@
 #include <membrane/mesh/triangle_mesh.hpp>
 #include <membrane/mesh/adjacency.hpp>
 #include <membrane/mesh/shapes.hpp>
+#include <membrane/mesh/reordered.hpp>
 #include <membrane/mesh/normals.hpp>
 
 #include <membrane/network/spring_law.hpp>

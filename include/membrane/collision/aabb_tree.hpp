@@ -130,9 +130,10 @@ class AabbTree {
     std::vector<Node> nodes_;  // as of TreeShape
     std::vector<Item> items_;  // leaf by leaf
     std::vector<Index> parents_;
-    CompressedRows<Index> leaves_of_;   // the leaves around a vertex
-    IndexSet stale_;                    // the boxes to fit
-    std::vector<std::int8_t> awaited_;  // how many of a box's children are to be fitted before it
+    CompressedRows<Index> vertices_of_;  // of a leaf
+    CompressedRows<Index> leaves_of_;    // around a vertex
+    IndexSet stale_;                     // the boxes to fit
+    std::vector<std::int8_t> awaited_;   // how many of a box's children are to be fitted before it
     TreeStatistics statistics_;
 };
 
@@ -148,15 +149,20 @@ AabbTree<Scalar>::AabbTree(const TriangleMesh<Scalar>& mesh, const TreeOptions& 
         items_.push_back({{corners[0], corners[1], corners[2]}, f});
     }
     const auto node_count = static_cast<Index>(nodes_.size());
-    leaves_of_ = CompressedRows<Index>(mesh.vertex_count(), [&](auto put) {
+    vertices_of_ = CompressedRows<Index>(node_count, [&](auto put) {
         std::vector<Index> latest(static_cast<std::size_t>(mesh.vertex_count()), no_index);
         for (Index i = 0; i < node_count; ++i) {
             if (!node(i).is_leaf()) continue;
             for (const Item& item : items(node(i))) {
                 for (const Index v : item.corners) {
-                    if (std::exchange(latest[static_cast<std::size_t>(v)], i) != i) put(v, i);
+                    if (std::exchange(latest[static_cast<std::size_t>(v)], i) != i) put(i, v);
                 }
             }
+        }
+    });
+    leaves_of_ = CompressedRows<Index>(mesh.vertex_count(), [&](auto put) {
+        for (Index i = 0; i < node_count; ++i) {
+            for (const Index v : vertices_of_[i]) put(v, i);
         }
     });
     stale_ = IndexSet(node_count);
@@ -170,9 +176,7 @@ void AabbTree<Scalar>::fit(const ConstPointsRef<Scalar>& x, Index i) noexcept {
     Node& fitted = nodes_[static_cast<std::size_t>(i)];
     fitted.box = {};
     if (fitted.is_leaf()) {
-        for (const Item& item : items(fitted)) {
-            for (const Index v : item.corners) fitted.box.include(point(x, v));
-        }
+        for (const Index v : vertices_of_[i]) fitted.box.include(point(x, v));
     } else {
         fitted.box.include(node(fitted.first).box);
         fitted.box.include(node(fitted.first + 1).box);

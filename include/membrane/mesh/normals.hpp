@@ -43,13 +43,15 @@ class VertexNormals {
     [[nodiscard]] const Points<Scalar>& values() const noexcept { return values_; }
 
   private:
-    void update_vertex(const ConstPointsRef<Scalar>& x, Index v) noexcept;
-    void update_once(const ConstPointsRef<Scalar>& x, Index v) noexcept;
+    void measure(const ConstPointsRef<Scalar>& x, Index f) noexcept;
+    void sum_up(Index v) noexcept;
 
-    CompressedRows<std::array<Index, 2>> opposite_;  // of v: the other two corners of each triangle, in its order
+    Triangles triangles_;
+    CompressedRows<Index> triangles_of_;  // around a vertex
+    Points<Scalar> areas_;                // twice the area of each triangle, along its normal
     Points<Scalar> values_;
     Points<Scalar> at_rest_;
-    IndexSet updated_;  // by the last call
+    IndexSet measured_, updated_;  // by the last call
 };
 
 /// The angle-weighted normal where `barycentric` says, of the face, edge or corner: its sign against the way from there
@@ -82,16 +84,17 @@ template <Real Scalar>
 
 template <Real Scalar>
 VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
-    : opposite_(mesh.vertex_count(),
-                [&](auto put) {
-                    for (const auto& corner : mesh.triangles().colwise()) {
-                        for (const Index k : {0, 1, 2}) {
-                            put(corner[k], std::array{corner[(k + 1) % 3], corner[(k + 2) % 3]});
+    : triangles_(mesh.triangles()),
+      triangles_of_(mesh.vertex_count(),
+                    [&](auto put) {
+                        for (Index f = 0; f < mesh.triangle_count(); ++f) {
+                            for (const Index v : mesh.triangles().col(f)) put(v, f);
                         }
-                    }
-                }),
+                    }),
+      areas_(3, mesh.triangle_count()),
       values_(3, mesh.vertex_count()),
       at_rest_(Vector3<Scalar>(0, 0, 1).replicate(1, mesh.vertex_count())),
+      measured_(mesh.triangle_count()),
       updated_(mesh.vertex_count()) {
     update(mesh.positions());
     at_rest_ = values_;
@@ -100,36 +103,38 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
 template <Real Scalar>
 void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
-    for (Index v = 0; v < opposite_.row_count(); ++v) update_vertex(x, v);
+    for (Index f = 0; f < static_cast<Index>(triangles_.cols()); ++f) measure(x, f);
+    for (Index v = 0; v < triangles_of_.row_count(); ++v) sum_up(v);
 }
 
 template <Real Scalar>
 std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x,
                                                      std::span<const Index> moved) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
+    measured_.clear();
     updated_.clear();
     for (const Index v : moved) {
-        const auto around = opposite_[v];
-        update_once(x, v);
-        for (const auto& [next, last] : around) {
-            update_once(x, next);
-            update_once(x, last);
+        updated_.insert(v);
+        for (const Index f : triangles_of_[v]) {
+            if (!measured_.insert(f)) continue;
+            measure(x, f);
+            for (const Index corner : triangles_.col(f)) updated_.insert(corner);
         }
     }
+    for (const Index v : updated_.items()) sum_up(v);
     return updated_.items();
 }
 
 template <Real Scalar>
-void VertexNormals<Scalar>::update_vertex(const ConstPointsRef<Scalar>& x, Index v) noexcept {
-    const Vector3<Scalar> at = point(x, v);
-    Vector3<Scalar> area(0, 0, 0);
-    for (const auto& [next, last] : opposite_[v]) area += cross<Scalar>(point(x, next) - at, point(x, last) - at);
-    values_.col(v) = detail::unit_or(area, point(at_rest_, v));
+void VertexNormals<Scalar>::measure(const ConstPointsRef<Scalar>& x, Index f) noexcept {
+    areas_.col(f) = 2 * area_vector(triangle_at(x, triangles_.col(f)));
 }
 
 template <Real Scalar>
-void VertexNormals<Scalar>::update_once(const ConstPointsRef<Scalar>& x, Index v) noexcept {
-    if (updated_.insert(v)) update_vertex(x, v);
+void VertexNormals<Scalar>::sum_up(Index v) noexcept {
+    Vector3<Scalar> area(0, 0, 0);
+    for (const Index f : triangles_of_[v]) area += point(areas_, f);
+    values_.col(v) = detail::unit_or(area, point(at_rest_, v));
 }
 
 template <class Positions>

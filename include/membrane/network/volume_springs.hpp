@@ -61,17 +61,22 @@ struct VolumeSpring {
         return {-stiffness * (position - anchor), stiffness + rate};
     }
 
-    /// All of it. The velocity along the spring in (5) is by how much its length has changed
+    /// The drag. The velocity along the spring in (5) is by how much its length has changed
     /// over the tick: how often a solver visits the vertex within the tick does not change the damping, and
     /// the damping force, like that of a spring, has an energy: k'_d (change of length)^2 / (2 dt).
-    [[nodiscard]] Pull<Scalar> pull(const Vector3<Scalar>& position) const noexcept {
+    [[nodiscard]] Vector3<Scalar> drag(const Vector3<Scalar>& position) const noexcept {
         const Vector3<Scalar> length = position - anchor;
         const Scalar square = squared_norm(length);
         const auto damps = (rate != 0) & (square != 0);  // the spring acts only while it has a length
-        if (!any(damps)) return elastic_pull(position);
         const Scalar now = select(damps, root_of(square), Scalar(1));
-        const Scalar drag = select<Scalar>(damps, rate * (now - before) / now, Scalar(0));
-        return {-stiffness * length - drag * length, stiffness + rate};
+        return -select<Scalar>(damps, rate * (now - before) / now, Scalar(0)) * length;
+    }
+
+    /// Both.
+    [[nodiscard]] Pull<Scalar> pull(const Vector3<Scalar>& position) const noexcept {
+        auto sum = elastic_pull(position);
+        sum.force += drag(position);
+        return sum;
     }
 };
 

@@ -23,9 +23,10 @@ namespace membrane {
 /// Whether the visits of a rule may be made in lanes: law and rule reckon with `Lanes`, the backing hands out its springs,
 /// and no visit has to look at the energy.
 template <class Scalar, class Rule, class Law, class Volume>
-concept VisitsInLanes = (never_stiffens<Law>() || !requires { requires Rule::is_safe; }) &&
-                        requires(const Rule& rule, const Law& law, const SpringState<Lanes<Scalar>>& spring,
-                                 const VertexState<Lanes<Scalar>>& vertex) {
+concept VisitsInLanes = (never_stiffens<Law>() ||
+                         !is_safe_rule<Rule>)&&requires(const Rule& rule, const Law& law,
+                                                        const SpringState<Lanes<Scalar>>& spring,
+                                                        const VertexState<Lanes<Scalar>>& vertex) {
     law(spring);
     rule.compliance(vertex);
 }
@@ -136,7 +137,8 @@ Sum CompactBlock<Scalar>::pull(std::size_t p, const Vector3<Several>& here, cons
 
 template <Real Scalar>
 template <class Scene, class Rule>
-auto CompactBlock<Scalar>::visit(std::size_t p, const Scene& scene, const Rule& rule, bool allowed) noexcept -> Visit {
+auto CompactBlock<Scalar>::visit(std::size_t p, const Scene& scene, const Rule& rule,
+                                 [[maybe_unused]] bool allowed) noexcept -> Visit {
     const Vector3<Several> here = packs_.positions(p);
     VertexState<Several> state;
     if constexpr (requires { requires Rule::needs_relief; }) {
@@ -151,9 +153,11 @@ auto CompactBlock<Scalar>::visit(std::size_t p, const Scene& scene, const Rule& 
     const auto may_move = ties_[p].free != 0;
     const auto compliance = rule.compliance(state);
     if constexpr (moves_along_force<Rule, Scalar>) {
-        if (!allowed && any((compliance * state.stiffness >= 2) & may_move)) {
-            const auto bound = curvature_bound(pull<CurvedPull<Several>>(p, here, scene));
-            if (any((compliance * bound >= 2) & may_move)) return Visit::too_far;
+        if constexpr (!is_safe_rule<Rule>) {
+            if (!allowed && any((compliance * state.stiffness >= 2) & may_move)) {
+                const auto bound = curvature_bound(pull<CurvedPull<Several>>(p, here, scene));
+                if (any((compliance * bound >= 2) & may_move)) return Visit::too_far;
+            }
         }
         answers_[p] = compliance;
     } else {

@@ -91,9 +91,14 @@ class Region {
 
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept { return point(x_, v); }
 
-    /// The vertices of these triangles, each once; valid until the next call.
-    template <class TouchedTriangles>
-    [[nodiscard]] std::span<const Index> corners_of(const TouchedTriangles& triangles) noexcept {
+    /// The vertices of these triangles, each once; valid until the next call. Of the same span as last time, at no cost.
+    template <class TouchedTriangle>
+    [[nodiscard]] std::span<const Index> corners_of(std::span<const TouchedTriangle> triangles) noexcept {
+        if (const void* first = triangles.data(); first == patch_of_ && triangles.size() == patch_size_) {
+            return work_.patch.items();
+        }
+        patch_of_ = triangles.data();
+        patch_size_ = triangles.size();
         work_.patch.clear();
         for (const auto& triangle : triangles) {
             for (const Index v : triangle.corners) work_.patch.insert(v);
@@ -216,6 +221,8 @@ class Region {
     Workspace<Scalar>& work_;
     std::size_t constraint_ = 0;
     std::size_t last_recalled_ = 0;
+    const void* patch_of_ = nullptr;  // the triangles whose corners are the workspace's patch
+    std::size_t patch_size_ = 0;
 };
 
 template <Real Scalar>

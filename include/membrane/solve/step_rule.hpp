@@ -48,6 +48,12 @@ template <class Rule, class Scalar>
 inline constexpr bool moves_along_force =
     std::same_as<Scalar, decltype(std::declval<const Rule&>().compliance(std::declval<const VertexState<Scalar>&>()))>;
 
+/// Whether `Rule` says that it is safe: there is no need to look whether its moves swing ever further out.
+template <class Rule>
+inline constexpr bool is_safe_rule = requires {
+    requires Rule::is_safe;
+};
+
 /// The rule as published, [Liu07] (4): dx = F dt^2 / m. It converges while dt^2 / m stays below 2 over the largest
 /// eigenvalue of the 3 x 3 block of every vertex; the solver refuses a step beyond that.
 struct MassStep {

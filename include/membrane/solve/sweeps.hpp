@@ -200,7 +200,7 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit_pack(std::size_t p) noexce
     using Visit = typename CompactBlock<Scalar>::Visit;
     report_.visits += block_.free_count(p);
     auto visit = block_.visit(p, scene_, rule_);
-    if constexpr (moves_along_force<Rule, Scalar>) {
+    if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
         if (visit == Visit::too_far) {
             block_.packs().store(scene_.x);
             for (const Index v : block_.packs().vertices(p)) {
@@ -245,7 +245,7 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
     }
     const auto compliance = rule_.compliance(state);
     if constexpr (moves_along_force<Rule, Scalar>) {
-        if (compliance * state.stiffness >= 2 && diverges(scene_, v, compliance)) {
+        if (!is_safe_rule<Rule> && compliance * state.stiffness >= 2 && diverges(scene_, v, compliance)) {
             report_.status = StepStatus::unstable;
             return false;
         }

@@ -48,12 +48,14 @@ template <class Scalar, class Network, class Volume>
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> lasting_force(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const Vector3<Scalar> here = point(scene.x, v), start = point(scene.work.start, v);
+    const Vector3<Scalar> now = point(scene.work.unbalanced, v);
     if constexpr (requires { scene.volume.spring(v, start, scene.dt); }) {
-        if (scene.volume.spring(v, start, scene.dt).rate == 0) return point(scene.work.unbalanced, v);
+        return now - scene.volume.spring(v, start, scene.dt).drag(here);
+    } else {
+        const Vector3<Scalar> still = scene.volume.pull(v, here, here, scene.dt).force;
+        const Vector3<Scalar> moving = scene.volume.pull(v, here, start, scene.dt).force;
+        return now + (still - moving);
     }
-    const Vector3<Scalar> still = scene.volume.pull(v, here, here, scene.dt).force;
-    const Vector3<Scalar> moving = scene.volume.pull(v, here, start, scene.dt).force;
-    return point(scene.work.unbalanced, v) + (still - moving);
 }
 
 /// What `Rule` is told.
@@ -91,7 +93,7 @@ template <class Rule, class Scalar, class Network, class Volume>
                                         std::type_identity_t<Vector3<Scalar>> way) noexcept {
     const auto& network = scene.network;
     using Law = std::remove_cvref_t<decltype(network.law())>;
-    if constexpr (!never_stiffens<Law>() && requires { requires Rule::is_safe; }) {
+    if constexpr (!never_stiffens<Law>() && is_safe_rule<Rule>) {
         const auto others = others_on(scene, v);
         const Vector3<Scalar> here = point(scene.x, v);
         const Scalar before = network.energy(v, here, scene.x), far = here.cwiseAbs().maxCoeff();
