@@ -14,8 +14,10 @@ constexpr double way = 1e-3;    // of the segments, towards the centre [m]
 constexpr std::size_t asked = 4096;
 
 const Mesh& mesh_of(std::int64_t triangles) {
-    static std::map<std::int64_t, Mesh> made;
-    return made.try_emplace(triangles, sphere(triangles / 2 + 2)).first->second;
+    static std::map<std::int64_t, std::unique_ptr<Mesh>> made;
+    auto& mesh = made[triangles];
+    if (!mesh) mesh = std::make_unique<Mesh>(sphere(triangles / 2 + 2));
+    return *mesh;
 }
 
 template <class Tree>

@@ -245,7 +245,9 @@ void print_line(std::string line) {
 void print_table(const Results& results, const Table& table) {
     const auto first = [](std::string name) { return name.append(27 - std::min<std::size_t>(27, name.size()), ' '); };
     const bool grows = table.column == "vertices";
-    const std::size_t gap = grows || table.column == "triangles" ? 8 : 1;  // holds the comparison
+    const bool compares = std::any_of(table.rows.begin(), table.rows.end(),
+                                      [](const Row& row) { return row.kind == Row::gain || row.kind == Row::share; });
+    const std::size_t gap = compares || grows ? 8 : 1;  // holds the comparison
     std::string line = first("  " + table.column);
     for (const int column : table.columns) line += right(std::to_string(column), 9) + right("", gap);
     print_line("\n" + table.title);

@@ -92,8 +92,7 @@ inline Table peers_rest_table() {
                      error("newton/whole"),
                      gain("  its pattern anew", "newton/whole_anew")},
             .column = "layers",
-            .columns = {2, 3, 4, 6},
-            .scene = "/vertices:642"};
+            .columns = {2, 3, 4, 6}};
 }
 
 inline std::vector<Table> peers_tables() {
