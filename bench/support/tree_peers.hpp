@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <vector>
 
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
@@ -227,31 +228,36 @@ class Fcl {
     }
 
     void build() {
-        model_.beginModel(static_cast<int>(triangles_.size()), static_cast<int>(points_.size()));
-        model_.addSubModel(points_, triangles_);
-        model_.endModel();
+        model_ = std::make_unique<Model>();
+        model_->beginModel(static_cast<int>(triangles_.size()), static_cast<int>(points_.size()));
+        model_->addSubModel(points_, triangles_);
+        model_->endModel();
     }
     [[nodiscard]] double closest(const Vector3& q) const {
         const fcl::Sphered ball(tiny);
         fcl::DistanceResultd result;
-        return fcl::distance(&ball, at(q), &model_, fcl::Transform3d::Identity(), fcl::DistanceRequestd(true), result) +
+        return fcl::distance(&ball, at(q), model_.get(), fcl::Transform3d::Identity(), fcl::DistanceRequestd(true),
+                             result) +
                tiny;
     }
     [[nodiscard]] int touching(const Vector3& q, double reach) const {
         const fcl::Sphered ball(reach);
         fcl::CollisionResultd result;
-        fcl::collide(&ball, at(q), &model_, fcl::Transform3d::Identity(), fcl::CollisionRequestd(most_contacts),
+        fcl::collide(&ball, at(q), model_.get(), fcl::Transform3d::Identity(), fcl::CollisionRequestd(most_contacts),
                      result);
         return static_cast<int>(result.numContacts());
     }
     void refit(const Points& x) {
         copy(x);
-        model_.beginReplaceModel();
-        model_.replaceSubModel(points_);
-        model_.endReplaceModel();
+        constexpr bool bottom_up = false;  // gives boxes that do not hold their triangles
+        model_->beginReplaceModel();
+        model_->replaceSubModel(points_);
+        model_->endReplaceModel(true, bottom_up);
     }
 
   private:
+    using Model = fcl::BVHModel<fcl::OBBRSSd>;
+
     static constexpr double tiny = 1e-9;  // [m]
     static constexpr std::size_t most_contacts = 1'000'000;
 
@@ -262,7 +268,7 @@ class Fcl {
 
     std::vector<fcl::Vector3d> points_;
     std::vector<fcl::Triangle> triangles_;
-    fcl::BVHModel<fcl::OBBRSSd> model_;
+    std::unique_ptr<Model> model_;
 };
 
 /// Bullet's shape of a mesh that does not deform, for rays only; in millimetres, for its boxes of 16 bits have a margin
