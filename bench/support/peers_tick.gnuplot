@@ -26,6 +26,6 @@ do for [tool in 'same fine'] {
     set ylabel (tool eq 'same' ? 'time of a tick [µs]' : '')
     set title (tool eq 'same' ? 'the same tool' : 'a tool as many edges wide')
     plot for [i = 1:5] sprintf('peers_tick_%s.tsv', tool) using 'vertices':(1e6 * column(word(names, i))) \
-        title word(names, i) lc rgb word(colours, i) lw (i == 5 ? 2.6 : 1.8) dt (i == 3 || i == 4 ? 2 : 1) pt 7
+        title word(names, i) lc rgb word(colours, i) lw (i == 5 ? 2.6 : 1.8) dt 1 + (i == 3 || i == 4) pt 7
     unset key
 }
