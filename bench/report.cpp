@@ -13,33 +13,19 @@
 
 #include <nlohmann/json.hpp>
 
+#include "support/peers_tables.hpp"
+
 // report FOLDER TOPIC...: prints tables of what the benchmarks of these topics left in FOLDER, and leaves the same
 // figures there as summary.json and, for the plots, a .tsv for each table; of `trade`, all that was tried as trade.csv.
 
 namespace {
 
+using bench::Row;
+using bench::Table;
 using Json = nlohmann::json;
 
 /// Medians by topic and name, as "frame/part/solve/vertices:642".
 using Results = std::map<std::string, Json>;
-
-/// One line of a table: a benchmark in all columns.
-struct Row {
-    enum Kind { time, share, gain, rate, each, counter, percent };
-
-    std::string name, benchmark;
-    Kind kind = time;
-    std::string other = {};  ///< share, gain: the benchmark it is set against; the last three: a counter of its own
-    std::string unit = "s";
-};
-
-struct Table {
-    std::string topic, key, title;
-    std::vector<Row> rows;
-    std::string column = "vertices";
-    std::vector<int> columns = {162, 642, 2562, 10242};
-    std::string scene = {};  ///< what is the same in all columns
-};
 
 Table threshold_table(const std::string& vertices) {
     return {.topic = "tree",
@@ -234,7 +220,8 @@ std::string comparison(const Results& results, const Table& table, const Row& ro
     const auto other = value_in(results, table, {"", row.other}, column);
     if (!value || !other) return "";
     if (row.kind == Row::share) return print("%.0f %%", 100 * *value / *other);
-    return print(*other < 9.95 * *value ? "%.1f x" : "%.0f x", *other / *value);
+    const double gain = *other / *value;
+    return print(gain < 0.0995 ? "%.3f x" : gain < 0.995 ? "%.2f x" : gain < 9.95 ? "%.1f x" : "%.0f x", gain);
 }
 
 bool has_results(const Results& results, const Table& table) {
@@ -258,7 +245,9 @@ void print_line(std::string line) {
 void print_table(const Results& results, const Table& table) {
     const auto first = [](std::string name) { return name.append(27 - std::min<std::size_t>(27, name.size()), ' '); };
     const bool grows = table.column == "vertices";
-    const std::size_t gap = grows ? 8 : 1;  // holds the comparison
+    const bool compares = std::any_of(table.rows.begin(), table.rows.end(),
+                                      [](const Row& row) { return row.kind == Row::gain || row.kind == Row::share; });
+    const std::size_t gap = compares || grows ? 8 : 1;  // holds the comparison
     std::string line = first("  " + table.column);
     for (const int column : table.columns) line += right(std::to_string(column), 9) + right("", gap);
     print_line("\n" + table.title);
@@ -361,7 +350,9 @@ void report(const std::string& folder, const std::vector<std::string>& topics) {
         "line of its kind\n",
         said("processor").c_str(), context.at("mhz_per_cpu").get<int>(), said("compiler").c_str(),
         said("flags").c_str());
-    for (const Table& table : all_tables) {
+    std::vector<Table> tables = all_tables;
+    for (const Table& table : bench::peers_tables()) tables.push_back(table);
+    for (const Table& table : tables) {
         if (std::find(topics.begin(), topics.end(), table.topic) == topics.end()) continue;
         if (!has_results(results, table)) continue;
         print_table(results, table);

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: MIT
+#include "support/bullet_body.hpp"
+#include "support/sweep.hpp"
+
+// What does a vertex cost in one sweep over all of the mesh: ours, the loop one would write, and one position iteration
+// of Bullet's soft body, which brings the links of the same edges nearer to their lengths, one after the other?
+
+namespace {
+
+using namespace bench;
+
+void two_sizes(benchmark::internal::Benchmark* measured) {
+    measured->ArgName("vertices");
+    for (const int vertices : {642, 2562}) measured->Arg(vertices);
+}
+
+BENCHMARK(plain<double>)->Name("plain/double")->Apply(two_sizes);
+BENCHMARK(block<double, membrane::MassStep>)->Name("ours/double/mass")->Apply(two_sizes);
+BENCHMARK(block<double, membrane::SafeStep>)->Name("ours/double/safe")->Apply(two_sizes);
+BENCHMARK(block<float, membrane::MassStep>)->Name("ours/float/mass")->Apply(two_sizes);
+BENCHMARK(block<float, membrane::SafeStep>)->Name("ours/float/safe")->Apply(two_sizes);
+
+/// How much longer or shorter than at rest a link is at most.
+btScalar worst_stretch(const btSoftBody& body) {
+    btScalar worst = 0;
+    for (int i = 0; i < body.m_links.size(); ++i) {
+        const auto& link = body.m_links[i];
+        worst = std::max(worst, std::abs((link.m_n[1]->m_x - link.m_n[0]->m_x).length() / link.m_rl - 1));
+    }
+    return worst;
+}
+
+void bullet(benchmark::State& state) {
+    BulletBody body(state.range(0));
+    const Field<double> field(state.range(0));
+    for (Index v = 0; v < field.x.cols(); ++v) body->m_nodes[v].m_x = bullet_point(membrane::point(field.x, v));
+    const btScalar stretch = worst_stretch(*body);
+    for (auto _ : state) {
+        btSoftBody::PSolve_Links(&*body, 1, 0);
+        benchmark::ClobberMemory();
+    }
+    require(body.finite() && worst_stretch(*body) < stretch, "the links must come nearer to their lengths");
+    count_visits(state);
+}
+BENCHMARK(bullet)->Apply(two_sizes);
+
+}  // namespace

@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: MIT
+#include "support/bullet_body.hpp"
+
+// How long does a tick take on meshes from 162 to 655,362 vertices while a tool slides, ours (contact, 4 sweeps over 8
+// layers, boxes, normals, force) and that of Bullet's soft body (4 position iterations, contact, normals, its own shape
+// matching for a backing)? Bullet moves every node in every tick, and gives no force.
+
+namespace {
+
+using namespace bench;
+
+constexpr Index ticks_before = Path::ticks_in + ticks_around / 6;
+
+void sizes_between(benchmark::internal::Benchmark* measured, int least, int most) {
+    measured->ArgName("vertices");
+    for (int vertices = least; vertices <= most; vertices = 4 * vertices - 6) measured->Arg(vertices);
+    measured->Iterations(50);
+}
+void sizes_of_same(benchmark::internal::Benchmark* measured) { sizes_between(measured, 162, 40962); }
+void sizes_of_fine(benchmark::internal::Benchmark* measured) { sizes_between(measured, 642, 655362); }
+
+/// The same tool on all meshes: the finer, the more it touches.
+Path same(std::int64_t) { return {}; }
+
+/// A tool that is as many edges wide, goes as deep and as far on all meshes as the usual one does on 642 vertices.
+Path fine(std::int64_t vertices) { return {.scale = std::sqrt(640 / static_cast<double>(vertices - 2))}; }
+
+using Way = Path (*)(std::int64_t vertices);
+
+/// The loop with the tool pressed in; kept until another is asked for.
+template <membrane::Real Scalar, class Rule>
+const LoopOf<Scalar, Rule>& sliding(std::int64_t vertices, const Path& path) {
+    static std::unique_ptr<LoopOf<Scalar, Rule>> loop;
+    if (!loop || loop->mesh.vertex_count() != vertices || loop->path != path) {
+        const membrane::SolverOptions<Scalar> options{.layers = 8, .sweeps = 4};
+        loop = std::make_unique<LoopOf<Scalar, Rule>>(vertices, path, options, ticks_before);
+    }
+    return *loop;
+}
+
+template <membrane::Real Scalar, class Rule, Way way>
+void ours(benchmark::State& state) {
+    auto loop = sliding<Scalar, Rule>(state.range(0), way(state.range(0)));
+    double moved = 0;
+    for (auto _ : state) {
+        loop.frame();
+        moved += static_cast<double>(loop.report.moved.size());
+    }
+    loop.check();
+    state.counters["moved"] = benchmark::Counter(moved, benchmark::Counter::kAvgIterations);
+}
+BENCHMARK(ours<double, membrane::BlockStep, same>)->Name("same/double/block")->Apply(sizes_of_same);
+BENCHMARK(ours<double, membrane::SafeStep, same>)->Name("same/double/safe")->Apply(sizes_of_same);
+BENCHMARK(ours<float, membrane::BlockStep, same>)->Name("same/float/block")->Apply(sizes_of_same);
+BENCHMARK(ours<float, membrane::SafeStep, same>)->Name("same/float/safe")->Apply(sizes_of_same);
+BENCHMARK(ours<double, membrane::BlockStep, fine>)->Name("fine/double/block")->Apply(sizes_of_fine);
+BENCHMARK(ours<double, membrane::SafeStep, fine>)->Name("fine/double/safe")->Apply(sizes_of_fine);
+BENCHMARK(ours<float, membrane::BlockStep, fine>)->Name("fine/float/block")->Apply(sizes_of_fine);
+BENCHMARK(ours<float, membrane::SafeStep, fine>)->Name("fine/float/safe")->Apply(sizes_of_fine);
+
+/// Bullet's body, and the tool as a rigid body that goes its way whatever it meets.
+class BulletScene {
+  public:
+    BulletScene(std::int64_t vertices, const Path& path) : body_(vertices), path_(path) {
+        body_->m_cfg.piterations = 4;
+        body_->m_cfg.kMT = btScalar(0.1);
+        body_->m_cfg.kDP = btScalar(0.05);
+        body_->m_cfg.kKHR = 1;
+        body_->setTotalMass(1);
+        body_->setPose(false, true);
+        tool_.setCollisionFlags(tool_.getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+    }
+
+    void frame() {
+        const btTransform place(btQuaternion::getIdentity(), bullet_point(path_.at<double>(now_++).position));
+        tool_.setWorldTransform(place);
+        tool_.setInterpolationWorldTransform(place);
+        body_->predictMotion(btScalar(tick));
+        const btCollisionObjectWrapper tool(nullptr, &ball_, &tool_, place, -1, -1);
+        body_->defaultCollisionHandler(&tool);
+        touched_ = body_->m_rcontacts.size();
+        body_->solveConstraints();
+        body_->integrateMotion();
+    }
+
+    [[nodiscard]] int touched() const noexcept { return touched_; }
+
+    /// How deep a node is in the tool at most, as a part of the press.
+    [[nodiscard]] double overlap() {
+        double deepest = 0;
+        for (int i = 0; i < body_->m_nodes.size(); ++i) {
+            const double gap =
+                (body_->m_nodes[i].m_x - tool_.getWorldTransform().getOrigin()).length() - ball_.getRadius();
+            deepest = std::max(deepest, -gap * bullet_unit / (path_.scale * depth));
+        }
+        return deepest;
+    }
+
+    [[nodiscard]] bool finite() const { return body_.finite(); }
+
+  private:
+    BulletBody body_;
+    Path path_;
+    btSphereShape ball_{static_cast<btScalar>(path_.scale * path_.tool_radius / bullet_unit)};
+    btRigidBody tool_{0, nullptr, &ball_};
+    Index now_ = 0;  // ticks
+    int touched_ = 0;
+};
+
+/// With the tool pressed in; it goes on from where the last measurement ended, until another size is asked for.
+template <Way way>
+BulletScene& bullet_sliding(std::int64_t vertices) {
+    static std::unique_ptr<BulletScene> scene;
+    static std::int64_t made = 0;
+    if (made == vertices) return *scene;
+    made = vertices;
+    scene = std::make_unique<BulletScene>(vertices, way(vertices));
+    for (Index t = 0; t < ticks_before; ++t) scene->frame();
+    return *scene;
+}
+
+template <Way way>
+void bullet(benchmark::State& state) {
+    auto& scene = bullet_sliding<way>(state.range(0));
+    int touched = 0;
+    for (auto _ : state) {
+        scene.frame();
+        touched += scene.touched();
+    }
+    require(scene.finite() && touched > 0, "the tool must press on Bullet's body");
+    require(scene.overlap() < 0.5, "Bullet's nodes must go out of the tool's way");
+    state.counters["touched"] = benchmark::Counter(touched, benchmark::Counter::kAvgIterations);
+}
+BENCHMARK(bullet<same>)->Name("same/bullet")->Apply(sizes_of_same);
+BENCHMARK(bullet<fine>)->Name("fine/bullet")->Apply([](auto* b) { sizes_between(b, 642, 40962); });
+
+}  // namespace

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+#include "support/tree_peers.hpp"
+
+// Our tree against those of others, on the same spheres, with the same questions, whose answers must be the same: Embree 3
+// (float; it takes what the processor has, AVX-512 too), CGAL (double), FCL (double, up to 81,920 triangles: larger ones
+// take it too long) and Bullet (float). And the tracker, that follows a contact in place of asking a tree.
+
+namespace {
+
+using namespace bench;
+
+constexpr double reach = 3e-4;  // of the spheres [m]
+constexpr double way = 1e-3;    // of the segments, towards the centre [m]
+constexpr std::size_t asked = 4096;
+
+const Mesh& mesh_of(std::int64_t triangles) {
+    static std::map<std::int64_t, std::unique_ptr<Mesh>> made;
+    auto& mesh = made[triangles];
+    if (!mesh) mesh = std::make_unique<Mesh>(sphere(triangles / 2 + 2));
+    return *mesh;
+}
+
+template <class Tree>
+Tree& tree_over(std::int64_t triangles) {
+    static std::map<std::int64_t, Tree> made;
+    return made.try_emplace(triangles, mesh_of(triangles)).first->second;
+}
+
+/// A way near the surface, 0.05 mm from each point to the next: what a tool does in a tick.
+std::vector<Vector3> points_along(std::size_t count) {
+    const Vector3 u(1, 0, 0), v = Vector3(0, 0.8, 0.6), w(0, -0.6, 0.8);
+    std::vector<Vector3> points;
+    for (std::size_t i = 0; i < count; ++i) {
+        const double turn = 5e-5 / radius * static_cast<double>(i);
+        const Vector3 around = std::cos(turn) * u + std::sin(turn) * v + 0.3 * std::sin(0.37 * turn) * w;
+        points.push_back(radius * (1 + 0.03 * std::sin(9 * turn)) * around.normalized());
+    }
+    return points;
+}
+
+// What is asked of a tree. The answers are numbers.
+struct Closest {
+    static double of(auto& tree, const Vector3& q) { return tree.closest(q); }
+};
+struct Touching {
+    static double of(auto& tree, const Vector3& q) { return tree.touching(q, reach); }
+};
+struct Hit {
+    static double of(auto& tree, const Vector3& q) { return tree.first_hit(q, (1 - way / membrane::norm(q)) * q); }
+};
+
+/// The answers must be those of our tree in double but for roundings, which decide about what is hardly touched or hit.
+template <class Question, class Tree>
+void compare(Tree& tree, std::int64_t triangles, const std::vector<Vector3>& points) {
+    auto& ours = tree_over<Ours<double>>(triangles);
+    std::size_t compared = 0, same = 0;
+    for (std::size_t i = 0; i < points.size(); i += 7, ++compared) {
+        const double expected = Question::of(ours, points[i]), found = Question::of(tree, points[i]);
+        const double rounding = std::is_same_v<Question, Hit> ? 1e-3 : 1e-6 * radius;
+        if (std::abs(found - expected) <= rounding) ++same;
+    }
+    require(100 * same >= 98 * compared, "all trees must answer the same");
+}
+
+template <class Tree, class Question, std::vector<Vector3> (*points_of)(std::size_t)>
+void ask(benchmark::State& state) {
+    auto& tree = tree_over<Tree>(state.range(0));
+    const auto points = points_of(asked);
+    compare<Question>(tree, state.range(0), points);
+    std::size_t i = 0;
+    for (auto _ : state) benchmark::DoNotOptimize(Question::of(tree, points[i++ % asked]));
+}
+
+template <class Tree>
+void build(benchmark::State& state) {
+    auto& tree = tree_over<Tree>(state.range(0));
+    for (auto _ : state) tree.build();
+    compare<Closest>(tree, state.range(0), points_near(asked));
+}
+
+/// To and fro: the sphere, and a sphere of which one half is drawn in.
+template <class Tree>
+void refit(benchmark::State& state) {
+    auto& tree = tree_over<Tree>(state.range(0));
+    const Mesh& mesh = mesh_of(state.range(0));
+    Points drawn = mesh.positions();
+    for (auto p : drawn.colwise()) p.x() = std::min(p.x(), 0.5 * radius);
+    bool in = false;
+    for (auto _ : state) {
+        in = !in;
+        tree.refit(in ? drawn : mesh.positions());
+    }
+    tree.refit(mesh.positions());
+    compare<Closest>(tree, state.range(0), points_near(asked));
+}
+
+void sizes_up_to(benchmark::internal::Benchmark* measured, int most) {
+    measured->ArgName("triangles");
+    for (const int triangles : {1'280, 81'920, 1'310'720}) {
+        if (triangles <= most) measured->Arg(triangles);
+    }
+}
+
+template <class Tree>
+void add(const std::string& name, int most = 1'310'720) {
+    const auto add_one = [&](const char* what, void (*measure)(benchmark::State&)) {
+        sizes_up_to(benchmark::RegisterBenchmark((what + ("/" + name)).c_str(), measure), most);
+    };
+    if constexpr (requires(Tree tree, Vector3 q) { tree.closest(q); }) {
+        add_one("path", ask<Tree, Closest, points_along>);
+        add_one("random", ask<Tree, Closest, points_near>);
+        add_one("sphere", ask<Tree, Touching, points_near>);
+    }
+    if constexpr (requires(Tree tree, Vector3 q) { tree.first_hit(q, q); })
+        add_one("segment", ask<Tree, Hit, points_near>);
+    if constexpr (requires(Tree tree, Points x) { tree.refit(x); }) add_one("refit", refit<Tree>);
+    // The last: Embree does not refit afterwards.
+    if constexpr (requires(Tree tree) { tree.build(); }) add_one("build", build<Tree>);
+}
+
+const bool added = [] {
+    add<Ours<double>>("double");
+    add<Ours<float>>("float");
+    add<Embree>("embree");
+    add<Cgal>("cgal");
+    add<Fcl>("fcl", 81'920);
+    add<Bullet>("bullet");
+    return true;
+}();
+
+void ask_tree(const Loop& loop) {
+    benchmark::DoNotOptimize(loop.tree.closest_point(loop.x, loop.tool.position));
+    loop.tree.touching_sphere(loop.x, loop.tool.position, loop.contact.reach,
+                              [](Index f) { benchmark::DoNotOptimize(f); });
+}
+
+/// The contact while the tool of the scene slides: by the tracker, or what it would ask the tree for in each tick.
+void contact(benchmark::State& state, bool tracked) {
+    Loop loop = pressed(state.range(0) / 2 + 2);
+    double touched = 0;
+    for (auto _ : state) {
+        double time = 0;
+        loop.frame([&](Stage stage, auto work) {
+            const double taken = seconds(work);
+            if (stage == Stage::contact) time = taken;
+        });
+        if (!tracked) time = seconds([&] { ask_tree(loop); });
+        state.SetIterationTime(time);
+        touched += static_cast<double>(loop.contact.touched.size());
+    }
+    loop.check();
+    state.counters["touched"] = benchmark::Counter(touched, benchmark::Counter::kAvgIterations);
+}
+void sizes_of_contact(benchmark::internal::Benchmark* measured) {
+    sizes_up_to(measured, 81'920);
+    measured->Iterations(100)->UseManualTime();
+}
+BENCHMARK_CAPTURE(contact, tracker, true)->Apply(sizes_of_contact);
+BENCHMARK_CAPTURE(contact, tree, false)->Apply(sizes_of_contact);
+
+}  // namespace

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <random>
+#include <span>
+#include <vector>
+
+#include <membrane/solve/compact_block.hpp>
+
+#include "scene.hpp"
+
+/// A sweep over all vertices of a mesh: the compact block, and the loop one would write.
+namespace bench {
+
+using membrane::Lanes;
+using membrane::Real;
+
+/// A sphere out of balance, every vertex joined to vertex 0.
+template <Real Scalar>
+struct Field {
+    explicit Field(std::int64_t vertices)
+        : mesh(sphere_of<Scalar>(vertices)),
+          network(mesh, {}, {.stiffness = Scalar(stiffness), .mass = Scalar(4e-4)}),
+          volume(mesh, {.stiffness = Scalar(backing)}),
+          work(
+              mesh.vertex_count(), [](Index) { return false; }, 0) {
+        std::mt19937_64 random(1);
+        for (Index v = 0; v < x.cols(); ++v) {
+            for (int k = 0; k < 3; ++k)
+                x(k, v) += static_cast<Scalar>(0.05 * radius * (static_cast<double>(random() % 2001) / 1000 - 1));
+        }
+        work.start = x;
+    }
+
+    membrane::TriangleMesh<Scalar> mesh;
+    membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network;
+    membrane::VirtualVolumeSprings<Scalar> volume;
+    membrane::Workspace<Scalar> work;
+    membrane::Points<Scalar> x = mesh.positions();
+};
+
+inline void count_visits(benchmark::State& state) { state.counters["visits"] = static_cast<double>(state.range(0)); }
+
+/// Vertex by vertex, as one would write it.
+template <Real Scalar>
+void plain(benchmark::State& state) {
+    struct End {
+        Index other;
+        Scalar stiffness, rest_length;
+    };
+    Field<Scalar> field(state.range(0));
+    std::vector<std::size_t> row{0};
+    std::vector<End> ends;
+    for (Index v = 0; v < field.x.cols(); ++v) {
+        for (const auto& end : field.network.springs_of(v)) ends.push_back({end.other, end.stiffness, end.rest_length});
+        row.push_back(ends.size());
+    }
+    auto& x = field.x;
+    const membrane::Points<Scalar> anchor = field.mesh.positions();
+    const auto step = static_cast<Scalar>(tick * tick / 4e-4);
+    for (auto _ : state) {
+        for (Index v = 0; v < x.cols(); ++v) {
+            const auto at = static_cast<std::size_t>(v);
+            membrane::Vector3<Scalar> force = -Scalar(backing) * (x.col(v) - anchor.col(v));
+            for (std::size_t e = row[at]; e < row[at + 1]; ++e) {
+                const membrane::Vector3<Scalar> reach = x.col(ends[e].other) - x.col(v);
+                const Scalar length = reach.norm();
+                force += ends[e].stiffness * (length - ends[e].rest_length) / length * reach;
+            }
+            x.col(v) += step * force;
+        }
+        benchmark::DoNotOptimize(x.data());
+    }
+    require(membrane::is_finite(x), "the plain loop must not diverge");
+    count_visits(state);
+}
+
+/// The compact block, positions brought and fetched in every sweep.
+template <Real Scalar, class Rule>
+void block(benchmark::State& state) {
+    Field<Scalar> field(state.range(0));
+    membrane::PointsRef<Scalar> x = field.x;
+    const membrane::StepInput<Scalar, decltype(field.network), decltype(field.volume)> scene{
+        x, Scalar(tick), field.network, field.volume, field.work};
+    const Index seed = 0;
+    membrane::PropagationQueue queue(field.mesh.vertex_count());
+    queue.build(field.network, std::span(&seed, 1), membrane::unlimited);
+    queue.group(field.network);
+    membrane::CompactBlock<Scalar> compact(field.network);
+    compact.packs().follow(queue, field.network);
+    require(compact.packs().size() + 1 == static_cast<std::size_t>(state.range(0)),
+            "all vertices have room in the block");
+    compact.open(scene, [](Index) { return false; });
+    for (auto _ : state) {
+        compact.packs().load(x);
+        for (std::size_t p = 0; p < compact.packs().count(); ++p) {
+            benchmark::DoNotOptimize(compact.visit(p, scene, Rule{}, true));
+        }
+        compact.packs().store(x);
+    }
+    require(membrane::is_finite(field.x), "the block must not diverge");
+    count_visits(state);
+    state.counters["filled"] = static_cast<double>(compact.packs().size()) /
+                               static_cast<double>(compact.packs().count() * Lanes<Scalar>::count);
+}
+
+}  // namespace bench

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string>
+#include <vector>
+
+/// What a table of the report is made of.
+namespace bench {
+
+/// One line of a table: a benchmark in all columns.
+struct Row {
+    enum Kind { time, share, gain, rate, each, counter, percent };
+
+    std::string name, benchmark;
+    Kind kind = time;
+    std::string other = {};  ///< share, gain: the benchmark it is set against; the last three: a counter of its own
+    std::string unit = "s";
+};
+
+struct Table {
+    std::string topic, key, title;
+    std::vector<Row> rows;
+    std::string column = "vertices";
+    std::vector<int> columns = {162, 642, 2562, 10242};
+    std::string scene = {};  ///< what is the same in all columns
+};
+
+}  // namespace bench
