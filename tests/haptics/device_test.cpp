@@ -15,6 +15,8 @@
 using namespace membrane;
 using test::Random;
 
+static_assert(Device<NullDevice<double>, double> && Device<NullDevice<float>, float>);
+
 namespace {
 
 template <class S>

@@ -14,6 +14,9 @@
 using namespace membrane;
 using test::Random;
 
+static_assert(ForcePolicy<SpringDamperForce, double> && ForcePolicy<SpringDamperForce, float>);
+static_assert(ForcePolicy<ReactionForce, double> && ForcePolicy<ReactionForce, float>);
+
 namespace {
 
 template <class S>

@@ -14,6 +14,9 @@
 
 using namespace membrane;
 
+static_assert(SpringLaw<LinearSpring, float> && SpringLaw<LinearSpring, double>);
+static_assert(SpringLaw<ExponentialSpring, float> && SpringLaw<ExponentialSpring, double>);
+
 namespace {
 
 template <class S>

@@ -18,6 +18,9 @@
 using namespace membrane;
 using test::Random;
 
+static_assert(VolumeModel<NoVolumeSprings, float> && VolumeModel<NoVolumeSprings, double>);
+static_assert(VolumeModel<VirtualVolumeSprings<double>, double> && VolumeModel<MovedVolumeSprings<float>, float>);
+
 namespace {
 
 /// (5) as it is printed: u the spring from its fixed to its moving end, v the velocity of the moving end.

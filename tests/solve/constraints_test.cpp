@@ -24,6 +24,9 @@ using namespace membrane;
 using test::Random;
 using test::same_bits;
 
+static_assert(Constraint<HeldPoint<double>, double> && Constraint<HeldVertex<double>, double>);
+static_assert(Constraint<Pinned, double> && Constraint<Load<double>, double>);
+
 namespace {
 
 constexpr double dt = 1e-3;

@@ -23,6 +23,8 @@
 
 using namespace membrane;
 
+static_assert(Constraint<Press<double>, double> && Constraint<Press<float>, float>);
+
 namespace {
 
 using Point = Vector3<double>;

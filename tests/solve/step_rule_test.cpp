@@ -24,6 +24,10 @@ using namespace membrane;
 using test::Random;
 using test::same_bits;
 
+static_assert(StepRule<MassStep, float> && StepRule<MassStep, double>);
+static_assert(StepRule<SafeStep, float> && StepRule<SafeStep, double>);
+static_assert(StepRule<BlockStep, float> && StepRule<BlockStep, double>);
+
 TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", double, float) {
     using S = TestType;
     VertexState<S> vertex;

@@ -10,8 +10,10 @@
 
 #include <membrane/core/types.hpp>
 
-#if defined(__SSE2__)
+#if defined(__AVX__)
 #include <immintrin.h>
+#elif defined(__SSE2__)
+#include <emmintrin.h>
 #endif
 
 /// Several numbers side by side, for what is reckoned alike with all of them.

@@ -81,7 +81,6 @@ class NullDevice {
     std::size_t next_ = 0;  // the first waypoint that is not over
     Vector3<Scalar> force_ = Vector3<Scalar>::Zero();
 };
-static_assert(Device<NullDevice<double>, double> && Device<NullDevice<float>, float>);
 
 template <Real Scalar>
 NullDevice<Scalar>::NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options)

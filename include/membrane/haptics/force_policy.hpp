@@ -50,8 +50,15 @@ struct SpringDamperForce {
     double stiffness;    ///< k [N/m]
     double damping = 0;  ///< mu [N s/m]
 
-    [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept { return force(state); }
-    [[nodiscard]] Vector3<float> operator()(const HapticState<float>& state) const noexcept { return force(state); }
+    // For a state of doubles in braces or of floats; templates, so that an include costs no more for them.
+    template <int = 0>
+    [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept {
+        return force(state);
+    }
+    template <int = 0>
+    [[nodiscard]] Vector3<float> operator()(const HapticState<float>& state) const noexcept {
+        return force(state);
+    }
 
   private:
     template <Real Scalar>
@@ -64,8 +71,14 @@ struct SpringDamperForce {
 struct ReactionForce {
     double scale = 1;
 
-    [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept { return force(state); }
-    [[nodiscard]] Vector3<float> operator()(const HapticState<float>& state) const noexcept { return force(state); }
+    template <int = 0>
+    [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept {
+        return force(state);
+    }
+    template <int = 0>
+    [[nodiscard]] Vector3<float> operator()(const HapticState<float>& state) const noexcept {
+        return force(state);
+    }
 
   private:
     template <Real Scalar>
@@ -73,9 +86,6 @@ struct ReactionForce {
         return detail::finite_or_zero<Scalar>(static_cast<Scalar>(scale) * state.report.total_reaction());
     }
 };
-
-static_assert(ForcePolicy<SpringDamperForce, double> && ForcePolicy<SpringDamperForce, float>);
-static_assert(ForcePolicy<ReactionForce, double> && ForcePolicy<ReactionForce, float>);
 
 template <Real Scalar>
 Vector3<Scalar> SpringDamperForce::force(const HapticState<Scalar>& state) const noexcept {

@@ -81,7 +81,6 @@ struct LinearSpring {
         return {tension, spring.stiffness, tension * elongation / 2};
     }
 };
-static_assert(SpringLaw<LinearSpring, float> && SpringLaw<LinearSpring, double>);
 
 /// Soft tissue stiffens as it is stretched: the tension grows exponentially with the strain e = (l - r) / r, as [Fung67]
 /// found for mesentery: k r (exp(a e) - 1) / a, of stiffness k at rest. Beyond `strain_limit` it goes on along its
@@ -116,7 +115,6 @@ SpringResponse<Scalar> ExponentialSpring::operator()(const SpringState<Scalar>& 
     const Scalar beyond = (strain - held) * rest;
     return {tension + stiffness * beyond, stiffness, energy + (tension + stiffness * beyond / 2) * beyond};
 }
-static_assert(SpringLaw<ExponentialSpring, float> && SpringLaw<ExponentialSpring, double>);
 
 inline void ExponentialSpring::check() const {
     constexpr std::string_view component = "ExponentialSpring";

@@ -46,7 +46,6 @@ struct NoVolumeSprings {
         return {Vector3<Scalar>::Zero(), 0};
     }
 };
-static_assert(VolumeModel<NoVolumeSprings, float> && VolumeModel<NoVolumeSprings, double>);
 
 /// One virtual volume spring, [Liu07] (5), for the length of a tick: of rest length zero, from an anchor to its vertex.
 template <Number Scalar>
@@ -161,7 +160,6 @@ class MovedVolumeSprings {
     const VirtualVolumeSprings<Scalar>* springs_;
     ConstPointsRef<Scalar> anchors_, previous_;
 };
-static_assert(VolumeModel<VirtualVolumeSprings<double>, double> && VolumeModel<MovedVolumeSprings<float>, float>);
 
 template <Real Scalar>
 VirtualVolumeSprings<Scalar>::VirtualVolumeSprings(const TriangleMesh<Scalar>& mesh,

@@ -147,9 +147,6 @@ struct Load {
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>&) const noexcept { return -force; }
 };
 
-static_assert(Constraint<HeldPoint<double>, double> && Constraint<HeldVertex<double>, double>);
-static_assert(Constraint<Pinned, double> && Constraint<Load<double>, double>);
-
 /// What forceps hold follows the tool.
 template <Real Scalar>
 [[nodiscard]] HeldPoint<Scalar> pull(const Tool<Scalar>& tool, const Grasp<Scalar>& grasp) noexcept {

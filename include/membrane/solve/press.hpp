@@ -50,8 +50,6 @@ struct Press {
     }
 };
 
-static_assert(Constraint<Press<double>, double> && Constraint<Press<float>, float>);
-
 /// The tool presses where it touches. Forceps that hold something press nothing.
 template <Real Scalar>
 [[nodiscard]] Press<Scalar> press(const Tool<Scalar>& tool, const Contact<Scalar>& contact,

@@ -64,7 +64,6 @@ struct MassStep {
         return vertex.dt * vertex.dt / vertex.mass;
     }
 };
-static_assert(StepRule<MassStep, float> && StepRule<MassStep, double>);
 
 namespace detail {
 
@@ -94,7 +93,6 @@ struct SafeStep {
     /// @throws InvalidInput for an `omega` out of its range
     void check() const;
 };
-static_assert(StepRule<SafeStep, float> && StepRule<SafeStep, double>);
 
 /// Newton's step of a vertex on its own 3 x 3 block, as vertex block descent takes it [Chen24], made safe without a
 /// look at the energy: dx = omega H^-1 F, H = stiffness I - relief / (1 + rho / size).
@@ -115,7 +113,6 @@ struct BlockStep {
     /// @throws InvalidInput for an `omega` out of its range
     void check() const;
 };
-static_assert(StepRule<BlockStep, float> && StepRule<BlockStep, double>);
 
 namespace detail {
 
