@@ -55,9 +55,9 @@ struct Choice : Outcome {
 ///
 /// The history stands for what is to come: it should last, press at many places, and be as fast as the hand will be; most
 /// errors come with the change from one tick to the next. Other histories of the same kind are off by somewhat more or
-/// less: hence `margin`. In 200 random scenes, spheres, ellipsoids and caps of 42 to 642 vertices on backings of 0.01 to
-/// 10 times the springs, under 12 presses, 156 could be judged: under 12 other presses elsewhere 96 % kept the wanted
-/// error, of 0.1 to 10 %, and 84 % took no more than 1.5 times the time of the cheapest setting that does. A wanted time
+/// less: hence `margin`. In 500 random scenes, spheres, ellipsoids and caps of 42 to 642 vertices on backings of 0.01 to
+/// 10 times the springs, under 12 presses, 374 could be judged: under 12 other presses elsewhere 96 % kept the wanted
+/// error, of 0.1 to 10 %, and 82 % took no more than 1.5 times the time of the cheapest setting that does. A wanted time
 /// has no margin.
 ///
 /// @throws InvalidInput for a wanted error or time that is not positive, none or both of them, an option out of its range,
