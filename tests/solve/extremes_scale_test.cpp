@@ -197,7 +197,8 @@ TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, a
         const auto expected = scene_of<S, BlockStep>(seed, {}), found = scene_of<S, BlockStep>(seed, units);
         if (++seen; !(expected.settled && found.settled)) continue;
         ++settled;
-        REQUIRE(found.distance_to(expected) < (sizeof(S) == 4 ? 100 : 1000) * spacing);
+        const double left = 2 * 1e-13 / 0.3;  // of both: the least negligible force against the softest backing
+        REQUIRE(found.distance_to(expected) < (sizeof(S) == 4 ? 100 : 1000) * spacing + left);
     }
     CHECK(accepted > 0);
     CHECK(settled >= 0.9 * seen);
