@@ -174,9 +174,8 @@ void Press<Scalar>::find_touches(Region<Scalar>& region) const noexcept {
     }
 }
 
-// Brings the touch up to date with the positions, its pressure unchanged, and returns the gap; one that neither presses
-// nor is pressed is left as it is. The tool stays on the side of the triangle, or of the edge or corner it is nearest
-// to, where the touch was found.
+// Brings the touch up to date with the positions, its pressure unchanged, and returns the gap. The tool stays on the
+// side of the triangle, or of the edge or corner it is nearest to, where the touch was found.
 template <Real Scalar>
 Scalar Press<Scalar>::aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept {
     constexpr Scalar apart = std::numeric_limits<Scalar>::infinity();
@@ -184,10 +183,6 @@ Scalar Press<Scalar>::aim(Region<Scalar>& region, Touch<Scalar>& touch) const no
     const Touch<Scalar> before = touch;
     const auto triangle = triangle_of(region, touch.corners);
     const auto nearest = proximity(triangle, tool, touch.pair);
-    if (pressure == 0 && nearest && squared_norm(nearest->reach) > contact.radius * contact.radius &&
-        dot(nearest->reach, touch.normal) > 0) {
-        return apart;
-    }
     if (nearest) touch.barycentric = nearest->barycentric;
     if (!nearest || is_rigid(region, touch.corners, touch.barycentric)) {
         touch.force.setZero();
