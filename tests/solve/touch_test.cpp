@@ -75,7 +75,7 @@ TEST_CASE("a point on a pinned corner is rigid") {
     CHECK_FALSE(membrane::is_rigid<double>(m.region, corners, {0.2, 0, 0.8}));
 }
 
-TEST_CASE("a force on a point is shared out, moves it by its compliance, and can be replaced") {
+TEST_CASE("a force on a point is shared out, moves it by its compliance, and can be taken back") {
     for (int seed = 1; seed <= cases(2000); ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));
         Membrane m(random, false, seed % 2 == 0);
@@ -98,15 +98,8 @@ TEST_CASE("a force on a point is shared out, moves it by its compliance, and can
         }
         m.region.remember(touch);
         CHECK((membrane::reaction_of_touches(m.region) + force).norm() < 1e-12);
-        const Touch<double> attached = touch;
-        touch.barycentric = random.barycentric();
-        touch.force = random.vector();
-        touch.stiffness = random.vector<double>(0, 1);
-        membrane::reattach(m.region, attached, touch);
-        for (Index v = 0; v < 3; ++v) {
-            CHECK((m.work.external.col(v) - touch.barycentric[v] * touch.force).norm() < 1e-12);
-            CHECK(std::abs(m.work.stiffness[static_cast<std::size_t>(v)] - touch.stiffness[v]) < 1e-12);
-        }
+        membrane::detach(m.region, touch);
+        CHECK(m.work.external.cwiseAbs().maxCoeff() < 1e-15);
     }
 }
 

@@ -50,6 +50,8 @@ struct Press {
     }
 };
 
+static_assert(Constraint<Press<double>, double> && Constraint<Press<float>, float>);
+
 /// The tool presses where it touches. Forceps that hold something press nothing.
 template <Real Scalar>
 [[nodiscard]] Press<Scalar> press(const Tool<Scalar>& tool, const Contact<Scalar>& contact,
@@ -178,25 +180,23 @@ void Press<Scalar>::find_touches(Region<Scalar>& region) const noexcept {
 // side of the triangle, or of the edge or corner it is nearest to, where the touch was found.
 template <Real Scalar>
 Scalar Press<Scalar>::aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept {
-    constexpr Scalar apart = std::numeric_limits<Scalar>::infinity();
     const Scalar pressure = norm(touch.force);
-    const Touch<Scalar> before = touch;
+    if (pressure > 0) detach(region, touch);
     const auto triangle = triangle_of(region, touch.corners);
     const auto nearest = proximity(triangle, tool, touch.pair);
     if (nearest) touch.barycentric = nearest->barycentric;
     if (!nearest || is_rigid(region, touch.corners, touch.barycentric)) {
         touch.force.setZero();
         touch.stiffness.setZero();
-        if (pressure > 0) reattach(region, before, touch);
-        return apart;
+        return std::numeric_limits<Scalar>::infinity();
     }
     const Vector3<Scalar> along = on_face(touch) ? area_vector(triangle) : nearest->reach;
     const Vector3<Scalar> away = direction(along, touch.normal);
     touch.normal = dot(away, touch.normal) < 0 ? Vector3<Scalar>(-away) : away;
+    touch.force = -pressure * touch.normal;
     if (pressure > 0) {
-        touch.force = -pressure * touch.normal;
         touch.stiffness = detail::wandering_stiffness(triangle, touch.barycentric, pressure * norm(nearest->reach));
-        reattach(region, before, touch);
+        attach(region, touch);
     }
     return dot(nearest->reach, touch.normal) - contact.radius;
 }
@@ -245,10 +245,9 @@ bool Press<Scalar>::enforce(Region<Scalar>& region) const noexcept {
         Scalar largest = 0;
         for (auto& touch : region.touches()) {
             const Scalar gap = aim(region, touch);
-            const Scalar pressure = -dot(touch.force, touch.normal);
-            if (pressure == 0 && gap >= 0) continue;
             const Scalar compliance = compliance_of(region, touch);
-            if (!(compliance > 0)) continue;
+            const Scalar pressure = -dot(touch.force, touch.normal);
+            if (!(compliance > 0) || (pressure == 0 && gap >= 0)) continue;
             Scalar more = (std::max)(-gap / compliance, -pressure);
             if (pressure + more > most_pressure(region, touch, gap)) more = -pressure;  // wedged: let go
             if (!(std::abs(more) * compliance > negligible_shift(region, touch))) continue;

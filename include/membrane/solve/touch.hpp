@@ -105,7 +105,7 @@ template <Real Scalar>
     return inverse(stiffness * Symmetric3<Scalar>{x[0], y[1], z[2], x[1], x[2], y[2]}) * (stiffness * way);
 }
 
-/// Brings what the touch does to its corners into the region.
+/// Brings what the touch does to its corners into the region, and takes it out again.
 template <Real Scalar>
 void attach(Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
     push_point(region, touch.corners, touch.barycentric, touch.force);
@@ -113,15 +113,11 @@ void attach(Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
         region.stiffen(touch.corners[k], touch.stiffness[static_cast<Eigen::Index>(k)]);
     }
 }
-
-/// Brings it up to date, where it was attached as `before`.
 template <Real Scalar>
-void reattach(Region<Scalar>& region, const Touch<Scalar>& before, const Touch<Scalar>& touch) noexcept {
+void detach(Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
+    push_point<Scalar>(region, touch.corners, touch.barycentric, -touch.force);
     for (std::size_t k = 0; k < 3; ++k) {
-        const auto corner = static_cast<Eigen::Index>(k);
-        region.push(touch.corners[k],
-                    touch.barycentric[corner] * touch.force - before.barycentric[corner] * before.force);
-        region.stiffen(touch.corners[k], touch.stiffness[corner] - before.stiffness[corner]);
+        region.stiffen(touch.corners[k], -touch.stiffness[static_cast<Eigen::Index>(k)]);
     }
 }
 
