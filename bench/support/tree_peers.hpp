@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <new>
 #include <vector>
 
 #include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
@@ -69,8 +70,9 @@ class Embree {
         rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_LOW);
         const auto count = static_cast<std::size_t>(mesh.vertex_count());
         const auto triangles = static_cast<std::size_t>(mesh.triangle_count());
-        x_ = static_cast<float*>(
+        auto* points = static_cast<float*>(
             rtcSetNewGeometryBuffer(geometry_, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), count));
+        new (&x_) Eigen::Map<membrane::Points<float>>(points, 3, mesh.vertex_count());
         auto* indices = static_cast<Index*>(rtcSetNewGeometryBuffer(geometry_, RTC_BUFFER_TYPE_INDEX, 0,
                                                                     RTC_FORMAT_UINT3, 3 * sizeof(Index), triangles));
         std::copy_n(corners_.data(), corners_.size(), indices);
@@ -124,16 +126,15 @@ class Embree {
     }
 
   private:
-    void copy(const Points& x) { Eigen::Map<membrane::Points<float>>(x_, 3, x.cols()) = x.cast<float>(); }
+    void copy(const Points& x) { x_ = x.cast<float>(); }
     void commit() {
         rtcUpdateGeometryBuffer(geometry_, RTC_BUFFER_TYPE_VERTEX, 0);
         rtcCommitGeometry(geometry_);
         rtcCommitScene(scene_);
     }
     [[nodiscard]] float distance(const RTCPointQueryFunctionArguments& asked) const {
-        const Eigen::Map<const membrane::Points<float>> x(x_, 3, 3 * corners_.cols());
         const Eigen::Vector3f q(asked.query->x, asked.query->y, asked.query->z);
-        const auto triangle = membrane::triangle_at(x, corners_.col(static_cast<Index>(asked.primID)));
+        const auto triangle = membrane::triangle_at(x_, corners_.col(static_cast<Index>(asked.primID)));
         return std::sqrt(membrane::closest_point<float>(triangle, q).squared_distance);
     }
     float ask(const Vector3& q, float radius_of_query, RTCPointQueryFunction answer) {
@@ -153,7 +154,7 @@ class Embree {
     membrane::Triangles corners_;
     RTCScene scene_ = rtcNewScene(one_thread());
     RTCGeometry geometry_ = rtcNewGeometry(one_thread(), RTC_GEOMETRY_TYPE_TRIANGLE);
-    float* x_ = nullptr;
+    Eigen::Map<membrane::Points<float>> x_{nullptr, 3, 0};  // Embree's
     int touched_ = 0;
 };
 

@@ -37,8 +37,7 @@ struct Register {
 
 }  // namespace detail
 
-/// 8 floats or 4 doubles, on every processor: which numbers share a step decides what comes of it. Each lane comes to the
-/// bits that its number would come to by itself.
+/// 8 floats or 4 doubles, on every processor. Each lane comes to the bits that its number would come to by itself.
 template <Real Scalar>
 class Lanes {
   public:

@@ -74,7 +74,7 @@ struct VolumeSpring {
     /// Both.
     [[nodiscard]] Pull<Scalar> pull(const Vector3<Scalar>& position) const noexcept {
         auto sum = elastic_pull(position);
-        sum.force += drag(position);
+        if (any(rate != 0)) sum.force += drag(position);
         return sum;
     }
 };

@@ -32,7 +32,8 @@ class PropagationQueue {
     template <Real Scalar, class Law>
     bool grow(const MassSpringNetwork<Scalar, Law>& network) noexcept;
 
-    /// Orders every layer but layer 0 in groups that no spring joins. Online. Cost: the springs of the vertices in the queue.
+    /// Orders every layer but layer 0 in groups that no spring joins.
+    /// Online. Cost: the springs of the vertices in the queue.
     template <Real Scalar, class Law>
     void group(const MassSpringNetwork<Scalar, Law>& network) noexcept;
 

@@ -91,7 +91,8 @@ class Region {
 
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept { return point(x_, v); }
 
-    /// The vertices of these triangles, each once; valid until the next call. Of the same span as last time, at no cost.
+    /// The vertices of these triangles, each once; valid until the next call. Of the same span as last time, at no cost:
+    /// what a step is handed does not change within it.
     template <class TouchedTriangle>
     [[nodiscard]] std::span<const Index> corners_of(std::span<const TouchedTriangle> triangles) noexcept {
         if (const void* first = triangles.data(); first == patch_of_ && triangles.size() == patch_size_) {

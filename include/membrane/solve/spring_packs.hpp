@@ -16,7 +16,7 @@
 ///
 ///     packs.follow(queue, network);                      // where the queue has changed
 ///     packs.load(x);
-///     packs.for_each_spring(p, [&](const Vector3<Several>& there, const Several& stiffness, const Several& rest_length) { ... });
+///     packs.for_each_spring(p, [&](const auto& there, const auto& stiffness, const auto& rest_length) { ... });
 ///     packs.store(x);
 namespace membrane {
 

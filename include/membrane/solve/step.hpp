@@ -16,7 +16,7 @@ namespace membrane {
 /// In what order the vertices of a layer are visited; the layers always from the contact outward.
 enum class VisitOrder {
     arrival,  ///< as the breadth-first search came to them, [Liu07] 2.2
-    groups,   ///< those together that no spring joins, 8 floats or 4 doubles: the processor moves them all at once
+    groups,   ///< those together that no spring joins: the processor moves several of them at once
 };
 
 /// What a step may cost. More of everything is more accurate.

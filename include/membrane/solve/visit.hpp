@@ -50,7 +50,8 @@ template <class Scalar, class Network, class Volume>
     const Vector3<Scalar> here = point(scene.x, v), start = point(scene.work.start, v);
     const Vector3<Scalar> now = point(scene.work.unbalanced, v);
     if constexpr (requires { scene.volume.spring(v, start, scene.dt); }) {
-        return now - scene.volume.spring(v, start, scene.dt).drag(here);
+        const auto spring = scene.volume.spring(v, start, scene.dt);
+        return spring.rate == 0 ? now : Vector3<Scalar>(now - spring.drag(here));
     } else {
         const Vector3<Scalar> still = scene.volume.pull(v, here, here, scene.dt).force;
         const Vector3<Scalar> moving = scene.volume.pull(v, here, start, scene.dt).force;
