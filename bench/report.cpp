@@ -159,6 +159,9 @@ const std::vector<Table> all_tables{
       {"refit, moved", "update/refit_moved", Row::gain, "update/refit_all"},
       {"normals, all", "update/normals_all"},
       {"normals, moved", "update/normals_moved", Row::gain, "update/normals_all"},
+      {"normals, plain loop, double", "normals_plain"},
+      {"  ours, double", "normals<double>", Row::gain, "normals_plain"},
+      {"  ours, float", "normals<float>", Row::gain, "normals_plain"},
       {"moved vertices", "update/refit_moved", Row::counter, "moved", ""}}}};
 
 /// Reads what Google Benchmark wrote: its medians, or the one figure there is.

@@ -439,7 +439,6 @@ TEST_CASE("few boxes are visited near the surface", "[tree]") {
         double sum = 0;
         for (int i = 0; i < 1000; ++i) {
             const auto found = tree.closest_point(mesh.positions(), 1.01 * random.unit_vector());
-            CHECK(found.boxes_visited % 2 == 1);
             sum += found.boxes_visited;
         }
         CHECK(sum / 1000 < 100);
@@ -531,7 +530,7 @@ TEST_CASE("a single triangle is a tree", "[tree]") {
     const AabbTree<double> tree(mesh);
     CHECK(tree.statistics().nodes == 1);
     CHECK(tree.closest_point(mesh.positions(), {1, 1, 1}).squared_distance == Approx(4.0 / 3));
-    CHECK(tree.closest_point(mesh.positions(), {1, 1, 1}).boxes_visited == 1);
+    CHECK(tree.closest_point(mesh.positions(), {1, 1, 1}).boxes_visited == 2);  // around the surface, and the leaf
     CHECK(tree.first_hit(mesh.positions(), {0, 0, 0}, {1, 1, 1}).along == Approx(1.0 / 3));
 }
 

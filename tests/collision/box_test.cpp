@@ -2,6 +2,7 @@
 #include <membrane/collision/box.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -59,7 +60,7 @@ TEST_CASE("boxes overlap when no axis separates them, borders included", "[box]"
     const Box<double> box{{0, 0, 0}, {1, 2, 3}};
     CHECK(overlap(box, {{1, 2, 3}, {4, 4, 4}}));
     CHECK(overlap(box, {{0.5, 0.5, 0.5}, {0.6, 0.6, 0.6}}));
-    CHECK(overlap({{-1, -1, -1}, {9, 9, 9}}, box));
+    CHECK(overlap(Box<double>{{-1, -1, -1}, {9, 9, 9}}, box));
     for (int k = 0; k < 3; ++k) {
         Box<double> beside = box;
         beside.low[k] += box.high[k] * 1.001;
@@ -131,4 +132,43 @@ TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[box]", floa
     }
     CHECK(touching > cases(3000));
     CHECK(missing > cases(3000));
+}
+
+TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[box][lanes]", float, double) {
+    using S = TestType;
+    using Several = Lanes<S>;
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        std::array<Triangle<S>, Several::count> each;
+        std::array<Box<S>, Several::count> box;
+        Triangle<Several> triangles;
+        Box<Several> boxes;
+        for (std::size_t i = 0; i < Several::count; ++i) {
+            each[i] = {random.vector<S>(), random.vector<S>(), random.vector<S>()};
+            box[i] = random_box<S>(random);
+            for (int k = 0; k < 3; ++k) {
+                triangles.a[k].set(i, each[i].a[k]);
+                triangles.b[k].set(i, each[i].b[k]);
+                triangles.c[k].set(i, each[i].c[k]);
+                boxes.low[k].set(i, box[i].low[k]);
+                boxes.high[k].set(i, box[i].high[k]);
+            }
+        }
+        Vector3<S> q = random.vector<S>(-2, 2), p = random.vector<S>(-2, 2);
+        if (random.chance(0.2)) p[random.index(3)] = q[0];
+        const Box<S> other = random_box<S>(random);
+        const CapsuleProbe<S> probe(q, p, random.number<S>(0, S(0.2)), other);
+        const auto around = bounds(triangles);
+        for (std::size_t i = 0; i < Several::count; ++i) {
+            CAPTURE(i);
+            CHECK(squared_distance(boxes, q)[i] == squared_distance(box[i], q));
+            CHECK(probe.entry(boxes)[i] == probe.entry(box[i]));
+            CHECK(((bits(overlap(boxes, other)) >> i) & 1) == (overlap(box[i], other) ? 1 : 0));
+            for (int k = 0; k < 3; ++k) {
+                CHECK(around.low[k][i] == bounds(each[i]).low[k]);
+                CHECK(around.high[k][i] == bounds(each[i]).high[k]);
+            }
+        }
+    }
 }

@@ -206,3 +206,51 @@ TEST_CASE("a threshold below 1 is refused", "[tree_shape][bad]") {
     CHECK(test::refusal([&] { (void)tree_shape(mesh, -7); }) ==
           "AabbTree: balance_threshold must be at least 1, got -7");
 }
+
+namespace {
+
+/// Everything that `folded` promises.
+template <std::size_t width>
+void check_folded(const TreeShape& shape) {
+    const auto wide = folded<width>(shape);
+    REQUIRE(wide.children.size() == wide.nodes.size());
+    REQUIRE(wide.nodes[0] == 0);
+    std::set<Index> kept(wide.nodes.begin(), wide.nodes.end()), named;
+    CHECK(kept.size() == wide.nodes.size());
+    for (std::size_t n = 0; n < wide.nodes.size(); ++n) {
+        const auto& children = wide.children[n];
+        const auto end = std::find(children.begin(), children.end(), no_index);
+        CHECK(std::all_of(end, children.end(), [](Index i) { return i == no_index; }));
+        std::set<Index> triangles;
+        bool only_leaves = true;
+        for (auto child = children.begin(); child != end; ++child) {
+            CHECK(named.insert(*child).second);
+            auto of_child = below(shape, *child);
+            triangles.merge(of_child);
+            CHECK(of_child.empty());  // no triangle is below two of them
+            if (shape.nodes[at(*child)].is_leaf()) continue;
+            only_leaves = false;
+            const auto place = std::find(wide.nodes.begin(), wide.nodes.end(), *child);
+            CHECK(place > wide.nodes.begin() + static_cast<std::ptrdiff_t>(n));
+            CHECK(place != wide.nodes.end());
+        }
+        CHECK(triangles == below(shape, wide.nodes[n]));
+        if (end != children.end()) CHECK(only_leaves);  // there is room only where nothing more can be folded in
+    }
+    for (std::size_t i = 0; i < shape.nodes.size(); ++i) {
+        if (shape.nodes[i].is_leaf()) CHECK(named.count(static_cast<Index>(i)) == 1);
+    }
+}
+
+}  // namespace
+
+TEST_CASE("a folded tree has the same leaves, each below the same triangles' nodes", "[tree]") {
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto shape = tree_shape(test::random_surface<double>(random).mesh(), 1 + random.index(20));
+        check_folded<2>(shape);
+        check_folded<4>(shape);
+        check_folded<8>(shape);
+    }
+}

@@ -74,6 +74,9 @@ TEMPLATE_TEST_CASE("every lane comes to what its number would by itself", "[lane
             REQUIRE(same(select(a < b, a, b)[i], select(x[i] < y[i], x[i], y[i])));
             REQUIRE(same(select(a > b, a, b)[i], select(x[i] > y[i], x[i], y[i])));
             REQUIRE(same(select(a >= b, a, b)[i], select(x[i] >= y[i], x[i], y[i])));
+            REQUIRE(same(select(a <= b, a, b)[i], select(x[i] <= y[i], x[i], y[i])));
+            REQUIRE(((bits(a < b) >> i) & 1) == (x[i] < y[i] ? 1 : 0));
+            REQUIRE(same(abs(a)[i], std::abs(x[i])));
             REQUIRE(same(select(a != b, a, b)[i], select(x[i] != y[i], x[i], y[i])));
             REQUIRE(same(select((a > b) & (b != 0), a, b)[i], x[i] > y[i] && y[i] != 0 ? x[i] : y[i]));
             REQUIRE(same(larger(a, b)[i], (std::max)(x[i], y[i])));

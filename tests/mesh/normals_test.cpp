@@ -157,6 +157,53 @@ TEST_CASE("an update of the moved vertices changes these and their neighbours on
     }
 }
 
+TEMPLATE_TEST_CASE("a vertex of any number of triangles has their normal, closed around it or not", "[normals]", double,
+                   float) {
+    using S = TestType;
+    for (const Index count : {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 15, 100, 1001}) {
+        for (const bool closed : {false, true}) {
+            if (closed && count < 3) continue;
+            CAPTURE(count, closed);
+            Random random(static_cast<std::uint64_t>(count));
+            const Index around = closed ? count : count + 1;
+            Points<S> x(3, around + 1);
+            Triangles triangles(3, count);
+            const S turn = (closed ? 2 : 1) * std::numbers::pi_v<S> / static_cast<S>(count);
+            for (Index i = 0; i < around; ++i) {
+                const S angle = turn * static_cast<S>(i);
+                x.col(i) = random.number(S(0.5), S(1)) * Vector3<S>(std::cos(angle), std::sin(angle), S(0.3));
+            }
+            x.col(around) = random.template vector<S>(S(-0.2), S(0.2));  // the vertex
+            for (Index f = 0; f < count; ++f) triangles.col(f) << f, (f + 1) % around, around;
+            const TriangleMesh<S> mesh(x, triangles);
+            VertexNormals<S> full(mesh), partial(mesh);
+            const S tolerance = 100 * std::numeric_limits<S>::epsilon();
+            REQUIRE(largest_error(full.values(), expected_normals(x, triangles)) < tolerance);
+
+            x.col(0) *= S(1.2);  // a neighbour, then the vertex
+            x.col(around) *= S(0.5);
+            full.update(x);
+            REQUIRE(largest_error(full.values(), expected_normals(x, triangles)) < tolerance);
+            REQUIRE(partial.update(x, std::array{Index{0}, around}).size() == static_cast<std::size_t>(around + 1));
+            REQUIRE(same_bits(partial.values(), full.values()));
+        }
+    }
+}
+
+TEMPLATE_TEST_CASE("normals read no number behind the last position", "[normals]", double, float) {
+    using S = TestType;
+    const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
+    const auto memory = std::make_unique<S[]>(3 * 42);  // whose end the address sanitizer watches
+    Eigen::Map<Points<S>> x(memory.get(), 3, 42);
+    x = mesh.positions();
+    VertexNormals<S> normals(mesh);
+    const Points<S> at_rest = normals.values();
+    normals.update(x);
+    CHECK(same_bits(normals.values(), at_rest));
+    normals.update(x, std::array<Index, 1>{41});
+    CHECK(same_bits(normals.values(), at_rest));
+}
+
 TEST_CASE("normals take positions from anybody's memory", "[normals]") {
     const auto mesh = icosphere<float>({.radius = 1, .subdivisions = 2});
     VertexNormals<float> normals(mesh);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include <membrane/core/lanes.hpp>
 #include <membrane/mesh/triangle.hpp>
 
 /// Boxes along the axes, and what is near them.
@@ -14,32 +15,32 @@
 ///     if (squared_distance(box, tool.position) > tool.radius * tool.radius) { /* the tool touches nothing */ }
 namespace membrane {
 
-/// All points between two corners, borders included [m]; empty until something is included.
-template <Real Scalar>
+/// All points between two corners, borders included [m]; empty until something is included. Of `Lanes`: several boxes.
+template <Number N>
 struct Box {
-    Vector3<Scalar> low = Vector3<Scalar>::Constant((std::numeric_limits<Scalar>::max)());
-    Vector3<Scalar> high = Vector3<Scalar>::Constant(std::numeric_limits<Scalar>::lowest());
+    Vector3<N> low = Vector3<N>::Constant((std::numeric_limits<Each<N>>::max)());
+    Vector3<N> high = Vector3<N>::Constant(std::numeric_limits<Each<N>>::lowest());
 
     /// Grows to hold `p`; coordinates that are NaN are left out.
-    void include(const Vector3<Scalar>& p) noexcept;
+    void include(const Vector3<N>& p) noexcept;
     void include(const Box& other) noexcept;
 };
 
 /// The smallest box around a triangle.
-template <Real Scalar>
-[[nodiscard]] Box<Scalar> bounds(const Triangle<Scalar>& triangle) noexcept;
+template <Number N>
+[[nodiscard]] Box<N> bounds(const Triangle<N>& triangle) noexcept;
 
 /// The axis along which the box is longest, 0 to 2; the first of equals.
 template <Real Scalar>
 [[nodiscard]] int longest_axis(const Box<Scalar>& box) noexcept;
 
 /// Whether the boxes have a point in common.
-template <Real Scalar>
-[[nodiscard]] bool overlap(const Box<Scalar>& a, const Box<Scalar>& b) noexcept;
+template <Number N>
+[[nodiscard]] auto overlap(const Box<N>& a, const Box<Each<N>>& b) noexcept;
 
 /// From `q` to the nearest point of the box, 0 inside [m^2].
-template <Real Scalar>
-[[nodiscard]] Scalar squared_distance(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept;
+template <Number N>
+[[nodiscard]] N squared_distance(const Box<N>& box, const Vector3<Each<N>>& q) noexcept;
 
 /// From `q` to the farthest corner, along the axis where that is most [m].
 template <Real Scalar>
@@ -57,31 +58,33 @@ class CapsuleProbe {
                  const Box<Scalar>& all) noexcept;
 
     /// A bound from below of how far along the segment, 0 to 1, the capsule meets the box; `never` if it does not.
-    [[nodiscard]] Scalar entry(const Box<Scalar>& box) const noexcept;
+    template <Number N>
+    [[nodiscard]] N entry(const Box<N>& box) const noexcept;
 
   private:
-    Vector3<Scalar> from_low_, from_high_, pace_;  // pace: what part of the segment it takes to advance by a metre
+    Vector3<Scalar> to_near_, to_far_;  // where it begins, seen from the sides of a box that it meets and leaves by
+    Vector3<Scalar> pace_;              // what part of the segment it takes to advance by a metre
 };
 
-template <Real Scalar>
-void Box<Scalar>::include(const Vector3<Scalar>& p) noexcept {
+template <Number N>
+void Box<N>::include(const Vector3<N>& p) noexcept {
     for (int k = 0; k < 3; ++k) {
-        low[k] = (std::min)(low[k], p[k]);
-        high[k] = (std::max)(high[k], p[k]);
+        low[k] = smaller(low[k], p[k]);
+        high[k] = larger(high[k], p[k]);
     }
 }
 
-template <Real Scalar>
-void Box<Scalar>::include(const Box& other) noexcept {
+template <Number N>
+void Box<N>::include(const Box& other) noexcept {
     for (int k = 0; k < 3; ++k) {
-        low[k] = (std::min)(low[k], other.low[k]);
-        high[k] = (std::max)(high[k], other.high[k]);
+        low[k] = smaller(low[k], other.low[k]);
+        high[k] = larger(high[k], other.high[k]);
     }
 }
 
-template <Real Scalar>
-Box<Scalar> bounds(const Triangle<Scalar>& triangle) noexcept {
-    Box<Scalar> box{triangle.a, triangle.a};
+template <Number N>
+Box<N> bounds(const Triangle<N>& triangle) noexcept {
+    Box<N> box{triangle.a, triangle.a};
     box.include(triangle.b);
     box.include(triangle.c);
     return box;
@@ -94,17 +97,16 @@ int longest_axis(const Box<Scalar>& box) noexcept {
     return side[2] > side[longer] ? 2 : longer;
 }
 
-template <Real Scalar>
-bool overlap(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
-    bool apart = false;
-    for (int k = 0; k < 3; ++k) apart |= !(a.low[k] <= b.high[k] && b.low[k] <= a.high[k]);
-    return !apart;
+template <Number N>
+auto overlap(const Box<N>& a, const Box<Each<N>>& b) noexcept {
+    const auto along = [&](int k) { return (a.low[k] <= N(b.high[k])) & (N(b.low[k]) <= a.high[k]); };
+    return along(0) & along(1) & along(2);
 }
 
-template <Real Scalar>
-Scalar squared_distance(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept {
-    const auto offset = [&](int k) { return q[k] - (std::min)((std::max)(q[k], box.low[k]), box.high[k]); };
-    return squared_norm<Scalar>({offset(0), offset(1), offset(2)});
+template <Number N>
+N squared_distance(const Box<N>& box, const Vector3<Each<N>>& q) noexcept {
+    const auto offset = [&](int k) { return q[k] - smaller(larger(N(q[k]), box.low[k]), box.high[k]); };
+    return squared_norm<N>({offset(0), offset(1), offset(2)});
 }
 
 template <Real Scalar>
@@ -124,22 +126,25 @@ CapsuleProbe<Scalar>::CapsuleProbe(const Vector3<Scalar>& from, const Vector3<Sc
     const Scalar shortest = (std::max)(Limits::epsilon() * size, (Limits::min)());
     for (int k = 0; k < 3; ++k) {
         const Scalar step = to[k] - from[k];
-        from_low_[k] = from[k] + margin;
-        from_high_[k] = from[k] - margin;
-        pace_[k] = 1 / (abs(step) >= shortest ? step : shortest);
+        const bool known = abs(step) >= shortest;
+        pace_[k] = 1 / (known ? step : shortest);
+        to_near_[k] = from[k] + (pace_[k] > 0 ? margin : -margin);
+        to_far_[k] = from[k] - (pace_[k] > 0 ? margin : -margin);
     }
 }
 
 template <Real Scalar>
-Scalar CapsuleProbe<Scalar>::entry(const Box<Scalar>& box) const noexcept {
-    Scalar first = 0, last = 1;
+template <Number N>
+N CapsuleProbe<Scalar>::entry(const Box<N>& box) const noexcept {
+    N first = 0, last = 1;
     for (int k = 0; k < 3; ++k) {
-        const Scalar to_low = (box.low[k] - from_low_[k]) * pace_[k],
-                     to_high = (box.high[k] - from_high_[k]) * pace_[k];
-        first = (std::max)(first, (std::min)(to_low, to_high));
-        last = (std::min)(last, (std::max)(to_low, to_high));
+        const bool forward = pace_[k] > 0;
+        const N& near = forward ? box.low[k] : box.high[k];
+        const N& far = forward ? box.high[k] : box.low[k];
+        first = larger<N>(first, (near - to_near_[k]) * pace_[k]);
+        last = smaller<N>(last, (far - to_far_[k]) * pace_[k]);
     }
-    return first <= last ? first : never;
+    return select<N>(first <= last, first, never);
 }
 
 }  // namespace membrane

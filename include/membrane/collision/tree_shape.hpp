@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <numeric>
 #include <span>
@@ -53,6 +54,19 @@ template <Real Scalar>
 
 /// O(F).
 [[nodiscard]] inline TreeStatistics statistics(const TreeShape& shape);
+
+/// A binary tree of which most nodes are folded into those above: what is left of it, and is no leaf, has up to `width`
+/// children.
+template <std::size_t width>
+struct FoldedShape {
+    std::vector<Index> nodes;  ///< Of the binary tree; the root first, children after their parent.
+    std::vector<std::array<Index, width>>
+        children;  ///< Of each, the binary tree's nodes; `no_index` in place of the rest.
+};
+
+/// Folds in what has most triangles first. A root that is a leaf is the only child of itself. O(nodes).
+template <std::size_t width>
+[[nodiscard]] FoldedShape<width> folded(const TreeShape& shape);
 
 namespace detail {
 
@@ -146,6 +160,35 @@ inline TreeStatistics statistics(const TreeShape& shape) {
     }
     tree.mean_leaf = static_cast<double>(shape.triangles.size()) / tree.leaves;
     return tree;
+}
+
+template <std::size_t width>
+FoldedShape<width> folded(const TreeShape& shape) {
+    const auto node = [&](Index i) -> const TreeShape::Node& { return shape.nodes[static_cast<std::size_t>(i)]; };
+    std::vector<Index> sizes(shape.nodes.size());  // [triangles]
+    const auto size = [&](Index i) -> Index& { return sizes[static_cast<std::size_t>(i)]; };
+    for (auto i = static_cast<Index>(sizes.size()); i-- > 0;) {
+        size(i) = node(i).is_leaf() ? node(i).count : size(node(i).first) + size(node(i).first + 1);
+    }
+    FoldedShape<width> wide{{0}, {}};
+    for (std::size_t n = 0; n < wide.nodes.size(); ++n) {
+        std::array<Index, width> children;
+        children.fill(no_index);
+        children[0] = wide.nodes[n];
+        for (std::size_t count = 1; count < width; ++count) {
+            const auto weight = [&](Index i) { return i == no_index || node(i).is_leaf() ? 0 : size(i); };
+            const auto largest = std::max_element(children.begin(), children.end(),
+                                                  [&](Index a, Index b) { return weight(a) < weight(b); });
+            if (weight(*largest) == 0) break;
+            children[count] = node(*largest).first + 1;
+            *largest = node(*largest).first;
+        }
+        for (const Index i : children) {
+            if (i != no_index && !node(i).is_leaf()) wide.nodes.push_back(i);
+        }
+        wide.children.push_back(children);
+    }
+    return wide;
 }
 
 }  // namespace membrane

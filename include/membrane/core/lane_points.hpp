@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstring>
@@ -20,6 +21,72 @@ struct alignas(4 * sizeof(Scalar)) PaddedPoint {
 
     [[nodiscard]] Vector3<Scalar> point() const noexcept { return {number[0], number[1], number[2]}; }
     void set(const Vector3<Scalar>& p) noexcept { number = {p.x(), p.y(), p.z(), 0}; }
+};
+
+namespace detail {
+
+/// As many numbers of a point as a register holds.
+template <Real Scalar>
+struct PartOfPoint {
+    static constexpr std::size_t bytes = (std::min)(4 * sizeof(Scalar), register_bytes);
+    using Type __attribute__((vector_size(bytes))) = Scalar;
+};
+
+}  // namespace detail
+
+/// A point in registers, reckoned with as a whole.
+template <Real Scalar>
+class PaddedVector {
+  public:
+    PaddedVector() = default;  ///< Zero.
+
+    /// The four numbers from `from` on.
+    [[nodiscard]] static PaddedVector load(const Scalar* from) noexcept {
+        PaddedVector vector;
+        std::memcpy(vector.parts_.data(), from, sizeof parts_);
+        return vector;
+    }
+    void store(Scalar* to) const noexcept { std::memcpy(to, parts_.data(), sizeof parts_); }
+
+    [[nodiscard]] friend PaddedVector operator+(const PaddedVector& a, const PaddedVector& b) noexcept {
+        return each([](auto x, auto y) { return x + y; }, a, b);
+    }
+    [[nodiscard]] friend PaddedVector operator-(const PaddedVector& a, const PaddedVector& b) noexcept {
+        return each([](auto x, auto y) { return x - y; }, a, b);
+    }
+    [[nodiscard]] friend PaddedVector operator*(const PaddedVector& a, const PaddedVector& b) noexcept {
+        return each([](auto x, auto y) { return x * y; }, a, b);
+    }
+
+    /// Of all four numbers.
+    [[nodiscard]] Scalar sum() const noexcept {
+        std::array<Scalar, 4> number;
+        store(number.data());
+        return (number[0] + number[1]) + (number[2] + number[3]);
+    }
+
+    /// y, z, x.
+    [[nodiscard]] PaddedVector turned() const noexcept {
+        PaddedVector result;
+        if constexpr (parts == 1) {
+            result.parts_[0] = __builtin_shufflevector(parts_[0], parts_[0], 1, 2, 0, 3);
+        } else {
+            result.parts_ = {__builtin_shufflevector(parts_[0], parts_[1], 1, 2), parts_[0]};
+        }
+        return result;
+    }
+
+  private:
+    template <class Operation>
+    static PaddedVector each(Operation operation, const PaddedVector& a, const PaddedVector& b) noexcept {
+        PaddedVector result;
+        for (std::size_t i = 0; i < parts; ++i) result.parts_[i] = operation(a.parts_[i], b.parts_[i]);
+        return result;
+    }
+
+    using Part = typename detail::PartOfPoint<Scalar>::Type;
+    static constexpr std::size_t parts = 4 * sizeof(Scalar) / sizeof(Part);
+    std::array<Part, parts> parts_{};
 };
 
 /// How many numbers a point takes: row r begins at number 4 r.

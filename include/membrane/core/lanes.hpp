@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
+#include <type_traits>
 #include <utility>
 
 #include <membrane/core/types.hpp>
@@ -88,6 +90,8 @@ class Lanes {
     /// A yes or no for each lane.
     class Mask {
       public:
+        using PartMask = decltype(Part{} < Part{});
+
         [[nodiscard]] friend Mask operator&(const Mask& a, const Mask& b) noexcept {
             Mask both;
             for (std::size_t i = 0; i < parts; ++i) both.parts_[i] = a.parts_[i] & b.parts_[i];
@@ -99,13 +103,41 @@ class Lanes {
             return ((bits[0] | bits[1]) | (bits[2] | bits[3])) != 0;
         }
 
+        /// Lane i in bit i.
+        [[nodiscard]] friend std::uint32_t bits(const Mask& mask) noexcept {
+            std::uint32_t all = 0;
+            for (std::size_t i = 0; i < parts; ++i) all |= bits_of(mask.parts_[i]) << (i * count / parts);
+            return all;
+        }
+
       private:
         friend Lanes;
-        std::array<decltype(Part{} < Part{}), parts> parts_;
+        static std::uint32_t bits_of(const PartMask& mask) noexcept {
+#if defined(__AVX__)
+            if constexpr (sizeof(Scalar) == 4)
+                return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<Part>(mask)));
+            else
+                return static_cast<std::uint32_t>(_mm256_movemask_pd(reinterpret_cast<Part>(mask)));
+#elif defined(__SSE2__)
+            if constexpr (sizeof(Scalar) == 4)
+                return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<Part>(mask)));
+            else
+                return static_cast<std::uint32_t>(_mm_movemask_pd(reinterpret_cast<Part>(mask)));
+#else
+            std::uint32_t all = 0;
+            for (std::size_t i = 0; i < count / parts; ++i) all |= static_cast<std::uint32_t>(mask[i] != 0) << i;
+            return all;
+#endif
+        }
+
+        std::array<PartMask, parts> parts_;
     };
 
     [[nodiscard]] friend Mask operator<(const Lanes& a, const Lanes& b) noexcept {
         return compare([](auto x, auto y) { return x < y; }, a, b);
+    }
+    [[nodiscard]] friend Mask operator<=(const Lanes& a, const Lanes& b) noexcept {
+        return compare([](auto x, auto y) { return x <= y; }, a, b);
     }
     [[nodiscard]] friend Mask operator>(const Lanes& a, const Lanes& b) noexcept { return b < a; }
     [[nodiscard]] friend Mask operator>=(const Lanes& a, const Lanes& b) noexcept {
@@ -113,6 +145,14 @@ class Lanes {
     }
     [[nodiscard]] friend Mask operator!=(const Lanes& a, const Lanes& b) noexcept {
         return compare([](auto x, auto y) { return x != y; }, a, b);
+    }
+
+    [[nodiscard]] friend Lanes abs(const Lanes& a) noexcept {
+        using Bits = typename Mask::PartMask;
+        using One = std::remove_cvref_t<decltype(Bits{}[0])>;
+        const Bits all_but_sign = (std::numeric_limits<One>::max)() - Bits{};
+        return each([&](auto x, auto) { return reinterpret_cast<Part>(reinterpret_cast<Bits>(x) & all_but_sign); }, a,
+                    a);
     }
 
     /// `yes` in the lanes of `mask`, `no` in the others.

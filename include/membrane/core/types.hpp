@@ -91,7 +91,7 @@ template <Number Scalar>
     return sqrt(squared_norm(a));
 }
 
-template <Real Scalar>
+template <Number Scalar>
 [[nodiscard]] Vector3<Scalar> cross(const Vector3<Scalar>& a, const Vector3<Scalar>& b) noexcept {
     return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(), a.x() * b.y() - a.y() * b.x()};
 }

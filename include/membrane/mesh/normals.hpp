@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
 #include <membrane/core/index_set.hpp>
+#include <membrane/core/lane_points.hpp>
 #include <membrane/mesh/adjacency.hpp>
 #include <membrane/mesh/triangle.hpp>
 
@@ -19,6 +22,16 @@
 ///     draw(x, normals.values());
 namespace membrane {
 
+namespace detail {
+
+/// The border of the triangles around a vertex, as begins in rows of `PaddedPoint`; see `borders_of`.
+struct Border {
+    std::array<Index, 6> begins;    ///< The first, of most vertices all.
+    Index rest = 0, rest_size = 0;  ///< Where the others are in an array of them.
+};
+
+}  // namespace detail
+
 /// Unit normals of the vertices, weighted by the area of their triangles. Owns all it holds; the mesh may go.
 ///
 /// An update of the moved vertices gives the same bits as one of all. A vertex whose triangles have no area together,
@@ -27,7 +40,7 @@ namespace membrane {
 template <Real Scalar>
 class VertexNormals {
   public:
-    /// Of the mesh at rest. O(F).
+    /// Of the mesh at rest. O(F log F).
     explicit VertexNormals(const TriangleMesh<Scalar>& mesh);
 
     /// Of all vertices, at the positions `x`, 3 x V [m]. O(F), no allocation.
@@ -35,7 +48,8 @@ class VertexNormals {
     void update(const ConstPointsRef<Scalar>& x) noexcept;
 
     /// Of the vertices `moved` and their neighbours, each once; a vertex may be named several times. Returns them, valid
-    /// until the next update: no other normal has changed. Linear in the number of their triangles, no allocation.
+    /// until the next update: no other normal has changed, and no other point is read. Linear in the number of their
+    /// triangles, no allocation.
     /// @pre `x` has a column for each vertex and `moved` names vertices (asserted).
     std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
@@ -43,15 +57,22 @@ class VertexNormals {
     [[nodiscard]] const Points<Scalar>& values() const noexcept { return values_; }
 
   private:
-    void measure(const ConstPointsRef<Scalar>& x, Index f) noexcept;
-    void sum_up(Index v) noexcept;
+    static constexpr auto lanes = static_cast<Index>(Lanes<Scalar>::count);
 
-    Triangles triangles_;
-    CompressedRows<Index> triangles_of_;  // around a vertex
-    Points<Scalar> areas_;                // twice the area of each triangle, along its normal
+    template <class VertexAt>
+    void face(Index count, const VertexAt& vertex) noexcept;
+    template <class VertexAt>
+    void normalise(const VertexAt& vertex) noexcept;
+    void mend(Index v, Scalar squared) noexcept;
+    PaddedPoint<Scalar>& place(Index v) noexcept { return places_[static_cast<std::size_t>(v)]; }
+
+    std::vector<detail::Border> borders_;
+    std::vector<Index> rests_;  // of the borders
+    std::vector<PaddedPoint<Scalar>> places_;
+    std::vector<PaddedPoint<Scalar>> padded_;  // twice the area around each vertex as z, x, y; then its normal
     Points<Scalar> values_;
     Points<Scalar> at_rest_;
-    IndexSet measured_, updated_;  // by the last call
+    IndexSet updated_;  // by the last call
 };
 
 /// The angle-weighted normal where `barycentric` says, of the face, edge or corner: its sign against the way from there
@@ -74,6 +95,57 @@ template <Real Scalar>
     return a / std::sqrt(squared);
 }
 
+/// What the triangles around each vertex have for a border, counter-clockwise: its neighbours; if these do not go all the
+/// way round, the vertex and its neighbours. An even number: where it would be odd, the first comes again.
+template <Real Scalar>
+[[nodiscard]] CompressedRows<Index> borders_of(const TriangleMesh<Scalar>& mesh) {
+    const Adjacency adjacency(mesh);
+    const auto& triangles = mesh.triangles();
+    return {mesh.vertex_count(), [&](auto put) {
+                for (Index v = 0; v < mesh.vertex_count(); ++v) {
+                    const auto corner = [&](Index f, Index k) {  // k corners after the vertex
+                        return ((triangles(0, f) == v ? 0 : triangles(1, f) == v ? 1 : 2) + k) % 3;
+                    };
+                    const auto across = [&](Index f, Index k) {
+                        return adjacency.triangle_neighbours(f)[static_cast<std::size_t>(corner(f, k))];
+                    };
+                    const auto around = adjacency.triangles_of(v);
+                    const std::size_t neighbours = adjacency.neighbours(v).size();
+                    const bool closed = neighbours == around.size();  // an isolated vertex has none of either
+                    Index f = around.empty() ? no_index : around[0];
+                    while (!closed && across(f, 0) != no_index) f = across(f, 0);
+                    const Index first = closed && f != no_index ? triangles(corner(f, 1), f) : v;
+                    put(v, first);
+                    if (!closed) put(v, triangles(corner(f, 1), f));
+                    for (std::size_t n = closed ? 1 : 0; n < around.size(); ++n, f = across(f, 2)) {
+                        put(v, triangles(corner(f, 2), f));
+                    }
+                    if ((neighbours + (closed ? 0 : 1)) % 2 == 1 || around.empty()) put(v, first);
+                }
+            }};
+}
+
+/// Twice the area that the border encloses, as z, x, y: whatever is inside, triangles from its first point to its others
+/// have the same together. They are taken two at a time, as the product of their diagonals.
+template <Real Scalar>
+[[gnu::always_inline]] inline PaddedVector<Scalar> area_within(const Border& border, const Index* rests,
+                                                               const PaddedPoint<Scalar>* places) noexcept {
+    const auto at = [&](Index begin) { return PaddedVector<Scalar>::load(places->number.data() + begin); };
+    const auto first = at(border.begins[0]);
+    auto last = at(border.begins[1]);
+    const auto next_two = [&](Index p, Index q) {
+        const auto next = at(q), a = at(p) - first, b = next - last;
+        last = next;
+        return a * b.turned() - a.turned() * b;
+    };
+    auto area = next_two(border.begins[2], border.begins[3]);
+    area = area + next_two(border.begins[4], border.begins[5]);
+    for (Index k = border.rest; k < border.rest + border.rest_size; k += 2) {
+        area = area + next_two(rests[k], rests[k + 1]);
+    }
+    return area;
+}
+
 /// The angle between two sides [rad].
 template <Real Scalar>
 [[nodiscard]] Scalar angle_between(const Vector3<Scalar>& a, const Vector3<Scalar>& b) noexcept {
@@ -84,18 +156,23 @@ template <Real Scalar>
 
 template <Real Scalar>
 VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
-    : triangles_(mesh.triangles()),
-      triangles_of_(mesh.vertex_count(),
-                    [&](auto put) {
-                        for (Index f = 0; f < mesh.triangle_count(); ++f) {
-                            for (const Index v : mesh.triangles().col(f)) put(v, f);
-                        }
-                    }),
-      areas_(3, mesh.triangle_count()),
+    : borders_(static_cast<std::size_t>(mesh.vertex_count())),
+      places_(borders_.size()),
+      padded_(borders_.size()),
       values_(3, mesh.vertex_count()),
       at_rest_(Vector3<Scalar>(0, 0, 1).replicate(1, mesh.vertex_count())),
-      measured_(mesh.triangle_count()),
       updated_(mesh.vertex_count()) {
+    const CompressedRows<Index> whole = detail::borders_of(mesh);
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        detail::Border& border = borders_[static_cast<std::size_t>(v)];
+        const auto points = whole[v];
+        const std::size_t here = (std::min)(points.size(), border.begins.size());
+        border.begins.fill(numbers_in_point * points[0]);
+        border.rest = static_cast<Index>(rests_.size());
+        border.rest_size = static_cast<Index>(points.size() - here);
+        for (std::size_t k = 0; k < here; ++k) border.begins[k] = numbers_in_point * points[k];
+        for (const Index w : points.subspan(here)) rests_.push_back(numbers_in_point * w);
+    }
     update(mesh.positions());
     at_rest_ = values_;
 }
@@ -103,38 +180,76 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
 template <Real Scalar>
 void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
-    for (Index f = 0; f < static_cast<Index>(triangles_.cols()); ++f) measure(x, f);
-    for (Index v = 0; v < triangles_of_.row_count(); ++v) sum_up(v);
+    const auto count = static_cast<Index>(values_.cols());
+    for (Index v = 0; v < count; ++v) place(v).set(point(x, v));
+    face(count, [](Index v) { return v; });
 }
 
 template <Real Scalar>
 std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x,
                                                      std::span<const Index> moved) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
-    measured_.clear();
     updated_.clear();
     for (const Index v : moved) {
         updated_.insert(v);
-        for (const Index f : triangles_of_[v]) {
-            if (!measured_.insert(f)) continue;
-            measure(x, f);
-            for (const Index corner : triangles_.col(f)) updated_.insert(corner);
+        const detail::Border& border = borders_[static_cast<std::size_t>(v)];
+        for (const Index begin : border.begins) updated_.insert(begin / numbers_in_point);
+        for (Index k = border.rest; k < border.rest + border.rest_size; ++k) {
+            updated_.insert(rests_[static_cast<std::size_t>(k)] / numbers_in_point);
         }
     }
-    for (const Index v : updated_.items()) sum_up(v);
-    return updated_.items();
+    const auto updated = updated_.items();
+    for (const Index v : updated) place(v).set(point(x, v));
+    face(updated_.count(), [&](Index n) { return updated[static_cast<std::size_t>(n)]; });
+    return updated;
 }
 
+/// Finds the normals of `vertex(n)` for n from 0 to `count` - 1.
 template <Real Scalar>
-void VertexNormals<Scalar>::measure(const ConstPointsRef<Scalar>& x, Index f) noexcept {
-    areas_.col(f) = 2 * area_vector(triangle_at(x, triangles_.col(f)));
+template <class VertexAt>
+void VertexNormals<Scalar>::face(Index count, const VertexAt& vertex) noexcept {
+    // Read once: for all the compiler knows, what is stored below changes them.
+    const detail::Border* borders = borders_.data();
+    const Index* rests = rests_.data();
+    const PaddedPoint<Scalar>* places = places_.data();
+    PaddedPoint<Scalar>* padded = padded_.data();
+    for (Index n = 0; n < count; ++n) {
+        const Index v = vertex(n);
+        detail::area_within(borders[v], rests, places).store(padded[v].number.data());
+    }
+    Index n = 0;
+    for (; n + lanes <= count; n += lanes) normalise([&](Index i) { return vertex(n + i); });
+    if (n < count) normalise([&](Index i) { return vertex((std::min)(n + i, count - 1)); });
 }
 
+/// Makes normals of areas, of as many vertices as there are lanes: square root and division are slow one by one.
 template <Real Scalar>
-void VertexNormals<Scalar>::sum_up(Index v) noexcept {
-    Vector3<Scalar> area(0, 0, 0);
-    for (const Index f : triangles_of_[v]) area += point(areas_, f);
-    values_.col(v) = detail::unit_or(area, point(at_rest_, v));
+template <class VertexAt>
+[[gnu::always_inline]] inline void VertexNormals<Scalar>::normalise(const VertexAt& vertex) noexcept {
+    std::array<Index, Lanes<Scalar>::count> begins;
+    PaddedVector<Scalar> places;
+    for (Index i = 0; i < lanes; ++i) {
+        begins[static_cast<std::size_t>(i)] = numbers_in_point * vertex(i);
+        places = places + PaddedVector<Scalar>::load(place(vertex(i)).number.data());
+    }
+    const Vector3<Lanes<Scalar>> turned = gather(padded_.data(), begins.data());
+    const Vector3<Lanes<Scalar>> area(turned.y(), turned.z(), turned.x());
+    const Lanes<Scalar> squared = squared_norm(area), length = sqrt(squared);
+    scatter<Scalar>({area.x() / length, area.y() / length, area.z() / length}, padded_.data(), begins.data());
+    for (Index i = 0; i < lanes; ++i) values_.col(vertex(i)) = padded_[static_cast<std::size_t>(vertex(i))].point();
+
+    Scalar all = places.sum();  // finite only if all that is added is; a vertex is no part of its border
+    for (std::size_t i = 0; i < Lanes<Scalar>::count; ++i) all += squared[i];
+    if (is_finite(all) && !any(squared < (std::numeric_limits<Scalar>::min)())) [[likely]]
+        return;
+    for (Index i = 0; i < lanes; ++i) mend(vertex(i), squared[static_cast<std::size_t>(i)]);
+}
+
+/// Gives vertex `v` its normal at rest unless it has one; `squared` is the square of twice its area.
+template <Real Scalar>
+[[gnu::noinline]] void VertexNormals<Scalar>::mend(Index v, Scalar squared) noexcept {
+    const bool measurable = is_finite(squared) && squared >= (std::numeric_limits<Scalar>::min)();
+    if (!measurable || !is_finite(place(v).point())) values_.col(v) = at_rest_.col(v);
 }
 
 template <class Positions>

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include <membrane/core/check.hpp>
+#include <membrane/core/lanes.hpp>
 
 /// One triangle and what can be near it: a point, a segment, a box.
 ///
@@ -19,10 +20,10 @@
 /// down to three equal corners, are segments or points. No finite input gives a NaN.
 namespace membrane {
 
-/// Three corners, counter-clockwise seen from outside [m].
-template <Real Scalar>
+/// Three corners, counter-clockwise seen from outside [m]. Of `Lanes`: several triangles.
+template <Number N>
 struct Triangle {
-    Vector3<Scalar> a, b, c;
+    Vector3<N> a, b, c;
 };
 
 /// A point of a triangle and how far it is from what was asked about.
@@ -99,10 +100,10 @@ template <Real Scalar>
     return part < whole ? part / whole : Scalar(1);
 }
 
-template <Real Scalar>
-[[nodiscard]] Scalar largest_magnitude(const Vector3<Scalar>& a) noexcept {
+template <Number N>
+[[nodiscard]] N largest_magnitude(const Vector3<N>& a) noexcept {
     using std::abs;
-    return (std::max)((std::max)(abs(a.x()), abs(a.y())), abs(a.z()));
+    return larger(larger<N>(abs(a.x()), abs(a.y())), N(abs(a.z())));
 }
 
 /// What a few roundings come to at a point as far out as `a`.
@@ -222,6 +223,32 @@ template <Real Scalar>
     return first <= last;
 }
 
+/// A segment against a triangle that it does not run in the plane of, or beside.
+template <Number N>
+struct Crossing {
+    using YesNo = decltype(N() < N());
+    YesNo clear, met;   ///< `met` only counts where it is `clear`
+    N distance, whole;  ///< on the segment; the quotient is how far along
+
+    /// Cramer's rule for from + along * segment = a + b * ab + c * ac [Moeller97], signs decided before the division.
+    Crossing(const Triangle<N>& triangle, const Vector3<Each<N>>& from, const Vector3<Each<N>>& to) noexcept {
+        const Vector3<N> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a;
+        const Vector3<N> start(from.x(), from.y(), from.z()), offset = triangle.a - start;
+        const Vector3<N> segment = Vector3<N>(to.x(), to.y(), to.z()) - start;
+        const Vector3<N> normal = cross(ab, ac), moment = cross(segment, offset);
+        const N climb = dot(segment, normal), sign = select<N>(climb < 0, -1, 1);
+        const N size = larger(largest_magnitude(ab), largest_magnitude(ac));
+        const N area = larger(size, largest_magnitude(offset)) * size, rounded = rounding<Each<N>> * area;
+        const N slack = rounded * largest_magnitude(segment), end_slack = rounded * size;
+        const N weight_b = -sign * dot(moment, ac), weight_c = sign * dot(moment, ab);
+        whole = sign * climb;
+        distance = sign * dot(normal, offset);
+        clear = whole > slack;
+        met = (weight_b >= -slack) & (weight_c >= -slack) & (weight_b + weight_c <= whole + slack) &
+              (distance >= -end_slack) & (distance <= whole + (slack + end_slack));
+    }
+};
+
 /// The weights follow from the point on the segment: solved for together with it, they would part from it where the
 /// segment meets the plane at a small angle.
 template <Real Scalar>
@@ -259,23 +286,10 @@ template <Real Scalar>
 template <Real Scalar>
 std::optional<SegmentHit<Scalar>> first_hit(const Triangle<Scalar>& triangle, const Vector3<Scalar>& from,
                                             const Vector3<Scalar>& to) noexcept {
-    using std::abs;
-    const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a;
-    const Vector3<Scalar> segment = to - from, offset = triangle.a - from;
-    const Vector3<Scalar> normal = cross(ab, ac), moment = cross(segment, offset);
-    const Scalar climb = dot(segment, normal), sign = climb < 0 ? Scalar(-1) : Scalar(1), whole = sign * climb;
-    const Scalar size = (std::max)(detail::largest_magnitude(ab), detail::largest_magnitude(ac));
-    const Scalar reach = (std::max)(size, detail::largest_magnitude(offset));
-    const Scalar slack = detail::rounding<Scalar> * reach * size * detail::largest_magnitude(segment);
-    if (!(whole > slack)) return detail::first_hit_in_plane(triangle, from, segment);
-
-    // Cramer's rule for from + along * segment = a + b * ab + c * ac [Moeller97], signs decided before the division.
-    const Scalar weight_b = -sign * dot(moment, ac), weight_c = sign * dot(moment, ab);
-    if (!(weight_b >= -slack && weight_c >= -slack && weight_b + weight_c <= whole + slack)) return std::nullopt;
-    const Scalar distance = sign * dot(normal, offset);
-    const Scalar end_slack = detail::rounding<Scalar> * reach * size * size;
-    if (!(distance >= -end_slack && distance <= whole + (slack + end_slack))) return std::nullopt;
-    return detail::hit_at(triangle, from, segment, detail::fraction(distance, whole));
+    const detail::Crossing<Scalar> crossing(triangle, from, to);
+    if (!crossing.clear) return detail::first_hit_in_plane<Scalar>(triangle, from, to - from);
+    if (!crossing.met) return std::nullopt;
+    return detail::hit_at<Scalar>(triangle, from, to - from, detail::fraction(crossing.distance, crossing.whole));
 }
 
 template <Real Scalar>
