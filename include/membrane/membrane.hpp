@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-// What the loop needs, in the order of the data flow. Scripts, the explicit Euler method and what tells how
+// What the loop needs, in the order of the data flow. Scripts, the explicit Euler method, threads and what tells how
 // accurate a step is are included by their own names.
 //
 // clang-format off
 #include <membrane/core/types.hpp>
 #include <membrane/core/check.hpp>
+#include <membrane/core/executor.hpp>
 #include <membrane/core/field.hpp>
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/core/version.hpp>

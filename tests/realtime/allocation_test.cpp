@@ -12,6 +12,7 @@
 #include <membrane/accuracy/error_bound.hpp>
 #include <membrane/accuracy/factored_convexity.hpp>
 #include <membrane/accuracy/tangent_stiffness.hpp>
+#include <membrane/core/thread_pool.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -83,6 +84,25 @@ TEST_CASE("a million ticks allocate nothing", "[allocation]") {
     CHECK(loop.touching > cases(300'000));
     CHECK(loop.holding > cases(100'000));
     CHECK(loop.x.allFinite());
+}
+
+TEST_CASE("nor does a step that several threads share", "[allocation]") {
+    const auto mesh = icosphere<float>({.radius = 1, .subdivisions = 4});
+    const MassSpringNetwork<float, LinearSpring> network(mesh, {}, {.stiffness = 1});
+    const VirtualVolumeSprings<float> backing(mesh, {.stiffness = 0.1F});
+    const ThreadPool pool(3);
+    QuasiStaticSolver solver(network, SolverOptions<float>{.layers = unlimited, .order = VisitOrder::colours},
+                             BlockStep{}, pool.executor());
+    Points<float> x = mesh.positions();
+    std::size_t moved = 0;
+    const long allocated = allocated_by([&] {
+        for (int i = 0; i < cases(200); ++i) {
+            const auto report = solver.step(x, 1e-3F, network, backing, pull(i % 50, Vector3<float>(0, 0, 1.1F)));
+            moved += report.moved.size();
+        }
+    });
+    CHECK(allocated == 0);
+    CHECK(moved > 0);
 }
 
 TEMPLATE_TEST_CASE("nor does whatever else a loop can hold", "[allocation]", double, float) {

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/solve/compact_block.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <numeric>
 #include <vector>
 
+#include <membrane/core/thread_pool.hpp>
 #include <membrane/mesh/shapes.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/quasi_static.hpp>
@@ -64,13 +67,24 @@ struct Membrane {
     VirtualVolumeSprings<S> backing;
 };
 
+/// Does its tasks in any order.
+struct AnyOrder {
+    template <class Task>
+    void operator()(Index count, const Task& task) const {
+        std::vector<Index> order(static_cast<std::size_t>(count));
+        std::iota(order.begin(), order.end(), 0);
+        std::shuffle(order.begin(), order.end(), Random(static_cast<std::uint64_t>(count)).engine());
+        for (const Index i : order) task(i);
+    }
+};
+
 /// Ten ticks in which a vertex is pulled about, another held, a third loaded; what the steps said is added to `log`.
-template <Real S, class Rule, class Volume>
+template <Real S, class Rule, class Volume, class Threads = OneThread>
 Points<S> play(const Membrane<S>& membrane, const Rule& rule, const Volume& volume, const SolverOptions<S>& options,
-               int seed, std::vector<double>& log) {
+               int seed, std::vector<double>& log, const Threads& executor = {}) {
     Random random(static_cast<std::uint64_t>(seed));
     const Index vertices = membrane.mesh.vertex_count();
-    QuasiStaticSolver<S, Rule> solver(membrane.network, options, rule);
+    QuasiStaticSolver<S, Rule, Threads> solver(membrane.network, options, rule, executor);
     Points<S> x = membrane.mesh.positions();
     Index v = random.index(vertices);
     const Index still = random.index(vertices), f = random.index(membrane.mesh.triangle_count());
@@ -99,7 +113,9 @@ void check_same(const Rule& rule) {
         const SolverOptions<S> options{.layers = random.chance(0.2) ? unlimited : random.index(8),
                                        .sweeps = 1 + random.index(4),
                                        .contact_visits = 1 + random.index(3),
-                                       .most_visits = random.chance(0.2) ? random.index(200) + 1 : unlimited};
+                                       .order = random.chance(0.3) ? VisitOrder::colours : VisitOrder::groups,
+                                       .most_visits = random.chance(0.2) ? random.index(200) + 1 : unlimited,
+                                       .most_in_groups = random.chance(0.2) ? random.index(100) : unlimited};
         std::vector<double> in_lanes, one_by_one;
         if (random.chance(0.2)) {
             const auto x = play(membrane, rule, NoVolumeSprings{}, options, seed, in_lanes);
@@ -116,6 +132,29 @@ void check_same(const Rule& rule) {
     if constexpr (std::same_as<Rule, MassStep>) CHECK((refused > 0 || cases(150) < 150));
 }
 
+/// With everything that a step can do at the same time shared out, however it is.
+template <Real S, class Rule>
+void check_same_shared_out(const Rule& rule) {
+    const ThreadPool pool(3);
+    int advanced = 0;
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Membrane<S> membrane(random);
+        const SolverOptions<S> options{.layers = random.chance(0.5) ? unlimited : random.index(8),
+                                       .sweeps = 1 + random.index(4),
+                                       .order = random.chance(0.7) ? VisitOrder::colours : VisitOrder::groups};
+        std::vector<double> alone, in_any_order, in_threads;
+        const auto x = play(membrane, rule, membrane.backing, options, seed, alone);
+        REQUIRE(same_bits(x, play(membrane, rule, membrane.backing, options, seed, in_any_order, AnyOrder{})));
+        REQUIRE(same_bits(x, play(membrane, rule, membrane.backing, options, seed, in_threads, pool.executor())));
+        REQUIRE(alone == in_any_order);
+        REQUIRE(alone == in_threads);
+        for (std::size_t i = 0; i < alone.size(); i += 5) advanced += alone[i] == 0 ? 1 : 0;
+    }
+    CHECK(advanced > 0);
+}
+
 }  // namespace
 
 TEMPLATE_TEST_CASE("visits in lanes end in the bits of visits one by one", "[block]", float, double) {
@@ -123,4 +162,11 @@ TEMPLATE_TEST_CASE("visits in lanes end in the bits of visits one by one", "[blo
     SECTION("block, over-relaxed") { check_same<TestType>(BlockStep{.omega = 1.3}); }
     SECTION("safe") { check_same<TestType>(SafeStep{}); }
     SECTION("as published") { check_same<TestType>(MassStep{}); }
+}
+
+TEMPLATE_TEST_CASE("it is all the same in what order an executor does its tasks, or in how many threads", "[block]",
+                   float, double) {
+    SECTION("block") { check_same_shared_out<TestType>(BlockStep{}); }
+    SECTION("safe") { check_same_shared_out<TestType>(SafeStep{}); }
+    SECTION("as published") { check_same_shared_out<TestType>(MassStep{}); }
 }

@@ -210,3 +210,32 @@ TEST_CASE("every layer but the first is ordered in groups, whatever was there be
         REQUIRE(std::ranges::equal(queue.group_ends(), groups.ends()));
     }
 }
+
+TEST_CASE("or all beyond the first together, which makes one layer of them", "[queue]") {
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto network = random_network(random);
+        const Index vertices = network.vertex_count(), layers = random.index(20);
+        const std::vector<Index> seeds{random.index(vertices), random.index(vertices)};
+        PropagationQueue queue(vertices), plain(vertices);
+        queue.build(network, seeds, layers);
+        plain.build(network, seeds, layers);
+        queue.group(network, true);
+        REQUIRE(queue.layer_count() == std::min(plain.layer_count(), Index(2)));
+        if (queue.layer_count() == 0) continue;
+        REQUIRE(std::ranges::equal(queue.layer(0), plain.layer(0)));
+        REQUIRE(std::ranges::is_permutation(queue.vertices(), plain.vertices()));
+        std::size_t begin = queue.layer(0).size();
+        for (const std::size_t end : queue.group_ends()) {
+            const auto group = queue.vertices().subspan(begin, end - begin);
+            for (const Index v : group) {
+                for (const auto& spring : network.springs_of(v)) {
+                    CHECK(std::ranges::find(group, spring.other) == group.end());
+                }
+            }
+            begin = end;
+        }
+        REQUIRE(begin == queue.vertices().size());
+    }
+}

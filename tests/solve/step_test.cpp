@@ -16,6 +16,7 @@ TEST_CASE("solver options out of range are refused by name") {
     CHECK(refused({.sweeps = 0}) == "QuasiStaticSolver: sweeps must be at least 1, got 0");
     CHECK(refused({.most_visits = 0}) == "QuasiStaticSolver: most_visits must be at least 1, got 0");
     CHECK(refused({.most_touches = -5}) == "QuasiStaticSolver: most_touches must be at least 0, got -5");
+    CHECK(refused({.most_in_groups = -1}) == "QuasiStaticSolver: most_in_groups must be at least 0, got -1");
     for (const double bad :
          {-1e-9, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
         CHECK_THAT(refused({.negligible_force = bad}),

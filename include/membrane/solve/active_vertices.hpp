@@ -101,8 +101,9 @@ class ActiveVertices {
     VertexGroups groups_;
     Index room_ = 0;  // of those visited
     std::size_t from_queue_ = 0;
-    Index layers_before_ = 0;
-    bool as_needed_ = false, in_groups_ = false, has_frontier_ = false;
+    Index layers_ = 0, layers_before_ = 0;
+    VisitOrder order_ = VisitOrder::arrival;
+    bool as_needed_ = false, has_frontier_ = false;
     bool has_new_queue_ = false;
     bool queue_at_rest_ = true;
 };
@@ -121,8 +122,8 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
 template <class Network, class Options>
 void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
     as_needed_ = options.layers_as_needed;
-    in_groups_ = options.order == VisitOrder::groups && !as_needed_;
-    layers_before_ = queue_.layer_count() - 1;
+    order_ = as_needed_ ? VisitOrder::arrival : options.order;
+    layers_before_ = order_ == VisitOrder::colours ? std::exchange(layers_, options.layers) : queue_.layer_count() - 1;
     next_seeds_.clear();
     for (const Index v : seeds) next_seeds_.insert(v);
     left_.clear();
@@ -152,14 +153,14 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     line_up(restless_.items(), room_);
     line_up(left_.items(), room_);
     groups_.clear();
-    if (in_groups_) groups_.add(network, visited_, from_queue_, vertices().size());
+    if (order_ != VisitOrder::arrival) groups_.add(network, visited_, from_queue_, vertices().size());
     extend(network, options);
 }
 
 template <class Network>
 void ActiveVertices::build_queue(const Network& network, std::span<const Index> seeds, Index layers) noexcept {
     queue_.build(network, seeds, layers);
-    if (in_groups_) queue_.group(network);
+    if (order_ != VisitOrder::arrival) queue_.group(network, order_ == VisitOrder::colours);
     has_new_queue_ = true;
 }
 

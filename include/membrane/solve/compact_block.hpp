@@ -40,13 +40,10 @@ class CompactBlock {
   public:
     using Several = Lanes<Scalar>;
 
-    /// Vertices beyond so many are not worth the memory: a sweep over them takes longer than a tick.
-    static constexpr Index most_vertices = 1 << 15;
-
-    /// Has room for `most_vertices`, or so many.
+    /// Has room for `most` vertices.
     template <class Law>
-    explicit CompactBlock(const MassSpringNetwork<Scalar, Law>& network, Index most = most_vertices)
-        : packs_(network, most), ties_(packs_.room()), answers_(packs_.room()) {}
+    explicit CompactBlock(const MassSpringNetwork<Scalar, Law>& network, Index most = unlimited)
+        : packs_(network, most), ties_(packs_.room()), answers_(packs_.room()), outcomes_(packs_.room()) {}
 
     [[nodiscard]] SpringPacks<Scalar>& packs() noexcept { return packs_; }
     [[nodiscard]] const SpringPacks<Scalar>& packs() const noexcept { return packs_; }
@@ -58,12 +55,24 @@ class CompactBlock {
     /// How many of pack `p` may move.
     [[nodiscard]] Index free_count(std::size_t p) const noexcept { return ties_[p].free_count; }
 
-    enum class Visit { still, moved, too_far };
+    enum class Visit : unsigned char { still, moved, too_far };
 
     /// Moves the vertices of pack `p` as `rule` says. Where that may be beyond what is stable, it is `too_far`, and nothing
     /// moves, unless the move is `allowed`.
     template <class Scene, class Rule>
     Visit visit(std::size_t p, const Scene& scene, const Rule& rule, bool allowed = false) noexcept;
+
+    /// The same for so many packs from number `begin` on that no spring joins, some by each thread; then what came of each.
+    template <class Scene, class Rule, Executor Threads>
+    void visit(std::size_t begin, std::size_t count, const Scene& scene, const Rule& rule,
+               const Threads& executor) noexcept {
+        constexpr Index packs_in_task = 32;
+        share_out(executor, static_cast<Index>(count), packs_in_task, [&](Index i) {
+            const std::size_t p = begin + static_cast<std::size_t>(i);
+            outcomes_[p] = visit(p, scene, rule);
+        });
+    }
+    [[nodiscard]] Visit outcome(std::size_t p) const noexcept { return outcomes_[p]; }
 
     /// The forces on the vertices of pack `p`, each in the lane of its number there [N].
     template <class Scene>
@@ -90,6 +99,7 @@ class CompactBlock {
     SpringPacks<Scalar> packs_;
     std::vector<Ties> ties_;
     std::vector<Several> answers_;
+    std::vector<Visit> outcomes_;
 };
 
 template <Real Scalar>

@@ -32,10 +32,11 @@ class PropagationQueue {
     template <Real Scalar, class Law>
     bool grow(const MassSpringNetwork<Scalar, Law>& network) noexcept;
 
-    /// Orders every layer but layer 0 in groups that no spring joins.
+    /// Orders every layer but layer 0 in groups that no spring joins; or all of them together, in fewer and larger ones,
+    /// which makes one layer of them.
     /// Online. Cost: the springs of the vertices in the queue.
     template <Real Scalar, class Law>
-    void group(const MassSpringNetwork<Scalar, Law>& network) noexcept;
+    void group(const MassSpringNetwork<Scalar, Law>& network, bool together = false) noexcept;
 
     /// Where in `vertices` the groups end: the first begins after layer 0. None before `group` is called.
     [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return groups_.ends(); }
@@ -94,8 +95,12 @@ bool PropagationQueue::grow(const MassSpringNetwork<Scalar, Law>& network) noexc
 }
 
 template <Real Scalar, class Law>
-void PropagationQueue::group(const MassSpringNetwork<Scalar, Law>& network) noexcept {
+void PropagationQueue::group(const MassSpringNetwork<Scalar, Law>& network, bool together) noexcept {
     groups_.clear();
+    if (together && layer_count() > 1) {
+        layer_ends_.cut(1);
+        layer_ends_.push(vertices().size());
+    }
     const auto ends = layer_ends_.items();
     for (std::size_t k = 1; k < ends.size(); ++k) groups_.add(network, reached_, ends[k - 1], ends[k]);
 }

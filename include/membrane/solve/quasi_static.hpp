@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include <membrane/core/executor.hpp>
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
@@ -40,14 +41,14 @@ namespace membrane {
 ///
 /// Positions, network and backing are handed in at each step, always those of one membrane; what is remembered (queue,
 /// restless vertices, contact forces) is a cache. One thread at a time for each solver.
-template <Real Scalar, StepRule<Scalar> Rule = BlockStep>
+template <Real Scalar, StepRule<Scalar> Rule = BlockStep, Executor Threads = OneThread>
 class QuasiStaticSolver {
   public:
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
     /// Cost: O(V) memory.
     template <class Law>
     explicit QuasiStaticSolver(const MassSpringNetwork<Scalar, Law>& network, const SolverOptions<Scalar>& options = {},
-                               const Rule& rule = {});
+                               const Rule& rule = {}, const Threads& executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, in layer 0 `contact_visits` in each
@@ -93,8 +94,7 @@ class QuasiStaticSolver {
     void settle(const Handed& scene, bool mended) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept;
 
-    Rule rule_;
-    SolverOptions<Scalar> options_;
+    Method<Rule, Scalar, Threads> method_;
     ActiveVertices active_;
     CompactBlock<Scalar> block_;
     Workspace<Scalar> work_;
@@ -108,12 +108,12 @@ class QuasiStaticSolver {
     StepCosts costs_;
 };
 
-template <Real Scalar, StepRule<Scalar> Rule>
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <class Law>
-QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const MassSpringNetwork<Scalar, Law>& network,
-                                                   const SolverOptions<Scalar>& options, const Rule& rule)
-    : rule_(rule),
-      options_((options.check(), options)),
+QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const MassSpringNetwork<Scalar, Law>& network,
+                                                            const SolverOptions<Scalar>& options, const Rule& rule,
+                                                            const Threads& executor)
+    : method_{rule, (options.check(), options), executor},
       active_(network.vertex_count()),
       block_(network, detail::most_in_lanes<Scalar, Rule, Law>(options)),
       work_(
@@ -131,12 +131,12 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const MassSpringNetwork<Scala
     work_.negligible_force = options.negligible_force > 0 ? options.negligible_force : network.negligible_force();
 }
 
-template <Real Scalar, StepRule<Scalar> Rule>
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <class Pace, class Law, class Volume, class... Constraints>
-StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
-                                                            const MassSpringNetwork<Scalar, Law>& network,
-                                                            const Volume& volume,
-                                                            const Constraints&... constraints) noexcept {
+StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
+                                                                     const MassSpringNetwork<Scalar, Law>& network,
+                                                                     const Volume& volume,
+                                                                     const Constraints&... constraints) noexcept {
     static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints, "a step takes 16 constraints at most");
     MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());
     open(sizeof...(Constraints));
@@ -155,7 +155,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
     line_up(network, region);
     const StepInput<Scalar, MassSpringNetwork<Scalar, Law>, Volume> scene{x, dt, network, volume, work_};
     std::size_t resume = resume_;
-    Sweeps sweeps(rule_, options_, scene, region, acting, active_, block_, pace, report_);
+    Sweeps sweeps(method_, scene, region, acting, active_, block_, pace, report_);
     StepStatus status = sweeps.run(resume);
     if (status == StepStatus::advanced && !acting.react(reactions_)) status = StepStatus::unstable;
     if (status != StepStatus::advanced) {
@@ -169,8 +169,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(Pace pace, PointsRef
     return report_;
 }
 
-template <Real Scalar, StepRule<Scalar> Rule>
-void QuasiStaticSolver<Scalar, Rule>::open(std::size_t constraint_count) noexcept {
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+void QuasiStaticSolver<Scalar, Rule, Threads>::open(std::size_t constraint_count) noexcept {
     work_.open();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {};
@@ -178,10 +178,10 @@ void QuasiStaticSolver<Scalar, Rule>::open(std::size_t constraint_count) noexcep
 }
 
 // Those that moved go on, as far as what leads them does. They are to be visited, wherever they are now.
-template <Real Scalar, StepRule<Scalar> Rule>
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <class Acting>
-void QuasiStaticSolver<Scalar, Rule>::predict(const Acting& acting, Region<Scalar>& region) noexcept {
-    if (!options_.predict) return;
+void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const Acting& acting, Region<Scalar>& region) noexcept {
+    if (!method_.options.predict) return;
     std::array<Lead<Scalar>, Workspace<Scalar>::most_constraints> leads{};
     acting.tell(leads);
     const Scalar part = predictor_.expect(leads);
@@ -193,22 +193,22 @@ void QuasiStaticSolver<Scalar, Rule>::predict(const Acting& acting, Region<Scala
 }
 
 // Who is at work in this step, what has been let go of as well.
-template <Real Scalar, StepRule<Scalar> Rule>
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <class Network>
-void QuasiStaticSolver<Scalar, Rule>::line_up(const Network& network, Region<Scalar>& region) noexcept {
+void QuasiStaticSolver<Scalar, Rule, Threads>::line_up(const Network& network, Region<Scalar>& region) noexcept {
     for (const Index v : last_held_.items()) {
         if (!region.fixed(v)) active_.wake(v);
     }
-    active_.arrange(network, work_.seeds.items(), options_);
+    active_.arrange(network, work_.seeds.items(), method_.options);
     for (const auto vertices : {active_.vertices(), active_.frontier()}) {
         for (const Index v : vertices) region.save(v);
     }
 }
 
 // Who has moved, and who has to be looked at again.
-template <Real Scalar, StepRule<Scalar> Rule>
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <class Handed>
-void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene, bool mended) noexcept {
+void QuasiStaticSolver<Scalar, Rule, Threads>::settle(const Handed& scene, bool mended) noexcept {
     moved_.clear();
     active_.settle(
         [&](Index v) { return work_.held.contains(v) || norm(lasting_force(scene, v)) <= work_.negligible_force; });
@@ -216,9 +216,9 @@ void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene, bool mended) n
         const Vector3<Scalar> way = point(scene.x, v) - point(work_.start, v);
         if (way.isZero(0)) continue;
         moved_.push(v);
-        if (options_.predict) ways_.col(v) = way;
+        if (method_.options.predict) ways_.col(v) = way;
         const Scalar compliance = work_.compliance[static_cast<std::size_t>(v)];
-        const Scalar negligible = options_.layers_as_needed ? Scalar(0) : compliance * work_.negligible_force;
+        const Scalar negligible = method_.options.layers_as_needed ? Scalar(0) : compliance * work_.negligible_force;
         if (norm(way) > negligible) active_.stir_neighbours(scene.network, v);
     }
     report_.moved = moved_.items();
@@ -226,8 +226,9 @@ void QuasiStaticSolver<Scalar, Rule>::settle(const Handed& scene, bool mended) n
     std::swap(last_held_, work_.held);
 }
 
-template <Real Scalar, StepRule<Scalar> Rule>
-StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept {
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepStatus status,
+                                                                         PointsRef<Scalar>& x) noexcept {
     Region<Scalar>(x, work_).put_back([](Index) { return true; });
     if (status == StepStatus::unstable) work_.forget();  // what ran away may be a force from the step before
     predictor_.forget();
@@ -236,20 +237,20 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus statu
     return report_;
 }
 
-template <Real Scalar, StepRule<Scalar> Rule>
-void QuasiStaticSolver<Scalar, Rule>::wake(std::span<const Index> vertices) noexcept {
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+void QuasiStaticSolver<Scalar, Rule, Threads>::wake(std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
         if (v >= 0 && v < work_.vertex_count() && work_.pinned[static_cast<std::size_t>(v)] == 0) active_.wake(v);
     }
 }
 
-template <Real Scalar, StepRule<Scalar> Rule>
-void QuasiStaticSolver<Scalar, Rule>::wake_all() noexcept {
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+void QuasiStaticSolver<Scalar, Rule, Threads>::wake_all() noexcept {
     for (Index v = 0; v < work_.vertex_count(); ++v) wake({&v, 1});
 }
 
-template <Real Scalar, StepRule<Scalar> Rule>
-void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
     active_.clear();
     work_.forget();
     predictor_.forget();

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <membrane/core/bounded_list.hpp>
+#include <membrane/core/executor.hpp>
 #include <membrane/core/lane_points.hpp>
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/solve/propagation_queue.hpp>
@@ -61,8 +62,10 @@ class SpringPacks {
     }
 
     /// Takes the positions of all packs and their neighbours from `x` (3 x V [m]), and gives those of the packs back.
-    void load(const PointsRef<Scalar>& x) noexcept;
-    void store(PointsRef<Scalar>& x) const noexcept;
+    template <Executor Threads = OneThread>
+    void load(const PointsRef<Scalar>& x, const Threads& executor = {}) noexcept;
+    template <Executor Threads = OneThread>
+    void store(PointsRef<Scalar>& x, const Threads& executor = {}) const noexcept;
 
     /// Where the vertices of pack `p` are, each in the lane of its number there [m].
     [[nodiscard]] Vector3<Several> positions(std::size_t p) const noexcept {
@@ -83,6 +86,7 @@ class SpringPacks {
 
   private:
     static constexpr std::size_t lanes = Several::count;
+    static constexpr Index points_in_task = 2048;
     /// Of each lane, where the row of its point begins.
     using Begins = std::array<Index, lanes>;
     struct Pack {
@@ -216,16 +220,20 @@ bool SpringPacks<Scalar>::append_pack(std::span<const Index> vertices, const Net
 }
 
 template <Real Scalar>
-void SpringPacks<Scalar>::load(const PointsRef<Scalar>& x) noexcept {
-    auto* row = rows_.data();
-    for (const Index v : with_row_.items()) (++row)->set(point(x, v));
+template <Executor Threads>
+void SpringPacks<Scalar>::load(const PointsRef<Scalar>& x, const Threads& executor) noexcept {
+    share_out(executor, static_cast<Index>(with_row_.size()), points_in_task,
+              [&, from = with_row_.items().data(), to = rows_.data() + 1](Index i) { to[i].set(point(x, from[i])); });
 }
 
 template <Real Scalar>
-void SpringPacks<Scalar>::store(PointsRef<Scalar>& x) const noexcept {
-    for (const Index v : members_.items()) {
-        x.col(v) = rows_[static_cast<std::size_t>(row_[static_cast<std::size_t>(v)])].point();
-    }
+template <Executor Threads>
+void SpringPacks<Scalar>::store(PointsRef<Scalar>& x, const Threads& executor) const noexcept {
+    share_out(executor, static_cast<Index>(members_.size()), points_in_task,
+              [&, members = members_.items().data()](Index i) {
+                  const Index v = members[i];
+                  x.col(v) = rows_[static_cast<std::size_t>(row_[static_cast<std::size_t>(v)])].point();
+              });
 }
 
 }  // namespace membrane

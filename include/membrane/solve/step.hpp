@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include <membrane/core/check.hpp>
+#include <membrane/core/executor.hpp>
 
 /// What a step of the solver may cost, and what it says of itself.
 ///
@@ -17,6 +18,7 @@ namespace membrane {
 enum class VisitOrder {
     arrival,  ///< as the breadth-first search came to them, [Liu07] 2.2
     groups,   ///< those together that no spring joins: the processor moves several of them at once
+    colours,  ///< the same, of all layers together: few and large groups, for several threads; changes spread more slowly
 };
 
 /// What a step may cost. More of everything is more accurate.
@@ -31,9 +33,18 @@ struct SolverOptions {
     Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 and what is held get theirs anyway
     Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
     Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time
+    Index most_in_groups = 32'768;  ///< room for vertices moved several at once: each 260 bytes, 460 in double
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
+};
+
+/// How a solver works: what moves a vertex, what that may cost, and who does what may be done at the same time.
+template <class Rule, Real Scalar, class Threads>
+struct Method {
+    Rule rule;
+    SolverOptions<Scalar> options;
+    Threads executor;
 };
 
 enum class StepStatus {
@@ -74,6 +85,7 @@ void SolverOptions<Scalar>::check() const {
     at_least(contact_visits, 1, "contact_visits");
     at_least(most_visits, 1, "most_visits");
     at_least(most_touches, 0, "most_touches");
+    at_least(most_in_groups, 0, "most_in_groups");
     if (!is_finite(negligible_force) || negligible_force < 0) {
         refuse(component, "negligible_force must be finite and not negative [N], got ", negligible_force);
     }

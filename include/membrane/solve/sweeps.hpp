@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include <membrane/solve/active_vertices.hpp>
@@ -16,7 +17,7 @@
 
 /// What a step spends its time with.
 ///
-///     membrane::Sweeps sweeps(rule, options, scene, region, acting, active, block, pace, report);
+///     membrane::Sweeps sweeps(method, scene, region, acting, active, block, pace, report);
 ///     if (sweeps.run(resume) == membrane::StepStatus::advanced) ...      // positions moved, forces looked at
 namespace membrane {
 
@@ -26,23 +27,19 @@ namespace detail {
 template <class Scalar, class Rule, class Law>
 [[nodiscard]] Index most_in_lanes(const SolverOptions<Scalar>& options) noexcept {
     constexpr bool possible = VisitsInLanes<Scalar, Rule, Law, NoVolumeSprings>;
-    return possible && options.order == VisitOrder::groups && !options.layers_as_needed
-               ? CompactBlock<Scalar>::most_vertices
-               : 0;
+    return possible && options.order != VisitOrder::arrival && !options.layers_as_needed ? options.most_in_groups : 0;
 }
 
 }  // namespace detail
 
 /// The visits of one step: layer 0 and what the constraints then mend, in rounds, and all the vertices beyond; again until
 /// nothing changes, the sweeps are done, or time is up. In the end a look at the forces on all of them.
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
 class Sweeps {
   public:
-    Sweeps(const Rule& rule, const SolverOptions<Scalar>& options, const Scene& scene, Region<Scalar>& region,
-           const Acting& acting, ActiveVertices& active, CompactBlock<Scalar>& block, Pace& pace,
-           StepReport<Scalar>& report) noexcept
-        : rule_(rule),
-          options_(options),
+    Sweeps(const Method& method, const Scene& scene, Region<Scalar>& region, const Acting& acting,
+           ActiveVertices& active, CompactBlock<Scalar>& block, Pace& pace, StepReport<Scalar>& report) noexcept
+        : method_(method),
           scene_(scene),
           region_(region),
           acting_(acting),
@@ -59,6 +56,8 @@ class Sweeps {
     [[nodiscard]] bool mended() const noexcept { return mended_; }
 
   private:
+    using Rule = decltype(Method::rule);
+    static constexpr bool alone = std::is_same_v<decltype(Method::executor), OneThread>;
     static constexpr bool can_use_lanes =
         VisitsInLanes<Scalar, Rule, std::remove_cvref_t<decltype(std::declval<Scene>().network.law())>,
                       std::remove_cvref_t<decltype(std::declval<Scene>().volume)>>;
@@ -68,14 +67,15 @@ class Sweeps {
     bool rounds() noexcept;
     bool pass(std::span<const Index> vertices) noexcept;
     bool pass_in_lanes(std::size_t begin, std::size_t end) noexcept;
-    bool visit_pack(std::size_t p) noexcept;
+    [[nodiscard]] std::size_t batch_from(std::size_t p, std::size_t last) const noexcept;
+    bool visit_packs(std::size_t begin, std::size_t end) noexcept;
+    bool take(std::size_t p, typename CompactBlock<Scalar>::Visit visit) noexcept;
     bool grow() noexcept;
     bool visit(Index v) noexcept;
     bool look() noexcept;
     bool look_at(Index v, const Vector3<Scalar>& force) noexcept;
 
-    const Rule& rule_;
-    const SolverOptions<Scalar>& options_;
+    const Method& method_;
     const Scene& scene_;
     Region<Scalar>& region_;
     const Acting& acting_;
@@ -88,12 +88,12 @@ class Sweeps {
     bool in_lanes_ = false;  // the groups of the block are visited all at once
 };
 
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-StepStatus Sweeps<Rule, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+StepStatus Sweeps<Method, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) noexcept {
     pace_.begin(active_.vertices().size() + active_.frontier().size());
     open_block();
     bool changed = true;
-    for (Index i = 0; i < options_.sweeps && changed && !report_.out_of_time; ++i) {
+    for (Index i = 0; i < method_.options.sweeps && changed && !report_.out_of_time; ++i) {
         changed = sweep(resume);
         if (report_.status != StepStatus::advanced) return report_.status;
     }
@@ -104,8 +104,8 @@ StepStatus Sweeps<Rule, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) n
 }
 
 // Groups are visited in lanes, if all of the queue's are lined up, and forces of constraints act on layer 0 alone.
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-void Sweeps<Rule, Scalar, Scene, Acting, Pace>::open_block() noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+void Sweeps<Method, Scalar, Scene, Acting, Pace>::open_block() noexcept {
     if constexpr (can_use_lanes) {
         if (active_.has_new_queue()) block_.packs().follow(active_.queue(), scene_.network);
         const auto pushed = scene_.work.pushed.items();
@@ -117,8 +117,8 @@ void Sweeps<Rule, Scalar, Scene, Acting, Pace>::open_block() noexcept {
     }
 }
 
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::sweep(std::size_t& resume) noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::sweep(std::size_t& resume) noexcept {
     bool changed = rounds();
     if (report_.status != StepStatus::advanced) return changed;
     const auto beyond = active_.beyond();
@@ -130,11 +130,11 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::sweep(std::size_t& resume) noexc
     return changed;
 }
 
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::rounds() noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::rounds() noexcept {
     const auto touched = active_.touched();
     bool changed = false;
-    for (Index i = 0; i < options_.contact_visits && pace_.has_time_for_round(touched.size()); ++i) {
+    for (Index i = 0; i < method_.options.contact_visits && pace_.has_time_for_round(touched.size()); ++i) {
         for (const Index v : touched) changed |= visit(v);
         pace_.visited(touched.size());
         if (report_.status != StepStatus::advanced) break;
@@ -146,8 +146,8 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::rounds() noexcept {
     return changed;
 }
 
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> vertices) noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> vertices) noexcept {
     bool changed = false;
     const auto begin = static_cast<std::size_t>(vertices.data() - active_.beyond().data());
     if (in_lanes_ && begin < block_.packs().size()) {
@@ -170,53 +170,77 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> vert
 }
 
 // Vertices number `begin` to `end` beyond layer 0, in whole groups.
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::pass_in_lanes(std::size_t begin, std::size_t end) noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::pass_in_lanes(std::size_t begin, std::size_t end) noexcept {
     bool changed = false;
     if constexpr (can_use_lanes) {
-        constexpr std::size_t packs_in_batch = visits_in_batch / Lanes<Scalar>::count;
-        block_.packs().load(scene_.x);
-        std::size_t p = block_.packs().pack_from(begin);
-        const std::size_t last = block_.packs().pack_from(end);
+        auto& packs = block_.packs();
+        packs.load(scene_.x, method_.executor);
+        std::size_t p = packs.pack_from(begin);
+        const std::size_t last = packs.pack_from(end);
         while (p < last && !report_.out_of_time && report_.status == StepStatus::advanced) {
             report_.out_of_time = !pace_.has_time_for_batch();
             if (report_.out_of_time) {
-                next_ = active_.beyond().data() + block_.packs().place_of(p);
+                next_ = active_.beyond().data() + packs.place_of(p);
                 break;
             }
             const Index before = report_.visits;
-            const std::size_t batch_end = (std::min)(p + packs_in_batch, last);
-            for (; p < batch_end; ++p) changed |= visit_pack(p);
+            const std::size_t next = batch_from(p, last);
+            changed |= visit_packs(p, next);
             pace_.visited(static_cast<std::size_t>(report_.visits - before));
+            p = next;
         }
-        if (changed) block_.packs().store(scene_.x);
+        if (changed) packs.store(scene_.x, method_.executor);
     }
     return changed;
 }
 
-// Beyond a limit that costs nothing it is looked at closely whether a move is stable.
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit_pack(std::size_t p) noexcept {
+// Where a batch of packs ends that begins with `p`: with helpers, where the group does.
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+std::size_t Sweeps<Method, Scalar, Scene, Acting, Pace>::batch_from(std::size_t p, std::size_t last) const noexcept {
+    if constexpr (alone) return (std::min)(p + visits_in_batch / Lanes<Scalar>::count, last);
+    const std::size_t touched = active_.touched().size(), place = touched + block_.packs().place_of(p);
+    for (const auto ends : {active_.queue().group_ends(), active_.group_ends()}) {
+        const auto end = std::upper_bound(ends.begin(), ends.end(), place);
+        if (end != ends.end()) return (std::min)(block_.packs().pack_from(*end - touched), last);
+    }
+    return last;
+}
+
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::visit_packs(std::size_t begin, std::size_t end) noexcept {
+    bool changed = false;
+    if constexpr (!alone) block_.visit(begin, end - begin, scene_, method_.rule, method_.executor);
+    for (std::size_t p = begin; p < end; ++p) {
+        changed |= take(p, alone ? block_.visit(p, scene_, method_.rule) : block_.outcome(p));
+    }
+    return changed;
+}
+
+// What came of a visit. Beyond a limit that costs nothing it is looked at closely whether a move is stable.
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::take(std::size_t p,
+                                                       typename CompactBlock<Scalar>::Visit visit) noexcept {
     using Visit = typename CompactBlock<Scalar>::Visit;
     report_.visits += block_.free_count(p);
-    auto visit = block_.visit(p, scene_, rule_);
     if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
         if (visit == Visit::too_far) {
             block_.packs().store(scene_.x);
             for (const Index v : block_.packs().vertices(p)) {
-                if (region_.fixed(v) || !diverges(scene_, v, rule_.compliance(state_of<Rule>(scene_, v)))) continue;
+                if (region_.fixed(v) || !diverges(scene_, v, method_.rule.compliance(state_of<Rule>(scene_, v))))
+                    continue;
                 report_.status = StepStatus::unstable;
                 return false;
             }
-            visit = block_.visit(p, scene_, rule_, true);
+            visit = block_.visit(p, scene_, method_.rule, true);
         }
     }
     return visit == Visit::moved;
 }
 
 // Where layers are added as needed: adds the next one, and visits it, if a force on it is not negligible.
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::grow() noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::grow() noexcept {
     const auto frontier = active_.frontier();
     if (frontier.empty() || report_.out_of_time || !pace_.has_time_for_batch()) return false;
     report_.visits += static_cast<Index>(frontier.size());
@@ -226,15 +250,15 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::grow() noexcept {
     pace_.visited(frontier.size());
     const std::size_t before = active_.vertices().size();
     if (!needed) return false;
-    active_.grow(scene_.network, options_);
+    active_.grow(scene_.network, method_.options);
     for (const Index v : active_.frontier()) region_.save(v);
     pace_.looks_at(active_.vertices().size() + active_.frontier().size());
     pass(active_.vertices().subspan(before));
     return true;
 }
 
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
     if (region_.fixed(v)) return false;
     ++report_.visits;
     const auto state = state_of<Rule>(scene_, v);
@@ -243,7 +267,7 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
         region_.set_resistance(v, norm<Scalar>(state.force - point(scene_.work.external, v)),
                                state.stiffness - (std::max)(touches, Scalar(0)));
     }
-    const auto compliance = rule_.compliance(state);
+    const auto compliance = method_.rule.compliance(state);
     if constexpr (moves_along_force<Rule, Scalar>) {
         if (!is_safe_rule<Rule> && compliance * state.stiffness >= 2 && diverges(scene_, v, compliance)) {
             report_.status = StepStatus::unstable;
@@ -259,13 +283,13 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
 }
 
 // The forces at the end; false if any is not finite.
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look() noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::look() noexcept {
     bool finite = true;
     std::size_t seen = 0;  // beyond layer 0
     if constexpr (can_use_lanes) {
         if (in_lanes_) {
-            block_.packs().load(scene_.x);
+            block_.packs().load(scene_.x, method_.executor);
             for (std::size_t p = 0; p < block_.packs().count(); ++p) {
                 const auto forces = block_.forces(p, scene_);
                 const auto vertices = block_.packs().vertices(p);
@@ -287,8 +311,8 @@ bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look() noexcept {
     return finite;
 }
 
-template <class Rule, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Rule, Scalar, Scene, Acting, Pace>::look_at(Index v, const Vector3<Scalar>& force) noexcept {
+template <class Method, class Scalar, class Scene, class Acting, class Pace>
+bool Sweeps<Method, Scalar, Scene, Acting, Pace>::look_at(Index v, const Vector3<Scalar>& force) noexcept {
     ++report_.visits;
     region_.set_unbalanced(v, force);
     if (!region_.held(v)) report_.residual = (std::max)(report_.residual, norm(force));

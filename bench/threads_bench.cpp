@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/core/thread_pool.hpp>
+
+#include "support/scene.hpp"
+
+// What do orders of visits and threads do for a whole mesh? A vertex is pulled out by a third of the radius, and all others
+// follow: 16 sweeps a step. These programs may use every processor.
+
+namespace {
+
+using namespace bench;
+using membrane::VisitOrder;
+
+template <membrane::Real Scalar, class Threads>
+void step(benchmark::State& state, VisitOrder order, const Threads& executor) {
+    const auto mesh = sphere_of<Scalar>(state.range(0));
+    const auto network =
+        membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>(mesh, {}, {.stiffness = Scalar(stiffness)});
+    const auto volume = membrane::VirtualVolumeSprings<Scalar>(mesh, {.stiffness = Scalar(backing / 100)});
+    const membrane::SolverOptions<Scalar> options{.layers = membrane::unlimited,
+                                                  .sweeps = 16,
+                                                  .order = order,
+                                                  .predict = false,
+                                                  .most_in_groups = membrane::unlimited};
+    membrane::QuasiStaticSolver<Scalar, membrane::BlockStep, Threads> solver(network, options, {}, executor);
+    auto x = mesh.positions();
+    const membrane::Vector3<Scalar> out = Scalar(1.3) * membrane::point(x, 0);
+    double visits = 0, residual = 0;
+    for (auto _ : state) {
+        const auto report = solver.step(x, Scalar(tick), network, volume, membrane::pull(Index(0), out));
+        require(report.status == membrane::StepStatus::advanced && report.residual > 0, "the membrane must follow");
+        visits += report.visits;
+        residual = report.residual;
+    }
+    state.counters["visits"] = benchmark::Counter(visits, benchmark::Counter::kAvgIterations);
+    state.counters["residual"] = residual;
+}
+
+void sizes_of_whole(benchmark::internal::Benchmark* measured) {
+    measured->ArgName("vertices");
+    for (const int vertices : {2562, 10242, 40962, 163842}) measured->Arg(vertices);
+    measured->Iterations(5)->UseRealTime()->Unit(benchmark::kMillisecond);
+}
+
+template <membrane::Real Scalar>
+void arrival(benchmark::State& state) {
+    step<Scalar>(state, VisitOrder::arrival, membrane::OneThread{});
+}
+template <membrane::Real Scalar>
+void groups(benchmark::State& state) {
+    step<Scalar>(state, VisitOrder::groups, membrane::OneThread{});
+}
+template <membrane::Real Scalar>
+void colours(benchmark::State& state) {
+    step<Scalar>(state, VisitOrder::colours, membrane::OneThread{});
+}
+template <membrane::Real Scalar>
+void threads(benchmark::State& state) {
+    const membrane::ThreadPool pool;
+    step<Scalar>(state, VisitOrder::colours, pool.executor());
+    state.counters["threads"] = pool.threads();
+}
+BENCHMARK_TEMPLATE(arrival, double)->Name("arrival/double")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(groups, double)->Name("groups/double")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(colours, double)->Name("colours/double")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(threads, double)->Name("threads/double")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(groups, float)->Name("groups/float")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(colours, float)->Name("colours/float")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(threads, float)->Name("threads/float")->Apply(sizes_of_whole);
+
+}  // namespace

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <thread>
+#include <vector>
+
+#include <membrane/core/check.hpp>
+#include <membrane/core/executor.hpp>
+
+/// Threads that do what the library lets be done at the same time; it has none of its own.
+///
+///     const membrane::ThreadPool pool(4);
+///     auto solver = membrane::QuasiStaticSolver(network, options, membrane::BlockStep{}, pool.executor());
+namespace membrane {
+
+/// A number of threads that wait for work; the one that brings it takes part. They wait for a while without sleeping:
+/// tasks that follow on one another find them awake. Waking those that sleep is a call of the system's.
+///
+/// One thread at a time may bring work, and it must not be a task.
+class ThreadPool {
+  public:
+    /// `threads`, the one that brings work included.
+    /// @throws InvalidInput if there is to be none; std::system_error if the system has none left
+    explicit ThreadPool(int threads = static_cast<int>(std::thread::hardware_concurrency()));
+    ~ThreadPool();
+    ThreadPool(const ThreadPool&) = delete;
+    ThreadPool& operator=(const ThreadPool&) = delete;
+
+    [[nodiscard]] int threads() const noexcept { return static_cast<int>(workers_.size()) + 1; }
+
+    /// Calls `task(i)` once for each `i` from 0 to `count` - 1. Online, but for the waking of threads that sleep.
+    template <class Task>
+    void operator()(Index count, const Task& task) const noexcept;
+
+    /// Hands its tasks on to this pool, which must live as long.
+    [[nodiscard]] auto executor() const noexcept {
+        return [this](Index count, const auto& task) noexcept { (*this)(count, task); };
+    }
+
+  private:
+    struct Job {
+        const void* task = nullptr;
+        void (*run)(const void* task, Index i) noexcept = nullptr;
+        Index count = 0;
+    };
+
+    void work() const noexcept;
+    void serve() const noexcept;
+    template <class T>
+    static void wait_for_change(const std::atomic<T>& value, T old) noexcept;
+
+    mutable Job job_;
+    mutable std::atomic<Index> next_{0};               // task of the job
+    mutable std::atomic<std::uint32_t> job_count_{0};  // so far
+    mutable std::atomic<int> busy_{0};                 // threads, with this job
+    mutable std::atomic<bool> over_{false};
+    std::vector<std::thread> workers_;
+};
+
+inline ThreadPool::ThreadPool(int threads) {
+    if (threads < 1) refuse("ThreadPool", "there must be at least 1 thread, got ", threads);
+    for (int i = 1; i < threads; ++i) workers_.emplace_back([this] { serve(); });
+}
+
+inline ThreadPool::~ThreadPool() {
+    over_ = true;
+    ++job_count_;
+    job_count_.notify_all();
+    for (auto& worker : workers_) worker.join();
+}
+
+template <class Task>
+void ThreadPool::operator()(Index count, const Task& task) const noexcept {
+    if (workers_.empty() || count < 2) return OneThread{}(count, task);
+    job_ = {&task, [](const void* that, Index i) noexcept { (*static_cast<const Task*>(that))(i); }, count};
+    next_.store(0, std::memory_order_relaxed);
+    busy_.store(static_cast<int>(workers_.size()), std::memory_order_relaxed);
+    job_count_.fetch_add(1, std::memory_order_release);
+    job_count_.notify_all();
+    work();
+    for (int busy; (busy = busy_.load(std::memory_order_acquire)) > 0;) wait_for_change(busy_, busy);
+}
+
+inline void ThreadPool::work() const noexcept {
+    const Job job = job_;
+    for (Index i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < job.count;) job.run(job.task, i);
+}
+
+inline void ThreadPool::serve() const noexcept {
+    for (std::uint32_t seen = 0;;) {
+        wait_for_change(job_count_, seen);
+        if (over_) return;
+        ++seen;  // the next job begins when all have done this one
+        work();
+        if (busy_.fetch_sub(1, std::memory_order_acq_rel) == 1) busy_.notify_one();
+    }
+}
+
+// Some ten microseconds without sleeping, for the sake of tasks that follow on one another.
+template <class T>
+void ThreadPool::wait_for_change(const std::atomic<T>& value, T old) noexcept {
+    for (int i = 0; i < 10'000; ++i) {
+        if (value.load(std::memory_order_acquire) != old) return;
+    }
+    value.wait(old, std::memory_order_acquire);
+}
+
+}  // namespace membrane
