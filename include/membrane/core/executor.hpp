@@ -2,6 +2,7 @@
 #pragma once
 
 #include <concepts>
+#include <cstddef>
 
 #include <membrane/core/types.hpp>
 
@@ -37,13 +38,13 @@ struct OneThread {
 
 static_assert(Executor<OneThread>);
 
-/// Calls `act(i)` for `i` from 0 to `count` - 1, `at_once` of them in each task.
+/// Calls `act(begin, end)` for parts of 0 to `count` of at most `at_once`, each part in a task.
 template <Executor Threads, class Act>
-void share_out(const Threads& executor, Index count, Index at_once, const Act& act) noexcept {
-    const Index tasks = count / at_once + (count % at_once > 0 ? 1 : 0);
-    executor(tasks, [&](Index task) noexcept {
-        const Index begin = task * at_once, left = count - begin;
-        for (Index i = begin; i < begin + (left < at_once ? left : at_once); ++i) act(i);
+void share_out(const Threads& executor, std::size_t count, std::size_t at_once, const Act& act) noexcept {
+    const std::size_t tasks = count / at_once + (count % at_once > 0 ? 1 : 0);
+    executor(static_cast<Index>(tasks), [&](Index task) noexcept {
+        const std::size_t begin = static_cast<std::size_t>(task) * at_once, left = count - begin;
+        act(begin, begin + (left < at_once ? left : at_once));
     });
 }
 

@@ -66,10 +66,9 @@ class CompactBlock {
     template <class Scene, class Rule, Executor Threads>
     void visit(std::size_t begin, std::size_t count, const Scene& scene, const Rule& rule,
                const Threads& executor) noexcept {
-        constexpr Index packs_in_task = 32;
-        share_out(executor, static_cast<Index>(count), packs_in_task, [&](Index i) {
-            const std::size_t p = begin + static_cast<std::size_t>(i);
-            outcomes_[p] = visit(p, scene, rule);
+        constexpr std::size_t packs_in_task = 32;
+        share_out(executor, count, packs_in_task, [&](std::size_t first, std::size_t last) {
+            for (std::size_t p = begin + first; p < begin + last; ++p) outcomes_[p] = visit(p, scene, rule);
         });
     }
     [[nodiscard]] Visit outcome(std::size_t p) const noexcept { return outcomes_[p]; }

@@ -86,7 +86,7 @@ class SpringPacks {
 
   private:
     static constexpr std::size_t lanes = Several::count;
-    static constexpr Index points_in_task = 2048;
+    static constexpr std::size_t points_in_task = 2048;
     /// Of each lane, where the row of its point begins.
     using Begins = std::array<Index, lanes>;
     struct Pack {
@@ -222,18 +222,21 @@ bool SpringPacks<Scalar>::append_pack(std::span<const Index> vertices, const Net
 template <Real Scalar>
 template <Executor Threads>
 void SpringPacks<Scalar>::load(const PointsRef<Scalar>& x, const Threads& executor) noexcept {
-    share_out(executor, static_cast<Index>(with_row_.size()), points_in_task,
-              [&, from = with_row_.items().data(), to = rows_.data() + 1](Index i) { to[i].set(point(x, from[i])); });
+    const auto vertices = with_row_.items();
+    share_out(executor, vertices.size(), points_in_task, [&](std::size_t begin, std::size_t end) {
+        auto* row = rows_.data() + begin;
+        for (const Index v : vertices.subspan(begin, end - begin)) (++row)->set(point(x, v));
+    });
 }
 
 template <Real Scalar>
 template <Executor Threads>
 void SpringPacks<Scalar>::store(PointsRef<Scalar>& x, const Threads& executor) const noexcept {
-    share_out(executor, static_cast<Index>(members_.size()), points_in_task,
-              [&, members = members_.items().data()](Index i) {
-                  const Index v = members[i];
-                  x.col(v) = rows_[static_cast<std::size_t>(row_[static_cast<std::size_t>(v)])].point();
-              });
+    share_out(executor, members_.size(), points_in_task, [&](std::size_t begin, std::size_t end) {
+        for (const Index v : members_.items().subspan(begin, end - begin)) {
+            x.col(v) = rows_[static_cast<std::size_t>(row_[static_cast<std::size_t>(v)])].point();
+        }
+    });
 }
 
 }  // namespace membrane
