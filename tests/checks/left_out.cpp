@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: MIT
+// What does a part cost that a scene leaves out? Each pair of functions does the same with every vertex of a sphere:
+// ours leaves a part out by the library's means (no backing, volume springs without damping, a law of whose answer only
+// the tension is used), the other does not know it. The last one is the loop one would write by hand. `left_out` counts
+// their instructions; here they must come to the same bits.
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+#include <type_traits>
+#include <vector>
+
+#include <membrane/membrane.hpp>
+
+namespace {
+
+using membrane::Index;
+using S = SCALAR;
+using Network = membrane::MassSpringNetwork<S, membrane::LinearSpring>;
+using Points = membrane::Points<S>;
+using PointsRef = membrane::PointsRef<S>;
+using Rule = membrane::MassStep;
+
+constexpr S dt = S(1e-3), stiffness = 40, mass = S(1e-3), backing = 8;
+
+/// A linear law that knows no energy.
+struct NoEnergy {
+    template <membrane::Number N>
+    membrane::SpringResponse<N> operator()(const membrane::SpringState<N>& spring) const noexcept {
+        return {spring.stiffness * (spring.length - spring.rest_length), spring.stiffness, N(0)};
+    }
+};
+
+/// Volume springs that know no damping.
+struct NoDamping {
+    const Points* anchors;
+    const std::vector<S>* stiffness;
+
+    template <class V>
+    membrane::Pull<S> pull(Index v, const V& position, const V&, S) const noexcept {
+        const S k = (*stiffness)[static_cast<std::size_t>(v)];
+        return {-k * (position - membrane::point(*anchors, v)), k};
+    }
+};
+static_assert(membrane::VolumeModel<NoDamping, S>);
+
+/// What the solver does with a vertex that it visits alone, by a rule that moves it along the force.
+template <class Scene>
+[[gnu::always_inline]] inline void visit(const Scene& scene, Index v, const membrane::VertexState<S>& state) noexcept {
+    const S compliance = Rule{}.compliance(state);
+    if (compliance * state.stiffness >= 2) std::abort();
+    scene.x.col(v) += membrane::held_back<Rule>(scene, v, compliance * state.force);
+}
+
+template <class Volume>
+using SceneOf = membrane::StepInput<S, Network, Volume>;
+
+/// `state_of` without a backing.
+membrane::VertexState<S> bare_state(const SceneOf<membrane::NoVolumeSprings>& scene, Index v) noexcept {
+    membrane::VertexState<S> state;
+    const auto springs = scene.network.pull(v, scene.x);
+    state.force = springs.force;
+    state.stiffness = springs.stiffness;
+    const S touches = (std::max)(scene.work.stiffness[static_cast<std::size_t>(v)], S(0));
+    state.force += membrane::point(scene.work.external, v);
+    state.stiffness += touches;
+    state.mass = scene.network.has_masses() ? scene.network.mass(v) : S(0);
+    state.dt = scene.dt;
+    state.touched = scene.work.seeds.contains(v);
+    return state;
+}
+
+struct End {
+    Index other;
+    S stiffness, rest_length;
+};
+
+/// Springs and masses as a loop written by hand has them.
+struct Rows {
+    explicit Rows(const Network& network) {
+        for (Index v = 0; v < network.vertex_count(); ++v) {
+            for (const auto& end : network.springs_of(v)) ends.push_back({end.other, end.stiffness, end.rest_length});
+            begins.push_back(ends.size());
+            masses.push_back(network.mass(v));
+        }
+    }
+    std::vector<std::size_t> begins{0};
+    std::vector<End> ends;
+    std::vector<S> masses;
+};
+
+}  // namespace
+
+// All that is called is inlined: what is left is what the parts need, not what a compiler makes of their number.
+#define COUNTED [[gnu::noinline, gnu::flatten]]
+
+extern "C" {
+
+COUNTED void backing_ours(const SceneOf<membrane::NoVolumeSprings>& scene) {
+    for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v)
+        visit(scene, v, membrane::state_of<Rule>(scene, v));
+}
+COUNTED void backing_bare(const SceneOf<membrane::NoVolumeSprings>& scene) {
+    for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v) visit(scene, v, bare_state(scene, v));
+}
+
+COUNTED void damping_ours(const SceneOf<membrane::VirtualVolumeSprings<S>>& scene) {
+    for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v)
+        visit(scene, v, membrane::state_of<Rule>(scene, v));
+}
+COUNTED void damping_bare(const SceneOf<NoDamping>& scene) {
+    for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v)
+        visit(scene, v, membrane::state_of<Rule>(scene, v));
+}
+
+COUNTED void energy_ours(const Network& network, const membrane::ConstPointsRef<S>& x, Points& force) {
+    for (Index v = 0; v < force.cols(); ++v) force.col(v) = network.pull(v, x).force;
+}
+COUNTED void energy_bare(const membrane::MassSpringNetwork<S, NoEnergy>& network, const membrane::ConstPointsRef<S>& x,
+                         Points& force) {
+    for (Index v = 0; v < force.cols(); ++v) force.col(v) = network.pull(v, x).force;
+}
+
+COUNTED void by_hand_bare(const Rows& rows, S* x, const S* external, const S* touches) {
+    for (std::size_t v = 0; v < rows.masses.size(); ++v) {
+        S* here = x + 3 * v;
+        S force_x = 0, force_y = 0, force_z = 0, sum = 0;
+        for (std::size_t e = rows.begins[v]; e < rows.begins[v + 1]; ++e) {
+            const End& end = rows.ends[e];
+            const S* there = x + 3 * static_cast<std::size_t>(end.other);
+            const S dx = there[0] - here[0], dy = there[1] - here[1], dz = there[2] - here[2];
+            const S length = std::sqrt(dx * dx + dy * dy + dz * dz);
+            const S across = length != 0 ? end.stiffness * (length - end.rest_length) * (1 / length) : end.stiffness;
+            force_x += across * dx;
+            force_y += across * dy;
+            force_z += across * dz;
+            sum += end.stiffness < across ? across : end.stiffness;
+        }
+        sum += touches[v] < 0 ? 0 : touches[v];
+        const S step = dt * dt / rows.masses[v];
+        if (step * sum >= 2) std::abort();
+        here[0] += step * (force_x + external[3 * v]);
+        here[1] += step * (force_y + external[3 * v + 1]);
+        here[2] += step * (force_z + external[3 * v + 2]);
+    }
+}
+
+}  // extern "C"
+
+int main(int argc, char** argv) {
+    const auto mesh = membrane::icosphere<S>({.radius = S(0.01), .subdivisions = 3});
+    const Network network(mesh, {}, {.stiffness = stiffness, .mass = mass});
+    const membrane::MassSpringNetwork<S, NoEnergy> network_without_energy(mesh, {}, {.stiffness = stiffness});
+    const membrane::VirtualVolumeSprings<S> springs(mesh, {.stiffness = backing});
+    const membrane::NoVolumeSprings none;
+    const std::vector<S> stiffnesses(static_cast<std::size_t>(mesh.vertex_count()), backing);
+    const NoDamping undamped{&springs.anchors(), &stiffnesses};
+    membrane::Workspace<S> work(
+        mesh.vertex_count(), [](Index) { return false; }, 0);
+
+    Points start = mesh.positions();
+    std::mt19937_64 random(1);
+    for (Index v = 0; v < start.cols(); ++v) {
+        for (int k = 0; k < 3; ++k) {
+            start(k, v) += static_cast<S>(1e-4 * (static_cast<double>(random() % 2001) / 1000 - 1));
+        }
+    }
+    work.start = start;
+
+    bool same = true;
+    const auto compare = [&](const char* name, const auto& ours, const auto& bare) {
+        if (argc > 1 && std::strcmp(argv[1], name) != 0) return;
+        Points x = start, y = start;
+        ours(x);
+        bare(y);
+        if (x == y && x != start) return;
+        std::printf("%s: not the same\n", name);
+        same = false;
+    };
+    const auto visited = [&](const auto& visit, const auto& volume) {
+        return [&](Points& x) {
+            PointsRef ref = x;
+            visit(SceneOf<std::remove_cvref_t<decltype(volume)>>{ref, dt, network, volume, work});
+        };
+    };
+    compare("backing", visited(backing_ours, none), visited(backing_bare, none));
+    compare("damping", visited(damping_ours, springs), visited(damping_bare, undamped));
+    compare(
+        "energy", [&](Points& x) { energy_ours(network, start, x); },
+        [&](Points& x) { energy_bare(network_without_energy, start, x); });
+    const Rows rows(network);
+    compare("by_hand", visited(backing_ours, none),
+            [&](Points& x) { by_hand_bare(rows, x.data(), work.external.data(), work.stiffness.data()); });
+    std::printf("%d visits\n", static_cast<int>(mesh.vertex_count()));
+    return same ? 0 : 1;
+}
