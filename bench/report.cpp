@@ -66,6 +66,43 @@ Table trade_table(const std::string& vertices) {
             .scene = "/vertices:" + vertices};
 }
 
+/// By one option, a number, the others at their defaults.
+Table option_table(const std::string& option, const std::string& title, const std::vector<int>& numbers) {
+    Table table{.topic = "defaults",
+                .key = "defaults_" + option,
+                .title = title,
+                .rows = {},
+                .column = option,
+                .columns = numbers};
+    const auto add = [&](const std::string& name, const std::string& short_name, const std::string& scene) {
+        table.rows.push_back({name, scene});
+        table.rows.push_back({"  error, " + short_name, scene, Row::percent, "force_error", ""});
+    };
+    for (const std::string vertices : {"162", "642", "2562"}) {
+        add(vertices + " vertices", vertices, "scene:slide/vertices:" + vertices);
+    }
+    add("642 vertices, forceps", "forceps", "scene:draw_out/vertices:642");
+    return table;
+}
+
+/// With one thing that is chosen for another.
+Table choice_table(const std::string& scene, const std::string& title, const std::vector<int>& vertices) {
+    Table table{.topic = "defaults", .key = "defaults_" + scene, .title = title, .rows = {}, .columns = vertices};
+    const auto add = [&](const std::string& name, const std::string& short_name, const std::string& choice) {
+        const std::string benchmark = "scene:" + scene + "/" + choice;
+        table.rows.push_back({name, benchmark});
+        table.rows.push_back({"  error, " + short_name, benchmark, Row::percent, "force_error", ""});
+    };
+    add("default", "default", "default");
+    add("order of arrival", "arrival", "arrival");
+    add("default, float", "float", "float");
+    add("order of arrival, float", "arrival, float", "arrival_float");
+    add("not predicted", "not predicted", "unpredicted");
+    add("safe step", "safe", "safe");
+    add("(4), lightest stable mass", "(4)", "published");
+    return table;
+}
+
 Table sweep_table(const std::string& topic, const std::string& title) {
     const auto row = [](const std::string& name, const std::string& benchmark) {
         return Row{name, benchmark, Row::each, "visits"};
@@ -80,6 +117,26 @@ Table sweep_table(const std::string& topic, const std::string& title) {
                  row("(4), float", "lanes/float/mass"), row("safe step, float", "lanes/float/safe"),
                  row("block step, float", "lanes/float/newton"), row("numbers in a row, float", "contiguous/float")},
         .columns = {642, 2562, 10242}};
+}
+
+/// A vertex in one of the 16 sweeps of a step over the whole mesh, by order and scalar.
+Table threads_table() {
+    Table table{.topic = "threads",
+                .key = "threads",
+                .title = "A step over the whole mesh, 16 sweeps; groups and colours by one thread",
+                .rows = {},
+                .columns = {2562, 10242, 40962, 163842}};
+    for (const std::string scalar : {"double", "float"}) {
+        const std::string first = "groups/" + scalar;
+        table.rows.push_back({"groups, " + scalar, first});
+        if (scalar == "double") table.rows.push_back({"  one by one", "arrival/double", Row::gain, first});
+        table.rows.push_back({"  colours", "colours/" + scalar, Row::gain, first});
+        table.rows.push_back({"  colours, all threads", "threads/" + scalar, Row::gain, first});
+    }
+    table.rows.push_back({"threads", "threads/double", Row::counter, "threads", ""});
+    table.rows.push_back({"left out of balance by groups", "groups/double", Row::counter, "residual", "N"});
+    table.rows.push_back({"  by colours", "colours/double", Row::counter, "residual", "N"});
+    return table;
 }
 
 Table stability_table(const std::string& column, const std::string& title, const std::vector<int>& columns) {
@@ -101,6 +158,7 @@ Table stability_table(const std::string& column, const std::string& title, const
 }
 
 const std::vector<Table> all_tables{
+    threads_table(),
     {"frame",
      "frame",
      "A frame, and where the time goes: the tool presses and slides",
@@ -135,6 +193,13 @@ const std::vector<Table> all_tables{
       {"build", "tree/build"}}},
     trade_table("162"),
     trade_table("642"),
+    option_table("layers", "Time of a tick, and error of its force in percent, by layers: the default is 6",
+                 {1, 2, 3, 4, 6, 8, 12}),
+    option_table("sweeps", "The same by sweeps: the default is 2", {1, 2, 3, 4, 6, 8}),
+    option_table("contact_visits", "The same by visits of the contact in a sweep: the default is 4",
+                 {1, 2, 3, 4, 6, 8}),
+    choice_table("slide", "The same with one thing chosen for another: a tool slides", {162, 642, 2562}),
+    choice_table("draw_out", "The same: forceps draw out", {642}),
     stability_table("dt", "Of 200 scenes, percent that diverge; dt in hundredths of sqrt(m / k)",
                     {20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 90, 100, 200, 500, 1000}),
     stability_table("limit", "The same; dt in hundredths of what theory allows each scene",

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
+#include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <string>
 #include <tuple>
+#include <vector>
 
-#include <membrane/accuracy/trial.hpp>
-
-#include "support/scene.hpp"
+#include "support/strokes.hpp"
 
 // What does accuracy cost? A tool of 3 mm on a sphere of 10 mm, 1.5 mm deep: sliding along it at 50 mm/s, or put down here
 // and there; by rule, layers, sweeps and visits of the contact. The error is against the equilibrium of the tick.
@@ -15,18 +16,6 @@
 namespace {
 
 using namespace bench;
-using membrane::Real;
-
-constexpr double tool_radius = 3e-3, deep = 1.5e-3;  // [m]
-
-/// A scene by its name, on so many vertices, its backing a part of the springs.
-struct Place {
-    std::string scene;
-    int vertices;
-    double part;
-
-    friend auto operator<=>(const Place&, const Place&) = default;
-};
 
 struct Setting {
     Place place;
@@ -35,78 +24,12 @@ struct Setting {
     Index layers, sweeps, contact_visits;
 };
 
-membrane::Tool<double> tool_at(const Vector3& position) { return {.position = position, .radius = tool_radius}; }
-
-/// Straight in within 30 ticks, then along.
-std::vector<membrane::Tool<double>> slide() {
-    constexpr Index ticks_in = 30, ticks_along = 60;
-    constexpr double speed = 0.05;  // [m/s]
-    const Vector3 start = Vector3(0.3, 0.2, 0.93).normalized(), across = Vector3(0, 0.93, -0.2).normalized();
-    const Vector3 along = membrane::cross<double>(start, across);
-    std::vector<membrane::Tool<double>> tools;
-    for (Index t = 1; t <= ticks_in + ticks_along; ++t) {
-        const double way = speed * tick * std::max(t - ticks_in, 0) / radius;
-        const double from_centre = radius + tool_radius - deep * std::min(t, ticks_in) / ticks_in;
-        tools.push_back(tool_at(from_centre * (std::cos(way) * start + std::sin(way) * along)));
-    }
-    return tools;
-}
-
-/// All the way in at once, for three ticks each time.
-std::vector<membrane::Tool<double>> put_down() {
-    constexpr int presses = 8, ticks_each = 3;
-    std::vector<membrane::Tool<double>> tools;
-    for (int i = 0; i < presses; ++i) {
-        const Vector3 there = Vector3(std::cos(i), std::sin(i), 0.3 * i).normalized();
-        for (int t = 0; t < ticks_each; ++t) tools.push_back(tool_at(2 * radius * there));
-        for (int t = 0; t < ticks_each; ++t) tools.push_back(tool_at((radius + tool_radius - deep) * there));
-    }
-    return tools;
-}
-
 template <Real Scalar>
-struct Scene {
-    explicit Scene(const Place& place, double mass = 1)
-        : mesh(sphere(place.vertices).positions().cast<Scalar>(), sphere(place.vertices).triangles()),
-          network(mesh, {}, {.stiffness = Scalar(stiffness), .mass = static_cast<Scalar>(mass)}),
-          volume(mesh, {.stiffness = static_cast<Scalar>(place.part * stiffness)}),
-          stroke(mesh, tools_of(place), Scalar(tick)) {}
-
-    static std::vector<membrane::Tool<Scalar>> tools_of(const Place& place) {
-        std::vector<membrane::Tool<Scalar>> tools;
-        for (const auto& tool : place.scene == "slide" ? slide() : put_down()) {
-            tools.push_back({.position = tool.position.template cast<Scalar>(), .radius = Scalar(tool_radius)});
-        }
-        return tools;
-    }
-
-    membrane::TriangleMesh<Scalar> mesh;
-    membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network;
-    membrane::VirtualVolumeSprings<Scalar> volume;
-    membrane::Stroke<Scalar> stroke;
-};
-
-/// Of every sixth tick: of those down, the last ones.
-const std::vector<membrane::TickAtRest>& rests_of(const Place& place) {
-    static std::map<Place, std::vector<membrane::TickAtRest>> known;
-    auto& rests = known[place];
-    if (!rests.empty()) return rests;
-    const Scene<double> scene(place);
-    constexpr Index every = 6;
-    rests = equilibria(scene.mesh, scene.network, scene.volume, scene.stroke, every);
-    require(rests.size() == static_cast<std::size_t>(scene.stroke.ticks() / every), "all ticks have an equilibrium");
-    return rests;
-}
-
-template <Real Scalar, class Rule>
-membrane::Outcome play(const Setting& setting, const Rule& rule, double mass = 1) {
-    const Scene<Scalar> scene(setting.place, mass);
-    return trial(scene.mesh, scene.network, scene.volume, scene.stroke, rests_of(setting.place),
-                 {.layers = setting.layers,
-                  .sweeps = setting.sweeps,
-                  .contact_visits = setting.contact_visits,
-                  .predict = setting.predicted},
-                 rule, ProcessorSeconds{});
+membrane::SolverOptions<Scalar> options_of(const Setting& setting) {
+    return {.layers = setting.layers,
+            .sweeps = setting.sweeps,
+            .contact_visits = setting.contact_visits,
+            .predict = setting.predicted};
 }
 
 /// dt^2 stiffness / mass for (4), with the lightest mass that is stable for all of the scene, to a fiftieth.
@@ -121,29 +44,15 @@ double& stable_part(const Setting& setting) {
 }
 
 template <Real Scalar>
-membrane::Outcome play_published(const Setting& setting) {
-    for (double& part = stable_part(setting);; part -= 0.01) {
-        const auto outcome = play<Scalar>(setting, membrane::MassStep{}, tick * tick * stiffness / part);
-        if (outcome.advanced || part < 0.02) return outcome;
-    }
-}
-
-template <Real Scalar>
 membrane::Outcome play_by(const Setting& setting) {
-    if (setting.rule == "published") return play_published<Scalar>(setting);
-    if (setting.rule == "safe") return play<Scalar>(setting, membrane::SafeStep{});
-    return play<Scalar>(setting, membrane::BlockStep{});
+    const auto options = options_of<Scalar>(setting);
+    if (setting.rule == "published") return play_published<Scalar>(setting.place, options, stable_part(setting));
+    if (setting.rule == "safe") return play<Scalar>(setting.place, options, membrane::SafeStep{});
+    return play<Scalar>(setting.place, options, membrane::BlockStep{});
 }
 
 void measure(benchmark::State& state, const Setting& setting) {
-    membrane::Outcome outcome;
-    for (auto _ : state) {
-        outcome = setting.scalar == "float" ? play_by<float>(setting) : play_by<double>(setting);
-        require(outcome.advanced, "no step may be refused");
-        state.SetIterationTime(outcome.time);
-    }
-    state.counters["force_error"] = outcome.force_error;
-    state.counters["position_error"] = outcome.position_error / deep;
+    for (auto _ : state) record(state, setting.scalar == "float" ? play_by<float>(setting) : play_by<double>(setting));
     if (setting.rule == "published") state.counters["part"] = stable_part(setting);
 }
 

@@ -36,8 +36,7 @@ struct TreeOptions {
 template <Real Scalar>
 class BoxTree {
   public:
-    /// O(F log F) for usual shapes.
-    /// @throws InvalidInput if `balance_threshold` is below 1
+    /// O(F log F) for usual shapes. @throws InvalidInput if `balance_threshold` is below 1
     explicit BoxTree(const TriangleMesh<Scalar>& mesh, const TreeOptions& options = {});
 
     /// Fits all boxes, or those around the vertices `moved`: see `AabbTree`.
@@ -53,9 +52,10 @@ class BoxTree {
 
     [[nodiscard]] const TreeStatistics& statistics() const noexcept { return statistics_; }
 
-    /// Around all triangles, and around those below a node of `tree_shape`.
-    /// @pre 0 <= `node` < `statistics().nodes` (asserted)
+    /// Around all triangles.
     [[nodiscard]] const Box<Scalar>& surface() const noexcept { return surface_; }
+
+    /// Around those below a node of `tree_shape`. @pre 0 <= `node` < `statistics().nodes` (asserted)
     [[nodiscard]] Box<Scalar> box(Index node) const noexcept;
 
   private:

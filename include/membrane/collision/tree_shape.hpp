@@ -45,7 +45,7 @@ struct TreeStatistics {
 /// leaves, whatever the positions [Liu07] 2.3. Halves are taken at the median, so that they too lie side by side.
 ///
 /// From 32 steps below the root on, every set is halved; a set of fewer than 2^31 triangles is down to single ones 31
-/// steps later. So the depth is bounded by `max_depth`, and a search needs room for one waiting node a level.
+/// steps later. So the depth is bounded by `max_depth`, and a search needs room for what waits beside one node a level.
 ///
 /// The same for the same mesh everywhere. O(F log F) for usual shapes, at most O(F max_depth).
 /// @throws InvalidInput if `balance_threshold` is below 1
@@ -59,9 +59,10 @@ template <Real Scalar>
 /// children.
 template <std::size_t width>
 struct FoldedShape {
-    std::vector<Index> nodes;  ///< Of the binary tree; the root first, children after their parent.
-    std::vector<std::array<Index, width>>
-        children;  ///< Of each, the binary tree's nodes; `no_index` in place of the rest.
+    using Children = std::array<Index, width>;  ///< Nodes of the binary tree, then `no_index`.
+
+    std::vector<Index> nodes;        ///< Of the binary tree; the root first, children after their parent.
+    std::vector<Children> children;  ///< Of each.
 };
 
 /// Folds in what has most triangles first. A root that is a leaf is the only child of itself. O(nodes).
@@ -172,7 +173,7 @@ FoldedShape<width> folded(const TreeShape& shape) {
     }
     FoldedShape<width> wide{{0}, {}};
     for (std::size_t n = 0; n < wide.nodes.size(); ++n) {
-        std::array<Index, width> children;
+        typename FoldedShape<width>::Children children;
         children.fill(no_index);
         children[0] = wide.nodes[n];
         for (std::size_t count = 1; count < width; ++count) {
