@@ -1,0 +1,146 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <compare>
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <membrane/accuracy/trial.hpp>
+
+#include "scene.hpp"
+
+/// A tool of 3 mm on a sphere of 10 mm, 1.5 mm deep, played with one setting of the solver after the other: what a tick
+/// takes, and how far its force is from that of the tick's equilibrium.
+///
+///     const auto outcome = play<double>({"slide", 642, 0.1}, {.layers = 3}, membrane::BlockStep{});
+///     record(state, outcome);
+namespace bench {
+
+using membrane::Real;
+
+inline constexpr double wide_tool = 3e-3, deep = 1.5e-3;  // radius and depth [m]
+
+/// A scene by its name, `slide`, `put_down` or `draw_out`, on so many vertices, its backing a part of the springs.
+struct Place {
+    std::string scene;
+    int vertices;
+    double part;
+
+    friend auto operator<=>(const Place&, const Place&) = default;
+};
+
+[[nodiscard]] inline membrane::Tool<double> wide_tool_at(const Vector3& position) {
+    return {.position = position, .radius = wide_tool};
+}
+
+/// Straight in within 30 ticks, then along at 50 mm/s.
+[[nodiscard]] inline std::vector<membrane::Tool<double>> slide() {
+    constexpr Index ticks_in = 30, ticks_along = 60;
+    constexpr double speed = 0.05;  // [m/s]
+    const Vector3 start = Vector3(0.3, 0.2, 0.93).normalized(), across = Vector3(0, 0.93, -0.2).normalized();
+    const Vector3 along = membrane::cross<double>(start, across);
+    std::vector<membrane::Tool<double>> tools;
+    for (Index t = 1; t <= ticks_in + ticks_along; ++t) {
+        const double way = speed * tick * std::max(t - ticks_in, 0) / radius;
+        const double from_centre = radius + wide_tool - deep * std::min(t, ticks_in) / ticks_in;
+        tools.push_back(wide_tool_at(from_centre * (std::cos(way) * start + std::sin(way) * along)));
+    }
+    return tools;
+}
+
+/// All the way in at once here and there, for three ticks each time.
+[[nodiscard]] inline std::vector<membrane::Tool<double>> put_down() {
+    constexpr int presses = 8, ticks_each = 3;
+    std::vector<membrane::Tool<double>> tools;
+    for (int i = 0; i < presses; ++i) {
+        const Vector3 there = Vector3(std::cos(i), std::sin(i), 0.3 * i).normalized();
+        for (int t = 0; t < ticks_each; ++t) tools.push_back(wide_tool_at(2 * radius * there));
+        for (int t = 0; t < ticks_each; ++t) tools.push_back(wide_tool_at((radius + wide_tool - deep) * there));
+    }
+    return tools;
+}
+
+/// Forceps take hold of the surface, draw it out by 1.5 mm within 30 ticks, and go along at 25 mm/s.
+[[nodiscard]] inline std::vector<membrane::Tool<double>> draw_out() {
+    constexpr Index ticks_out = 30, ticks_along = 60;
+    constexpr double tip = 5e-4, out = 1.5e-3, speed = 0.025;  // [m], [m/s]
+    const Vector3 start = Vector3(0.3, 0.2, 0.93).normalized(), along = Vector3(0, 0.93, -0.2).normalized();
+    std::vector<membrane::Tool<double>> tools;
+    for (Index t = 1; t <= ticks_out + ticks_along; ++t) {
+        const double from_centre = radius + out * std::min(t, ticks_out) / ticks_out;
+        const double way = speed * tick * std::max(t - ticks_out, 0);
+        tools.push_back({.position = from_centre * start + way * along, .radius = tip, .grasping = true});
+    }
+    return tools;
+}
+
+/// What is played.
+template <Real Scalar>
+struct StrokeScene {
+    explicit StrokeScene(const Place& place, double mass = 1)
+        : mesh(sphere_of<Scalar>(place.vertices)),
+          network(mesh, {}, {.stiffness = Scalar(stiffness), .mass = static_cast<Scalar>(mass)}),
+          volume(mesh, {.stiffness = static_cast<Scalar>(place.part * stiffness)}),
+          stroke(mesh, tools_of(place), Scalar(tick)) {}
+
+    [[nodiscard]] static std::vector<membrane::Tool<Scalar>> tools_of(const Place& place) {
+        std::vector<membrane::Tool<Scalar>> tools;
+        const auto stroke = place.scene == "slide" ? slide() : place.scene == "draw_out" ? draw_out() : put_down();
+        for (const auto& tool : stroke) {
+            tools.push_back({.position = tool.position.template cast<Scalar>(),
+                             .radius = static_cast<Scalar>(tool.radius),
+                             .grasping = tool.grasping});
+        }
+        return tools;
+    }
+
+    membrane::TriangleMesh<Scalar> mesh;
+    membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network;
+    membrane::VirtualVolumeSprings<Scalar> volume;
+    membrane::Stroke<Scalar> stroke;
+};
+
+/// The equilibria of every sixth tick: of those down, the last ones. Found once.
+[[nodiscard]] inline const std::vector<membrane::TickAtRest>& rests_of(const Place& place) {
+    static std::map<Place, std::vector<membrane::TickAtRest>> known;
+    auto& rests = known[place];
+    if (!rests.empty()) return rests;
+    const StrokeScene<double> scene(place);
+    constexpr Index every = 6;
+    rests = equilibria(scene.mesh, scene.network, scene.volume, scene.stroke, every);
+    require(rests.size() == static_cast<std::size_t>(scene.stroke.ticks() / every), "all ticks have an equilibrium");
+    return rests;
+}
+
+template <Real Scalar, class Rule>
+[[nodiscard]] membrane::Outcome play(const Place& place, const membrane::SolverOptions<Scalar>& options,
+                                     const Rule& rule, double mass = 1) {
+    const StrokeScene<Scalar> scene(place, mass);
+    return trial(scene.mesh, scene.network, scene.volume, scene.stroke, rests_of(place), options, rule,
+                 ProcessorSeconds{});
+}
+
+/// By (4), with the lightest mass that is stable for all of the scene, to a fiftieth: `part`, which is dt^2 stiffness /
+/// mass, begins with 0.5 and is taken down to that.
+template <Real Scalar>
+[[nodiscard]] membrane::Outcome play_published(const Place& place, const membrane::SolverOptions<Scalar>& options,
+                                               double& part) {
+    for (;; part -= 0.01) {
+        const auto outcome = play<Scalar>(place, options, membrane::MassStep{}, tick * tick * stiffness / part);
+        if (outcome.advanced || part < 0.02) return outcome;
+    }
+}
+
+/// For the benchmark's iteration: its time is that of a tick.
+inline void record(benchmark::State& state, const membrane::Outcome& outcome) {
+    require(outcome.advanced, "no step may be refused");
+    state.SetIterationTime(outcome.time);
+    state.counters["force_error"] = outcome.force_error;
+    state.counters["position_error"] = outcome.position_error / deep;
+}
+
+}  // namespace bench
