@@ -169,7 +169,7 @@ class MassSpringNetwork {
     }
     void build_springs(const Adjacency& adjacency, const Points<Scalar>& x, const NetworkOptions<Scalar>& options);
 
-    Law law_;
+    [[no_unique_address]] Law law_;
     std::vector<Spring<Scalar>> springs_;
     CompressedRows<SpringEnd<Scalar>> ends_;  // each spring twice
     std::vector<Scalar> mass_, viscosity_;

@@ -42,9 +42,9 @@ struct SolverOptions {
 /// How a solver works: what moves a vertex, what that may cost, and who does what may be done at the same time.
 template <class Rule, Real Scalar, class Threads>
 struct Method {
-    Rule rule;
+    [[no_unique_address]] Rule rule;
     SolverOptions<Scalar> options;
-    Threads executor;
+    [[no_unique_address]] Threads executor;
 };
 
 enum class StepStatus {

@@ -8,6 +8,7 @@
 #include <type_traits>
 
 #include <membrane/network/spring_law.hpp>
+#include <membrane/network/volume_springs.hpp>
 #include <membrane/solve/curvature.hpp>
 #include <membrane/solve/region.hpp>
 #include <membrane/solve/step_rule.hpp>
@@ -31,8 +32,9 @@ struct StepInput {
 /// What pulls on vertex `v` beside its springs: backing, damping and constraints.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] Pull<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
-    const auto backing = scene.volume.pull(v, point(scene.x, v), point(scene.work.start, v), scene.dt);
     const Scalar touches = (std::max)(scene.work.stiffness[static_cast<std::size_t>(v)], Scalar(0));
+    if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {point(scene.work.external, v), touches};
+    const auto backing = scene.volume.pull(v, point(scene.x, v), point(scene.work.start, v), scene.dt);
     return {backing.force + point(scene.work.external, v), backing.stiffness + touches};
 }
 
