@@ -12,7 +12,7 @@ set xrange [130:800000]
 set yrange [20:50000]
 set grid ytics lc '#d8d8d8' lw 0.7
 set border 3 lc '#444444'
-set key bottom right opaque reverse Left spacing 1.2 samplen 2
+set key top left opaque reverse Left spacing 1.2 samplen 2
 set style data linespoints
 set pointsize 0.6
 
