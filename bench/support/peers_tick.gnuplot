@@ -9,10 +9,10 @@ set logscale xy
 set xtics nomirror (162, 642, '2562' 2562, '10k' 10242, '41k' 40962, '164k' 163842, '655k' 655362)
 set ytics nomirror format '%g'
 set xrange [130:800000]
-set yrange [20:50000]
+set yrange [8:50000]
 set grid ytics lc '#d8d8d8' lw 0.7
 set border 3 lc '#444444'
-set key top left opaque reverse Left spacing 1.2 samplen 2
+set key bottom right reverse Left spacing 1.1 samplen 2 font ',12'
 set style data linespoints
 set pointsize 0.6
 
