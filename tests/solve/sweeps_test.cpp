@@ -152,3 +152,24 @@ TEST_CASE("a membrane comes to rest however little time its steps have", "[solve
         CHECK(membrane.residual(x, v) <= membrane.network.negligible_force());
     }
 }
+
+TEST_CASE("what a limit of visits leaves out is the farthest, in colours too", "[solver][queue]") {
+    const Membrane membrane(stiffness / 10, 3);
+    const Index v = 5;
+    const auto force = [&](VisitOrder order, Index most_visits) {
+        QuasiStaticSolver solver(membrane.network,
+                                 {.layers = unlimited, .sweeps = 4, .order = order, .most_visits = most_visits});
+        Points<double> x = membrane.mesh.positions();
+        StepReport<double> report;
+        for (int tick = 0; tick < 300; ++tick) {
+            report = solver.step(x, dt, membrane.network, membrane.backing, pull(v, membrane.pushed(v, 0.1)));
+            REQUIRE(report.visits <= most_visits);
+        }
+        return norm(report.reactions[0]);
+    };
+    const double exact = force(VisitOrder::arrival, unlimited);
+    for (const VisitOrder order : {VisitOrder::arrival, VisitOrder::groups, VisitOrder::colours}) {
+        CHECK(force(order, unlimited) == Approx(exact).epsilon(1e-6));
+        CHECK(force(order, 1000) == Approx(exact).epsilon(0.02));
+    }
+}

@@ -21,7 +21,7 @@ struct SomeTask {
 }  // namespace detail
 
 /// `executor(count, task)` calls `task(i)` once for each `i` from 0 to `count` - 1, in any order and on any threads, and
-/// returns when all are done. Neither throws.
+/// returns when all are done, after which there is no task. Neither throws; `count` may be 0.
 template <class E>
 concept Executor = std::copy_constructible<E> &&
     requires(const E& executor, Index count, const detail::SomeTask& task) {

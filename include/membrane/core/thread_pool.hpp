@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <thread>
@@ -10,7 +12,7 @@
 #include <membrane/core/check.hpp>
 #include <membrane/core/executor.hpp>
 
-/// Threads that do what the library lets be done at the same time; it has none of its own.
+/// Threads that do what the library lets be done at the same time. No other part starts any.
 ///
 ///     const membrane::ThreadPool pool(4);
 ///     auto solver = membrane::QuasiStaticSolver(network, options, membrane::BlockStep{}, pool.executor());
@@ -24,7 +26,7 @@ class ThreadPool {
   public:
     /// `threads`, the one that brings work included.
     /// @throws InvalidInput if there is to be none; std::system_error if the system has none left
-    explicit ThreadPool(int threads = static_cast<int>(std::thread::hardware_concurrency()));
+    explicit ThreadPool(int threads = (std::max)(1, static_cast<int>(std::thread::hardware_concurrency())));
     ~ThreadPool();
     ThreadPool(const ThreadPool&) = delete;
     ThreadPool& operator=(const ThreadPool&) = delete;
@@ -41,6 +43,9 @@ class ThreadPool {
     }
 
   private:
+    struct NoWorkers {};
+    explicit ThreadPool(NoWorkers) noexcept {}
+
     struct Job {
         const void* task = nullptr;
         void (*run)(const void* task, Index i) noexcept = nullptr;
@@ -53,15 +58,17 @@ class ThreadPool {
     static void wait_for_change(const std::atomic<T>& value, T old) noexcept;
 
     mutable Job job_;
-    mutable std::atomic<Index> next_{0};               // task of the job
+    mutable std::atomic<std::int64_t> next_{0};        // task of the job
     mutable std::atomic<std::uint32_t> job_count_{0};  // so far
     mutable std::atomic<int> busy_{0};                 // threads, with this job
     mutable std::atomic<bool> over_{false};
     std::vector<std::thread> workers_;
 };
 
-inline ThreadPool::ThreadPool(int threads) {
+// Made before its threads are, so that it joins those there are if the system has no more.
+inline ThreadPool::ThreadPool(int threads) : ThreadPool(NoWorkers{}) {
     if (threads < 1) refuse("ThreadPool", "there must be at least 1 thread, got ", threads);
+    workers_.reserve(static_cast<std::size_t>(threads) - 1);
     for (int i = 1; i < threads; ++i) workers_.emplace_back([this] { serve(); });
 }
 
@@ -86,7 +93,9 @@ void ThreadPool::operator()(Index count, const Task& task) const noexcept {
 
 inline void ThreadPool::work() const noexcept {
     const Job job = job_;
-    for (Index i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < job.count;) job.run(job.task, i);
+    for (std::int64_t i; (i = next_.fetch_add(1, std::memory_order_relaxed)) < job.count;) {
+        job.run(job.task, static_cast<Index>(i));
+    }
 }
 
 inline void ThreadPool::serve() const noexcept {

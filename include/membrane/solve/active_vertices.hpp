@@ -122,7 +122,10 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
 template <class Network, class Options>
 void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
     as_needed_ = options.layers_as_needed;
+    const bool limited = options.most_visits != unlimited;
     order_ = as_needed_ ? VisitOrder::arrival : options.order;
+    if (order_ == VisitOrder::colours && limited)
+        order_ = VisitOrder::groups;  // what is left out is to be the farthest
     layers_before_ = order_ == VisitOrder::colours ? std::exchange(layers_, options.layers) : queue_.layer_count() - 1;
     next_seeds_.clear();
     for (const Index v : seeds) next_seeds_.insert(v);
@@ -138,7 +141,7 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_visits + 1);
     const auto passes = (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // a look before a layer is added
     const auto spare = (std::max)(options.most_visits - own, std::int64_t{0}) / passes;
-    room_ = (std::max)(touched + static_cast<Index>(spare), Index(1));
+    room_ = limited ? (std::max)(touched + static_cast<Index>(spare), Index(1)) : unlimited;
     const Index others =
         (std::min)(restless_.count() + left_.count(), room_ / 4);  // their turn under a lasting contact
     visited_.clear();

@@ -16,7 +16,8 @@
 namespace membrane {
 
 /// Vertices in the order of a breadth-first search from the seeds, [Liu07] 2.2: the seeds are layer 0, layer k holds the
-/// vertices that k springs and no fewer join to a seed. Within a layer, the order of arrival, or groups.
+/// vertices that k springs and no fewer join to a seed, until they are grouped together. Within a layer, the order of
+/// arrival, or groups.
 class PropagationQueue {
   public:
     explicit PropagationQueue(Index vertex_count)

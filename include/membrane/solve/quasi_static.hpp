@@ -36,8 +36,8 @@ namespace membrane {
 ///
 /// Beyond the paper: a step begins where the last one leads to, if what acts goes on; it may sweep the queue several
 /// times; what a contact leaves behind stays at work until it is at rest, and then costs nothing; constraints keep the
-/// forces they act with from step to step, so that a sweep ends with forces that balance. A step that is refused leaves the positions as they were, to the bit: it keeps the
-/// positions of the vertices it works on, three numbers for each.
+/// forces they act with from step to step, so that a sweep ends with forces that balance. A step that is refused leaves
+/// the positions as they were, to the bit: it keeps the positions of the vertices it works on, three numbers for each.
 ///
 /// Positions, network and backing are handed in at each step, always those of one membrane; what is remembered (queue,
 /// restless vertices, contact forces) is a cache. One thread at a time for each solver.
@@ -60,7 +60,7 @@ class QuasiStaticSolver {
     }
 
     /// The same, over at `deadline`, or later by what it misjudged its end by; or by what comes in any case, one
-    /// round over layer 0, 32 vertices beyond, and a look at all that are at work. The next step goes on where time ran
+    /// round over layer 0, 32 vertices beyond, and a look at all that are at work. One thread visits. The next step goes on where time ran
     /// out, so that a membrane comes to rest however little time its steps have.
     template <class Now, class Law, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,

@@ -14,11 +14,12 @@
 ///     if (report.status != membrane::StepStatus::advanced) { /* nothing has moved */ }
 namespace membrane {
 
-/// In what order the vertices of a layer are visited; the layers always from the contact outward.
+/// In what order vertices are visited: the layers from the contact outward, and in each
 enum class VisitOrder {
     arrival,  ///< as the breadth-first search came to them, [Liu07] 2.2
     groups,   ///< those together that no spring joins: the processor moves several of them at once
-    colours,  ///< the same, of all layers together: few and large groups, for several threads; changes spread more slowly
+    colours,  ///< groups of all layers together: few and large, for several threads; changes spread more slowly.
+              ///< Where there is a limit of visits: as `groups`
 };
 
 /// What a step may cost. More of everything is more accurate.

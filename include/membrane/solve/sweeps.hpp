@@ -57,7 +57,9 @@ class Sweeps {
 
   private:
     using Rule = decltype(Method::rule);
-    static constexpr bool alone = std::is_same_v<decltype(Method::executor), OneThread>;
+    // Somebody in a hurry has no time for as much as is worth sharing.
+    static constexpr bool alone =
+        std::is_same_v<decltype(Method::executor), OneThread> || !std::is_same_v<Pace, NoHurry>;
     static constexpr bool can_use_lanes =
         VisitsInLanes<Scalar, Rule, std::remove_cvref_t<decltype(std::declval<Scene>().network.law())>,
                       std::remove_cvref_t<decltype(std::declval<Scene>().volume)>>;
@@ -211,7 +213,7 @@ template <class Method, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Method, Scalar, Scene, Acting, Pace>::visit_packs(std::size_t begin, std::size_t end) noexcept {
     bool changed = false;
     if constexpr (!alone) block_.visit(begin, end - begin, scene_, method_.rule, method_.executor);
-    for (std::size_t p = begin; p < end; ++p) {
+    for (std::size_t p = begin; p < end && report_.status == StepStatus::advanced; ++p) {
         changed |= take(p, alone ? block_.visit(p, scene_, method_.rule) : block_.outcome(p));
     }
     return changed;
