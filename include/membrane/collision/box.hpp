@@ -126,10 +126,10 @@ CapsuleProbe<Scalar>::CapsuleProbe(const Vector3<Scalar>& from, const Vector3<Sc
     const Scalar shortest = (std::max)(Limits::epsilon() * size, (Limits::min)());
     for (int k = 0; k < 3; ++k) {
         const Scalar step = to[k] - from[k];
-        const bool known = abs(step) >= shortest;
-        pace_[k] = 1 / (known ? step : shortest);
-        to_near_[k] = from[k] + (pace_[k] > 0 ? margin : -margin);
-        to_far_[k] = from[k] - (pace_[k] > 0 ? margin : -margin);
+        pace_[k] = 1 / (abs(step) >= shortest ? step : shortest);
+        const Scalar ahead = pace_[k] > 0 ? margin : -margin;
+        to_near_[k] = from[k] + ahead;
+        to_far_[k] = from[k] - ahead;
     }
 }
 

@@ -22,7 +22,7 @@
 ///
 ///     auto boxes = membrane::BoxTree(mesh, {.balance_threshold = 16});
 ///     boxes.refit(x, report.moved);
-///     boxes.search(x, key, limit, [&](membrane::Index f, const auto& triangle) { ... });
+///     const auto visited = boxes.search(x, key, limit, [&](membrane::Index f, const auto& triangle) { ... });
 namespace membrane {
 
 struct TreeOptions {
