@@ -99,8 +99,12 @@ int longest_axis(const Box<Scalar>& box) noexcept {
 
 template <Number N>
 auto overlap(const Box<N>& a, const Box<Each<N>>& b) noexcept {
-    const auto along = [&](int k) { return (a.low[k] <= N(b.high[k])) & (N(b.low[k]) <= a.high[k]); };
-    return along(0) & along(1) & along(2);
+    const auto along = [&](int k) {
+        const auto begins = a.low[k] <= N(b.high[k]), ends = N(b.low[k]) <= a.high[k];
+        return begins & ends;
+    };
+    const auto x = along(0), y = along(1), z = along(2);
+    return x & y & z;
 }
 
 template <Number N>
