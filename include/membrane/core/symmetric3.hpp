@@ -54,6 +54,13 @@ template <Number Scalar>
                                       xz, a.xy * a.xz - a.xx * a.yz};
 }
 
+/// No eigenvalue is larger: root of the sum of their squares.
+template <Number Scalar>
+[[nodiscard]] Scalar eigenvalue_bound(const Symmetric3<Scalar>& a) noexcept {
+    using std::sqrt;
+    return sqrt((a.xx * a.xx + a.yy * a.yy + a.zz * a.zz) + 2 * (a.xy * a.xy + a.xz * a.xz + a.yz * a.yz));
+}
+
 /// In closed form [Smith61].
 template <Real Scalar>
 [[nodiscard]] Scalar largest_eigenvalue(const Symmetric3<Scalar>& a) noexcept {

@@ -13,6 +13,7 @@
 #include <membrane/core/field.hpp>
 #include <membrane/mesh/adjacency.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/network/elastic_network.hpp>
 #include <membrane/network/spring_law.hpp>
 
 /// The membrane as masses joined by springs, one along each edge of the mesh.
@@ -111,6 +112,8 @@ class MassSpringNetwork {
   public:
     using Scalar = Scalar_;
 
+    static constexpr bool never_stiffens = membrane::never_stiffens<Law>();
+
     /// @throws InvalidInput for a number that is negative, not finite, missing, or of the wrong count. Cost: O(V + F log F).
     MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law, const NetworkOptions<Scalar>& options);
 
@@ -120,6 +123,8 @@ class MassSpringNetwork {
 
     /// The springs of vertex `v`, by ascending vertex at the other end.
     [[nodiscard]] std::span<const SpringEnd<Scalar>> springs_of(Index v) const noexcept { return ends_[v]; }
+
+    [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const noexcept { return ends_[v]; }
 
     [[nodiscard]] bool pinned(Index v) const noexcept { return pinned_[static_cast<std::size_t>(v)] != 0; }
     [[nodiscard]] bool has_masses() const noexcept { return !mass_.empty(); }
@@ -146,9 +151,12 @@ class MassSpringNetwork {
     /// smallest max(l, r): with these, relief / (1 + rho / size) is no more than the sum of k r / (l + rho) (I - u u^T).
     [[nodiscard]] CurvedPull<Scalar> curved_pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
-    /// Energy stored in the springs of vertex `v` where it is at `position`, the others at `x` [J].
-    [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position,
-                                const ConstPointsRef<Scalar>& x) const noexcept;
+    /// Second derivative of the energy by the place of vertex `v` alone [N/m].
+    [[nodiscard]] Symmetric3<Scalar> curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// What moving vertex `v` by `way` [m] costs.
+    [[nodiscard]] EnergyChange<Scalar> energy_change(Index v, const Vector3<Scalar>& way,
+                                                     const ConstPointsRef<Scalar>& x) const noexcept;
 
     /// Tension of spring `s` [N].
     [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
@@ -265,12 +273,29 @@ CurvedPull<Scalar> MassSpringNetwork<Scalar, Law>::curved_pull(Index v,
 }
 
 template <Real Scalar, SpringLaw<Scalar> Law>
-Scalar MassSpringNetwork<Scalar, Law>::energy(Index v, const Vector3<Scalar>& position,
-                                              const ConstPointsRef<Scalar>& x) const noexcept {
-    Scalar sum = 0;
+Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
+    Symmetric3<Scalar> block;
+    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) {
+        block += diagonal3(spring.across);
+        block += outer<Scalar>(spring.along - spring.across, spring.direction);
+    });
+    return block;
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law>
+EnergyChange<Scalar> MassSpringNetwork<Scalar, Law>::energy_change(Index v, const Vector3<Scalar>& way,
+                                                                   const ConstPointsRef<Scalar>& x) const noexcept {
+    const Vector3<Scalar> here = point(x, v);
+    const Scalar far = here.cwiseAbs().maxCoeff();
+    EnergyChange<Scalar> sum;
     for (const auto& end : springs_of(v)) {
-        const Scalar length = norm<Scalar>(point(x, end.other) - position);
-        sum += law_(SpringState<Scalar>{end.stiffness, end.rest_length, length}).energy;
+        const auto response_at = [&](Scalar length) {
+            return law_(SpringState<Scalar>{end.stiffness, end.rest_length, length});
+        };
+        const Vector3<Scalar> reach = point(x, end.other) - here;
+        const Scalar length = norm(reach);
+        const auto before = response_at(length), after = response_at(norm<Scalar>(reach - way));
+        sum += {after.energy - before.energy, before.energy + std::abs(before.tension) * (length + far)};
     }
     return sum;
 }

@@ -8,7 +8,7 @@
 
 #include <membrane/core/check.hpp>
 #include <membrane/core/lanes.hpp>
-#include <membrane/core/symmetric3.hpp>
+#include <membrane/core/types.hpp>
 
 /// What one spring does at a given length: constant stiffness, or stiffness as a function of the elongation.
 ///
@@ -52,23 +52,6 @@ template <class Law>
     if constexpr (requires { Law::never_stiffens; }) return Law::never_stiffens;
     return false;
 }
-
-/// What pulls on a vertex: the sum over its springs.
-template <Number Scalar>
-struct Pull {
-    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
-    Scalar stiffness = 0;                             ///< at least the curvature of the energy in every direction [N/m]
-};
-
-/// What pulls on a vertex, and what is known of the energy around it: for a move d of a length up to rho it is at most
-/// E - force . d + d . (stiffness I - relief / (1 + rho / size)) d / 2, see `MassSpringNetwork::curved_pull`.
-template <Number Scalar>
-struct CurvedPull {
-    Vector3<Scalar> force = Vector3<Scalar>::Zero();              ///< [N]
-    Scalar stiffness = 0;                                         ///< [N/m]
-    Symmetric3<Scalar> relief;                                    ///< no eigenvalue below zero [N/m]
-    Scalar size = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m]
-};
 
 /// Tension proportional to the elongation, [Liu07] 2.2: k (l - r).
 struct LinearSpring {

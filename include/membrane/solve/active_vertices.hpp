@@ -206,7 +206,7 @@ void ActiveVertices::settle(IsBalanced is_balanced) noexcept {
 
 template <class Network>
 void ActiveVertices::stir_neighbours(const Network& network, Index v) noexcept {
-    for (const auto& end : network.springs_of(v)) {
+    for (const auto& end : network.neighbours(v)) {
         const bool takes_part =
             as_needed_ ? !network.pinned(end.other) && !queue_.contains(end.other) : stirred_.contains(end.other);
         if (takes_part && !visited_.contains(end.other)) next_restless_.insert(end.other);

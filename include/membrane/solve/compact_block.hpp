@@ -20,14 +20,14 @@
 ///     block.packs().store(x);
 namespace membrane {
 
-/// Whether the visits of a rule may be made in lanes: law and rule reckon with `Lanes`, the backing hands out its springs,
-/// and no visit has to look at the energy.
-template <class Scalar, class Rule, class Law, class Volume>
-concept VisitsInLanes = (never_stiffens<Law>() ||
-                         !is_safe_rule<Rule>)&&requires(const Rule& rule, const Law& law,
+/// Whether the visits of a rule may be made in lanes: the network is of springs, their law and the rule reckon with
+/// `Lanes`, the backing hands out its springs, and no visit has to look at the energy.
+template <class Scalar, class Rule, class Network, class Volume>
+concept VisitsInLanes = (Network::never_stiffens ||
+                         !is_safe_rule<Rule>)&&requires(const Rule& rule, const Network& network,
                                                         const SpringState<Lanes<Scalar>>& spring,
                                                         const VertexState<Lanes<Scalar>>& vertex) {
-    law(spring);
+    network.law()(spring);
     rule.compliance(vertex);
 }
 &&(std::same_as<Volume, NoVolumeSprings> || requires(const Volume& volume, const Vector3<Scalar>& start, Scalar dt) {
@@ -41,8 +41,8 @@ class CompactBlock {
     using Several = Lanes<Scalar>;
 
     /// Has room for `most` vertices.
-    template <class Law>
-    explicit CompactBlock(const MassSpringNetwork<Scalar, Law>& network, Index most = unlimited)
+    template <ElasticNetwork<Scalar> Network>
+    explicit CompactBlock(const Network& network, Index most = unlimited)
         : packs_(network, most), ties_(packs_.room()), answers_(packs_.room()), outcomes_(packs_.room()) {}
 
     [[nodiscard]] SpringPacks<Scalar>& packs() noexcept { return packs_; }

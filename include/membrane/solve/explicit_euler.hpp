@@ -20,8 +20,8 @@ template <Real Scalar>
 class ExplicitEuler {
   public:
     /// @throws InvalidInput for a network without masses
-    template <class Law>
-    explicit ExplicitEuler(const MassSpringNetwork<Scalar, Law>& network)
+    template <ElasticNetwork<Scalar> Network>
+    explicit ExplicitEuler(const Network& network)
         : force_(Points<Scalar>::Zero(3, network.vertex_count())), previous_(force_), previous_velocity_(force_) {
         if (!network.has_masses()) refuse("ExplicitEuler", "the network must have masses [kg]");
     }
@@ -29,17 +29,17 @@ class ExplicitEuler {
     /// One step of `dt` [s] under the springs, the viscosity and the backing. `x` [m] and `velocity` [m/s] are 3 x V;
     /// pinned vertices stay. False, with both as they were, where the result would not be finite or dt is not positive.
     /// Online. Cost: all springs.
-    template <class Law, VolumeModel<Scalar> Volume>
+    template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume>
     [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt,
-                            const MassSpringNetwork<Scalar, Law>& network, const Volume& volume) noexcept {
+                            const Network& network, const Volume& volume) noexcept {
         force_.setZero();
         return advance(x, velocity, dt, network, volume);
     }
 
     /// The same with an external force on each vertex, F^ext of (1), 3 x V [N].
-    template <class Law, VolumeModel<Scalar> Volume>
+    template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume>
     [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt,
-                            const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                            const Network& network, const Volume& volume,
                             const ConstPointsRef<Scalar>& external) noexcept {
         force_ = external;
         return advance(x, velocity, dt, network, volume);
@@ -49,21 +49,21 @@ class ExplicitEuler {
     [[nodiscard]] Scalar residual() const noexcept { return residual_; }
 
   private:
-    template <class Law, class Volume>
+    template <class Network, class Volume>
     bool advance(PointsRef<Scalar>& x, PointsRef<Scalar>& velocity, Scalar dt,
-                 const MassSpringNetwork<Scalar, Law>& network, const Volume& volume) noexcept;
+                 const Network& network, const Volume& volume) noexcept;
 
     Points<Scalar> force_, previous_, previous_velocity_;
     Scalar residual_ = 0;
 };
 
-template <Real Scalar, class Law>
-ExplicitEuler(const MassSpringNetwork<Scalar, Law>&) -> ExplicitEuler<Scalar>;
+template <class Network>
+ExplicitEuler(const Network&) -> ExplicitEuler<typename Network::Scalar>;
 
 template <Real Scalar>
-template <class Law, class Volume>
+template <class Network, class Volume>
 bool ExplicitEuler<Scalar>::advance(PointsRef<Scalar>& x, PointsRef<Scalar>& velocity, Scalar dt,
-                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume) noexcept {
+                                    const Network& network, const Volume& volume) noexcept {
     MEMBRANE_ASSERT(x.cols() == network.vertex_count() && velocity.cols() == network.vertex_count());
     if (!is_finite(dt) || !(dt > 0)) return false;
     previous_ = x;

@@ -26,18 +26,18 @@ class PropagationQueue {
     /// Builds the queue anew, up to layer `layers` (0 for the seeds alone, `unlimited` for all they are joined to). A
     /// pinned vertex passes no force on: it is never in the queue. Seeds may be named twice.
     /// Online. Cost: the springs of the vertices in the queue.
-    template <Real Scalar, class Law>
-    void build(const MassSpringNetwork<Scalar, Law>& network, std::span<const Index> seeds, Index layers) noexcept;
+    template <class Network>
+    void build(const Network& network, std::span<const Index> seeds, Index layers) noexcept;
 
     /// Adds a layer; false if there is nobody left to add. Online. Cost: the springs of the last layer.
-    template <Real Scalar, class Law>
-    bool grow(const MassSpringNetwork<Scalar, Law>& network) noexcept;
+    template <class Network>
+    bool grow(const Network& network) noexcept;
 
     /// Orders every layer but layer 0 in groups that no spring joins; or all of them together, in fewer and larger ones,
     /// which makes one layer of them.
     /// Online. Cost: the springs of the vertices in the queue.
-    template <Real Scalar, class Law>
-    void group(const MassSpringNetwork<Scalar, Law>& network, bool together = false) noexcept;
+    template <class Network>
+    void group(const Network& network, bool together = false) noexcept;
 
     /// Where in `vertices` the groups end: the first begins after layer 0. None before `group` is called.
     [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return groups_.ends(); }
@@ -68,8 +68,8 @@ class PropagationQueue {
     VertexGroups groups_;
 };
 
-template <Real Scalar, class Law>
-void PropagationQueue::build(const MassSpringNetwork<Scalar, Law>& network, std::span<const Index> seeds,
+template <class Network>
+void PropagationQueue::build(const Network& network, std::span<const Index> seeds,
                              Index layers) noexcept {
     clear();
     for (const Index v : seeds) {
@@ -81,13 +81,13 @@ void PropagationQueue::build(const MassSpringNetwork<Scalar, Law>& network, std:
     }
 }
 
-template <Real Scalar, class Law>
-bool PropagationQueue::grow(const MassSpringNetwork<Scalar, Law>& network) noexcept {
+template <class Network>
+bool PropagationQueue::grow(const Network& network) noexcept {
     if (layer_count() == 0) return false;
     const std::size_t end = vertices().size();
     for (const Index v : layer(layer_count() - 1)) {
-        for (const auto& spring : network.springs_of(v)) {
-            if (!network.pinned(spring.other)) reached_.insert(spring.other);
+        for (const auto& joined : network.neighbours(v)) {
+            if (!network.pinned(joined.other)) reached_.insert(joined.other);
         }
     }
     if (vertices().size() == end) return false;
@@ -95,8 +95,8 @@ bool PropagationQueue::grow(const MassSpringNetwork<Scalar, Law>& network) noexc
     return true;
 }
 
-template <Real Scalar, class Law>
-void PropagationQueue::group(const MassSpringNetwork<Scalar, Law>& network, bool together) noexcept {
+template <class Network>
+void PropagationQueue::group(const Network& network, bool together) noexcept {
     groups_.clear();
     if (together && layer_count() > 1) {
         layer_ends_.cut(1);

@@ -46,15 +46,15 @@ class QuasiStaticSolver {
   public:
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
     /// Cost: O(V) memory.
-    template <class Law>
-    explicit QuasiStaticSolver(const MassSpringNetwork<Scalar, Law>& network, const SolverOptions<Scalar>& options = {},
+    template <ElasticNetwork<Scalar> Network>
+    explicit QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options = {},
                                const Rule& rule = {}, const Threads& executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, in layer 0 `contact_visits` in each
     /// sweep; a visit costs the vertex's springs.
-    template <class Law, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
-    [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const MassSpringNetwork<Scalar, Law>& network,
+    template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
+    [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network,
                                           const Volume& volume, const Constraints&... constraints) noexcept {
         return step_in(NoHurry{}, x, dt, network, volume, constraints...);
     }
@@ -62,9 +62,9 @@ class QuasiStaticSolver {
     /// The same, over at `deadline`, or later by what it misjudged its end by; or by what comes in any case, one
     /// round over layer 0, 32 vertices beyond, and a look at all that are at work. One thread visits. The next step goes on where time ran
     /// out, so that a membrane comes to rest however little time its steps have.
-    template <class Now, class Law, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
+    template <class Now, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
-                                                const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                                const Network& network, const Volume& volume,
                                                 const Constraints&... constraints) noexcept {
         return step_in(Hurry<Now>(deadline, costs_), x, dt, network, volume, constraints...);
     }
@@ -81,9 +81,9 @@ class QuasiStaticSolver {
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return active_.queue(); }
 
   private:
-    template <class Pace, class Law, class Volume, class... Constraints>
+    template <class Pace, class Network, class Volume, class... Constraints>
     [[nodiscard]] StepReport<Scalar> step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
-                                             const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                             const Network& network, const Volume& volume,
                                              const Constraints&... constraints) noexcept;
     void open(std::size_t constraint_count) noexcept;
     template <class Acting>
@@ -108,14 +108,19 @@ class QuasiStaticSolver {
     StepCosts costs_;
 };
 
+template <class Network, class Rule = BlockStep, class Threads = OneThread>
+requires ElasticNetwork<Network, typename Network::Scalar>
+QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {},
+                  const Threads& = {}) -> QuasiStaticSolver<typename Network::Scalar, Rule, Threads>;
+
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
-template <class Law>
-QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const MassSpringNetwork<Scalar, Law>& network,
+template <ElasticNetwork<Scalar> Network>
+QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& network,
                                                             const SolverOptions<Scalar>& options, const Rule& rule,
                                                             const Threads& executor)
     : method_{rule, (options.check(), options), executor},
       active_(network.vertex_count()),
-      block_(network, detail::most_in_lanes<Scalar, Rule, Law>(options)),
+      block_(network, detail::most_in_lanes<Scalar, Rule, Network>(options)),
       work_(
           network.vertex_count(), [&](Index v) { return network.pinned(v); }, options.most_touches),
       last_held_(network.vertex_count()),
@@ -132,9 +137,9 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const MassSpringNetw
 }
 
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
-template <class Pace, class Law, class Volume, class... Constraints>
+template <class Pace, class Network, class Volume, class... Constraints>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
-                                                                     const MassSpringNetwork<Scalar, Law>& network,
+                                                                     const Network& network,
                                                                      const Volume& volume,
                                                                      const Constraints&... constraints) noexcept {
     static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints, "a step takes 16 constraints at most");
@@ -153,7 +158,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
     if (work_.full) return refuse_step(StepStatus::too_many_touches, x);
 
     line_up(network, region);
-    const StepInput<Scalar, MassSpringNetwork<Scalar, Law>, Volume> scene{x, dt, network, volume, work_};
+    const StepInput<Scalar, Network, Volume> scene{x, dt, network, volume, work_};
     std::size_t resume = resume_;
     Sweeps sweeps(method_, scene, region, acting, active_, block_, pace, report_);
     StepStatus status = sweeps.run(resume);

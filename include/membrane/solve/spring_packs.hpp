@@ -29,8 +29,8 @@ class SpringPacks {
     using Several = Lanes<Scalar>;
 
     /// Has room for `most` vertices.
-    template <class Law>
-    SpringPacks(const MassSpringNetwork<Scalar, Law>& network, Index most);
+    template <ElasticNetwork<Scalar> Network>
+    SpringPacks(const Network& network, Index most);
 
     /// Takes over the groups of `queue`, in place of all there were. Online. Cost: the springs of its vertices.
     template <class Network>
@@ -128,15 +128,18 @@ class SpringPacks {
 };
 
 template <Real Scalar>
-template <class Law>
-SpringPacks<Scalar>::SpringPacks(const MassSpringNetwork<Scalar, Law>& network, Index most)
+template <ElasticNetwork<Scalar> Network>
+SpringPacks<Scalar>::SpringPacks(const Network& network, Index most)
     : members_(static_cast<std::size_t>((std::min)(network.vertex_count(), most))),
       packs_(packs_for(members_.room())),
       with_row_(most > 0 ? static_cast<std::size_t>(network.vertex_count()) : 0),
       row_(with_row_.room(), no_index) {
     rows_.resize(with_row_.room() + 1);
-    std::size_t ends = 2 * network.springs().size(), longest = 0;
-    for (Index v = 0; v < network.vertex_count(); ++v) longest = (std::max)(longest, network.springs_of(v).size());
+    std::size_t ends = 0, longest = 0;
+    for (Index v = 0; v < network.vertex_count(); ++v) {
+        ends += network.neighbours(v).size();
+        longest = (std::max)(longest, network.neighbours(v).size());
+    }
     ends = (std::min)(ends, longest * members_.room());
     if (most > 0) slots_.resize(2 * ends / lanes + 64 * longest);
 }
@@ -198,7 +201,7 @@ template <Real Scalar>
 template <class Network>
 bool SpringPacks<Scalar>::append_pack(std::span<const Index> vertices, const Network& network) noexcept {
     std::size_t springs = 0;
-    for (const Index v : vertices) springs = (std::max)(springs, network.springs_of(v).size());
+    for (const Index v : vertices) springs = (std::max)(springs, network.neighbours(v).size());
     if (members_.size() + vertices.size() > members_.room() || slot_count_ + springs > slots_.size()) return false;
     Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}};
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * row_of(vertices[i]);

@@ -24,9 +24,9 @@ namespace membrane {
 namespace detail {
 
 // Nothing where the visits cannot be in lanes whatever the backing.
-template <class Scalar, class Rule, class Law>
+template <class Scalar, class Rule, class Network>
 [[nodiscard]] Index most_in_lanes(const SolverOptions<Scalar>& options) noexcept {
-    constexpr bool possible = VisitsInLanes<Scalar, Rule, Law, NoVolumeSprings>;
+    constexpr bool possible = VisitsInLanes<Scalar, Rule, Network, NoVolumeSprings>;
     return possible && options.order != VisitOrder::arrival && !options.layers_as_needed ? options.most_in_groups : 0;
 }
 
@@ -61,7 +61,7 @@ class Sweeps {
     static constexpr bool alone =
         std::is_same_v<decltype(Method::executor), OneThread> || !std::is_same_v<Pace, NoHurry>;
     static constexpr bool can_use_lanes =
-        VisitsInLanes<Scalar, Rule, std::remove_cvref_t<decltype(std::declval<Scene>().network.law())>,
+        VisitsInLanes<Scalar, Rule, std::remove_cvref_t<decltype(std::declval<Scene>().network)>,
                       std::remove_cvref_t<decltype(std::declval<Scene>().volume)>>;
 
     void open_block() noexcept;

@@ -49,7 +49,7 @@ void VertexGroups::add(const Network& network, IndexSet& set, std::size_t begin,
     const auto vertices = set.items().subspan(begin, end - begin);
     Index groups = 0;
     for (const Index v : vertices) {
-        for (const auto& spring : network.springs_of(v)) {
+        for (const auto& spring : network.neighbours(v)) {
             const Index group = group_of_[at(spring.other)];
             if (group != no_index) barred_[at(group)] = v;
         }

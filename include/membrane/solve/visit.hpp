@@ -2,12 +2,11 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <type_traits>
 
-#include <membrane/network/spring_law.hpp>
+#include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
 #include <membrane/solve/curvature.hpp>
 #include <membrane/solve/region.hpp>
@@ -94,20 +93,12 @@ template <class Scalar, class Network, class Volume>
 template <class Rule, class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> held_back(const StepInput<Scalar, Network, Volume>& scene, Index v,
                                         std::type_identity_t<Vector3<Scalar>> way) noexcept {
-    const auto& network = scene.network;
-    using Law = std::remove_cvref_t<decltype(network.law())>;
-    if constexpr (!never_stiffens<Law>() && is_safe_rule<Rule>) {
+    if constexpr (!Network::never_stiffens && is_safe_rule<Rule>) {
         const auto others = others_on(scene, v);
-        const Vector3<Scalar> here = point(scene.x, v);
-        const Scalar before = network.energy(v, here, scene.x), far = here.cwiseAbs().maxCoeff();
-        Scalar size = before;  // of what is added up and taken off again
-        network.for_each_pull(v, scene.x, [&](const SpringPull<Scalar>& spring) {
-            size += std::abs(spring.tension) * (spring.length + far);
-        });
-        const Scalar rounding = 16 * std::numeric_limits<Scalar>::epsilon() * size;
         for (int i = 0; i < std::numeric_limits<Scalar>::digits; ++i, way /= 2) {
             const Scalar work = dot(others.force, way) - others.stiffness * squared_norm(way) / 2;
-            if (network.energy(v, here + way, scene.x) - before <= work + rounding) return way;
+            const auto energy = scene.network.energy_change(v, way, scene.x);
+            if (energy.change <= work + 16 * std::numeric_limits<Scalar>::epsilon() * energy.size) return way;
         }
         way.setZero();
     }

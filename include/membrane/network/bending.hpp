@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <membrane/mesh/half_edges.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/network/elements.hpp>
+#include <membrane/network/material.hpp>
+
+/// Resistance to being bent.
+///
+///     const auto tissue = membrane::Tissue(springs, membrane::bending_springs(mesh, membrane::flexural_rigidity(material)));
+///
+/// A flat sheet that is not stretched has no stiffness normal to itself but this and its backing. It matters where both are
+/// soft: against a backing of c [Pa/m] over ways of (D / c)^(1/4), 0.1 mm for a cornea's 3 uN m on 30 GPa/m, and against a
+/// tension T over ways of sqrt(D / T); triangles larger than that do not feel it.
+namespace membrane {
+
+/// E t^3 / (12 (1 - nu^2)) [N m]. @throws InvalidInput for a material out of its range
+[[nodiscard]] inline double flexural_rigidity(const Material& material) {
+    material.check();
+    const double nu = material.poisson_ratio;
+    return material.young_modulus * std::pow(material.thickness, 3) / (12 * (1 - nu * nu));
+}
+
+/// Two triangles at an edge, from corner 0 to corner 1, with the apexes 2 and 3, 2 on the left seen from outside. Folded
+/// by the angle a, positive where apexes go inward, instead of the angle at rest, it stores stiffness (a - rest)^2 / 2
+/// [Grinspun03]. Of the second derivative the part is left out that vanishes at rest, and with it all that could be
+/// negative.
+template <Real Scalar>
+struct Hinge {
+    static constexpr std::size_t corner_count = 4;
+
+    Scalar stiffness;  ///< [N m]
+    Scalar rest;       ///< [rad]
+
+    template <Real N>
+    [[nodiscard]] CornerPull<N> pull(const Corners<N, 4>& x, std::size_t i) const noexcept;
+    template <Real N>
+    [[nodiscard]] N energy(const Corners<N, 4>& x) const noexcept;
+    template <Real N>
+    [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 4>& x, std::size_t i,
+                                                const Vector3<N>& way) const noexcept;
+    [[nodiscard]] Eigen::Matrix3d second_derivative(const Corners<double, 4>& x, std::size_t i,
+                                                    std::size_t j) const noexcept;
+};
+
+/// A hinge at each edge between two triangles of `mesh`, which is at rest as it is, for a flexural rigidity D [N m]: of
+/// stiffness D l^2 / (A + B), l the edge's length, A and B the areas. On equilateral triangles it stores what a plate does
+/// that is bent like a cylinder; where it is bent two ways, its Poisson ratio is -1/3: that part depends on the slopes at
+/// the border alone [Seung88].
+/// @throws InvalidInput for a rigidity that is not finite, or negative. O(F log F).
+template <Real Scalar>
+[[nodiscard]] Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh, double rigidity);
+
+namespace detail {
+
+/// The angle of a hinge, and its derivative by each corner.
+template <Real N>
+struct Fold {
+    explicit Fold(const Corners<N, 4>& x) noexcept
+        : edge(x[1] - x[0]), left(cross<N>(edge, x[2] - x[0])), right(cross<N>(x[3] - x[0], edge)) {}
+
+    [[nodiscard]] bool is_sound() const noexcept { return squared_norm(left) > 0 && squared_norm(right) > 0; }
+
+    [[nodiscard]] N angle() const noexcept {
+        return std::atan2(dot<N>(cross(left, right), edge) / norm(edge), dot(left, right));
+    }
+
+    [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
+        const N length = norm(edge), square = length * length;
+        const Vector3<N> by_left = (-length / squared_norm(left)) * left;
+        const Vector3<N> by_right = (-length / squared_norm(right)) * right;
+        if (i == 2) return by_left;
+        if (i == 3) return by_right;
+        // Neither does shifting the hinge change the angle, nor turning it about its edge.
+        const N on_left = dot<N>(edge, x[2] - x[0]) / square, on_right = dot<N>(edge, x[3] - x[0]) / square;
+        return i == 0 ? Vector3<N>((on_left - 1) * by_left + (on_right - 1) * by_right)
+                      : Vector3<N>(-on_left * by_left - on_right * by_right);
+    }
+
+    Vector3<N> edge, left, right;
+};
+
+/// `angle` but for whole turns, between -pi and pi.
+template <Real N>
+[[nodiscard]] N within_half_turn(N angle) noexcept {
+    constexpr N turn = 2 * std::numbers::pi_v<N>;
+    return angle - turn * std::round(angle / turn);
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+template <Real N>
+CornerPull<N> Hinge<Scalar>::pull(const Corners<N, 4>& x, std::size_t i) const noexcept {
+    const detail::Fold<N> fold(x);
+    if (!fold.is_sound()) return {};
+    const auto k = static_cast<N>(stiffness);
+    const Vector3<N> slope = fold.slope(x, i);
+    const N moment = k * detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
+    return {-moment * slope, outer<N>(k, slope)};
+}
+
+template <Real Scalar>
+template <Real N>
+N Hinge<Scalar>::energy(const Corners<N, 4>& x) const noexcept {
+    const detail::Fold<N> fold(x);
+    if (!fold.is_sound()) return 0;
+    const N by = detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
+    return static_cast<N>(stiffness) * by * by / 2;
+}
+
+template <Real Scalar>
+template <Real N>
+EnergyChange<N> Hinge<Scalar>::energy_change(const Corners<N, 4>& x, std::size_t i,
+                                             const Vector3<N>& way) const noexcept {
+    auto there = x;
+    there[i] += way;
+    const N before = energy(x), after = energy(there);
+    // The angle itself is known to some epsilons.
+    const N noise = static_cast<N>(stiffness) * (1 + std::abs(static_cast<N>(rest))) *
+                    std::sqrt(2 * (before + after) / (std::max)(static_cast<N>(stiffness), N(1e-30)));
+    return {after - before, before + after + noise};
+}
+
+template <Real Scalar>
+Eigen::Matrix3d Hinge<Scalar>::second_derivative(const Corners<double, 4>& x, std::size_t i,
+                                                 std::size_t j) const noexcept {
+    const detail::Fold<double> fold(x);
+    if (!fold.is_sound()) return Eigen::Matrix3d::Zero();
+    return static_cast<double>(stiffness) * fold.slope(x, i) * fold.slope(x, j).transpose();
+}
+
+template <Real Scalar>
+Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh, double rigidity) {
+    if (!is_finite(rigidity) || rigidity < 0) {
+        refuse("bending_springs", "rigidity must be finite and not negative [N m], got ", rigidity);
+    }
+    using All = Elements<Scalar, Hinge<Scalar>>;
+    std::vector<typename All::Placed> all;
+    const auto sides = half_edges(mesh.triangles());
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
+        if (edge.size() != 2) return;
+        const HalfEdge &left = edge[0].forward ? edge[0] : edge[1], &right = edge[0].forward ? edge[1] : edge[0];
+        const std::array<Index, 4> corners{left.first, left.second, left.apex, right.apex};
+        Corners<double, 4> x;
+        for (std::size_t i = 0; i < 4; ++i) x[i] = point(mesh.positions(), corners[i]).template cast<double>();
+        const detail::Fold<double> fold(x);
+        if (!fold.is_sound() || rigidity == 0) return;
+        const double areas = (norm(fold.left) + norm(fold.right)) / 2;
+        all.push_back({corners,
+                       {static_cast<Scalar>(rigidity * squared_norm(fold.edge) / areas),
+                        static_cast<Scalar>(fold.angle())}});
+    });
+    return All(mesh, std::move(all));
+}
+
+}  // namespace membrane

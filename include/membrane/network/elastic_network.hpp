@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <concepts>
+#include <limits>
+
+#include <membrane/core/symmetric3.hpp>
+#include <membrane/core/types.hpp>
+
+/// What a solver asks of whatever pulls on the vertices of a membrane.
+///
+///     template <membrane::ElasticNetwork<double> Network>
+///     membrane::Vector3<double> force_on(const Network& network, membrane::Index v, const Eigen::Matrix3Xd& x) {
+///         return network.pull(v, x).force;                                                // [N]
+///     }
+namespace membrane {
+
+/// What pulls on a vertex: the sum over its springs.
+template <Number Scalar>
+struct Pull {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
+    Scalar stiffness = 0;                             ///< at least the curvature of the energy in every direction [N/m]
+};
+
+/// What pulls on a vertex, and what is known of the energy around it: for a move d of a length up to rho it is at most
+/// E - force . d + d . (stiffness I - relief / (1 + rho / size)) d / 2, see `MassSpringNetwork::curved_pull`.
+template <Number Scalar>
+struct CurvedPull {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();              ///< [N]
+    Scalar stiffness = 0;                                         ///< [N/m]
+    Symmetric3<Scalar> relief;                                    ///< no eigenvalue below zero [N/m]
+    Scalar size = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m]
+};
+
+/// By how much the energy changes when a vertex moves.
+template <Real Scalar>
+struct EnergyChange {
+    Scalar change = 0;  ///< [J]
+    Scalar size = 0;    ///< of what was added up and taken off again: times epsilon, the rounding [J]
+
+    EnergyChange& operator+=(const EnergyChange& other) noexcept {
+        change += other.change, size += other.size;
+        return *this;
+    }
+};
+
+/// What joins the vertices of a membrane: springs, or springs and more. What the compiler cannot see: all of it is the
+/// derivative of one energy, `neighbours(v)` are all vertices whose place changes the pull on `v`, by their `other`, and
+/// where a network says that it `never_stiffens`, what `CurvedPull` promises holds for every move, else for small ones.
+template <class Network, class Scalar>
+concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, Scalar> &&
+    requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+    { Network::never_stiffens } -> std::convertible_to<bool>;
+    { network.vertex_count() } noexcept -> std::same_as<Index>;
+    { network.pinned(v) } noexcept -> std::same_as<bool>;
+    { network.has_masses() } noexcept -> std::same_as<bool>;
+    { network.mass(v) } noexcept -> std::same_as<Scalar>;
+    { network.viscosity(v) } noexcept -> std::same_as<Scalar>;
+    { network.neighbours(v)[0].other } -> std::convertible_to<Index>;
+    { network.pull(v, x) } noexcept -> std::same_as<Pull<Scalar>>;
+    { network.curved_pull(v, x) } noexcept -> std::same_as<CurvedPull<Scalar>>;
+    { network.curvature(v, x) } noexcept -> std::same_as<Symmetric3<Scalar>>;
+    { network.energy_change(v, way, x) } noexcept -> std::same_as<EnergyChange<Scalar>>;
+    { network.negligible_force() } noexcept -> std::same_as<Scalar>;
+};
+
+}  // namespace membrane

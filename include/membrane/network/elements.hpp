@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/compressed_rows.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/network/elastic_network.hpp>
+
+/// What joins more than two vertices, or pulls at one alone: triangles that resist stretch, hinges, pressure, loads.
+///
+///     const auto triangles = membrane::triangular_springs(mesh, material);
+///     const auto tissue = membrane::Tissue(springs, triangles, membrane::pressure(mesh, 2000.0));
+namespace membrane {
+
+/// What an element does to one of its corners.
+template <Real Scalar>
+struct CornerPull {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
+    Symmetric3<Scalar> curvature = {};  ///< of the energy as the corner moves, no eigenvalue below zero [N/m]
+};
+
+/// Where the corners of an element are [m].
+template <Real Scalar, std::size_t count>
+using Corners = std::array<Vector3<Scalar>, count>;
+
+/// One element with its constants, which floats and doubles can be asked. What the compiler cannot see: force, curvature
+/// and change of energy are of the same energy; `second_derivative(x, i, j)` is that by corners i and j [N/m], or so much
+/// of it that Newton's method still finds to rest.
+template <class E>
+concept Element = std::copyable<E> &&
+    requires(const E& element, const Corners<double, E::corner_count>& x, const Corners<float, E::corner_count>& y,
+             std::size_t i) {
+    { element.pull(x, i) } noexcept -> std::same_as<CornerPull<double>>;
+    { element.pull(y, i) } noexcept -> std::same_as<CornerPull<float>>;
+    { element.energy(x) } noexcept -> std::same_as<double>;
+    { element.energy_change(x, i, x[i]) } noexcept -> std::same_as<EnergyChange<double>>;
+    { element.energy_change(y, i, y[i]) } noexcept -> std::same_as<EnergyChange<float>>;
+    { element.second_derivative(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
+};
+
+/// Elements of one kind, each at its vertices. Constant once built, no positions in it.
+template <Real Scalar_, Element Each>
+class Elements {
+  public:
+    using Scalar = Scalar_;
+    static constexpr std::size_t corner_count = Each::corner_count;
+    struct Placed {
+        std::array<Index, corner_count> corners;
+        Each element;
+    };
+
+    /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex. Linear.
+    Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all);
+
+    [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
+    [[nodiscard]] std::span<const Placed> all() const noexcept { return all_; }
+
+    /// Calls `act(placed, x, corner)` for the elements of vertex `v`: where their corners are, and which of them is `v`.
+    template <class Act>
+    void for_each(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
+        for (const auto& at : corners_of_[v]) {
+            const Placed& placed = all_[static_cast<std::size_t>(at.element)];
+            act(placed, where(placed, x), static_cast<std::size_t>(at.corner));
+        }
+    }
+
+    /// Where the corners of an element are.
+    template <class Positions>
+    [[nodiscard]] static auto where(const Placed& placed, const Positions& x) noexcept {
+        Corners<typename Positions::Scalar, corner_count> corners;
+        for (std::size_t i = 0; i < corner_count; ++i) corners[i] = point(x, placed.corners[i]);
+        return corners;
+    }
+
+    /// See `MassSpringNetwork::negligible_force`.
+    [[nodiscard]] Scalar negligible_force() const noexcept { return negligible_force_; }
+
+  private:
+    struct Corner {
+        Index element, corner;
+    };
+    [[nodiscard]] Scalar negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept;
+
+    std::vector<Placed> all_;
+    CompressedRows<Corner> corners_of_;
+    Scalar negligible_force_ = 0;
+};
+
+template <Real Scalar, Element Each>
+Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all) : all_(std::move(all)) {
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+        for (const Index v : all_[i].corners) {
+            if (v >= 0 && v < mesh.vertex_count()) continue;
+            refuse("Elements", "element ", i, " names vertex ", v, ", expected 0 to ", mesh.vertex_count() - 1);
+        }
+        negligible_force_ = (std::max)(negligible_force_, negligible_force_of(all_[i], mesh.positions()));
+    }
+    corners_of_ = CompressedRows<Corner>(mesh.vertex_count(), [this](auto put) {
+        for (std::size_t i = 0; i < all_.size(); ++i) {
+            for (std::size_t k = 0; k < corner_count; ++k) {
+                put(all_[i].corners[k], Corner{static_cast<Index>(i), static_cast<Index>(k)});
+            }
+        }
+    });
+}
+
+template <Real Scalar, Element Each>
+Scalar Elements<Scalar, Each>::negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept {
+    const auto corners = where(placed, x);
+    Scalar largest = 0, stiffness = 0, size = 0;
+    for (std::size_t i = 0; i < corner_count; ++i) {
+        const auto pull = placed.element.pull(corners, i);
+        stiffness = (std::max)(stiffness, pull.curvature.trace());
+        size = (std::max)(size, norm<Scalar>(corners[i] - corners[0]));
+        largest = (std::max)(largest, norm(pull.force));
+    }
+    const Scalar epsilon = std::numeric_limits<Scalar>::epsilon(), far = x.cwiseAbs().maxCoeff();
+    return (std::max)(stiffness * (std::max)(size / Scalar(1e9), 64 * epsilon * far), 64 * epsilon * largest);
+}
+
+}  // namespace membrane
