@@ -15,6 +15,8 @@
 using namespace membrane;
 
 static_assert(SpringLaw<LinearSpring, float> && SpringLaw<LinearSpring, double>);
+static_assert(SpringLaw<TensionSpring, float> && SpringLaw<TensionSpring, double>);
+static_assert(!never_stiffens<TensionSpring>());  // a slack one is stiffer once it is stretched
 static_assert(SpringLaw<ExponentialSpring, float> && SpringLaw<ExponentialSpring, double>);
 
 namespace {
@@ -30,6 +32,7 @@ SpringState<S> random_spring(test::Random& random, S most_strain) {
 
 TEST_CASE("the stock laws, and one of one's own, are sound", "[network]") {
     CHECK(test::check_spring_law(LinearSpring{}) == "");
+    CHECK(test::check_spring_law(TensionSpring{}) == "");
     CHECK(test::check_spring_law(ExponentialSpring{}) == "");
     CHECK(test::check_spring_law(ExponentialSpring{.stiffening = 3, .strain_limit = 2}, 4) == "");
     CHECK(test::check_spring_law(ExponentialSpring{.stiffening = 1e-3}) == "");
@@ -91,6 +94,27 @@ TEMPLATE_TEST_CASE("a linear spring is k (l - r)", "[network]", double, float) {
     const auto point_like = LinearSpring{}(SpringState<S>{40, 0, S(0.5)});
     CHECK(point_like.tension == 20);
     CHECK(point_like.energy == 5);
+}
+
+TEMPLATE_TEST_CASE("a spring of tension only is linear while it is stretched, and else not there", "[network]", double,
+                   float) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(1000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto spring = random_spring<S>(random, 1);
+        const auto answer = TensionSpring{}(spring), linear = LinearSpring{}(spring);
+        const bool is_slack = spring.length < spring.rest_length;
+        REQUIRE(answer.tension == (is_slack ? 0 : linear.tension));
+        REQUIRE(answer.stiffness == (is_slack ? 0 : linear.stiffness));
+        REQUIRE(answer.energy == (is_slack ? 0 : linear.energy));
+    }
+    CHECK(TensionSpring{}(SpringState<S>{40, 2, 2}).stiffness == 40);
+    const auto in_lanes = [](S length) {
+        return TensionSpring{}(SpringState<Lanes<S>>{Lanes<S>(40), Lanes<S>(2), Lanes<S>(length)});
+    };
+    CHECK((in_lanes(3).tension[0] == 40 && in_lanes(3).stiffness[0] == 40));
+    CHECK((in_lanes(1).tension[0] == 0 && in_lanes(1).stiffness[0] == 0));
 }
 
 TEMPLATE_TEST_CASE("an exponential spring is the exponential, whatever the strain", "[network]", double, float) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <membrane/accuracy/newton_system.hpp>
+#include <membrane/core/symmetric3.hpp>
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
 
@@ -39,8 +40,8 @@ class Elasticity {
     /// O(V + springs).
     [[nodiscard]] ElasticState at(const Points<double>& x);
 
-    /// Adds the second derivative of the energy to H, exact for springs and for a backing that is linear; else as much
-    /// as the backing says its curvature is at the most.
+    /// Adds the second derivative of the energy to H, exact for springs and for a backing that is linear: alike in all
+    /// directions, or as its `curvature(v)` says. Else as much as the backing says its curvature is at the most.
     void add_stiffness(const ElasticState& state, NewtonSystem& system) const;
 
     /// How much more energy `b` holds than `a` [J]; of the backing by the trapezium rule, exact where it is linear.
@@ -59,12 +60,16 @@ class Elasticity {
                                                   (std::max)(length, shortest)});
     }
     void ask_backing(const Points<double>& x);
+    [[nodiscard]] Symmetric3<double> curvature(Index v, Scalar most) const noexcept;
+    [[nodiscard]] const Symmetric3<double>& backing_stiffness(Index v) const noexcept {
+        return backing_stiffness_[static_cast<std::size_t>(v)];
+    }
 
     const MassSpringNetwork<Scalar, Law>& network_;
     const Volume& volume_;
     Points<Scalar> asked_;     // where the backing was asked last, 3 x V
     Points<double> answered_;  // its force there
-    std::vector<double> backing_stiffness_;
+    std::vector<Symmetric3<double>> backing_stiffness_;
 };
 
 template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
@@ -84,7 +89,7 @@ ElasticState Elasticity<Scalar, Law, Volume>::at(const Points<double>& x) {
     ask_backing(x);
     for (Index v = 0; v < x.cols(); ++v) {
         const Vector3<double> since = point(x, v) - point(asked_, v).template cast<double>();
-        state.backing.col(v) = point(answered_, v) - backing_stiffness_[static_cast<std::size_t>(v)] * since;
+        state.backing.col(v) = point(answered_, v) - backing_stiffness(v) * since;
         state.largest_force = (std::max)(state.largest_force, norm(point(state.backing, v)));
     }
     return state;
@@ -108,8 +113,17 @@ void Elasticity<Scalar, Law, Volume>::ask_backing(const Points<double>& x) {
         const auto pull = volume_.pull(v, place, place, endless);
         asked_.col(v) = place;
         answered_.col(v) = pull.force.template cast<double>();
-        backing_stiffness_[static_cast<std::size_t>(v)] = pull.stiffness;
+        backing_stiffness_[static_cast<std::size_t>(v)] = curvature(v, pull.stiffness);
     }
+}
+
+template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
+Symmetric3<double> Elasticity<Scalar, Law, Volume>::curvature(Index v, Scalar most) const noexcept {
+    if constexpr (requires { volume_.curvature(v); }) {
+        const Symmetric3<Scalar> k = volume_.curvature(v);
+        return {k.xx, k.yy, k.zz, k.xy, k.xz, k.yz};
+    }
+    return diagonal3<double>(most);
 }
 
 template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
@@ -129,7 +143,8 @@ void Elasticity<Scalar, Law, Volume>::add_stiffness(const ElasticState& state, N
         system.add(spring.first, spring.second, -block);
     }
     for (Index v = 0; v < state.x.cols(); ++v) {
-        system.add(v, v, backing_stiffness_[static_cast<std::size_t>(v)] * Eigen::Matrix3d::Identity());
+        const auto& k = backing_stiffness(v);
+        system.add(v, v, Eigen::Matrix3d{{k.xx, k.xy, k.xz}, {k.xy, k.yy, k.yz}, {k.xz, k.yz, k.zz}});
     }
 }
 
@@ -139,7 +154,7 @@ double Elasticity<Scalar, Law, Volume>::largest_stiffness(const ElasticState& st
     for (const auto& spring : network_.springs()) {
         largest = (std::max)(largest, response(spring, norm(reach_of(spring, state.x))).stiffness);
     }
-    for (const double k : backing_stiffness_) largest = (std::max)(largest, k);
+    for (const auto& k : backing_stiffness_) largest = (std::max)(largest, largest_eigenvalue(k));
     return largest;
 }
 

@@ -65,6 +65,18 @@ struct LinearSpring {
     }
 };
 
+/// Linear while it is stretched, slack where it is shorter than at rest, as fibres and thin tissue that wrinkles are:
+/// k max(l - r, 0). A membrane of such springs has no force of its own against being pressed together: its backing has.
+struct TensionSpring {
+    template <Number Scalar>
+    SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
+        const Scalar elongation = larger<Scalar>(spring.length - spring.rest_length, Scalar(0));
+        const Scalar tension = spring.stiffness * elongation;
+        const auto is_slack = spring.length < spring.rest_length;
+        return {tension, select(is_slack, Scalar(0), spring.stiffness), tension * elongation / 2};
+    }
+};
+
 /// Soft tissue stiffens as it is stretched: the tension grows exponentially with the strain e = (l - r) / r, as [Fung67]
 /// found for mesentery: k r (exp(a e) - 1) / a, of stiffness k at rest. Beyond `strain_limit` it goes on along its
 /// tangent, so that a wild position never overflows. A spring of rest length zero has no strain and stays linear.

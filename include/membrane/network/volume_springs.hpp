@@ -31,7 +31,9 @@ static_assert(std::is_default_constructible_v<VolumeOptions<double>>);
 
 /// A model of the body under the membrane: the pull on vertex `v` at `position`, which was at `start` when the tick of
 /// length `dt` began. What the compiler cannot see: the pull does no work on the membrane over a closed path. One that
-/// hands out its springs, `spring(v, start, dt)`, lets a solver visit several vertices at once.
+/// hands out its springs, `spring(v, start, dt)`, lets a solver visit several vertices at once. One that is not alike in
+/// all directions may say its stiffness without damping as a `Symmetric3`, `curvature(v)`, for the parts that look for
+/// an equilibrium.
 template <class Volume, class Scalar>
 concept VolumeModel = Real<Scalar> &&
     requires(const Volume& volume, Index v, const Vector3<Scalar>& position, Scalar dt) {
