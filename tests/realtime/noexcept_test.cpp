@@ -115,10 +115,10 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(load(corners, p, p)));
     });
     using Solver = QuasiStaticSolver<S, MassStep>;
-    static_assert(is_noexcept<decltype(&Solver::template step<LinearSpring, Volume>)>);
-    static_assert(is_noexcept<decltype(&Solver::template step<LinearSpring, NoVolumeSprings, Press<S>, HeldPoint<S>,
+    static_assert(is_noexcept<decltype(&Solver::template step<Network, Volume>)>);
+    static_assert(is_noexcept<decltype(&Solver::template step<Network, NoVolumeSprings, Press<S>, HeldPoint<S>,
                                                               HeldVertex<S>, Load<S>, Pinned>)>);
-    static_assert(is_noexcept<decltype(&Solver::template step_until<S (*)(), LinearSpring, Volume, Press<S>>)>);
+    static_assert(is_noexcept<decltype(&Solver::template step_until<S (*)(), Network, Volume, Press<S>>)>);
     static_assert(is_noexcept<decltype(&Solver::wake)> && is_noexcept<decltype(&Solver::wake_all)>);
     static_assert(is_noexcept<decltype(&Solver::reset)>);
     using Euler = ExplicitEuler<S>;

@@ -34,11 +34,12 @@ struct Opaque {
         return volume.pull(v, position, start, dt);
     }
 };
-static_assert(VisitsInLanes<double, BlockStep, LinearSpring, VirtualVolumeSprings<double>>);
-static_assert(VisitsInLanes<float, SafeStep, LinearSpring, NoVolumeSprings>);
-static_assert(VisitsInLanes<float, MassStep, LinearSpring, MovedVolumeSprings<float>>);
-static_assert(!VisitsInLanes<double, BlockStep, LinearSpring, Opaque<VirtualVolumeSprings<double>>>);
-static_assert(!VisitsInLanes<double, BlockStep, ExponentialSpring, NoVolumeSprings>);
+static_assert(VisitsInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, VirtualVolumeSprings<double>>);
+static_assert(VisitsInLanes<float, SafeStep, MassSpringNetwork<float, LinearSpring>, NoVolumeSprings>);
+static_assert(VisitsInLanes<float, MassStep, MassSpringNetwork<float, LinearSpring>, MovedVolumeSprings<float>>);
+static_assert(
+    !VisitsInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Opaque<VirtualVolumeSprings<double>>>);
+static_assert(!VisitsInLanes<double, BlockStep, MassSpringNetwork<double, ExponentialSpring>, NoVolumeSprings>);
 
 /// A mesh with holes, springs and backing of all kinds, some left out.
 template <Real S>

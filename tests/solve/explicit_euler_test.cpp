@@ -282,7 +282,7 @@ TEST_CASE("explicit Euler owns what it knows, and works in anybody's memory", "[
     using Step =
         bool (ExplicitEuler<float>::*)(PointsRef<float>, PointsRef<float>, float,
                                        const MassSpringNetwork<float, LinearSpring>&, const NoVolumeSprings&) noexcept;
-    CHECK(Step(&ExplicitEuler<float>::step<LinearSpring, NoVolumeSprings>) != nullptr);
+    CHECK(Step(&ExplicitEuler<float>::step<MassSpringNetwork<float, LinearSpring>, NoVolumeSprings>) != nullptr);
 }
 
 #ifndef NDEBUG

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include <membrane/accuracy/newton_system.hpp>
@@ -17,27 +18,26 @@ namespace membrane {
 /// Springs and backing where the membrane is.
 struct ElasticState {
     Points<double> x;                 ///< 3 x V [m]
-    Points<double> springs, backing;  ///< force on each vertex, 3 x V [N]
-    double energy = 0;                ///< of the springs [J]
-    double largest_force = 0;         ///< of a single spring, or on a single vertex by the backing [N]
+    Points<double> springs, backing;  ///< force on each vertex, by springs and elements and by the backing, 3 x V [N]
+    double energy = 0;                ///< of springs and elements [J]
+    double largest_force = 0;         ///< of a single spring, or on a vertex by an element or the backing [N]
 };
 
-/// A membrane without time, in double whatever its scalar: its springs by their law, its backing as it pulls in a tick
-/// without end, in which no damping is left.
+/// A membrane without time, in double whatever its scalar: its springs by their law, its elements, if it is a `Tissue`, its
+/// backing as it pulls in a tick without end, in which no damping is left.
 ///
 ///     Elasticity elasticity(network, volume);
 ///     const auto state = elasticity.at(x);                    // state.springs + state.backing [N]
 ///     elasticity.add_stiffness(state, system);
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
+template <class Network, class Volume>
 class Elasticity {
-    static_assert(SpringLaw<Law, double>, "an equilibrium is found in double: the law must take SpringState<double>");
-
   public:
-    /// Keeps a reference to both.
-    Elasticity(const MassSpringNetwork<Scalar, Law>& network, const Volume& volume)
-        : network_(network), volume_(volume) {}
+    using Scalar = typename Network::Scalar;
 
-    /// O(V + springs).
+    /// Keeps a reference to both.
+    Elasticity(const Network& network, const Volume& volume) : network_(network), volume_(volume) {}
+
+    /// O(V + springs + elements).
     [[nodiscard]] ElasticState at(const Points<double>& x);
 
     /// Adds the second derivative of the energy to H, exact for springs and for a backing that is linear: alike in all
@@ -53,29 +53,54 @@ class Elasticity {
     [[nodiscard]] double largest_stiffness(const ElasticState& state) const;
 
   private:
-    [[nodiscard]] SpringResponse<double> response(const Spring<Scalar>& spring, double length) const noexcept {
-        const double shortest = (std::numeric_limits<double>::min)();  // a law is asked for no less
-        return network_.law()(SpringState<double>{static_cast<double>(spring.stiffness),
-                                                  static_cast<double>(spring.rest_length),
-                                                  (std::max)(length, shortest)});
+    static constexpr bool has_elements = requires(const Network& network) {
+        network.for_each_kind([](const auto&) {});
+    };
+
+    [[nodiscard]] const auto& springs() const noexcept {
+        if constexpr (has_elements) {
+            return network_.springs();
+        } else {
+            return network_;
+        }
     }
+    [[nodiscard]] SpringResponse<double> response(const Spring<Scalar>& spring, double length) const noexcept {
+        using Law = std::remove_cvref_t<decltype(springs().law())>;
+        static_assert(SpringLaw<Law, double>,
+                      "an equilibrium is found in double: the law must take SpringState<double>");
+        const double shortest = (std::numeric_limits<double>::min)();  // a law is asked for no less
+        return springs().law()(SpringState<double>{static_cast<double>(spring.stiffness),
+                                                   static_cast<double>(spring.rest_length),
+                                                   (std::max)(length, shortest)});
+    }
+    /// Calls `act(placed, corners)` for each element.
+    template <class Act>
+    void for_each_element([[maybe_unused]] const Points<double>& x, [[maybe_unused]] Act act) const {
+        if constexpr (has_elements) {
+            network_.for_each_kind([&](const auto& elements) {
+                for (const auto& placed : elements.all()) act(placed, elements.where(placed, x));
+            });
+        }
+    }
+    void add_elements(ElasticState& state) const;
+    void add_elements(const ElasticState& state, NewtonSystem& system) const;
     void ask_backing(const Points<double>& x);
     [[nodiscard]] Symmetric3<double> curvature(Index v, Scalar most) const noexcept;
     [[nodiscard]] const Symmetric3<double>& backing_stiffness(Index v) const noexcept {
         return backing_stiffness_[static_cast<std::size_t>(v)];
     }
 
-    const MassSpringNetwork<Scalar, Law>& network_;
+    const Network& network_;
     const Volume& volume_;
     Points<Scalar> asked_;     // where the backing was asked last, 3 x V
     Points<double> answered_;  // its force there
     std::vector<Symmetric3<double>> backing_stiffness_;
 };
 
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
-ElasticState Elasticity<Scalar, Law, Volume>::at(const Points<double>& x) {
+template <class Network, class Volume>
+ElasticState Elasticity<Network, Volume>::at(const Points<double>& x) {
     ElasticState state{x, Points<double>::Zero(3, x.cols()), Points<double>::Zero(3, x.cols())};
-    for (const auto& spring : network_.springs()) {
+    for (const auto& spring : springs().springs()) {
         const Vector3<double> along = reach_of(spring, x);
         const double length = norm(along);
         const auto answer = response(spring, length);
@@ -86,6 +111,7 @@ ElasticState Elasticity<Scalar, Law, Volume>::at(const Points<double>& x) {
         state.springs.col(spring.second) -= pull;
         state.largest_force = (std::max)(state.largest_force, std::abs(answer.tension));
     }
+    add_elements(state);
     ask_backing(x);
     for (Index v = 0; v < x.cols(); ++v) {
         const Vector3<double> since = point(x, v) - point(asked_, v).template cast<double>();
@@ -95,9 +121,21 @@ ElasticState Elasticity<Scalar, Law, Volume>::at(const Points<double>& x) {
     return state;
 }
 
+template <class Network, class Volume>
+void Elasticity<Network, Volume>::add_elements(ElasticState& state) const {
+    for_each_element(state.x, [&](const auto& placed, const auto& corners) {
+        state.energy += placed.element.energy(corners);
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            const Vector3<double> force = placed.element.pull(corners, i).force;
+            state.springs.col(placed.corners[i]) += force;
+            state.largest_force = (std::max)(state.largest_force, norm(force));
+        }
+    });
+}
+
 // Where a float is asked anew its rounding changes the answer: it is not, as long as x hardly moves.
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
-void Elasticity<Scalar, Law, Volume>::ask_backing(const Points<double>& x) {
+template <class Network, class Volume>
+void Elasticity<Network, Volume>::ask_backing(const Points<double>& x) {
     const bool first = asked_.cols() == 0;
     if (first) {
         asked_.resize(3, x.cols());
@@ -117,8 +155,8 @@ void Elasticity<Scalar, Law, Volume>::ask_backing(const Points<double>& x) {
     }
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
-Symmetric3<double> Elasticity<Scalar, Law, Volume>::curvature(Index v, Scalar most) const noexcept {
+template <class Network, class Volume>
+Symmetric3<double> Elasticity<Network, Volume>::curvature(Index v, Scalar most) const noexcept {
     if constexpr (requires { volume_.curvature(v); }) {
         const Symmetric3<Scalar> k = volume_.curvature(v);
         return {k.xx, k.yy, k.zz, k.xy, k.xz, k.yz};
@@ -126,9 +164,9 @@ Symmetric3<double> Elasticity<Scalar, Law, Volume>::curvature(Index v, Scalar mo
     return diagonal3<double>(most);
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
-void Elasticity<Scalar, Law, Volume>::add_stiffness(const ElasticState& state, NewtonSystem& system) const {
-    for (const auto& spring : network_.springs()) {
+template <class Network, class Volume>
+void Elasticity<Network, Volume>::add_stiffness(const ElasticState& state, NewtonSystem& system) const {
+    for (const auto& spring : springs().springs()) {
         const Vector3<double> along = reach_of(spring, state.x);
         const double length = norm(along);
         Eigen::Matrix3d block = static_cast<double>(spring.stiffness) * Eigen::Matrix3d::Identity();
@@ -142,18 +180,35 @@ void Elasticity<Scalar, Law, Volume>::add_stiffness(const ElasticState& state, N
         system.add(spring.second, spring.second, block);
         system.add(spring.first, spring.second, -block);
     }
+    add_elements(state, system);
     for (Index v = 0; v < state.x.cols(); ++v) {
         const auto& k = backing_stiffness(v);
         system.add(v, v, Eigen::Matrix3d{{k.xx, k.xy, k.xz}, {k.xy, k.yy, k.yz}, {k.xz, k.yz, k.zz}});
     }
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume>
-double Elasticity<Scalar, Law, Volume>::largest_stiffness(const ElasticState& state) const {
+template <class Network, class Volume>
+void Elasticity<Network, Volume>::add_elements(const ElasticState& state, NewtonSystem& system) const {
+    for_each_element(state.x, [&](const auto& placed, const auto& corners) {
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            for (std::size_t j = 0; j <= i; ++j) {
+                system.add(placed.corners[i], placed.corners[j], placed.element.second_derivative(corners, i, j));
+            }
+        }
+    });
+}
+
+template <class Network, class Volume>
+double Elasticity<Network, Volume>::largest_stiffness(const ElasticState& state) const {
     double largest = 0;
-    for (const auto& spring : network_.springs()) {
+    for (const auto& spring : springs().springs()) {
         largest = (std::max)(largest, response(spring, norm(reach_of(spring, state.x))).stiffness);
     }
+    for_each_element(state.x, [&](const auto& placed, const auto& corners) {
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            largest = (std::max)(largest, largest_eigenvalue(placed.element.pull(corners, i).curvature));
+        }
+    });
     for (const auto& k : backing_stiffness_) largest = (std::max)(largest, largest_eigenvalue(k));
     return largest;
 }

@@ -37,11 +37,10 @@ namespace membrane {
 /// @throws InvalidInput for points that are not one finite for each vertex, a mesh, network and backing that do not
 /// belong together, an option out of its range, a constraint that is not sound. Offline.
 /// Cost: some 5 to 20 sparse factorisations for each increment.
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, RestConstraint... Constraints>
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, RestConstraint... Constraints>
 [[nodiscard]] Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                      const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
-                                      const Volume& volume, const EquilibriumOptions& options,
-                                      const Constraints&... constraints);
+                                      const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
+                                      const EquilibriumOptions& options, const Constraints&... constraints);
 
 namespace detail {
 
@@ -87,10 +86,10 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
 
 }  // namespace detail
 
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, RestConstraint... Constraints>
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, RestConstraint... Constraints>
 Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, const TriangleMesh<Scalar>& mesh,
-                        const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                        const EquilibriumOptions& options, const Constraints&... constraints) {
+                        const Network& network, const Volume& volume, const EquilibriumOptions& options,
+                        const Constraints&... constraints) {
     options.check();
     detail::check_fit(x, mesh, network, volume);
     std::vector<unsigned char> fixed(static_cast<std::size_t>(network.vertex_count()));

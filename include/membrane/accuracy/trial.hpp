@@ -92,10 +92,9 @@ struct TickAtRest {
 /// is off by what a damped backing lags behind.
 /// @throws InvalidInput for what `equilibrium` refuses, a history without ticks, or an `every` below 1. Offline.
 /// Cost: an `equilibrium` for each tick of the result.
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History>
-[[nodiscard]] std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh,
-                                                 const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                                 History history, Index every = 1);
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History>
+[[nodiscard]] std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network,
+                                                 const Volume& volume, History history, Index every = 1);
 
 /// What a setting comes to. Forces that count are those that somebody feels: all but what loads and pins answer with.
 struct Outcome {
@@ -117,11 +116,11 @@ struct SteadySeconds {
 /// Plays `history` with a solver of these options, from the mesh at rest, each tick from where the one before ended, and
 /// sets it against `rests`. `clock()` gives the time [s].
 /// @throws InvalidInput for options that the solver refuses, and `rests` of another scene. Offline.
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
           StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
-[[nodiscard]] Outcome trial(const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
-                            const Volume& volume, History history, std::span<const TickAtRest> rests,
-                            const SolverOptions<Scalar>& options, const Rule& rule = {}, const Clock& clock = {});
+[[nodiscard]] Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
+                            History history, std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options,
+                            const Rule& rule = {}, const Clock& clock = {});
 
 namespace detail {
 
@@ -206,9 +205,9 @@ std::tuple<Press<Scalar>, HeldPoint<Scalar>> Stroke<Scalar>::operator()(Index ti
     return {press(tool, contact, grasp), pull(tool, grasp)};
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History>
-std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
-                                   const Volume& volume, History history, Index every) {
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History>
+std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
+                                   History history, Index every) {
     detail::check_history<Scalar>("equilibria", history);
     if (every < 1) refuse("equilibria", "every must be at least 1, got ", every);
     std::vector<Index> all(static_cast<std::size_t>(mesh.vertex_count()));
@@ -235,11 +234,11 @@ std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const MassS
     return rests;
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
           StepRule<Scalar> Rule, class Clock>
-Outcome trial(const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-              History history, std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options,
-              const Rule& rule, const Clock& clock) {
+Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume, History history,
+              std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options, const Rule& rule,
+              const Clock& clock) {
     detail::check_history<Scalar>("trial", history);
     QuasiStaticSolver<Scalar, Rule> solver(network, options, rule);
     Points<Scalar> x = mesh.positions();

@@ -157,9 +157,9 @@ Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh
         const detail::Fold<double> fold(x);
         if (!fold.is_sound() || rigidity == 0) return;
         const double areas = (norm(fold.left) + norm(fold.right)) / 2;
-        all.push_back({corners,
-                       {static_cast<Scalar>(rigidity * squared_norm(fold.edge) / areas),
-                        static_cast<Scalar>(fold.angle())}});
+        all.push_back(
+            {corners,
+             {static_cast<Scalar>(rigidity * squared_norm(fold.edge) / areas), static_cast<Scalar>(fold.angle())}});
     });
     return All(mesh, std::move(all));
 }

@@ -51,17 +51,27 @@ template <class Network, class Scalar>
 concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, Scalar> &&
     requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
     { Network::never_stiffens } -> std::convertible_to<bool>;
-    { network.vertex_count() } noexcept -> std::same_as<Index>;
-    { network.pinned(v) } noexcept -> std::same_as<bool>;
-    { network.has_masses() } noexcept -> std::same_as<bool>;
-    { network.mass(v) } noexcept -> std::same_as<Scalar>;
-    { network.viscosity(v) } noexcept -> std::same_as<Scalar>;
+    { network.vertex_count() }
+    noexcept->std::same_as<Index>;
+    { network.pinned(v) }
+    noexcept->std::same_as<bool>;
+    { network.has_masses() }
+    noexcept->std::same_as<bool>;
+    { network.mass(v) }
+    noexcept->std::same_as<Scalar>;
+    { network.viscosity(v) }
+    noexcept->std::same_as<Scalar>;
     { network.neighbours(v)[0].other } -> std::convertible_to<Index>;
-    { network.pull(v, x) } noexcept -> std::same_as<Pull<Scalar>>;
-    { network.curved_pull(v, x) } noexcept -> std::same_as<CurvedPull<Scalar>>;
-    { network.curvature(v, x) } noexcept -> std::same_as<Symmetric3<Scalar>>;
-    { network.energy_change(v, way, x) } noexcept -> std::same_as<EnergyChange<Scalar>>;
-    { network.negligible_force() } noexcept -> std::same_as<Scalar>;
+    { network.pull(v, x) }
+    noexcept->std::same_as<Pull<Scalar>>;
+    { network.curved_pull(v, x) }
+    noexcept->std::same_as<CurvedPull<Scalar>>;
+    { network.curvature(v, x) }
+    noexcept->std::same_as<Symmetric3<Scalar>>;
+    { network.energy_change(v, way, x) }
+    noexcept->std::same_as<EnergyChange<Scalar>>;
+    { network.negligible_force() }
+    noexcept->std::same_as<Scalar>;
 };
 
 }  // namespace membrane

@@ -35,14 +35,18 @@ using Corners = std::array<Vector3<Scalar>, count>;
 /// and change of energy are of the same energy; `second_derivative(x, i, j)` is that by corners i and j [N/m], or so much
 /// of it that Newton's method still finds to rest.
 template <class E>
-concept Element = std::copyable<E> &&
-    requires(const E& element, const Corners<double, E::corner_count>& x, const Corners<float, E::corner_count>& y,
-             std::size_t i) {
-    { element.pull(x, i) } noexcept -> std::same_as<CornerPull<double>>;
-    { element.pull(y, i) } noexcept -> std::same_as<CornerPull<float>>;
-    { element.energy(x) } noexcept -> std::same_as<double>;
-    { element.energy_change(x, i, x[i]) } noexcept -> std::same_as<EnergyChange<double>>;
-    { element.energy_change(y, i, y[i]) } noexcept -> std::same_as<EnergyChange<float>>;
+concept Element = std::copyable<E> && requires(const E& element, const Corners<double, E::corner_count>& x,
+                                               const Corners<float, E::corner_count>& y, std::size_t i) {
+    { element.pull(x, i) }
+    noexcept->std::same_as<CornerPull<double>>;
+    { element.pull(y, i) }
+    noexcept->std::same_as<CornerPull<float>>;
+    { element.energy(x) }
+    noexcept->std::same_as<double>;
+    { element.energy_change(x, i, x[i]) }
+    noexcept->std::same_as<EnergyChange<double>>;
+    { element.energy_change(y, i, y[i]) }
+    noexcept->std::same_as<EnergyChange<float>>;
     { element.second_derivative(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
 };
 

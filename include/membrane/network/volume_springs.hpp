@@ -9,8 +9,9 @@
 #include <vector>
 
 #include <membrane/core/field.hpp>
+#include <membrane/core/lanes.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
-#include <membrane/network/spring_law.hpp>
+#include <membrane/network/elastic_network.hpp>
 
 /// What holds the membrane to the body under it.
 ///

@@ -30,17 +30,16 @@ class ExplicitEuler {
     /// pinned vertices stay. False, with both as they were, where the result would not be finite or dt is not positive.
     /// Online. Cost: all springs.
     template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume>
-    [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt,
-                            const Network& network, const Volume& volume) noexcept {
+    [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt, const Network& network,
+                            const Volume& volume) noexcept {
         force_.setZero();
         return advance(x, velocity, dt, network, volume);
     }
 
     /// The same with an external force on each vertex, F^ext of (1), 3 x V [N].
     template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume>
-    [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt,
-                            const Network& network, const Volume& volume,
-                            const ConstPointsRef<Scalar>& external) noexcept {
+    [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt, const Network& network,
+                            const Volume& volume, const ConstPointsRef<Scalar>& external) noexcept {
         force_ = external;
         return advance(x, velocity, dt, network, volume);
     }
@@ -50,8 +49,8 @@ class ExplicitEuler {
 
   private:
     template <class Network, class Volume>
-    bool advance(PointsRef<Scalar>& x, PointsRef<Scalar>& velocity, Scalar dt,
-                 const Network& network, const Volume& volume) noexcept;
+    bool advance(PointsRef<Scalar>& x, PointsRef<Scalar>& velocity, Scalar dt, const Network& network,
+                 const Volume& volume) noexcept;
 
     Points<Scalar> force_, previous_, previous_velocity_;
     Scalar residual_ = 0;

@@ -69,8 +69,7 @@ class PropagationQueue {
 };
 
 template <class Network>
-void PropagationQueue::build(const Network& network, std::span<const Index> seeds,
-                             Index layers) noexcept {
+void PropagationQueue::build(const Network& network, std::span<const Index> seeds, Index layers) noexcept {
     clear();
     for (const Index v : seeds) {
         if (!network.pinned(v)) reached_.insert(v);

@@ -47,15 +47,15 @@ class QuasiStaticSolver {
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
     /// Cost: O(V) memory.
     template <ElasticNetwork<Scalar> Network>
-    explicit QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options = {},
-                               const Rule& rule = {}, const Threads& executor = {});
+    explicit QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options = {}, const Rule& rule = {},
+                               const Threads& executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, in layer 0 `contact_visits` in each
     /// sweep; a visit costs the vertex's springs.
     template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
-    [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network,
-                                          const Volume& volume, const Constraints&... constraints) noexcept {
+    [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
+                                          const Constraints&... constraints) noexcept {
         return step_in(NoHurry{}, x, dt, network, volume, constraints...);
     }
 
@@ -82,9 +82,8 @@ class QuasiStaticSolver {
 
   private:
     template <class Pace, class Network, class Volume, class... Constraints>
-    [[nodiscard]] StepReport<Scalar> step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
-                                             const Network& network, const Volume& volume,
-                                             const Constraints&... constraints) noexcept;
+    [[nodiscard]] StepReport<Scalar> step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt, const Network& network,
+                                             const Volume& volume, const Constraints&... constraints) noexcept;
     void open(std::size_t constraint_count) noexcept;
     template <class Acting>
     void predict(const Acting& acting, Region<Scalar>& region) noexcept;
@@ -109,9 +108,9 @@ class QuasiStaticSolver {
 };
 
 template <class Network, class Rule = BlockStep, class Threads = OneThread>
-requires ElasticNetwork<Network, typename Network::Scalar>
-QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {},
-                  const Threads& = {}) -> QuasiStaticSolver<typename Network::Scalar, Rule, Threads>;
+    requires ElasticNetwork<Network, typename Network::Scalar> QuasiStaticSolver(
+        const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {}, const Threads& = {})
+->QuasiStaticSolver<typename Network::Scalar, Rule, Threads>;
 
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <ElasticNetwork<Scalar> Network>
@@ -139,8 +138,7 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& netwo
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <class Pace, class Network, class Volume, class... Constraints>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
-                                                                     const Network& network,
-                                                                     const Volume& volume,
+                                                                     const Network& network, const Volume& volume,
                                                                      const Constraints&... constraints) noexcept {
     static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints, "a step takes 16 constraints at most");
     MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());

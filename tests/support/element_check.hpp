@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include <Eigen/Eigenvalues>
+
+#include <membrane/network/elements.hpp>
+
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+namespace test {
+
+inline Eigen::Matrix3d full(const membrane::Symmetric3<double>& a) {
+    return Eigen::Matrix3d{{a.xx, a.xy, a.xz}, {a.xy, a.yy, a.yz}, {a.xz, a.yz, a.zz}};
+}
+
+/// Force, change of energy and curvature of an element against differences of its energy, which vary over ways of `size`
+/// [m] by some `energy` [J].
+template <class E>
+void check_element(const E& element, const membrane::Corners<double, E::corner_count>& x, double size, double energy,
+                   Random& random) {
+    const double h = 1e-5 * size;
+    for (std::size_t i = 0; i < E::corner_count; ++i) {
+        const auto pull = element.pull(x, i);
+        const auto moved = [&](const Eigen::Vector3d& way) {
+            auto there = x;
+            there[i] += way;
+            return there;
+        };
+        for (Eigen::Index k = 0; k < 3; ++k) {
+            const Eigen::Vector3d by = h * Eigen::Vector3d::Unit(k);
+            const double slope = (element.energy(moved(by)) - element.energy(moved(-by))) / (2 * h);
+            REQUIRE(std::abs(pull.force[k] + slope) < 1e-7 * energy / size);
+        }
+        const Eigen::Vector3d way = random.number(0.0, 0.3) * size * random.unit_vector();
+        const auto change = element.energy_change(x, i, way);
+        const double difference = element.energy(moved(way)) - element.energy(x);
+        REQUIRE(std::abs(change.change - difference) < 1e-12 * energy + 1e-15 * change.size);
+        const auto eigenvalues = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(full(pull.curvature)).eigenvalues();
+        REQUIRE(eigenvalues.minCoeff() > -1e-12 * energy / (size * size));
+        membrane::Corners<float, E::corner_count> y;
+        for (std::size_t k = 0; k < y.size(); ++k) y[k] = x[k].template cast<float>();
+        const auto single = element.pull(y, i);
+        REQUIRE((single.force.template cast<double>() - pull.force).norm() < 1e-4 * energy / size);
+    }
+}
+
+/// The exact second derivative, by differences of the forces.
+template <class E>
+void check_second_derivative(const E& element, const membrane::Corners<double, E::corner_count>& x, double size,
+                             double energy) {
+    const double h = 1e-5 * size;
+    for (std::size_t i = 0; i < E::corner_count; ++i) {
+        for (std::size_t j = 0; j < E::corner_count; ++j) {
+            const Eigen::Matrix3d block = element.second_derivative(x, i, j);
+            for (Eigen::Index k = 0; k < 3; ++k) {
+                auto before = x, after = x;
+                before[j][k] -= h;
+                after[j][k] += h;
+                const Eigen::Vector3d slope = (element.pull(before, i).force - element.pull(after, i).force) / (2 * h);
+                REQUIRE((slope - block.col(k)).norm() < 1e-7 * energy / (size * size));
+            }
+        }
+    }
+}
+
+}  // namespace test
