@@ -33,6 +33,14 @@ require() {
         apt-get install -qq --yes --no-install-recommends "${missing[@]}" > /dev/null
 }
 
+# With ccache, if there is one, a clean clone is built at no cost from what was built before. It cannot keep precompiled
+# headers.
+cache_options=()
+if command -v ccache > /dev/null; then
+    export CMAKE_CXX_COMPILER_LAUNCHER=ccache CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1
+    cache_options=(-DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON)
+fi
+
 # runs_here BENCHMARK: whether this processor has what the benchmark is built for.
 runs_here() { [[ $1 != *_avx2* ]] || grep -qs avx2 /proc/cpuinfo; }
 
@@ -56,7 +64,7 @@ build() {
     [[ $(printf '%s\n' 3.25 "$version" | sort --version-sort | head -n 1) == 3.25 ]] ||
         die "CMake 3.25 or newer is needed (Debian 12, Ubuntu 23.04), this is $version"
     say "configuring build/$preset"
-    log=$(cd "$root" && cmake --preset "$preset" "${options[@]}" "$@" 2>&1) || die "cmake failed"$'\n'"$log"
+    log=$(cd "$root" && cmake --preset "$preset" "${cache_options[@]}" "${options[@]}" "$@" 2>&1) || die "cmake failed"$'\n'"$log"
     say "building ${parts[*]}"
     cmake --build "$root/build/$preset" --parallel "$(nproc)" --target "${targets[@]}" >&2
 }
