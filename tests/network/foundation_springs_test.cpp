@@ -59,7 +59,7 @@ struct Capsule {
 /// How long what is left of a dent takes to be a part of 1 / e, from `begin` to `end` [s] after the membrane is let go at
 /// `x`: seen at the vertex that was farthest from rest.
 double recovery(const Capsule& capsule, Points<double> x, double begin, double end, double dt) {
-    QuasiStaticSolver solver(capsule.network, {.layers = unlimited, .sweeps = 200, .negligible_force = 1e-12});
+    QuasiStaticSolver solver(capsule.network, {.layers = unlimited, .sweeps = 100, .negligible_force = 1e-11});
     Eigen::Index seen = 0;
     (x - capsule.mesh.positions()).colwise().norm().maxCoeff(&seen);
     solver.wake_all();
@@ -145,7 +145,7 @@ TEST_CASE("each tick leaves the same part of what the foundation brings back", "
 }
 
 TEST_CASE("what the membrane helps to bring back recovers the sooner", "[foundation]") {
-    // An icosahedron blown up: its springs, sin(36 deg) of their stretch along the radius at each end, help all vertices alike.
+    // An icosahedron blown up: its 30 springs help its 12 vertices, all alike.
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     const double k = 2, normal = 3, time = 0.3, dt = 0.01;
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = k});
@@ -166,11 +166,13 @@ TEST_CASE("a dent in a sheet is gone in the time asked for", "[foundation]") {
     const Capsule capsule(sheet({.width = 0.02, .height = 0.02, .columns = 20, .rows = 20}));
     Points<double> x = capsule.mesh.positions();
     for (auto p : x.colwise()) p.z() -= 1e-6 * std::exp(-p.head<2>().squaredNorm() / 9e-6);
-    CHECK(recovery(capsule, x, 0, 0.4, 0.004) == Approx(0.2).epsilon(0.05));
+    const double found = recovery(capsule, x, 0, 0.4, 0.008);
+    INFO("recovery time " << found << " s");
+    CHECK(found == Approx(0.2).epsilon(0.05));
 }
 
 TEST_CASE("a sphere that a tool has pressed comes back in the time asked for", "[foundation]") {
-    const Capsule capsule(icosphere({.radius = 0.01, .subdivisions = 2}));
+    const Capsule capsule(icosphere({.radius = 0.01, .subdivisions = 1}));
     Points<double> x = capsule.mesh.positions();
     AabbTree tree(capsule.mesh);
     ContactTracker tracker(capsule.mesh);
@@ -181,7 +183,9 @@ TEST_CASE("a sphere that a tool has pressed comes back in the time asked for", "
         const auto report = solver.step(x, 1e-3, capsule.network, capsule.backing, press(tool, contact));
         tree.refit(x, report.moved);
     }
-    const double found = recovery(capsule, x, 0.6, 1.4, 0.004);
+    // At first the membrane helps.
+    const double found = recovery(capsule, x, 0.6, 1.2, 0.008);
+    INFO("recovery time " << found << " s");
     CHECK(found == Approx(0.2).epsilon(0.05));
 }
 
