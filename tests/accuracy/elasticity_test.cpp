@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <membrane/mesh/shapes.hpp>
+#include <membrane/network/foundation_springs.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -161,4 +162,28 @@ TEST_CASE("a backing of one's own is asked wherever it is", "[elasticity]") {
             CHECK((state.backing.col(v) - expected).norm() < 1e-14);
         }
     }
+}
+
+TEST_CASE("a backing that is not alike in all directions gives way as its stiffness says", "[elasticity]") {
+    test::Random random(1);
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 0.0});
+    const FoundationSprings backing(mesh, {.normal = 7.0, .tangential = 0.3, .recovery_time = 5.0});
+    Elasticity elasticity(network, backing);
+    const auto rest = elasticity.at(mesh.positions());
+    CHECK(elasticity.largest_stiffness(rest) == Approx(7));
+    NewtonSystem system(std::vector<unsigned char>(static_cast<std::size_t>(mesh.vertex_count()), 0));
+    system.open(Points<double>::Zero(3, mesh.vertex_count()));
+    elasticity.add_stiffness(rest, system);
+    Points<double> force = Points<double>::Zero(3, mesh.vertex_count());
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        force.col(v) = random.vector();
+        system.push(v, force.col(v));
+    }
+    const Points<double> step = system.solve(7).step;
+    const auto there = elasticity.at(mesh.positions() + step);
+    CHECK((there.backing + force).cwiseAbs().maxCoeff() < 1e-13);
+    double energy = 0;
+    for (Index v = 0; v < mesh.vertex_count(); ++v) energy += backing.energy(v, mesh.positions().col(v) + step.col(v));
+    CHECK(elasticity.energy_change(rest, there) == Approx(energy));
 }

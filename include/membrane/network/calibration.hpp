@@ -56,8 +56,13 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] Scalar mean_edge(const TriangleMesh<Scalar>& mesh);
 
-/// The radius with which a ball of `radius` is to press triangles with edges of length `edge` [m].
-/// @throws InvalidInput for lengths that are not finite and positive
+/// The radius of the ball that is to press triangles with edges of length `edge` in place of one of `radius` [m], with its
+/// centre in the same place: flat triangles whose corners lie on the one touch the other with their middles. Otherwise
+/// a coarse mesh is pressed in too deep: by edge^2 / (6 radius).
+///
+/// With it, the force on a ball is within 10 % of that on the finest mesh from a radius of 1.5 edges on, within 3 % from
+/// 2.5 edges on, pressed in by half its radius; smaller ones a mesh does not resolve.
+/// @throws InvalidInput for lengths that are not finite and positive, or a radius of no more than edge / sqrt(3)
 [[nodiscard]] inline double tool_radius(double radius, double edge);
 
 namespace detail {
@@ -137,7 +142,11 @@ Scalar mean_edge(const TriangleMesh<Scalar>& mesh) {
 inline double tool_radius(double radius, double edge) {
     detail::check_constant("tool_radius", "radius", "m", radius);
     detail::check_constant("tool_radius", "edge", "m", edge);
-    return radius + edge * edge / (6 * radius);
+    const double least = edge / std::sqrt(3.0);
+    if (!(radius > least)) {
+        refuse("tool_radius", "radius must be more than ", least, " [m] for triangles with this edge, got ", radius);
+    }
+    return std::sqrt((radius - least) * (radius + least));
 }
 
 }  // namespace membrane
