@@ -87,7 +87,6 @@ Header read_header(const std::string& file, std::string_view bytes) {
     if (std::find(formats.begin(), formats.end(), header.format) == formats.end()) {
         membrane::refuse(file, "expected the format ascii, binary_little_endian or binary_big_endian 1.0");
     }
-    header.text += "end_header\n";
     return header;
 }
 
@@ -164,7 +163,7 @@ void check_binary(const std::string& file, const Header& header) {
 /// One line for each row.
 std::string checked_ascii(const std::string& file, const Header& header) {
     const std::string body = plain_text(file, header.body);
-    const auto header_lines = static_cast<std::size_t>(std::count(header.text.begin(), header.text.end(), '\n'));
+    const auto header_lines = static_cast<std::size_t>(std::count(header.text.begin(), header.text.end(), '\n')) + 1;
     Lines lines(file, body, header_lines);
     std::string result;
     for (const Element& element : header.elements) {
@@ -199,9 +198,9 @@ std::string checked_ply(const std::string& file, std::string_view bytes) {
     if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
     const Header header = read_header(file, bytes);
     check_elements(file, header.elements);
-    if (header.format == "ascii") return header.text + checked_ascii(file, header);
+    if (header.format == "ascii") return header.text + "end_header\n" + checked_ascii(file, header);
     check_binary(file, header);
-    return header.text + std::string(header.body);
+    return header.text + "end_header\r\n" + std::string(header.body);  // after \n, assimp skips a body's first \n
 }
 
 }  // namespace examples
