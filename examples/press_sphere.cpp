@@ -4,10 +4,9 @@
 #include "support/specimen.hpp"
 
 int main(int argc, char** argv) {
-    const auto specimen = examples::specimen("Presses a sphere and prints the force.", argc, argv);
-    const auto& [points, triangles] = specimen.surface;
-    membrane::NullDevice<double> device({{0.0, specimen.above(0.3)}, {0.2, specimen.above(0)}},
-                                        {.radius = specimen.tool_radius()});
+    const auto body = examples::specimen("Presses a membrane and prints the force.", argc, argv);
+    const auto& [points, triangles] = body.surface;
+    membrane::NullDevice<double> device({{0.0, body.above(0.3)}, {0.2, body.above(0)}}, {.radius = body.tool_radius()});
     const double dt = 1e-3;  // [s]
     // [loop]
     const auto mesh = membrane::TriangleMesh(points, triangles);                                            // [m]

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include "support/mesh_file.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -29,8 +31,14 @@ using membrane::refuse;
 
 /// A surface as it grows.
 struct Soup {
-    std::vector<Eigen::Vector3d> points;
-    std::vector<Eigen::Matrix<membrane::Index, 3, 1>> triangles;
+    const std::string& file;
+    std::vector<Eigen::Vector3d> points = {};
+    std::vector<Eigen::Matrix<membrane::Index, 3, 1>> triangles = {};
+
+    void add_point(const Eigen::Vector3d& p) {
+        if (!membrane::is_finite(p)) refuse(file, "vertex ", points.size(), " is not finite, or too large to be read");
+        points.push_back(p);
+    }
 
     /// A polygon as a fan; `corner(k)` is its k-th vertex.
     template <class Corner>
@@ -39,6 +47,9 @@ struct Soup {
     }
 };
 
+/// What a library says, as a part of one line.
+std::string one_line(const std::string& says) { return says.substr(0, std::min<std::size_t>(says.find('\n'), 120)); }
+
 Soup read_obj(const std::string& file, const std::string& text) {
     std::istringstream stream(text);
     tinyobj::attrib_t attributes;
@@ -46,11 +57,10 @@ Soup read_obj(const std::string& file, const std::string& text) {
     std::vector<tinyobj::material_t> materials;
     std::string warning, error;
     const bool read = tinyobj::LoadObj(&attributes, &shapes, &materials, &warning, &error, &stream, nullptr, false);
-    if (!read || !warning.empty() || !error.empty())
-        refuse(file, "tinyobjloader says: ", error.empty() ? warning : error);
-    Soup soup;
+    if (!read || !warning.empty() || !error.empty()) refuse(file, "tinyobjloader: ", one_line(error + warning));
+    Soup soup{file};
     for (std::size_t at = 0; at < attributes.vertices.size(); at += 3) {
-        soup.points.emplace_back(Eigen::Map<const Eigen::Vector3d>(&attributes.vertices[at]));
+        soup.add_point(Eigen::Map<const Eigen::Vector3d>(&attributes.vertices[at]));
     }
     for (const auto& shape : shapes) {
         std::size_t begin = 0;
@@ -65,17 +75,18 @@ Soup read_obj(const std::string& file, const std::string& text) {
 Soup read_by_assimp(const std::string& file, const std::string& text, const std::string& kind) {
     Assimp::Importer importer;
     const aiScene* scene = importer.ReadFileFromMemory(text.data(), text.size(), 0, kind.c_str());
-    if (scene == nullptr) refuse(file, "assimp says: ", importer.GetErrorString());
-    Soup soup;
+    if (scene == nullptr) refuse(file, "assimp: ", one_line(importer.GetErrorString()));
+    Soup soup{file};
     std::map<std::array<double, 3>, membrane::Index> known;  // for STL
     for (unsigned m = 0; m < scene->mNumMeshes; ++m) {
         const aiMesh& part = *scene->mMeshes[m];
         std::vector<membrane::Index> index(part.mNumVertices);
         for (unsigned v = 0; v < part.mNumVertices; ++v) {
-            const aiVector3D& p = part.mVertices[v];
+            const Eigen::Vector3d p(part.mVertices[v].x, part.mVertices[v].y, part.mVertices[v].z);
             const auto next = static_cast<membrane::Index>(soup.points.size());
-            index[v] = kind == "stl" ? known.try_emplace({p.x, p.y, p.z}, next).first->second : next;
-            if (index[v] == next) soup.points.emplace_back(p.x, p.y, p.z);
+            const bool weld = kind == "stl" && membrane::is_finite(p);
+            index[v] = weld ? known.try_emplace({p.x(), p.y(), p.z()}, next).first->second : next;
+            if (index[v] == next) soup.add_point(p);
         }
         for (unsigned f = 0; f < part.mNumFaces; ++f) {
             const aiFace& face = part.mFaces[f];
@@ -98,7 +109,7 @@ std::string bytes_of(const std::filesystem::path& path, const std::string& file)
 }  // namespace
 
 Surface read_mesh(const std::filesystem::path& path, double unit) {
-    const std::string file = path.filename().string();
+    const std::string file = path.string();
     std::string ending = path.extension().string();
     for (char& c : ending) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
     const std::map<std::string, std::string (*)(const std::string&, std::string_view)> kinds{
@@ -111,7 +122,6 @@ Surface read_mesh(const std::filesystem::path& path, double unit) {
     if (soup.triangles.empty()) refuse(file, "has no triangles");
     Surface surface{membrane::Points<double>(3, soup.points.size()), membrane::Triangles(3, soup.triangles.size())};
     for (std::size_t v = 0; v < soup.points.size(); ++v) {
-        if (!membrane::is_finite(soup.points[v])) refuse(file, "vertex ", v, " is not finite, or too large to be read");
         surface.points.col(static_cast<Eigen::Index>(v)) = unit * soup.points[v];
     }
     for (std::size_t f = 0; f < soup.triangles.size(); ++f) {

@@ -71,7 +71,7 @@ inline void write_vtp(const std::filesystem::path& file, const membrane::Triangl
     text += "</PointData>\n<Points>\n";
     detail::append_array(text, "Float64", "points", state.points);
     text += "</Points>\n<Polys>\n";
-    detail::append_array(text, "Int32", "connectivity", triangles);
+    detail::append_array(text, "Int32", "connectivity", triangles.reshaped(1, triangles.size()));
     const Eigen::RowVectorXi ends =
         Eigen::RowVectorXi::LinSpaced(triangles.cols(), 3, 3 * static_cast<int>(triangles.cols()));
     detail::append_array(text, "Int32", "offsets", ends);
@@ -116,9 +116,10 @@ class Series {
         return !folder_.empty() && (times_.empty() || time > times_.back() + interval_ * (1 - 1e-9));
     }
 
-    /// The state at `time` [s]. The series is whole after each, should the program end.
-    void add(double time, const SurfaceState& state) {
+    /// The state at `time` [s], moved by `shift` [m]. The series is whole after each, should the program end.
+    void add(double time, SurfaceState state, const Eigen::Vector3d& shift = Eigen::Vector3d::Zero()) {
         times_.push_back(time);
+        state.points.colwise() += shift;
         write_vtp(folder_ / vtp(times_.size() - 1), triangles_, state);
         std::string text = "<?xml version='1.0'?>\n<VTKFile type='Collection' version='0.1'>\n<Collection>\n";
         for (std::size_t i = 0; i < times_.size(); ++i) {

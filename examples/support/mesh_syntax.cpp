@@ -44,36 +44,36 @@ bool Lines::next(bool comments) {
     return !words_.empty();
 }
 
-std::string Lines::quoted(std::size_t i) const {
-    std::string text(word(i).substr(0, 24));
-    for (char& c : text) {
+std::string Lines::quoted(std::string_view text) {
+    std::string shown(text.substr(0, 24));
+    for (char& c : shown) {
         if (c < ' ' || c > '~') c = '?';
     }
-    return "'" + text + (word(i).size() > 24 ? "...'" : "'");
+    return "'" + shown + (text.size() > shown.size() ? "...'" : "'");
 }
 
 void Lines::check_number(std::size_t i) const {
     std::string_view text = word(i);
     if (text.front() == '+' && text.size() > 1 && text[1] != '-') text.remove_prefix(1);
+    const auto whole = std::find_if_not(text.begin() + (text.front() == '-' ? 1 : 0), text.end(), digit);
+    if (whole - text.begin() > 18 || text.size() > 64) {  // assimp makes 0 of more
+        refuse("expected a number of at most 18 digits before the point and 64 characters, got ", quoted(i));
+    }
     double value = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const bool number = end == text.data() + text.size() && error != std::errc::invalid_argument;
-    if (!number || !(digit(text.back()) || text.back() == '.')) refuse("expected a number, got ", quoted(i));
-    if (error != std::errc() && (text.find("e-") == text.npos && text.find("E-") == text.npos)) {
+    const bool all = end == text.data() + text.size() && error != std::errc::invalid_argument;
+    const bool too_small = error == std::errc::result_out_of_range && text.find_first_of("eE") != text.npos &&
+                           text[text.find_first_of("eE") + 1] == '-';
+    if (!all || !(digit(text.back()) || text.back() == '.') || (error != std::errc() && !too_small)) {
         refuse("expected a finite number, got ", quoted(i));
-    }
-    const auto whole = std::find_if_not(text.begin() + (text.front() == '-' ? 1 : 0), text.end(), digit);
-    if (whole - text.begin() > 18 || text.size() > 64) {
-        refuse("expected at most 18 digits before the point and 64 characters, got ", quoted(i));
     }
 }
 
-std::int64_t Lines::integer(std::size_t i, std::int64_t least, std::int64_t most) const {
+std::int64_t Lines::integer(std::string_view text, std::int64_t least, std::int64_t most) const {
     std::int64_t value = 0;
-    const std::string_view text = word(i);
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
     if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
-        refuse("expected an integer from ", least, " to ", most, ", got ", quoted(i));
+        refuse("expected an integer from ", least, " to ", most, ", got ", quoted(text));
     }
     return value;
 }
@@ -108,6 +108,7 @@ std::string checked_obj(const std::string& file, std::string_view bytes) {
     for (std::size_t at = 0; (at = text.find("\\\n", at)) != text.npos;) text.replace(at, 2, "  ");  // goes on
     Lines lines(file, text);
     std::size_t written = 1;
+    std::int64_t vertices = 0;
     while (lines.next()) {
         const std::string_view kind = lines.word(0);
         if (kind != "v" && kind != "f") {
@@ -118,6 +119,7 @@ std::string checked_obj(const std::string& file, std::string_view bytes) {
         result.append(lines.line() - written, '\n');
         written = lines.line();
         result += kind;
+        vertices += kind == "v";
         if (kind == "v" && (lines.size() < 4 || lines.size() > 8)) {
             lines.refuse("expected 3 to 7 numbers of a vertex, got ", lines.size() - 1);
         }
@@ -127,11 +129,8 @@ std::string checked_obj(const std::string& file, std::string_view bytes) {
         for (std::size_t i = 1; i < lines.size(); ++i) {
             if (kind == "v") lines.check_number(i);
             if (kind == "v" && i > 3) continue;  // a weight or a colour
-            const std::string_view word = lines.word(i), corner = word.substr(0, word.find('/'));
-            if (kind == "f" &&
-                (corner.empty() || corner.find_first_not_of("-0123456789") != corner.npos || corner.size() > 11)) {
-                lines.refuse("expected the number of a vertex, got ", lines.quoted(i));
-            }
+            const std::string_view corner = lines.word(i).substr(0, lines.word(i).find('/'));
+            if (kind == "f") static_cast<void>(lines.integer(corner, -vertices, most_vertices));
             (result += ' ') += corner;
         }
     }

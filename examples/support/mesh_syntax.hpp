@@ -39,8 +39,11 @@ class Lines {
 
     /// Refuses word `i` if it is no plain finite decimal number, or one that a library reads as another.
     void check_number(std::size_t i) const;
-    /// Word `i` as an integer from `least` to `most`; else refuses it.
-    [[nodiscard]] std::int64_t integer(std::size_t i, std::int64_t least, std::int64_t most) const;
+    /// Word `i`, or `text` of this line, as an integer from `least` to `most`; else refuses it.
+    [[nodiscard]] std::int64_t integer(std::size_t i, std::int64_t least, std::int64_t most) const {
+        return integer(word(i), least, most);
+    }
+    [[nodiscard]] std::int64_t integer(std::string_view text, std::int64_t least, std::int64_t most) const;
     /// Refuses a line that has not so many words.
     void check_size(std::size_t count) const;
 
@@ -48,8 +51,9 @@ class Lines {
     [[noreturn]] void refuse(const Parts&... parts) const {
         membrane::refuse(file_, "line ", line_, ": ", parts...);
     }
-    /// Word `i` as it can stand in a message.
-    [[nodiscard]] std::string quoted(std::size_t i) const;
+    /// Word `i`, or `text`, as it can stand in a message.
+    [[nodiscard]] std::string quoted(std::size_t i) const { return quoted(word(i)); }
+    [[nodiscard]] static std::string quoted(std::string_view text);
 
   private:
     std::string file_;

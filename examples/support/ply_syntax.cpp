@@ -11,6 +11,10 @@
 namespace examples {
 namespace {
 
+using membrane::refuse;
+
+bool blank_or_end(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+
 /// How a number lies in a binary file.
 struct Type {
     std::size_t size = 0;
@@ -56,16 +60,26 @@ void add_property(const Lines& lines, std::vector<Element>& elements) {
     elements.back().properties.push_back(property);
 }
 
+/// Where the word that ends the header begins: at the beginning of a line.
+std::size_t header_end(std::string_view bytes) {
+    constexpr std::string_view last = "end_header";
+    for (std::size_t at = 1; (at = bytes.find(last, at)) != bytes.npos; ++at) {
+        const bool whole = bytes.size() == at + last.size() || blank_or_end(bytes[at + last.size()]);
+        if (whole && (bytes[at - 1] == '\n' || bytes[at - 1] == '\r')) return at;
+    }
+    return bytes.npos;
+}
+
 Header read_header(const std::string& file, std::string_view bytes) {
-    // The first line shows how lines end; in a binary body the same bytes mean something else.
-    const std::size_t first = std::min(bytes.find_first_of("\r\n"), bytes.size());
-    const std::string_view line_end = bytes.substr(first, bytes.substr(first, 2) == "\r\n" ? 2 : 1);
-    const std::string last = "end_header" + std::string(line_end);
-    const std::size_t end = first == bytes.size() ? bytes.npos : bytes.find(last);
-    if (!plain_text(file, bytes.substr(0, first)).starts_with("ply"))
-        membrane::refuse(file, "expected a file that begins with 'ply'");
-    if (end == bytes.npos) membrane::refuse(file, "expected a header that ends with 'end_header'");
-    Header header{{}, plain_text(file, bytes.substr(0, end)), {}, bytes.substr(end + last.size())};
+    const std::size_t first = std::min(bytes.find_first_of("\r\n"), bytes.size()), end = header_end(bytes);
+    if (!bytes.starts_with("ply") || first < 3) refuse(file, "expected a file that begins with 'ply'");
+    if (end == bytes.npos) refuse(file, "expected a header that ends with 'end_header'");
+    std::string_view body = bytes.substr(end + 10);
+    body.remove_prefix(std::min(body.find_first_not_of(" \t"), body.size()));
+    // Where lines end with \r alone, a \n belongs to a binary body.
+    const bool only_r = bytes[first] == '\r' && bytes[first + 1] != '\n';
+    body.remove_prefix(std::min<std::size_t>(!only_r && body.starts_with("\r\n") ? 2 : 1, body.size()));
+    Header header{{}, plain_text(file, bytes.substr(0, end)), {}, body};
     Lines lines(file, header.text);
     for (lines.next(false); lines.next(false);) {
         const std::string_view kind = lines.word(0);
@@ -85,7 +99,7 @@ Header read_header(const std::string& file, std::string_view bytes) {
     }
     constexpr std::array formats{"ascii", "binary_little_endian", "binary_big_endian"};
     if (std::find(formats.begin(), formats.end(), header.format) == formats.end()) {
-        membrane::refuse(file, "expected the format ascii, binary_little_endian or binary_big_endian 1.0");
+        refuse(file, "expected the format ascii, binary_little_endian or binary_big_endian 1.0");
     }
     return header;
 }
@@ -93,26 +107,25 @@ Header read_header(const std::string& file, std::string_view bytes) {
 /// Refuses elements other than those from which assimp takes the right vertices and triangles.
 void check_elements(const std::string& file, const std::vector<Element>& elements) {
     if (elements.size() < 2 || elements[0].name != "vertex" || elements[1].name != "face") {
-        membrane::refuse(file, "expected the elements vertex and face to be the first");
+        refuse(file, "expected the elements vertex and face to be the first");
     }
     for (const Element& element : elements) {
         std::size_t lists = 0;
         for (const Property& property : element.properties) lists += property.count.size > 0;
-        if (element.properties.empty()) membrane::refuse(file, "element ", element.name, " has no properties");
+        if (element.properties.empty()) refuse(file, "element ", element.name, " has no properties");
         if (&element == &elements[1] ? lists != 1 : lists != 0) {
-            membrane::refuse(file, "element ", element.name, " has ", lists,
-                             " lists, expected one of a face, else none");
+            refuse(file, "element ", element.name, " has ", lists, " lists, expected one of a face, else none");
         }
     }
     for (const std::string_view name : {"x", "y", "z"}) {
         const auto& all = elements[0].properties;
         const auto count = std::count_if(all.begin(), all.end(), [&](const Property& one) { return one.name == name; });
-        if (count != 1) membrane::refuse(file, "expected one property ", name, " of a vertex, got ", count);
+        if (count != 1) refuse(file, "expected one property ", name, " of a vertex, got ", count);
     }
     for (const Property& property : elements[1].properties) {
         if (property.count.size == 0) continue;
         if ((property.name != "vertex_indices" && property.name != "vertex_index") || property.type.real) {
-            membrane::refuse(file, "expected a list vertex_indices of integers, got ", property.name);
+            refuse(file, "expected a list vertex_indices of integers, got ", property.name);
         }
     }
 }
@@ -135,7 +148,7 @@ void check_binary(const std::string& file, const Header& header) {
         for (std::int64_t row = 0; row < element.count; ++row) {
             const auto need = [&](std::size_t size) {
                 if (size <= rest.size()) return;
-                membrane::refuse(file, "the file ends within ", element.name, " ", row, " of ", element.count);
+                refuse(file, "the file ends within ", element.name, " ", row, " of ", element.count);
             };
             for (const Property& property : element.properties) {
                 need(std::max(property.type.size, property.count.size));
@@ -145,19 +158,18 @@ void check_binary(const std::string& file, const Header& header) {
                 }
                 const auto corners = integer(rest, property.count, big_endian);
                 rest.remove_prefix(property.count.size);
-                if (corners < 3) membrane::refuse(file, "face ", row, " has ", corners, " corners, expected 3 or more");
+                if (corners < 3) refuse(file, "face ", row, " has ", corners, " corners, expected 3 or more");
                 need(static_cast<std::size_t>(corners) * property.type.size);
                 for (std::int64_t k = 0; k < corners; ++k) {
                     const auto v = integer(rest, property.type, big_endian);
                     rest.remove_prefix(property.type.size);
                     if (v >= 0 && v < header.elements[0].count) continue;
-                    membrane::refuse(file, "face ", row, " names vertex ", v, ", expected 0 to ",
-                                     header.elements[0].count - 1);
+                    refuse(file, "face ", row, " names vertex ", v, ", expected 0 to ", header.elements[0].count - 1);
                 }
             }
         }
     }
-    if (!rest.empty()) membrane::refuse(file, "has ", rest.size(), " bytes after the last element, expected none");
+    if (!rest.empty()) refuse(file, "has ", rest.size(), " bytes after the last element, expected none");
 }
 
 /// One line for each row.
