@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <numbers>
 
+#include <Eigen/Geometry>
+
 #include <membrane/membrane.hpp>
 
 #include "support/specimen.hpp"

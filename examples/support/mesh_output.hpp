@@ -2,11 +2,13 @@
 #pragma once
 
 #include <charconv>
+#include <cstddef>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -100,7 +102,8 @@ inline void write_ply(const std::filesystem::path& file, const membrane::Triangl
     detail::save(file, text);
 }
 
-/// A time series for ParaView: FOLDER/NAME.pvd, which names a .vtp for each time.
+/// A time series for ParaView: FOLDER/NAME.pvd, which names a .vtp for each time. Beside it, for MeshLab, NAME.ply: the state
+/// that is displaced farthest.
 class Series {
   public:
     /// At most one state each `interval` [s]. Nothing is written if `folder` is empty.
@@ -128,6 +131,10 @@ class Series {
             text += "' part='0' file='" + vtp(i) + "'/>\n";
         }
         detail::save(folder_ / (name_ + ".pvd"), text + "</Collection>\n</VTKFile>\n");
+        const double farthest = state.displacement.colwise().norm().maxCoeff();
+        if (farthest < farthest_) return;
+        farthest_ = farthest;
+        write_ply(folder_ / (name_ + ".ply"), triangles_, state);
     }
 
   private:
@@ -136,7 +143,7 @@ class Series {
     std::filesystem::path folder_;
     std::string name_;
     membrane::Triangles triangles_;
-    double interval_;
+    double interval_, farthest_ = 0;
     std::vector<double> times_;
 };
 

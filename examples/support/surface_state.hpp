@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include <membrane/mesh/triangle.hpp>
 #include <membrane/network/mass_spring_network.hpp>

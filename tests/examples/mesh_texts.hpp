@@ -30,6 +30,7 @@ struct Folder {
 
     /// A file with these bytes.
     [[nodiscard]] std::string file(const std::string& name, const std::string& bytes) const {
+        std::filesystem::remove(path / name);  // a file system may wait for the disk when a file is written over
         std::ofstream(path / name, std::ios::binary) << bytes;
         return (path / name).string();
     }
