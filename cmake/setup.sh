@@ -69,8 +69,10 @@ build() {
     cmake --build "$root/build/$preset" --parallel "$(nproc)" --target "${targets[@]}" >&2
 }
 
-test_packages=(g++ cmake ninja-build libeigen3-dev catch2 libcgal-dev libseccomp-dev)
-example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json3-dev)
+test_packages=(g++ cmake ninja-build libeigen3-dev catch2 libcgal-dev libseccomp-dev libcli11-dev libassimp-dev
+    libtinyobjloader-dev)
+example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json3-dev libassimp-dev
+    libtinyobjloader-dev)
 bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox
     libbullet-dev libcgal-dev libembree-dev libfcl-dev)
 check_packages=(clang clang-format clang-tidy valgrind)

@@ -2,15 +2,13 @@
 //
 // An engine's vertices, interleaved and in floats, are deformed where they are: the loop copies no position in or out,
 // and writes the normals that have changed.
-#include <algorithm>
-#include <array>
 #include <cstdint>
 #include <cstdio>
 #include <vector>
 
 #include <membrane/membrane.hpp>
 
-#include "support/command_line.hpp"
+#include "support/specimen.hpp"
 
 /// One vertex as the engine sends it to the graphics card.
 struct EngineVertex {
@@ -23,13 +21,13 @@ struct EngineMesh {
     std::vector<std::uint32_t> indices;
 };
 
-EngineMesh load() {
-    const auto sphere = membrane::icosphere<float>({.radius = 0.01, .subdivisions = 3});
-    EngineMesh mesh{std::vector<EngineVertex>(static_cast<std::size_t>(sphere.vertex_count())), {}};
+EngineMesh load(const examples::Surface& surface) {
+    EngineMesh mesh{std::vector<EngineVertex>(static_cast<std::size_t>(surface.points.cols())), {}};
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-        for (int k = 0; k < 3; ++k) mesh.vertices[v].position[k] = sphere.positions()(k, static_cast<Eigen::Index>(v));
+        Eigen::Map<Eigen::Vector3f>(mesh.vertices[v].position) =
+            surface.points.col(static_cast<Eigen::Index>(v)).cast<float>();
     }
-    for (const auto corner : sphere.triangles().reshaped()) mesh.indices.push_back(static_cast<std::uint32_t>(corner));
+    for (const auto corner : surface.triangles.reshaped()) mesh.indices.push_back(static_cast<std::uint32_t>(corner));
     return mesh;
 }
 
@@ -40,9 +38,8 @@ auto columns(std::vector<EngineVertex>& vertices, float (EngineVertex::*member)[
         vertices.front().*member, 3, static_cast<Eigen::Index>(vertices.size()), Eigen::OuterStride<>(stride));
 }
 
-int main(int argc, char** argv) {
-    examples::no_options("Presses an engine's interleaved float vertices in place.", argc, argv);
-    EngineMesh engine = load();
+void press_in_place(const examples::Specimen& specimen) {
+    EngineMesh engine = load(specimen.surface);
     auto x = columns(engine.vertices, &EngineVertex::position);
     auto shown_normals = columns(engine.vertices, &EngineVertex::normal);
     const Eigen::Map<const Eigen::Matrix<std::uint32_t, 3, Eigen::Dynamic>> triangles(
@@ -57,7 +54,9 @@ int main(int argc, char** argv) {
     auto tracker = membrane::ContactTracker(mesh);
     auto normals = membrane::VertexNormals(mesh);
     shown_normals = normals.values();
-    membrane::NullDevice<float> device({{0, {0, 0, 0.013F}}, {0.2F, {0, 0, 0.010F}}}, {.radius = 2e-3});
+    membrane::NullDevice<float> device(
+        {{0, specimen.above(0.3).cast<float>()}, {0.2F, specimen.above(0).cast<float>()}},
+        {.radius = specimen.tool_radius()});
 
     std::size_t written = 0;
     while (device.running()) {
@@ -69,13 +68,17 @@ int main(int argc, char** argv) {
         device.write(membrane::ReactionForce{}({tool, contact, report}));
         written = std::max(written, report.moved.size());
     }
-    const auto deepest = std::min_element(engine.vertices.begin(), engine.vertices.end(), [](auto& a, auto& b) {
-        const auto radius = [](auto& v) { return Eigen::Map<const Eigen::Vector3f>(v.position).norm(); };
-        return radius(a) < radius(b);
-    });
+    Eigen::Index deepest = 0;
+    (x - mesh.positions()).colwise().squaredNorm().maxCoeff(&deepest);
     std::printf("%zu vertices of %zu bytes, at most %zu of them written in a frame\n", engine.vertices.size(),
                 sizeof(EngineVertex), written);
-    std::printf("vertex %td is now at (%.2f, %.2f, %.2f) mm, pressed with %.1f mN\n", deepest - engine.vertices.begin(),
-                1e3F * deepest->position[0], 1e3F * deepest->position[1], 1e3F * deepest->position[2],
-                1e3F * device.force().norm());
+    std::printf("vertex %td is now at (%.2f, %.2f, %.2f) mm, pressed with %.1f mN\n", deepest, 1e3F * x(0, deepest),
+                1e3F * x(1, deepest), 1e3F * x(2, deepest), 1e3F * device.force().norm());
+}
+
+int main(int argc, char** argv) {
+    CLI::App app("Presses an engine's interleaved float vertices in place.");
+    examples::MeshOptions options;
+    options.add_to(app);
+    return examples::run(app, argc, argv, [&] { press_in_place(options.specimen(examples::stock_sphere())); });
 }

@@ -6,9 +6,11 @@
 #include <cstdio>
 #include <numbers>
 
+#include <Eigen/Geometry>
+
 #include <membrane/membrane.hpp>
 
-#include "support/command_line.hpp"
+#include "support/specimen.hpp"
 
 constexpr double dt = 1e-3;  // [s]
 
@@ -31,9 +33,9 @@ struct Membrane {
 };
 
 /// An eye turns under a tool that stands still: the tool is carried into the eye's frame, the force out of it.
-void turning_eye() {
-    Membrane eye(membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3}));
-    const membrane::Tool<double> tool{.position = {0, 0, 0.0112}, .radius = 2e-3};
+void turning_eye(const examples::Specimen& specimen) {
+    Membrane eye(membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles));
+    const membrane::Tool<double> tool{.position = specimen.above(0.12), .radius = specimen.tool_radius()};
     const double rate = 0.5;  // [rad/s]
     std::printf("an eye turns under a tool\n  time [s]   angle [deg]   force in the world [mN]\n");
     for (int tick = 0; tick <= 400; ++tick) {
@@ -41,6 +43,8 @@ void turning_eye() {
         membrane::RigidFrame<double> frame;
         frame.rotation << 1, 0, 0, 0, std::cos(angle), -std::sin(angle), 0, std::sin(angle), std::cos(angle);
         frame.angular_velocity = {rate, 0, 0};
+        frame.origin = specimen.centre - frame.rotation * specimen.centre;  // the centre stays where it is
+        frame.velocity = frame.angular_velocity.cross(frame.origin - specimen.centre);
         const auto seen = carried_in(tool, frame);
         const auto contact = eye.tracker.update(eye.tree, eye.x, seen);
         const auto report = eye.solver.step(eye.x, dt, eye.network, eye.backing, press(seen, contact));
@@ -53,29 +57,29 @@ void turning_eye() {
 }
 
 /// A vessel beats under a tool that stands still: the anchors move with it, and the membrane follows.
-void beating_vessel() {
-    const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});
+void beating_vessel(const examples::Specimen& specimen) {
+    const auto mesh = membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles);
     Membrane vessel(mesh);
-    const membrane::Tool<double> tool{.position = {0, 0, 0.0120}, .radius = 2e-3};
+    const membrane::Tool<double> tool{.position = specimen.above(0.2), .radius = specimen.tool_radius()};
     membrane::Points<double> anchors = mesh.positions(), previous;
     std::printf("a vessel beats under a tool\n  time [s]   swollen by [mm]   depth [mm]   force [mN]\n");
     for (int tick = 0; tick <= 500; ++tick) {
         const double swollen = 0.05 * std::sin(2 * std::numbers::pi * dt * tick);  // of the radius, once a second
         previous = anchors;
-        anchors = (1 + swollen) * mesh.positions();
+        anchors = ((1 + swollen) * mesh.positions()).colwise() - swollen * specimen.centre;
         vessel.solver.wake_all();
         const auto contact = vessel.tracker.update(vessel.tree, vessel.x, tool, anchors);
         const auto report = vessel.solver.step(vessel.x, dt, vessel.network, vessel.backing.at(anchors, previous),
                                                press(tool, contact));
         vessel.tree.refit(vessel.x, report.moved);
         if (tick % 50 != 0) continue;
-        std::printf("%10.2f %17.2f %12.2f %12.1f\n", dt * tick, 10 * swollen, 1e3 * contact.depth,
+        std::printf("%10.2f %17.2f %12.2f %12.1f\n", dt * tick, 1e3 * swollen * specimen.size, 1e3 * contact.depth,
                     1e3 * report.reactions[0].norm());
     }
 }
 
 int main(int argc, char** argv) {
-    examples::no_options("A membrane on a body that turns, and on one that beats.", argc, argv);
-    turning_eye();
-    beating_vessel();
+    const auto specimen = examples::specimen("A membrane on a body that turns, and on one that beats.", argc, argv);
+    turning_eye(specimen);
+    beating_vessel(specimen);
 }

@@ -11,7 +11,7 @@
 #include <membrane/haptics/script.hpp>
 #include <membrane/membrane.hpp>
 
-#include "support/command_line.hpp"
+#include "support/specimen.hpp"
 
 /// The membrane's reaction times `scale`, in its own direction but never above `limit`.
 struct LimitedReaction {
@@ -27,15 +27,16 @@ struct LimitedReaction {
 };
 static_assert(membrane::ForcePolicy<LimitedReaction, double>);
 
-void play(std::vector<membrane::Waypoint<double>> script, const LimitedReaction& feel) {
-    const double dt = 1e-3;                                                                                 // [s]
-    const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});                     // [m]
+void play(const examples::Specimen& specimen, std::vector<membrane::Waypoint<double>> script,
+          const LimitedReaction& feel) {
+    const double dt = 1e-3;  // [s]
+    const auto mesh = membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles);
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
     const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
-    membrane::NullDevice<double> device(std::move(script), {.tick = dt, .radius = 2e-3});
+    membrane::NullDevice<double> device(std::move(script), {.tick = dt, .radius = specimen.tool_radius()});
     auto x = mesh.positions();
 
     std::printf("time [s]   depth [mm]   reaction [mN]   hand feels [N]\n");
@@ -59,9 +60,13 @@ int main(int argc, char** argv) {
     app.add_option("--script", file, "the tool's way, a CSV file: time [s], x, y, z [m]")->check(CLI::ExistingFile);
     app.add_option("--scale", feel.scale, "from tissue to hand")->capture_default_str();
     app.add_option("--limit", feel.limit, "of the device [N]")->capture_default_str();
+    examples::MeshOptions options;
+    options.add_to(app);
     return examples::run(app, argc, argv, [&] {
-        if (file.empty()) return play({{0, {0, 0, 0.013}}, {0.4, {0, 0, 0.009}}, {0.8, {0, 0, 0.013}}}, feel);
+        const auto specimen = options.specimen(examples::stock_sphere());
+        const Eigen::Vector3d away = specimen.above(0.3), deep = specimen.above(-0.1);
+        if (file.empty()) return play(specimen, {{0, away}, {0.4, deep}, {0.8, away}}, feel);
         std::ifstream text(file);
-        play(membrane::read_script<double>(text), feel);
+        play(specimen, membrane::read_script<double>(text), feel);
     });
 }

@@ -6,7 +6,7 @@
 
 #include <membrane/membrane.hpp>
 
-#include "support/command_line.hpp"
+#include "support/specimen.hpp"
 
 /// Soft until stretched by `slack`, ten times as stiff from there on.
 struct Collagen {
@@ -23,20 +23,19 @@ struct Collagen {
 };
 static_assert(membrane::SpringLaw<Collagen, double>);
 
-/// Force that holds the middle of a disc `height` above its clamped rim [N].
+/// Force that holds the middle of a membrane `height` [m] above where it is at rest, its rim clamped [N].
 template <class Law>
-double holding_force(const Law& law, double height) {
-    const auto disc = membrane::disc<double>({.radius = 0.01, .rings = 8});
-    const membrane::Adjacency adjacency(disc);
-    const auto rim = adjacency.border_vertices();
+double holding_force(const examples::Specimen& specimen, const Law& law, double height) {
+    const auto mesh = membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles);
     const auto network =
-        membrane::MassSpringNetwork(disc, law, {.stiffness = 40.0, .pinned = {rim.begin(), rim.end()}});  // [N/m]
+        membrane::MassSpringNetwork(mesh, law, {.stiffness = 40.0, .pinned = specimen.rim()});  // [N/m]
     auto solver =
         membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = 100, .negligible_force = 1e-6});
-    auto x = disc.positions();
+    auto x = mesh.positions();
     for (int tick = 0; tick < 1000; ++tick) {
-        const Eigen::Vector3d target(0, 0, height);
-        const auto report = solver.step(x, 1e-3, network, membrane::NoVolumeSprings{}, membrane::pull(0, target));
+        const Eigen::Vector3d target = specimen.above(0) + height * specimen.outward;
+        const auto report =
+            solver.step(x, 1e-3, network, membrane::NoVolumeSprings{}, membrane::pull(specimen.vertex, target));
         if (report.converged) return report.reactions[0].norm();
     }
     std::fprintf(stderr, "not at rest after 1000 ticks\n");
@@ -44,11 +43,17 @@ double holding_force(const Law& law, double height) {
 }
 
 int main(int argc, char** argv) {
-    examples::no_options("Pulls a clamped disc by its middle, with linear springs and with a law of one's own.", argc,
-                         argv);
-    std::printf("height [mm]   linear [mN]   collagen [mN]\n");
-    for (const double height : {1e-3, 2e-3, 3e-3, 4e-3}) {
-        std::printf("%11.1f %13.2f %15.2f\n", 1e3 * height, 1e3 * holding_force(membrane::LinearSpring{}, height),
-                    1e3 * holding_force(Collagen{}, height));
-    }
+    CLI::App app("Pulls a clamped membrane by its middle, with linear springs and with a law of one's own.");
+    examples::MeshOptions options;
+    options.add_to(app);
+    return examples::run(app, argc, argv, [&] {
+        const auto specimen = options.specimen(membrane::disc<double>({.radius = 0.01, .rings = 8}));
+        std::printf("height [mm]   linear [mN]   collagen [mN]\n");
+        for (const double part : {0.1, 0.2, 0.3, 0.4}) {
+            const double height = part * specimen.size;
+            std::printf("%11.1f %13.2f %15.2f\n", 1e3 * height,
+                        1e3 * holding_force(specimen, membrane::LinearSpring{}, height),
+                        1e3 * holding_force(specimen, Collagen{}, height));
+        }
+    });
 }

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 //
 // The whole paper in one run: spheres of 162 and 642 vertices and a cornea are pressed, grasped, pulled and let go, with
-// virtual volume springs and without. Prints how fast that is and how far off, and draws the paper's figures 3 to 5.
+// virtual volume springs and without, or a membrane of a file. Prints how fast that is and how far off, draws the paper's
+// figures 3 to 5, and writes a time series for ParaView.
 #include <filesystem>
 #include <iostream>
 #include <string>
@@ -10,21 +11,21 @@
 
 #include <membrane/membrane.hpp>
 
-#include "support/command_line.hpp"
+#include "support/mesh_output.hpp"
 #include "support/output.hpp"
 #include "support/record.hpp"
 #include "support/scenes.hpp"
+#include "support/settings.hpp"
 
 using namespace examples;
 
 template <class Volume>
-Record run(const Scene& scene, const Volume& backing, const Motion& motion,
-           const membrane::SolverOptions<double>& options) {
+Record run(const Scene& scene, const Volume& backing, const Motion& motion, const Settings& settings, Series series) {
     const double dt = 1e-3;  // [s]
     const auto network = membrane::MassSpringNetwork(scene.mesh, membrane::LinearSpring{},
                                                      {.stiffness = scene.stiffness, .pinned = scene.pinned});
     const auto feel = membrane::SpringDamperForce{.stiffness = 50, .damping = 0.2};  // [N/m], [N s/m]
-    auto solver = membrane::QuasiStaticSolver(network, options);
+    auto solver = membrane::QuasiStaticSolver(network, settings.solver);
     auto tree = membrane::AabbTree(scene.mesh);
     auto tracker = membrane::ContactTracker(scene.mesh);
     auto grasper = membrane::Grasper(scene.mesh);
@@ -55,43 +56,39 @@ Record run(const Scene& scene, const Volume& backing, const Motion& motion,
                     .at_work = report.visits > 0,
                     .seconds = watch.seconds()},
                    x);
+        if (series.due(tool.time)) series.add(tool.time, surface_state(scene.mesh, x, network, backing), scene.origin);
     }
     return record;
 }
 
-Outcome run_both(const Scene& scene, double pace, const membrane::SolverOptions<double>& options) {
+Outcome run_both(const Scene& scene, const Settings& settings) {
     const auto press = press_moves(scene), pull = pull_moves(scene);
+    const auto series = [&](const std::string& name) {
+        return Series(settings.series, scene.key + name, scene.mesh.triangles(), 0.02);
+    };
     std::cout << scene.name << ": with volume springs ..." << std::flush;
     const auto backing = membrane::VirtualVolumeSprings(
         scene.mesh, {.stiffness = scene.backing_stiffness, .damping = scene.backing_damping});
-    auto with = run(scene, backing, motion(scene, joined(press, pull), pace), options);
+    auto with = run(scene, backing, motion(scene, joined(press, pull), settings.pace), settings, series(""));
 
     std::cout << " without ..." << std::flush;  // and the pull from rest: it does not come back from the press
     const membrane::NoVolumeSprings none;
-    auto pressed = run(scene, none, motion(scene, press, pace), options);
-    auto pulled = run(scene, none, motion(scene, pull, pace, pressed.phases.back().end), options);
+    auto pressed = run(scene, none, motion(scene, press, settings.pace), settings, series("_without_pressed"));
+    auto pulled = run(scene, none, motion(scene, pull, settings.pace, pressed.phases.back().end), settings,
+                      series("_without_pulled"));
     std::cout << " done" << std::endl;
     return {scene, std::move(with), std::move(pressed).then(std::move(pulled))};
 }
 
 int main(int argc, char** argv) {
-    auto pictures = std::filesystem::path(argv[0]).parent_path() / "pictures";
-    std::string json, csv;
-    membrane::SolverOptions<double> options{.layers = 6, .sweeps = 2};
-    bool quick = false;
+    Settings settings;
+    settings.out.pictures = std::filesystem::path(argv[0]).parent_path() / "pictures";
     CLI::App app("Presses, grasps, pulls and lets go membranes, with virtual volume springs and without.");
-    app.add_option("--out", pictures, "folder for the pictures and index.html")->capture_default_str();
-    app.add_option("--json", json, "write every figure to this file");
-    app.add_option("--csv", csv, "write time, tool, depth and force of every frame to this file");
-    app.add_option("--layers", options.layers, "threshold of the propagation queue")->capture_default_str();
-    app.add_option("--sweeps", options.sweeps, "passes over the queue in a step")->capture_default_str();
-    app.add_flag("--quick", quick, "the tool moves ten times as fast");
+    settings.add_to(app);
     return run(app, argc, argv, [&] {
-        Output output(pictures, json, csv);
+        Output output(settings.out);
         std::vector<Outcome> outcomes;
-        for (const Scene& scene : {sphere_scene(2, "3", 84), sphere_scene(3, "4", 23), cornea_scene()}) {
-            outcomes.push_back(run_both(scene, quick ? 10 : 1, options));
-        }
-        output.write(outcomes, options.layers);
+        for (const Scene& scene : scenes(settings.mesh)) outcomes.push_back(run_both(scene, settings));
+        output.write(outcomes, settings.solver.layers);
     });
 }

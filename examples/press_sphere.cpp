@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include <cstdio>
 #include <membrane/membrane.hpp>
-#include "support/command_line.hpp"
+#include "support/specimen.hpp"
 
 int main(int argc, char** argv) {
-    examples::no_options("Presses a sphere and prints the force.", argc, argv);
-    membrane::NullDevice<double> device({{0.0, {0, 0, 0.013}}, {0.2, {0, 0, 0.010}}}, {.radius = 2e-3});  // [s], [m]
-    const double dt = 1e-3;                                                                               // [s]
+    const auto body = examples::specimen("Presses a membrane and prints the force.", argc, argv);
+    const auto& [points, triangles] = body.surface;
+    membrane::NullDevice<double> device({{0.0, body.above(0.3)}, {0.2, body.above(0)}}, {.radius = body.tool_radius()});
+    const double dt = 1e-3;  // [s]
     // [loop]
-    const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});                     // [m]
+    const auto mesh = membrane::TriangleMesh(points, triangles);                                            // [m]
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
     const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};                 // [N/m], [N s/m]

@@ -41,12 +41,14 @@ namespace examples {
     return 2;
 }
 
-/// For a program without options: goes on only if there were none.
-inline void no_options(const std::string& purpose, int argc, char** argv) {
-    CLI::App app(purpose);
-    bool go_on = false;
-    const int code = run(app, argc, argv, [&] { go_on = true; });
-    if (!go_on) std::exit(code);
+/// Reads the command line and runs what comes before the program itself: ends the program unless that has been done.
+inline void run_first(CLI::App& app, int argc, char** argv, const std::function<void()>& first) {
+    bool done = false;
+    const int code = run(app, argc, argv, [&] {
+        first();
+        done = true;
+    });
+    if (!done) std::exit(code);
 }
 
 }  // namespace examples

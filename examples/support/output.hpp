@@ -10,25 +10,37 @@
 #include <system_error>
 #include <vector>
 
+#include "support/command_line.hpp"
 #include "support/pictures.hpp"
 #include "support/report.hpp"
 
 namespace examples {
 
+/// Where `press_and_pull` writes to, as options of the command line. No file for an empty name.
+struct OutputOptions {
+    std::filesystem::path pictures;
+    std::string json = {}, csv = {};
+
+    void add_to(CLI::App& app) {
+        app.add_option("--out", pictures, "folder for the pictures and index.html")->capture_default_str();
+        app.add_option("--json", json, "write every figure to this file");
+        app.add_option("--csv", csv, "write time, tool, depth and force of every frame to this file");
+    }
+};
+
 /// Where `press_and_pull` writes to. That it can is found out before the work begins, and what was there before is
 /// overwritten only at its end.
 ///
-///     Output output("pictures", "figures.json", "");
+///     Output output({.pictures = "pictures", .json = "figures.json"});
 ///     output.write(outcomes, layers);
 class Output {
   public:
-    /// No file for an empty name.
     /// @throws std::runtime_error for a folder or file that cannot be written
-    Output(const std::filesystem::path& folder, const std::string& json_name, const std::string& csv_name)
-        : folder_(folder), page_(folder / "index.html"), json_(json_name), csv_(csv_name) {
+    explicit Output(const OutputOptions& options)
+        : folder_(options.pictures), page_(folder_ / "index.html"), json_(options.json), csv_(options.csv) {
         std::error_code failed;
-        std::filesystem::create_directories(folder, failed);
-        if (failed) throw std::runtime_error("cannot make the folder " + folder.string());
+        std::filesystem::create_directories(folder_, failed);
+        if (failed) throw std::runtime_error("cannot make the folder " + folder_.string());
         for (const auto& file : {page_, json_, csv_}) {
             if (!file.empty()) save(file, "", std::ios::app);
         }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <Eigen/Core>
+#include <Eigen/LU>
 
 #include <membrane/haptics/device.hpp>
 #include <membrane/mesh/adjacency.hpp>
@@ -15,28 +16,48 @@
 
 #include "support/camera.hpp"
 #include "support/plot.hpp"
+#include "support/specimen.hpp"
 
 /// The membranes of `press_and_pull`, and what the tool does to them.
 namespace examples {
 
-/// A membrane that is part of a sphere around the origin, and how the tool meets it.
+/// A membrane that is part of a sphere around the origin, or seen from there much as one, and how the tool meets it.
 struct Scene {
     std::string key, name;  ///< For files, and for people.
     membrane::TriangleMesh<double> mesh;
     std::vector<membrane::Index> pinned;
-    double radius;                  ///< Of the membrane at rest [m].
-    double tool_radius;             ///< [m]
-    double depth;                   ///< How far it is pressed in, and pulled out [m].
-    Vector3d pressed, slid;         ///< Unit vectors to where it is pressed, and to where the tool slides then.
-    Camera::Options camera;         ///< Sees the tool from the side.
-    Camera::Options camera_after;   ///< Sees where the tool has been.
-    double stiffness = 40;          ///< Of the springs [N/m].
-    double backing_stiffness = 4;   ///< Of the volume springs [N/m],
-    double backing_damping = 0.02;  ///< and their damping [N s/m].
-    double picture_height;          ///< [px]
-    std::string paper_figure = {};  ///< Empty where the paper has no such scene.
-    double paper_frames = 0;        ///< A second, in [Liu07] 3; zero where the paper has no such scene.
+    double radius;                       ///< Of the membrane at rest [m].
+    double tool_radius;                  ///< [m]
+    double depth;                        ///< How far it is pressed in, and pulled out [m].
+    Vector3d pressed, slid;              ///< Unit vectors to where it is pressed, and to where the tool slides then.
+    Camera::Options camera;              ///< Sees the tool from the side.
+    Camera::Options camera_after;        ///< Sees where the tool has been.
+    double stiffness = 40;               ///< Of the springs [N/m].
+    double backing_stiffness = 4;        ///< Of the volume springs [N/m],
+    double backing_damping = 0.02;       ///< and their damping [N s/m].
+    double picture_height;               ///< [px]
+    std::string paper_figure = {};       ///< Empty where the paper has no such scene.
+    double paper_frames = 0;             ///< A second, in [Liu07] 3; zero where the paper has no such scene.
+    bool uneven = false;                 ///< Not everywhere `radius` from the origin.
+    Vector3d origin = Vector3d::Zero();  ///< Where the scene's origin is in the file of the mesh [m].
+
+    /// How far from the origin the surface is at rest, in the direction of a unit vector [m].
+    [[nodiscard]] double surface(const Vector3d& direction) const;
 };
+
+inline double Scene::surface(const Vector3d& direction) const {
+    double farthest = 0;
+    if (!uneven) return radius;
+    for (const auto& corners : mesh.triangles().colwise()) {
+        Eigen::Matrix3d edges;
+        const Vector3d a = mesh.positions().col(corners[0]);
+        edges << mesh.positions().col(corners[1]) - a, mesh.positions().col(corners[2]) - a, -direction;
+        const Vector3d at = edges.fullPivLu().solve(-a);  // a + at[0] ab + at[1] ac = at[2] direction
+        const bool hit = edges.determinant() != 0 && at[0] >= 0 && at[1] >= 0 && at[0] + at[1] <= 1;
+        if (hit) farthest = std::max(farthest, at[2]);
+    }
+    return farthest > 0 ? farthest : radius;
+}
 
 /// A sphere as in the paper's figures 3 and 4.
 [[nodiscard]] inline Scene sphere_scene(membrane::Index subdivisions, const std::string& paper_figure,
@@ -80,6 +101,39 @@ struct Scene {
             .camera = camera,
             .camera_after = camera,
             .picture_height = 136};
+}
+
+/// The membrane of a file, with the origin below the place where the tool meets it.
+[[nodiscard]] inline Scene file_scene(const Specimen& specimen) {
+    const Vector3d origin = specimen.above(-1);
+    auto mesh = membrane::TriangleMesh<double>(specimen.surface.points.colwise() - origin, specimen.surface.triangles);
+    const Vector3d across = specimen.outward.unitOrthogonal();
+    const Camera::Options camera{.target = specimen.centre - origin,
+                                 .elevation = specimen.outward.z() < 0 ? -20.0 : 20.0,
+                                 .distance = 8 * specimen.size,
+                                 .metre = 100 / specimen.size};
+    const std::string count = std::to_string(mesh.vertex_count());
+    auto rim = membrane::border(mesh);
+    return {.key = "file",
+            .name = "mesh of " + count + " vertices",
+            .mesh = std::move(mesh),
+            .pinned = std::move(rim),
+            .radius = specimen.size,
+            .tool_radius = specimen.tool_radius(),
+            .depth = 0.15 * specimen.size,
+            .pressed = specimen.outward,
+            .slid = (specimen.outward + 0.25 * across).normalized(),
+            .camera = camera,
+            .camera_after = camera,
+            .picture_height = 236,
+            .uneven = true,
+            .origin = origin};
+}
+
+/// The paper's spheres and a cornea, or the membrane of the file.
+[[nodiscard]] inline std::vector<Scene> scenes(const MeshOptions& options) {
+    if (options.file.empty()) return {sphere_scene(2, "3", 84), sphere_scene(3, "4", 23), cornea_scene()};
+    return {file_scene(options.specimen(stock_sphere()))};
 }
 
 /// One move of the tool.
@@ -130,7 +184,8 @@ struct Motion {
     double time = start, height = 0.7 * scene.depth;
     Vector3d toward = moves.front().toward;
     const auto place = [&](const Vector3d& direction, double above) {
-        return Vector3d((scene.radius + scene.tool_radius + above) * direction.normalized());
+        const Vector3d unit = direction.normalized();
+        return Vector3d((scene.surface(unit) + scene.tool_radius + above) * unit);
     };
     for (const Move& move : moves) {
         const bool still = move.toward == toward && move.height == height;
