@@ -76,8 +76,9 @@ class Remesher {
         }
     }
 
-    inline void split_long_edges();
-    inline void collapse_short_edges();
+    /// Those longer, those shorter than so many times what is wanted.
+    inline void split_edges(double longer);
+    inline void collapse_edges(double shorter);
     inline void flip_to_delaunay();
     inline double push();
 
@@ -184,10 +185,10 @@ void Remesher<Surface>::flip_to_delaunay() {
 }
 
 template <class Surface>
-void Remesher<Surface>::split_long_edges() {
+void Remesher<Surface>::split_edges(double longer) {
     const Index sides = mesh_.side_count();
     for (Index side = 0; side < sides; ++side) {
-        if (!is_first(side) || norm(edge(side)) < 4.0 / 3 * wanted(side)) continue;
+        if (!is_first(side) || norm(edge(side)) < longer * wanted(side)) continue;
         const Vector3<double> middle = (mesh_.position(mesh_.from(side)) + mesh_.position(mesh_.to(side))) / 2;
         const auto place = project(middle, mesh_.twin(side) == no_index);
         if (!place || norm<double>(place->point - middle) > norm(edge(side)) / 2) continue;
@@ -216,9 +217,9 @@ bool Remesher<Surface>::collapse(Index side) {
 }
 
 template <class Surface>
-void Remesher<Surface>::collapse_short_edges() {
+void Remesher<Surface>::collapse_edges(double shorter) {
     for (Index side = 0; side < mesh_.side_count(); ++side) {
-        if (!is_first(side) || norm(edge(side)) > 0.8 * wanted(side)) continue;
+        if (!is_first(side) || norm(edge(side)) > shorter * wanted(side)) continue;
         if (!collapse(side) && mesh_.twin(side) != no_index) collapse(mesh_.twin(side));
     }
 }
@@ -266,15 +267,13 @@ TriangleMesh<double> remesh(const TriangleMesh<double>& mesh, const Surface& sur
                             Index iterations, const std::function<void(const RemeshProgress&)>& progress) {
     detail::Remesher<Surface> remesher(mesh, surface, length);
     for (Index i = 1; i <= iterations; ++i) {
-        const bool changes = 3 * i <= 2 * iterations;
-        if (changes) {
-            remesher.split_long_edges();
-            remesher.collapse_short_edges();
-        }
+        const bool settling = 3 * i > 2 * iterations;
+        remesher.split_edges(settling ? 1.6 : 4.0 / 3);
+        remesher.collapse_edges(settling ? 0.5 : 0.7);
         remesher.flip_to_delaunay();
         const double movement = remesher.push();
         if (progress) progress({i, iterations, remesher.vertices(), movement});
-        if (!changes && movement < 1e-3) break;
+        if (settling && movement < 1e-3) break;
     }
     remesher.flip_to_delaunay();
     return remesher.mesh().mesh();
