@@ -80,6 +80,8 @@ class Remesher {
     inline void split_edges(double longer);
     inline void collapse_edges(double shorter);
     inline void flip_to_delaunay();
+    /// Makes vertices of the border of those that were pushed to it.
+    inline void widen_border();
     inline double push();
 
     [[nodiscard]] const EditableMesh& mesh() const noexcept { return mesh_; }
@@ -224,6 +226,22 @@ void Remesher<Surface>::collapse_edges(double shorter) {
     }
 }
 
+template <class Surface>
+void Remesher<Surface>::widen_border() {
+    const Index sides = mesh_.side_count();
+    for (Index side = 0; side < sides; ++side) {
+        if (!mesh_.exists(side) || mesh_.twin(side) != no_index || mesh_.is_border(mesh_.apex(side))) continue;
+        const Vector3<double> tip = mesh_.position(mesh_.apex(side));
+        const Vector3<double> p = mesh_.position(mesh_.from(side)) - tip, q = mesh_.position(mesh_.to(side)) - tip;
+        if (dot(p, q) > -0.5 * norm(p) * norm(q)) continue;  // less than 120 degrees
+        const auto place = surface_.project_to_border(tip);
+        if (!place || norm<double>(place->point - tip) > norm<double>(p - q) / 2) continue;
+        add_vertex(place->normal, place->point);
+        mesh_.split(side, place->point);
+        collapse(mesh_.twin(mesh_.next(side)));
+    }
+}
+
 /// Moves the vertices by the forces of their edges; the farthest move, as a part of the length wanted there.
 template <class Surface>
 double Remesher<Surface>::push() {
@@ -270,6 +288,7 @@ TriangleMesh<double> remesh(const TriangleMesh<double>& mesh, const Surface& sur
         const bool settling = 3 * i > 2 * iterations;
         remesher.split_edges(settling ? 1.6 : 4.0 / 3);
         remesher.collapse_edges(settling ? 0.5 : 0.7);
+        if constexpr (Surface::has_border) remesher.widen_border();
         remesher.flip_to_delaunay();
         const double movement = remesher.push();
         if (progress) progress({i, iterations, remesher.vertices(), movement});
