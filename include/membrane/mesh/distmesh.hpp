@@ -24,10 +24,10 @@
 namespace membrane {
 
 struct DistMeshOptions {
-    EdgeLength edge_length = {};           ///< Wanted: [m], or a function of the place. Must be given.
-    std::optional<Bounds> bounds = {};     ///< That the surface is in [m]: needed where the body does not know its own.
-    Index iterations = 200;                ///< At most; the paper's number.
-    std::optional<double> spacing = {};    ///< Of the grid that the surface is first found in [m], see below.
+    EdgeLength edge_length = {};         ///< Wanted: [m], or a function of the place. Must be given.
+    std::optional<Bounds> bounds = {};   ///< That the surface is in [m]: needed where the body does not know its own.
+    Index iterations = 200;              ///< At most; the paper's number.
+    std::optional<double> spacing = {};  ///< Of the grid that the surface is first found in [m], see below.
     std::function<void(const RemeshProgress&)> progress = {};  ///< Called after each iteration.
 };
 
@@ -92,8 +92,8 @@ template <Real Scalar, class Surface>
     const Bounds bounds = checked_bounds(surface, options);
     const double spacing = spacing_for(bounds, options);
     const auto level = LevelSurface(surface, bounds);
-    const auto mesh = remesh(isosurface(level, bounds, spacing), level, options.edge_length, options.iterations,
-                             options.progress);
+    const auto mesh =
+        remesh(isosurface(level, bounds, spacing), level, options.edge_length, options.iterations, options.progress);
     return TriangleMesh<Scalar>(mesh.positions().template cast<Scalar>(), mesh.triangles());
 }
 

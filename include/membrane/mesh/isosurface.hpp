@@ -250,8 +250,8 @@ template <class Surface>
     std::vector<std::array<Index, 3>> triangles;
     for (const auto& corners : std::exchange(soup.triangles, {})) {
         std::size_t k = 0;  // turned so that the corner that differs from the others comes first
-        while (k < 2 && (stays(corners[k]) == stays(corners[(k + 1) % 3]) ||
-                         stays(corners[k]) == stays(corners[(k + 2) % 3]))) {
+        while (k < 2 &&
+               (stays(corners[k]) == stays(corners[(k + 1) % 3]) || stays(corners[k]) == stays(corners[(k + 2) % 3]))) {
             ++k;
         }
         const Index a = corners[k], b = corners[(k + 1) % 3], c = corners[(k + 2) % 3];
@@ -282,7 +282,8 @@ TriangleMesh<double> isosurface(const Surface& surface, const Bounds& bounds, do
     }
     Triangles corners(3, static_cast<Eigen::Index>(soup.triangles.size()));
     for (std::size_t f = 0; f < soup.triangles.size(); ++f) {
-        corners.col(static_cast<Eigen::Index>(f)) = Eigen::Map<const Eigen::Matrix<Index, 3, 1>>(soup.triangles[f].data());
+        corners.col(static_cast<Eigen::Index>(f)) =
+            Eigen::Map<const Eigen::Matrix<Index, 3, 1>>(soup.triangles[f].data());
     }
     for_each_edge(half_edges(corners), [&](std::span<const HalfEdge> sides) {
         if (sides.size() != 1 || (sides[0].first >= crossed && sides[0].second >= crossed)) return;

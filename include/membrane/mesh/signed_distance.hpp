@@ -212,23 +212,22 @@ inline Vector3<double> Ellipsoid::nearest(const Vector3<double>& p) const {
     const auto excess = [&](int k) { return radii[k] * radii[k] - least; };
     double s = 0;
     for (int k = 0; k < 3; ++k) s = (std::max)(s, radii[k] * y[k] - excess(k));
-    for (int i = 0; i < 100 && s > 0; ++i) {
+    const auto share = [&](int k) { return y[k] > 0 ? radii[k] * y[k] / (s + excess(k)) : 0; };  // x_k / r_k
+    for (int i = 0; i < 100; ++i) {
         double value = -1, slope = 0;
         for (int k = 0; k < 3; ++k) {
-            const double term = radii[k] * y[k] / (s + excess(k));
-            value += term * term;
-            slope -= 2 * term * term / (s + excess(k));
+            value += share(k) * share(k);
+            if (y[k] > 0) slope -= 2 * share(k) * share(k) / (s + excess(k));
         }
         const double next = s - value / slope;
-        if (!(next > s)) break;  // it only grows, until roundings stop it
+        if (!(value > 0) || !(next > s)) break;  // it only grows, until roundings stop it
         s = next;
     }
     Vector3<double> x;
     double rest = 1;
     for (int k = 0; k < 3; ++k) {
-        const double share = s + excess(k) > 0 ? radii[k] * y[k] / (s + excess(k)) : 0;
-        x[k] = std::copysign(radii[k] * share, p[k] - centre[k]);
-        rest -= share * share;
+        x[k] = std::copysign(radii[k] * share(k), p[k] - centre[k]);
+        rest -= share(k) * share(k);
     }
     if (!(s > 0) && rest > 0) {  // on the middle plane, and so far in that the surface is nearest across it
         x[shortest] = radii[shortest] * std::sqrt(rest);
