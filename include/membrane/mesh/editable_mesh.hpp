@@ -62,9 +62,9 @@ class EditableMesh {
     /// Puts a vertex on the edge at `place`, which splits its triangles in two, and returns it. `side` then ends there.
     inline Index split(Index side, const Vector3<double>& place);
 
-    /// Moves the first vertex of `side` into the second, with the triangles at the edge gone, if the surface stays one:
-    /// no vertex but the apexes is next to both [Dey99], an inner edge does not go from border to border, and the last
-    /// four triangles of a part stay. Says whether it did.
+    /// Moves the first vertex of `side` into the second, with the triangles at the edge gone, if the surface stays one of
+    /// the same topology: no vertex but the apexes is next to both [Dey99], a vertex of the border goes only along the
+    /// border, and of a part that is one triangle or a tetrahedron all stays. Says whether it did.
     inline bool collapse(Index side);
 
     /// What is there now, vertices and triangles in the order of their numbers.
