@@ -48,7 +48,7 @@ struct DistMeshOptions {
 /// is not finite and positive, and for what `isosurface` refuses
 /// Cost: O(grid) + O(vertices) for each iteration: 0.2 s for 1,500 vertices and 200 iterations.
 template <Real Scalar = double, SignedDistance Body>
-[[nodiscard]] TriangleMesh<Scalar> distmesh(const Body& body, const DistMeshOptions& options);
+[[nodiscard]] TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options);
 
 /// The same with a border.
 template <Real Scalar = double, SignedDistance Body, SignedDistance Within>
@@ -100,7 +100,7 @@ template <Real Scalar, class Surface>
 }  // namespace detail
 
 template <Real Scalar, SignedDistance Body>
-TriangleMesh<Scalar> distmesh(const Body& body, const DistMeshOptions& options) {
+TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options) {
     return detail::distmesh<Scalar>(body, options);
 }
 

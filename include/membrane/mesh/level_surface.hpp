@@ -4,6 +4,7 @@
 #include <cmath>
 #include <concepts>
 #include <optional>
+#include <utility>
 
 #include <membrane/mesh/signed_distance.hpp>
 
@@ -25,8 +26,8 @@ struct Trimmed {
 
 /// The surface of `body` as far as it is in `within`. They should meet at an angle that is not small.
 template <SignedDistance Body, SignedDistance Within>
-[[nodiscard]] Trimmed<Body, Within> trimmed(const Body& body, const Within& within) {
-    return {body, within};
+[[nodiscard]] Trimmed<Body, Within> trimmed(Body body, Within within) {
+    return {std::move(body), std::move(within)};
 }
 
 /// In place of a body to be within: everything.

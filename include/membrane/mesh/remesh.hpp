@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <functional>
-#include <numbers>
-#include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 

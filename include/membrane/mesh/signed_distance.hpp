@@ -2,11 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <concepts>
 #include <limits>
-#include <optional>
+#include <utility>
 
 #include <membrane/core/check.hpp>
 
@@ -166,26 +165,26 @@ struct Offset {
 
 /// What is in one of the two or in both.
 template <SignedDistance A, SignedDistance B>
-[[nodiscard]] Union<A, B> united(const A& a, const B& b) {
-    return {a, b};
+[[nodiscard]] Union<A, B> united(A a, B b) {
+    return {std::move(a), std::move(b)};
 }
 
 /// What is in both.
 template <SignedDistance A, SignedDistance B>
-[[nodiscard]] Intersection<A, B> intersection(const A& a, const B& b) {
-    return {a, b};
+[[nodiscard]] Intersection<A, B> intersection(A a, B b) {
+    return {std::move(a), std::move(b)};
 }
 
 /// `a` without `b`.
 template <SignedDistance A, SignedDistance B>
-[[nodiscard]] Difference<A, B> difference(const A& a, const B& b) {
-    return {a, b};
+[[nodiscard]] Difference<A, B> difference(A a, B b) {
+    return {std::move(a), std::move(b)};
 }
 
 /// The body with a skin of thickness `by` [m], or without one if that is negative: of a `Cuboid`, one with round edges.
 template <SignedDistance A>
-[[nodiscard]] Offset<A> offset(const A& body, double by) {
-    return {body, by};
+[[nodiscard]] Offset<A> offset(A body, double by) {
+    return {std::move(body), by};
 }
 
 template <SignedDistance D>
