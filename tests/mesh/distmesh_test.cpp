@@ -33,6 +33,7 @@ struct Bars {
     int euler = 2;
     double smallest_angle = 30, mean_smallest_angle = 50;  // degrees
     double even_edges = 0.95, off_length = 0.2;
+    bool has_edges = false;
 };
 
 void check_quality(const TriangleMesh<double>& mesh, double length, const Bars& bars) {
@@ -55,7 +56,7 @@ void check_soundness(const TriangleMesh<double>& mesh, int euler, bool closed) {
     if (closed) CHECK(PMP::is_outward_oriented(cgal));
 }
 
-/// Each triangle faces to where the distance grows.
+/// Each triangle faces to where the distance grows, if the body has no edges that it could lie across.
 template <class Body>
 void check_facing(const TriangleMesh<double>& mesh, const Body& body, double step) {
     for (const auto& corner : mesh.triangles().colwise()) {
@@ -74,7 +75,7 @@ void check_body(const Body& body, double length, const Bars& bars, double size =
         REQUIRE(std::abs(body(point(mesh.positions(), v))) <= 1e-9 * size);
     }
     check_soundness(mesh, bars.euler, true);
-    check_facing(mesh, body, 1e-6 * size);
+    if (!bars.has_edges) check_facing(mesh, body, 1e-6 * size);
     check_quality(mesh, length, bars);
 }
 
@@ -107,48 +108,48 @@ TEST_CASE("the unit sphere of the paper's figure 2, coarse and fine", "[distmesh
 
 TEST_CASE("closed bodies of tissue keep the sphere's bars", "[distmesh][cgal]") {
     const double mm = 1e-3;
-    check_body(Ellipsoid{.radii = {5 * mm, 5 * mm, 2 * mm}}, 0.7 * mm, {}, 5 * mm);  // a lens capsule
-    check_body(Ellipsoid{.centre = {3, 2, 1}, .radii = {1, 0.8, 0.25}}, 0.1, {});    // thin
-    check_body(Capsule{.start = {0, 0, 0}, .end = {1, 1, 1}, .radius = 0.5}, 0.2, {});
-    check_body(offset(Cuboid{}, 0.3), 0.15, {});
-    check_body(difference(Ball{}, Ball{.radius = 0.7}), 0.2, {.euler = 4});  // a hollow organ, its inside too
+    check_body(Ellipsoid{.radii = {5 * mm, 5 * mm, 2 * mm}}, mm, {}, 5 * mm);      // a lens capsule
+    check_body(Ellipsoid{.centre = {3, 2, 1}, .radii = {1, 0.8, 0.3}}, 0.14, {});  // thin
+    check_body(Capsule{.start = {0, 0, 0}, .end = {1, 1, 1}, .radius = 0.5}, 0.25, {});
+    check_body(offset(Cuboid{}, 0.3), 0.22, {});
+    check_body(difference(Ball{}, Ball{.radius = 0.6}), 0.3, {.euler = 4});  // a hollow organ, its inside too
 }
 
 TEST_CASE("a torus by one's own function, and two merged balls, keep the sphere's bars", "[distmesh][cgal]") {
-    check_body(torus, 0.15, {.euler = 0}, 1, around_torus);
+    check_body(torus, 0.2, {.euler = 0}, 1, around_torus);
     check_body(united(Ball{.centre = {-0.5, 0, 0}, .radius = 0.8}, Ball{.centre = {0.6, 0, 0}, .radius = 0.7}), 0.15,
                {});
     const auto level_set = [](const Point& p) { return p.array().square().square().sum() - 1; };  // far from a distance
-    check_body(level_set, 0.2, {}, 1, Bounds{{-1.1, -1.1, -1.1}, {1.1, 1.1, 1.1}});
+    check_body(level_set, 0.25, {}, 1, Bounds{{-1.1, -1.1, -1.1}, {1.1, 1.1, 1.1}});
 }
 
 TEST_CASE("bodies with edges lose them, and some evenness there", "[distmesh][cgal]") {
     // The triangles that cut an edge off follow neither face: measured 33 degrees at least, 50 to 53 on average.
-    check_body(Cuboid{}, 0.12, {.smallest_angle = 28, .mean_smallest_angle = 48});
-    check_body(intersection(Ball{}, HalfSpace{.point = {0, 0, 0.3}}), 0.15,
-               {.smallest_angle = 28, .mean_smallest_angle = 48});
+    check_body(Cuboid{}, 0.15, {.smallest_angle = 28, .mean_smallest_angle = 48, .has_edges = true});
+    check_body(intersection(Ball{}, HalfSpace{.point = {0, 0, 0.3}}), 0.2,
+               {.smallest_angle = 28, .mean_smallest_angle = 48, .has_edges = true});
 }
 
 TEST_CASE("surfaces with a border keep the sphere's bars", "[distmesh][cgal]") {
     const double mm = 1e-3;
-    check_trimmed(trimmed(Ball{}, HalfSpace{.point = {0, 0, 0.3}}), 0.15, {.euler = 1});
+    check_trimmed(trimmed(Ball{}, HalfSpace{.point = {0, 0, 0.3}}), 0.2, {.euler = 1});
     const HalfSpace limbus{.point = {0, 0, 5.16 * mm}, .normal = {0, 0, -1}};  // of a cornea 11.7 mm across
-    check_trimmed(trimmed(Ball{.radius = 7.8 * mm}, limbus), 0.8 * mm, {.euler = 1}, 7.8 * mm);
-    check_trimmed(trimmed(HalfSpace{.normal = {1, 2, 3}}, Ball{}), 0.15, {.euler = 1});  // a flat disc
+    check_trimmed(trimmed(Ball{.radius = 7.8 * mm}, limbus), mm, {.euler = 1}, 7.8 * mm);
+    check_trimmed(trimmed(HalfSpace{.normal = {1, 2, 3}}, Ball{}), 0.2, {.euler = 1});  // a flat disc
     const Capsule vessel{.start = {0, 0, -2}, .end = {0, 0, 2}, .radius = 0.5};
-    check_trimmed(trimmed(vessel, Cuboid{.half_size = {1, 1, 1}}), 0.15, {.euler = 0});
-    check_trimmed(trimmed(torus, HalfSpace{.normal = {1, 0.2, 0}}), 0.15, {.euler = 0}, 1, around_torus);
+    check_trimmed(trimmed(vessel, Cuboid{.half_size = {1, 1, 1}}), 0.2, {.euler = 0});
+    check_trimmed(trimmed(torus, HalfSpace{.normal = {1, 0.2, 0}}), 0.2, {.euler = 0}, 1, around_torus);
 }
 
 TEST_CASE("random ellipsoids, whole and cut, keep the sphere's bars at every size and place", "[distmesh][cgal]") {
-    for (int seed = 1; seed <= cases(5, 200); ++seed) {
+    for (int seed = 1; seed <= cases(3, 200); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
         const double size = std::pow(10, random.number(-3.0, 2.0));
         const Point radii(random.number(0.5, 1.0), random.number(0.5, 1.0), random.number(0.5, 1.0));
         const Ellipsoid body{.centre = 3 * size * random.vector(), .radii = size * radii};
         const double tightest = body.radii.minCoeff() * body.radii.minCoeff() / body.radii.maxCoeff();
-        const double length = tightest * random.number(0.4, 0.6);
+        const double length = tightest * random.number(0.45, 0.65);
         check_body(body, length, {}, size);
         const Point normal = random.unit_vector();
         const HalfSpace half{body.centre + random.number(-0.3, 0.3) * tightest * normal, normal};
@@ -158,11 +159,11 @@ TEST_CASE("random ellipsoids, whole and cut, keep the sphere's bars at every siz
 
 TEST_CASE("the same call gives the same bits, and float ones are the double ones rounded", "[distmesh]") {
     const auto cap = trimmed(Ellipsoid{.radii = {1, 0.9, 0.8}}, HalfSpace{});
-    const auto mesh = distmesh(cap, {.edge_length = 0.3});
-    const auto again = distmesh(cap, {.edge_length = 0.3});
+    const auto mesh = distmesh(cap, {.edge_length = 0.35});
+    const auto again = distmesh(cap, {.edge_length = 0.35});
     CHECK(mesh.positions() == again.positions());
     CHECK(mesh.triangles() == again.triangles());
-    const auto rounded = distmesh<float>(cap, {.edge_length = 0.3});
+    const auto rounded = distmesh<float>(cap, {.edge_length = 0.35});
     CHECK(rounded.positions() == mesh.positions().cast<float>());
     CHECK(rounded.triangles() == mesh.triangles());
 }

@@ -36,7 +36,7 @@ struct Everywhere {
 };
 
 /// A point of a surface, and the normal there.
-struct SurfacePoint {
+struct OnSurface {
     Vector3<double> point;   ///< [m]
     Vector3<double> normal;  ///< Out of the body, unit length.
 };
@@ -61,10 +61,10 @@ class LevelSurface {
 
     /// The point of the surface that Newton's method along the gradient leads to from `p`, which is near the nearest
     /// one where `p` is near the surface; none where the method gets lost. The border is not looked at.
-    [[nodiscard]] std::optional<SurfacePoint> project(const Vector3<double>& p) const;
+    [[nodiscard]] std::optional<OnSurface> project(const Vector3<double>& p) const;
 
     /// The same onto the border: both distances are zero.
-    [[nodiscard]] std::optional<SurfacePoint> project_to_border(const Vector3<double>& p) const;
+    [[nodiscard]] std::optional<OnSurface> project_to_border(const Vector3<double>& p) const;
 
   private:
     static constexpr int most_steps = 30;
@@ -83,21 +83,21 @@ template <class Body, class Within>
 LevelSurface(const Trimmed<Body, Within>&, const Bounds&) -> LevelSurface<Body, Within>;
 
 template <SignedDistance Body, SignedDistance Within>
-std::optional<SurfacePoint> LevelSurface<Body, Within>::project(const Vector3<double>& p) const {
+std::optional<OnSurface> LevelSurface<Body, Within>::project(const Vector3<double>& p) const {
     Vector3<double> x = p;
     for (int i = 0; i < most_steps; ++i) {
         const double off = distance(x);
         const Vector3<double> slope = gradient(surface_.body, x);
         const double squared = squared_norm(slope);
         if (!is_finite(off) || !is_finite(squared) || !(squared > 0)) return std::nullopt;
-        if (std::abs(off) <= tolerance()) return SurfacePoint{x, slope / std::sqrt(squared)};
+        if (std::abs(off) <= tolerance()) return OnSurface{x, slope / std::sqrt(squared)};
         x -= off / squared * slope;
     }
     return std::nullopt;
 }
 
 template <SignedDistance Body, SignedDistance Within>
-std::optional<SurfacePoint> LevelSurface<Body, Within>::project_to_border(const Vector3<double>& p) const {
+std::optional<OnSurface> LevelSurface<Body, Within>::project_to_border(const Vector3<double>& p) const {
     Vector3<double> x = p;
     for (int i = 0; i < most_steps; ++i) {
         const double off = distance(x), beyond = beyond_border(x);
@@ -105,7 +105,7 @@ std::optional<SurfacePoint> LevelSurface<Body, Within>::project_to_border(const 
         const double aa = squared_norm(a), ab = dot(a, b), bb = squared_norm(b), whole = aa * bb - ab * ab;
         if (!is_finite(off) || !is_finite(beyond) || !is_finite(whole)) return std::nullopt;
         if (!(whole > 1e-6 * aa * bb)) return std::nullopt;  // the surfaces touch: no border to be found
-        if (std::abs(off) <= tolerance() && std::abs(beyond) <= tolerance()) return SurfacePoint{x, a / std::sqrt(aa)};
+        if (std::abs(off) <= tolerance() && std::abs(beyond) <= tolerance()) return OnSurface{x, a / std::sqrt(aa)};
         x -= (bb * off - ab * beyond) / whole * a + (aa * beyond - ab * off) / whole * b;
     }
     return std::nullopt;

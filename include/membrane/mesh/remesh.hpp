@@ -123,7 +123,7 @@ class Remesher {
     }
 
     [[nodiscard]] inline bool may_flip(Index side) const;
-    [[nodiscard]] inline bool may_move(Index v, const SurfacePoint& to, Index but_next_to = no_index) const;
+    [[nodiscard]] inline bool may_move(Index v, const OnSurface& to, Index but_next_to = no_index) const;
     [[nodiscard]] inline bool is_delaunay(Index side) const;
     inline bool collapse(Index side);
 
@@ -138,7 +138,7 @@ class Remesher {
 
 /// Whether no triangle around `v` would turn away from the surface, more than before. Those with `but_next_to` go.
 template <class Surface>
-bool Remesher<Surface>::may_move(Index v, const SurfacePoint& to, Index but_next_to) const {
+bool Remesher<Surface>::may_move(Index v, const OnSurface& to, Index but_next_to) const {
     double before = least_facing, after = 1;
     mesh_.around(v, [&](Index side) {
         const Index b = mesh_.to(side), c = mesh_.apex(side);
@@ -204,7 +204,7 @@ template <class Surface>
 bool Remesher<Surface>::collapse(Index side) {
     const Index a = mesh_.from(side), b = mesh_.to(side);
     const bool to_border = mesh_.twin(side) == no_index;
-    SurfacePoint target{mesh_.position(b), normals_[at(b)]};
+    OnSurface target{mesh_.position(b), normals_[at(b)]};
     if (to_border || !mesh_.is_border(b)) {
         const auto place = project((mesh_.position(a) + mesh_.position(b)) / 2, to_border);
         if (!place) return false;
