@@ -95,6 +95,27 @@ inline Table peers_rest_table() {
             .columns = {2, 3, 4, 6}};
 }
 
+inline Table peers_distmesh_table() {
+    Table table{.topic = "peers_distmesh",
+                .key = "peers_distmesh",
+                .title = "A mesh of a signed distance, and how many times as fast CGAL's mesher is; angles in degrees",
+                .rows = {},
+                .column = "thousandths",
+                .columns = {200, 100}};
+    for (const std::string body : {"sphere", "lens", "capsule", "merged", "torus", "box"}) {
+        const std::string ours = body + "/ours", theirs = body + "/cgal";
+        table.rows.push_back({body, ours});
+        table.rows.push_back({"  CGAL", theirs, Row::gain, ours});
+        for (const auto& [who, benchmark] : {std::pair<std::string, std::string>{"", ours}, {", CGAL", theirs}}) {
+            table.rows.push_back({"  smallest angle" + who, benchmark, Row::counter, "smallest_angle", ""});
+            table.rows.push_back({"  mean smallest" + who, benchmark, Row::counter, "mean_smallest_angle", ""});
+            table.rows.push_back({"  even edges, %" + who, benchmark, Row::percent, "even_edges", ""});
+            table.rows.push_back({"  vertices" + who, benchmark, Row::counter, "vertices", ""});
+        }
+    }
+    return table;
+}
+
 inline std::vector<Table> peers_tables() {
     const std::vector<int> same{162, 642, 2'562, 10'242, 40'962};
     const std::vector<int> fine{642, 2'562, 10'242, 40'962, 163'842, 655'362};
@@ -104,7 +125,8 @@ inline std::vector<Table> peers_tables() {
             peers_tick_table("peers_tick", "fine", "The same; a tool that is as many edges wide on all meshes", fine),
             peers_tick_table("peers_tick_avx2", "same", "A tick, a tool of 2 mm; our registers of 32 bytes", same),
             peers_tick_table("peers_tick_avx2", "fine", "The same; as many edges wide on all meshes", fine),
-            peers_rest_table()};
+            peers_rest_table(),
+            peers_distmesh_table()};
 }
 
 }  // namespace bench

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <utility>
+
+#include <membrane/core/check.hpp>
+
+/// Bodies, each as the signed distance of a point to its surface: what `distmesh` makes triangles of.
+///
+///     const auto lens = membrane::Ellipsoid{.radii = {5e-3, 5e-3, 2e-3}};                          // [m]
+///     const auto bowl = membrane::difference(membrane::Ball{.radius = 1}, membrane::Ball{.radius = 0.9});
+///     const auto ring = [](const membrane::Vector3<double>& p) {                                   // one's own: a torus
+///         return std::hypot(std::hypot(p.x(), p.y()) - 1, p.z()) - 0.3;
+///     };
+namespace membrane {
+
+/// The signed distance of a point to the surface of a body [m]: negative inside, positive outside.
+///
+/// What the compiler cannot check: it is finite and continuous, the same at each call, and grows by about one metre a
+/// metre across the surface (a level set that does not is mended by Newton's method, as long as its gradient does not
+/// vanish there).
+template <class D>
+concept SignedDistance = requires(const D& distance, const Vector3<double>& p) {
+    { distance(p) } -> std::convertible_to<double>;
+};
+
+/// A signed distance that knows its own gradient: a vector out of the body, of length one for a true distance.
+template <class D>
+concept GivesGradient = SignedDistance<D> && requires(const D& distance, const Vector3<double>& p) {
+    { distance.gradient(p) } -> std::convertible_to<Vector3<double>>;
+};
+
+/// A box with edges along the axes that a body fits in [m]. Infinite where the body is.
+struct Bounds {
+    Vector3<double> low = Vector3<double>::Constant(-std::numeric_limits<double>::infinity());
+    Vector3<double> high = Vector3<double>::Constant(std::numeric_limits<double>::infinity());
+
+    [[nodiscard]] Bounds grown(double by) const noexcept { return {low.array() - by, high.array() + by}; }
+    [[nodiscard]] Bounds within(const Bounds& other) const noexcept {
+        return {low.cwiseMax(other.low), high.cwiseMin(other.high)};
+    }
+    [[nodiscard]] Bounds around(const Bounds& other) const noexcept {
+        return {low.cwiseMin(other.low), high.cwiseMax(other.high)};
+    }
+};
+
+/// A body that says which box it fits in: `distmesh` need not be told.
+template <class D>
+concept GivesBounds = requires(const D& body) {
+    { body.bounds() } -> std::convertible_to<Bounds>;
+};
+
+/// The body's own bounds; without limit if it has none.
+template <class D>
+[[nodiscard]] Bounds bounds_of(const D& body) {
+    if constexpr (GivesBounds<D>) return body.bounds();
+    return {};
+}
+
+/// The body's own gradient at `p`, or differences of its distances `step` [m] to both sides of `p`.
+template <SignedDistance D>
+[[nodiscard]] Vector3<double> gradient_at(const D& distance, const Vector3<double>& p, double step);
+
+// All that follow are true distances, but `united` inside, `intersection` and `difference` outside, near where two
+// surfaces meet.
+
+struct Ball {
+    Vector3<double> centre = Vector3<double>::Zero();  ///< [m]
+    double radius = 1;                                 ///< [m]
+
+    [[nodiscard]] double operator()(const Vector3<double>& p) const { return norm<double>(p - centre) - radius; }
+    [[nodiscard]] Vector3<double> gradient(const Vector3<double>& p) const {
+        return direction<double>(p - centre, Vector3<double>::UnitZ());
+    }
+    [[nodiscard]] Bounds bounds() const { return Bounds{centre, centre}.grown(radius); }
+};
+
+/// With its axes along x, y and z.
+struct Ellipsoid {
+    Vector3<double> centre = Vector3<double>::Zero();  ///< [m]
+    Vector3<double> radii = Vector3<double>::Ones();   ///< Half the length of each axis [m].
+
+    [[nodiscard]] inline double operator()(const Vector3<double>& p) const;
+    [[nodiscard]] inline Vector3<double> gradient(const Vector3<double>& p) const;
+    [[nodiscard]] Bounds bounds() const { return {centre - radii, centre + radii}; }
+
+    /// The point of the surface nearest to `p` [m]. Newton's method on the multiplier of the ellipsoid's equation, from
+    /// the side on which it never steps too far [Eberly13].
+    [[nodiscard]] inline Vector3<double> nearest(const Vector3<double>& p) const;
+};
+
+/// With its edges along x, y and z. The mesher does not put vertices on the edges: triangles cut them off.
+struct Cuboid {
+    Vector3<double> centre = Vector3<double>::Zero();            ///< [m]
+    Vector3<double> half_size = Vector3<double>::Constant(0.5);  ///< From the centre to the faces [m].
+
+    [[nodiscard]] double operator()(const Vector3<double>& p) const {
+        const Vector3<double> beyond = (p - centre).cwiseAbs() - half_size;
+        return norm<double>(beyond.cwiseMax(0.0)) + (std::min)(beyond.maxCoeff(), 0.0);
+    }
+    [[nodiscard]] Bounds bounds() const { return {centre - half_size, centre + half_size}; }
+};
+
+/// All points within `radius` of the segment from `start` to `end`.
+struct Capsule {
+    Vector3<double> start = Vector3<double>::Zero();  ///< [m]
+    Vector3<double> end = Vector3<double>::UnitZ();   ///< [m]
+    double radius = 0.5;                              ///< [m]
+
+    [[nodiscard]] double operator()(const Vector3<double>& p) const {
+        const Vector3<double> axis = end - start, offset = p - start;
+        const double length = squared_norm(axis);
+        const double along = length > 0 ? std::clamp(dot(offset, axis) / length, 0.0, 1.0) : 0.0;
+        return norm<double>(offset - along * axis) - radius;
+    }
+    [[nodiscard]] Bounds bounds() const { return Bounds{start, start}.around({end, end}).grown(radius); }
+};
+
+/// All that lies behind a plane: what `intersection` and `trimmed` cut with.
+struct HalfSpace {
+    Vector3<double> point = Vector3<double>::Zero();    ///< Of the plane [m].
+    Vector3<double> normal = Vector3<double>::UnitZ();  ///< Out of the body, of any length.
+
+    [[nodiscard]] double operator()(const Vector3<double>& p) const { return dot<double>(gradient(p), p - point); }
+    [[nodiscard]] Vector3<double> gradient(const Vector3<double>&) const {
+        return direction<double>(normal, Vector3<double>::UnitZ());
+    }
+};
+
+template <SignedDistance A, SignedDistance B>
+struct Union {
+    A a;
+    B b;
+    [[nodiscard]] double operator()(const Vector3<double>& p) const { return (std::min<double>)(a(p), b(p)); }
+    [[nodiscard]] Bounds bounds() const { return bounds_of(a).around(bounds_of(b)); }
+};
+
+template <SignedDistance A, SignedDistance B>
+struct Intersection {
+    A a;
+    B b;
+    [[nodiscard]] double operator()(const Vector3<double>& p) const { return (std::max<double>)(a(p), b(p)); }
+    [[nodiscard]] Bounds bounds() const { return bounds_of(a).within(bounds_of(b)); }
+};
+
+template <SignedDistance A, SignedDistance B>
+struct Difference {
+    A a;
+    B b;
+    [[nodiscard]] double operator()(const Vector3<double>& p) const { return (std::max<double>)(a(p), -b(p)); }
+    [[nodiscard]] Bounds bounds() const { return bounds_of(a); }
+};
+
+template <SignedDistance A>
+struct Offset {
+    A body;
+    double by;
+    [[nodiscard]] double operator()(const Vector3<double>& p) const { return body(p) - by; }
+    [[nodiscard]] Bounds bounds() const { return bounds_of(body).grown(by); }
+};
+
+/// What is in one of the two or in both.
+template <SignedDistance A, SignedDistance B>
+[[nodiscard]] Union<A, B> united(A a, B b) {
+    return {std::move(a), std::move(b)};
+}
+
+/// What is in both.
+template <SignedDistance A, SignedDistance B>
+[[nodiscard]] Intersection<A, B> intersection(A a, B b) {
+    return {std::move(a), std::move(b)};
+}
+
+/// `a` without `b`.
+template <SignedDistance A, SignedDistance B>
+[[nodiscard]] Difference<A, B> difference(A a, B b) {
+    return {std::move(a), std::move(b)};
+}
+
+/// The body with a skin of thickness `by` [m], or without one if that is negative: of a `Cuboid`, one with round edges.
+template <SignedDistance A>
+[[nodiscard]] Offset<A> offset(A body, double by) {
+    return {std::move(body), by};
+}
+
+template <SignedDistance D>
+Vector3<double> gradient_at(const D& distance, const Vector3<double>& p, double step) {
+    if constexpr (GivesGradient<D>) {
+        return distance.gradient(p);
+    } else {
+        Vector3<double> gradient;
+        for (int k = 0; k < 3; ++k) {
+            const Vector3<double> beside = step * Vector3<double>::Unit(k);
+            gradient[k] = (double(distance(p + beside)) - double(distance(p - beside))) / (2 * step);
+        }
+        return gradient;
+    }
+}
+
+inline Vector3<double> Ellipsoid::nearest(const Vector3<double>& p) const {
+    // By symmetry in one octant: x_k = r_k^2 y_k / (r_k^2 + t), where t is such that x is on the surface. Counted from the
+    // shortest axis, s = r^2 + t, so that no digits are lost close to its middle plane.
+    const Vector3<double> y = (p - centre).cwiseAbs();
+    int shortest = 0;
+    radii.minCoeff(&shortest);
+    const double least = radii[shortest] * radii[shortest];
+    const auto excess = [&](int k) { return radii[k] * radii[k] - least; };
+    double s = 0;
+    for (int k = 0; k < 3; ++k) s = (std::max)(s, radii[k] * y[k] - excess(k));
+    const auto share = [&](int k) { return y[k] > 0 ? radii[k] * y[k] / (s + excess(k)) : 0; };  // x_k / r_k
+    for (int i = 0; i < 100; ++i) {
+        double value = -1, slope = 0;
+        for (int k = 0; k < 3; ++k) {
+            value += share(k) * share(k);
+            if (y[k] > 0) slope -= 2 * share(k) * share(k) / (s + excess(k));
+        }
+        const double next = s - value / slope;
+        if (!(value > 0) || !(next > s)) break;  // it only grows, until roundings stop it
+        s = next;
+    }
+    Vector3<double> x;
+    double rest = 1;
+    for (int k = 0; k < 3; ++k) {
+        x[k] = std::copysign(radii[k] * share(k), p[k] - centre[k]);
+        rest -= share(k) * share(k);
+    }
+    if (!(s > 0) && rest > 0) {  // on the middle plane, and so far in that the surface is nearest across it
+        x[shortest] = radii[shortest] * std::sqrt(rest);
+    }
+    return centre + x;
+}
+
+inline double Ellipsoid::operator()(const Vector3<double>& p) const {
+    const Vector3<double> from_centre = (p - centre).cwiseQuotient(radii);
+    const double distance = norm<double>(p - nearest(p));
+    return squared_norm(from_centre) < 1 ? -distance : distance;
+}
+
+inline Vector3<double> Ellipsoid::gradient(const Vector3<double>& p) const {
+    const Vector3<double> x = nearest(p) - centre;
+    return direction<double>(x.cwiseQuotient(radii).cwiseQuotient(radii), Vector3<double>::UnitZ());
+}
+
+}  // namespace membrane
