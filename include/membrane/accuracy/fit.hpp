@@ -79,7 +79,8 @@ struct Fit {
 /// Levenberg and Marquardt's method on the logarithms of the constants, [Nocedal06] 10.3, derivatives by central
 /// differences. Intervals are the linearised model's, in logarithms too, with Student's t for the rows that are left
 /// over. A constant is not told if its interval is wider than `widest`, if others can make up for all it does, or if it is
-/// still on its way at the end of its `span`. What cannot be told stays where it started.
+/// still on its way at the end of its `span`. What cannot be told stays where it started. Noise can look like the work of
+/// a constant that has none: it is told wrongly no more often than intervals miss.
 ///
 /// Of 500 tables with 2 % noise on the force, 95 % intervals held the truth in 94 to 97 %, see the tests.
 ///
@@ -296,11 +297,12 @@ Fit FitSearch<Model>::report(const View& around, bool converged) const {
     const Eigen::VectorXd seen = values.cwiseMax(around.negligible).cwiseMax(least);
     const Eigen::MatrixXd spread = directions * seen.cwiseInverse().asDiagonal();
     const Eigen::VectorXd widths = spread.rowwise().norm();
-    Fit result{.misfit = off_.norm() / std::sqrt(static_cast<double>(off_.size())),
-               .correlation = widths.cwiseInverse().asDiagonal() * (spread * spread.transpose()) *
-                              widths.cwiseInverse().asDiagonal(),
-               .evaluations = evaluations_,
-               .converged = converged};
+    const auto per_width = widths.cwiseInverse().asDiagonal();
+    Fit result;
+    result.misfit = off_.norm() / std::sqrt(static_cast<double>(off_.size()));
+    result.correlation = per_width * (spread * spread.transpose()) * per_width;
+    result.evaluations = evaluations_;
+    result.converged = converged;
     for (Eigen::Index k = 0; k < logs_.size(); ++k) {
         bool hidden = false;
         for (Eigen::Index j = 0; j < values.size(); ++j) {
