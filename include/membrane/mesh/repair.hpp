@@ -6,6 +6,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
@@ -52,8 +53,7 @@ template <Real Scalar>
 struct RepairedMesh {
     Points<Scalar> positions;
     Triangles triangles;
-    std::vector<Index> vertices;         ///< For each vertex the one it was.
-    std::vector<Index> given_triangles;  ///< For each triangle the one it was.
+    std::vector<Index> vertices, given_triangles;  ///< For each the one it was.
     RepairReport done;
 };
 
@@ -100,10 +100,10 @@ class Repair {
         : x_(std::move(x)),
           triangles_(std::move(triangles)),
           kept_vertices_(static_cast<std::size_t>(x_.cols()), true),
-          kept_(static_cast<std::size_t>(triangles_.cols())) {
-        for (std::size_t f = 0; f < kept_.size(); ++f) kept_[f] = static_cast<Index>(f);
-        origin_.resize(kept_vertices_.size());
-        for (std::size_t v = 0; v < origin_.size(); ++v) origin_[v] = static_cast<Index>(v);
+          kept_(static_cast<std::size_t>(triangles_.cols())),
+          origin_(static_cast<std::size_t>(x_.cols())) {
+        std::iota(kept_.begin(), kept_.end(), Index{0});
+        std::iota(origin_.begin(), origin_.end(), Index{0});
     }
 
     inline void weld(std::span<const Index> points, double distance);
@@ -136,11 +136,6 @@ class Repair {
         const auto [a, b, c] = corners(f);
         return a == b || b == c || c == a;
     }
-    template <class Condition>
-    [[nodiscard]] Index drop(Condition condition) {
-        return static_cast<Index>(std::erase_if(kept_, condition));
-    }
-
     Points<double> x_;
     Triangles triangles_;
     std::vector<bool> kept_vertices_;
@@ -167,17 +162,18 @@ inline void Repair::weld(std::span<const Index> points, double distance) {
 }
 
 inline void Repair::drop_repeated() {
-    done_.repeated = drop([&](Index f) { return repeats(f); });
+    done_.repeated = static_cast<Index>(std::erase_if(kept_, [&](Index f) { return repeats(f); }));
 }
 
 inline void Repair::drop_zero_area(const std::vector<bool>& usable) {
-    done_.zero_area = drop([&](Index f) {
+    const auto flat = [&](Index f) {
         for (const Index v : corners(f)) {
             if (!usable[static_cast<std::size_t>(v)]) return false;
         }
         const auto t = triangle_at(x_, corners(f));
         return !repeats(f) && on_one_line(t.a, t.b, t.c);
-    });
+    };
+    done_.zero_area = static_cast<Index>(std::erase_if(kept_, flat));
 }
 
 inline void Repair::drop_duplicates() {
@@ -188,7 +184,8 @@ inline void Repair::drop_duplicates() {
             if (edge[i].apex == edge[i - 1].apex) is_duplicate[static_cast<std::size_t>(edge[i].triangle)] = true;
         }
     });
-    done_.duplicates = drop([&](Index f) { return is_duplicate[static_cast<std::size_t>(f)]; });
+    done_.duplicates =
+        static_cast<Index>(std::erase_if(kept_, [&](Index f) { return is_duplicate[static_cast<std::size_t>(f)]; }));
 }
 
 inline void Repair::orient() {
@@ -249,8 +246,9 @@ inline void Repair::flip_inward(const std::vector<bool>& usable) {
     std::vector<bool> measured(static_cast<std::size_t>(triangles_.cols()), true);
     for (const Index f : kept_) {
         for (const Index v : corners(f)) {
-            const auto given = static_cast<std::size_t>(origin_[static_cast<std::size_t>(v)]);
-            if (!usable[given]) measured[static_cast<std::size_t>(f)] = false;
+            if (!usable[static_cast<std::size_t>(origin_[static_cast<std::size_t>(v)])]) {
+                measured[static_cast<std::size_t>(f)] = false;
+            }
         }
     }
     const SurfaceParts parts = surface_parts(x_, triangles_, sides(), measured);
