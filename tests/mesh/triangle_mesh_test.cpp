@@ -57,78 +57,6 @@ std::string vertices_of(const Surface<S>& surface, Index f) {
     return text(v[0]) + ", " + text(v[1]) + " and " + text(v[2]);
 }
 
-/// A triangle and a side of it that another triangle shares.
-template <class S>
-std::array<Index, 3> inner_side(const Surface<S>& surface, Random& random) {
-    for (;;) {
-        const Index f = random.index(surface.triangle_count()), k = random.index(3);
-        const Index from = surface.triangles(k, f), to = surface.triangles((k + 1) % 3, f);
-        for (Index g = 0; g < surface.triangle_count(); ++g) {
-            for (Index i = 0; i < 3; ++i) {
-                if (surface.triangles(i, g) == to && surface.triangles((i + 1) % 3, g) == from) return {f, g, k};
-            }
-        }
-    }
-}
-
-/// A band of `count` squares, closed to a ring with a twist.
-template <class S>
-Surface<S> moebius_strip(Index count) {
-    Surface<S> strip;
-    for (Index i = 0; i < count; ++i) {
-        const S turn = 2 * std::numbers::pi_v<S> * S(i) / S(count);
-        const Vector3<S> centre(std::cos(turn), std::sin(turn), 0);
-        const Vector3<S> half = S(0.3) * Vector3<S>(std::cos(turn / 2) * std::cos(turn),
-                                                    std::cos(turn / 2) * std::sin(turn), std::sin(turn / 2));
-        strip.add(Vector3<S>(centre - half));
-        strip.add(Vector3<S>(centre + half));
-    }
-    for (Index i = 0; i < count; ++i) {
-        const Index a = 2 * i, b = a + 1;
-        const Index c = i + 1 < count ? a + 2 : 1, d = i + 1 < count ? a + 3 : 0;
-        strip.add(a, c, b);
-        strip.add(b, c, d);
-    }
-    return strip;
-}
-
-/// A torus of squares whose last column is joined to the first upside down.
-template <class S>
-Surface<S> klein_bottle(Index columns, Index rows, bool twisted = true) {
-    Surface<S> surface;
-    for (Index i = 0; i < columns; ++i) {
-        for (Index j = 0; j < rows; ++j) {
-            const S u = 2 * std::numbers::pi_v<S> * S(i) / S(columns), v = 2 * std::numbers::pi_v<S> * S(j) / S(rows);
-            surface.add(Vector3<S>((2 + std::cos(v)) * std::cos(u), (2 + std::cos(v)) * std::sin(u), std::sin(v)));
-        }
-    }
-    const auto vertex = [&](Index i, Index j) {
-        const Index row = i < columns || !twisted ? j % rows : (2 * rows - j) % rows;
-        return (i % columns) * rows + row;
-    };
-    for (Index i = 0; i < columns; ++i) {
-        for (Index j = 0; j < rows; ++j) {
-            surface.add(vertex(i, j), vertex(i + 1, j), vertex(i, j + 1));
-            surface.add(vertex(i, j + 1), vertex(i + 1, j), vertex(i + 1, j + 1));
-        }
-    }
-    return surface;
-}
-
-template <class S>
-Surface<S> tetrahedron() {
-    Surface<S> result;
-    result.x.resize(3, 4);
-    result.x << 0, 1, 0, 0,  //
-        0, 0, 1, 0,          //
-        0, 0, 0, 1;
-    result.triangles.resize(3, 4);
-    result.triangles << 0, 0, 0, 1,  //
-        2, 1, 3, 2,                  //
-        1, 3, 2, 3;
-    return result;
-}
-
 }  // namespace
 
 TEMPLATE_TEST_CASE("a mesh holds what it was given", "[mesh]", double, float) {
@@ -143,7 +71,7 @@ TEMPLATE_TEST_CASE("a mesh holds what it was given", "[mesh]", double, float) {
 
 TEMPLATE_TEST_CASE("a mesh takes every layout of positions", "[mesh]", double, float) {
     using S = TestType;
-    const Surface<S> given = tetrahedron<S>();
+    const Surface<S> given = test::tetrahedron<S>();
     const auto same = [&](const TriangleMesh<S>& mesh) {
         return mesh.positions() == given.x && mesh.triangles() == given.triangles;
     };
@@ -180,7 +108,7 @@ TEMPLATE_TEST_CASE("a mesh takes every layout of positions", "[mesh]", double, f
 TEMPLATE_TEST_CASE("a mesh takes every integer type of triangles", "[mesh]", std::int8_t, std::uint8_t, std::int16_t,
                    std::uint16_t, std::int32_t, std::uint32_t, std::int64_t, std::uint64_t) {
     using I = TestType;
-    const Surface<double> given = tetrahedron<double>();
+    const Surface<double> given = test::tetrahedron<double>();
     const Eigen::Matrix<I, 3, Eigen::Dynamic> t = given.triangles.cast<I>();
     CHECK(TriangleMesh(given.x, t).triangles() == given.triangles);
     const Eigen::Matrix<I, Eigen::Dynamic, 3, Eigen::RowMajor> triangle_a_row = t.transpose();
@@ -213,7 +141,7 @@ TEST_CASE("a mesh can be copied and moved", "[mesh]") {
 
 TEMPLATE_TEST_CASE("missing and misshapen matrices are refused", "[mesh][bad]", double, float) {
     using S = TestType;
-    const Surface<S> t = tetrahedron<S>();
+    const Surface<S> t = test::tetrahedron<S>();
     using Any = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic>;
     const auto refused = [](const auto& x, const auto& triangles) {
         return test::refusal([&] { TriangleMesh<S> mesh(x, triangles); });
@@ -249,7 +177,7 @@ TEMPLATE_TEST_CASE("missing and misshapen matrices are refused", "[mesh][bad]", 
 }
 
 TEST_CASE("more vertices or triangles than can be numbered are refused before anything is stored", "[mesh][bad]") {
-    const Surface<double> t = tetrahedron<double>();
+    const Surface<double> t = test::tetrahedron<double>();
     const Eigen::Index too_many = Eigen::Index{1} << 31;
     CHECK(test::refusal([&] { TriangleMesh<double> mesh(Points<double>::Zero(3, too_many), t.triangles); }) ==
           "TriangleMesh: at most 2147483647 positions can be numbered, got 2147483648");
@@ -438,7 +366,7 @@ TEMPLATE_TEST_CASE("an edge with more than two triangles is refused", "[mesh][ba
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Surface<S> surface = test::random_surface<S>(random);
-        const auto [f, g, k] = inner_side(surface, random);
+        const auto [f, g, k] = test::inner_side(surface, random);
         const Index from = surface.triangles(k, f), to = surface.triangles((k + 1) % 3, f);
         const std::string edge = "TriangleMesh: edge " + text(std::min(from, to)) + "-" + text(std::max(from, to));
         const Index apex = surface.add(Vector3<S>(surface.x.col(from) + random.vector<S>()));
@@ -460,7 +388,7 @@ TEMPLATE_TEST_CASE("a triangle that is turned against its neighbours is refused"
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Surface<S> surface = test::random_surface<S>(random);
-        const Index f = inner_side(surface, random)[0];
+        const Index f = test::inner_side(surface, random)[0];
         surface.turn(f);
         const std::string message = refusal_of(surface);
         CHECK_THAT(message,
@@ -483,10 +411,10 @@ TEMPLATE_TEST_CASE("a one-sided surface is refused as such", "[mesh][bad]", doub
             if (random.chance(0.5)) surface.add(test::random_surface<S>(random));
             return refusal_of(test::shuffled(surface, random));
         };
-        CHECK(refused(moebius_strip<S>(3 + random.index(20))) == message);
-        CHECK(refused(klein_bottle<S>(3 + random.index(8), 3 + random.index(8))) == message);
+        CHECK(refused(test::moebius_strip<S>(3 + random.index(20))) == message);
+        CHECK(refused(test::klein_bottle<S>(3 + random.index(8), 3 + random.index(8))) == message);
     }
-    CHECK(accepted_unchanged(klein_bottle<S>(8, 5, false)));
+    CHECK(accepted_unchanged(test::klein_bottle<S>(8, 5, false)));
 }
 
 TEMPLATE_TEST_CASE("a vertex that joins surfaces without an edge is refused", "[mesh][bad]", double, float) {
@@ -530,7 +458,7 @@ TEST_CASE("what is accepted is what CGAL takes for a mesh", "[mesh][cgal]") {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Surface<double> surface =
-            random.chance(0.5) ? tetrahedron<double>() : test::random_open_surface<double>(random);
+            random.chance(0.5) ? test::tetrahedron<double>() : test::random_open_surface<double>(random);
         for (Index change = random.index(5); change > 0; --change) {
             const Index kind = random.index(4), f = random.index(surface.triangle_count());
             const auto order = test::random_order(surface.vertex_count(), random);
@@ -555,7 +483,7 @@ TEST_CASE("what is accepted is what CGAL takes for a mesh", "[mesh][cgal]") {
 
 TEMPLATE_TEST_CASE("what is odd but sound is accepted as it is", "[mesh]", double, float) {
     using S = TestType;
-    Surface<S> one = tetrahedron<S>();
+    Surface<S> one = test::tetrahedron<S>();
     one.triangles.conservativeResize(3, 1);
     CHECK(accepted_unchanged(one));  // one triangle, and an isolated vertex
 

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 #include <vector>
 
@@ -128,6 +130,80 @@ Surface<Scalar> with_holes(Surface<Scalar> surface, Random& random) {
         if (refusal([&] { (void)smaller.mesh(); }).empty()) surface = smaller;
     }
     return surface;
+}
+
+/// A triangle and a side of it that another triangle shares.
+template <membrane::Real S>
+std::array<membrane::Index, 3> inner_side(const Surface<S>& surface, Random& random) {
+    for (;;) {
+        const membrane::Index f = random.index(surface.triangle_count()), k = random.index(3);
+        const membrane::Index from = surface.triangles(k, f), to = surface.triangles((k + 1) % 3, f);
+        for (membrane::Index g = 0; g < surface.triangle_count(); ++g) {
+            for (membrane::Index i = 0; i < 3; ++i) {
+                if (surface.triangles(i, g) == to && surface.triangles((i + 1) % 3, g) == from) return {f, g, k};
+            }
+        }
+    }
+}
+
+/// A band of `count` squares, closed to a ring with a twist.
+template <membrane::Real S>
+Surface<S> moebius_strip(membrane::Index count) {
+    Surface<S> strip;
+    for (membrane::Index i = 0; i < count; ++i) {
+        const S turn = 2 * std::numbers::pi_v<S> * S(i) / S(count);
+        const membrane::Vector3<S> centre(std::cos(turn), std::sin(turn), 0);
+        const membrane::Vector3<S> half =
+            S(0.3) * membrane::Vector3<S>(std::cos(turn / 2) * std::cos(turn), std::cos(turn / 2) * std::sin(turn),
+                                          std::sin(turn / 2));
+        strip.add(membrane::Vector3<S>(centre - half));
+        strip.add(membrane::Vector3<S>(centre + half));
+    }
+    for (membrane::Index i = 0; i < count; ++i) {
+        const membrane::Index a = 2 * i, b = a + 1;
+        const membrane::Index c = i + 1 < count ? a + 2 : 1, d = i + 1 < count ? a + 3 : 0;
+        strip.add(a, c, b);
+        strip.add(b, c, d);
+    }
+    return strip;
+}
+
+/// A torus of squares whose last column is joined to the first upside down.
+template <membrane::Real S>
+Surface<S> klein_bottle(membrane::Index columns, membrane::Index rows, bool twisted = true) {
+    Surface<S> surface;
+    for (membrane::Index i = 0; i < columns; ++i) {
+        for (membrane::Index j = 0; j < rows; ++j) {
+            const S u = 2 * std::numbers::pi_v<S> * S(i) / S(columns), v = 2 * std::numbers::pi_v<S> * S(j) / S(rows);
+            surface.add(
+                membrane::Vector3<S>((2 + std::cos(v)) * std::cos(u), (2 + std::cos(v)) * std::sin(u), std::sin(v)));
+        }
+    }
+    const auto vertex = [&](membrane::Index i, membrane::Index j) {
+        const membrane::Index row = i < columns || !twisted ? j % rows : (2 * rows - j) % rows;
+        return (i % columns) * rows + row;
+    };
+    for (membrane::Index i = 0; i < columns; ++i) {
+        for (membrane::Index j = 0; j < rows; ++j) {
+            surface.add(vertex(i, j), vertex(i + 1, j), vertex(i, j + 1));
+            surface.add(vertex(i, j + 1), vertex(i + 1, j), vertex(i + 1, j + 1));
+        }
+    }
+    return surface;
+}
+
+template <membrane::Real S>
+Surface<S> tetrahedron() {
+    Surface<S> result;
+    result.x.resize(3, 4);
+    result.x << 0, 1, 0, 0,  //
+        0, 0, 1, 0,          //
+        0, 0, 0, 1;
+    result.triangles.resize(3, 4);
+    result.triangles << 0, 0, 0, 1,  //
+        2, 1, 3, 2,                  //
+        1, 3, 2, 3;
+    return result;
 }
 
 }  // namespace test

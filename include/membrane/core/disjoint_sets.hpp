@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+#include <vector>
+
+namespace membrane {
+
+/// Numbers in sets that grow together.
+///
+///     DisjointSets parts(triangle_count);
+///     parts.unite(f, g);
+///     parts.find(f) == parts.find(g);
+class DisjointSets {
+  public:
+    /// Each number below `count` in a set of its own.
+    explicit DisjointSets(std::size_t count) : parent_(count) {
+        std::iota(parent_.begin(), parent_.end(), std::size_t{0});
+    }
+
+    /// The lowest number of the set that holds `i`. O(log count), in the mean over many calls.
+    std::size_t find(std::size_t i) noexcept {
+        while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+        return i;
+    }
+
+    void unite(std::size_t i, std::size_t j) noexcept {
+        const auto [first, second] = std::minmax({find(i), find(j)});
+        parent_[second] = first;
+    }
+
+  private:
+    std::vector<std::size_t> parent_;
+};
+
+}  // namespace membrane

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+/// What can be wrong with a mesh, how bad that is, and what to do.
+///
+///     for (const auto& finding : membrane::validate(x, triangles).findings) {
+///         std::cout << name(finding.defect) << ": " << finding.text << "; " << remedy(finding.defect) << "\n";
+///     }
+namespace membrane {
+
+/// The kinds of defects. Those up to `non_manifold_vertex` are errors: `TriangleMesh` refuses them.
+enum class MeshDefect : std::uint8_t {
+    no_vertices,
+    no_triangles,
+    index_out_of_range,
+    repeated_vertex,  ///< A triangle names a vertex twice.
+    coordinate_not_finite,
+    coordinate_too_large,  ///< Squares of areas overflow.
+    too_small,             ///< Squares of areas vanish.
+    too_coarse,            ///< Numbers so far from 0 are too coarse for the edges.
+    all_at_one_point,
+    all_on_one_line,
+    duplicate_triangle,        ///< Another names the same vertices, in the same turn,
+    double_sided_triangle,     ///< or in the opposite one.
+    non_manifold_edge,         ///< Three triangles or more.
+    one_sided,                 ///< A Moebius strip, a Klein bottle.
+    inconsistent_orientation,  ///< Two triangles run along their edge in the same direction.
+    non_manifold_vertex,       ///< It joins triangles that no edges connect around it.
+
+    coincident_vertices,         ///< At the very same place.
+    nearly_coincident_vertices,  ///< Nearer than the tolerance.
+    zero_area,                   ///< Exactly: the corners are on one line.
+    needle,                      ///< The shortest side is a millionth of the longest, or less.
+    cap,                         ///< An angle of 179.999 degrees or more.
+    isolated_vertex,             ///< No triangle names it.
+    missing_triangle,            ///< A border of three edges.
+    t_junction,                  ///< A vertex of the border on the middle of an edge of the border.
+    several_components,
+    no_volume,          ///< Closed and flat.
+    inward,             ///< Closed, and its triangles run clockwise seen from outside.
+    nested_components,  ///< One closed component inside another.
+    self_intersection,  ///< Triangles meet elsewhere than at what they share.
+};
+
+inline constexpr std::size_t mesh_defect_count = static_cast<std::size_t>(MeshDefect::self_intersection) + 1;
+
+enum class Severity : std::uint8_t {
+    error,    ///< `TriangleMesh` refuses the mesh.
+    warning,  ///< It is accepted as it is, and may behave in a way nobody wants.
+};
+
+[[nodiscard]] constexpr Severity severity(MeshDefect defect) noexcept {
+    return defect <= MeshDefect::non_manifold_vertex ? Severity::error : Severity::warning;
+}
+
+namespace detail {
+
+struct DefectText {
+    std::string_view name, remedy;
+};
+
+/// In the order of the kinds.
+inline constexpr std::array<DefectText, mesh_defect_count> defect_texts{{
+    {"no vertices", "pass the positions, one point a column"},
+    {"no triangles", "pass the triangles, three vertices a column"},
+    {"index out of range", "count vertices from 0; look for triangles cut off or of another mesh"},
+    {"repeated vertex", "repair with .drop_repeated"},
+    {"coordinate not finite", "look for what wrote it: it cannot be guessed"},
+    {"coordinate too large", "look for what wrote it, or choose metres as unit"},
+    {"too small", "choose metres as unit, or use double"},
+    {"too coarse", "move the mesh to the origin, or use double"},
+    {"all at one point", "look for what wrote the positions"},
+    {"all on one line", "look for what wrote the positions"},
+    {"duplicate triangle", "repair with .drop_duplicates"},
+    {"double-sided triangle", "repair with .drop_duplicates: a membrane is one sheet, with two sides anyway"},
+    {"non-manifold edge", "remove triangles until two are left, or give the others vertices of their own"},
+    {"one-sided", "cut it open: a tool needs an outside to work on"},
+    {"inconsistent orientation", "repair with .orient"},
+    {"non-manifold vertex", "repair with .split_vertices"},
+    {"coincident vertices", "repair with .weld = 0, or the surface falls apart there"},
+    {"nearly coincident vertices", "repair with .weld and a distance, or the surface falls apart there"},
+    {"zero area", "repair with .weld and .drop_repeated if corners coincide, else with .drop_zero_area; or remesh"},
+    {"needle", "repair with .weld and .drop_repeated, or remesh"},
+    {"cap", "turn its longest edge, or remesh"},
+    {"isolated vertex", "repair with .drop_isolated"},
+    {"missing triangle", "add the triangle, if the surface is meant to be closed"},
+    {"T-junction", "cut the triangle at that edge in two"},
+    {"several components", "make a mesh of each, if they are not meant to be one membrane"},
+    {"no volume", "leave out one of the two sides"},
+    {"inward", "repair with .flip_inward, or the tool works from inside"},
+    {"nested components", "leave out the inner one, if it is not meant"},
+    {"self-intersection", "remesh, or move the vertices apart"},
+}};
+
+}  // namespace detail
+
+/// In a word or two.
+[[nodiscard]] constexpr std::string_view name(MeshDefect defect) noexcept {
+    return detail::defect_texts[static_cast<std::size_t>(defect)].name;
+}
+
+/// What to do.
+[[nodiscard]] constexpr std::string_view remedy(MeshDefect defect) noexcept {
+    return detail::defect_texts[static_cast<std::size_t>(defect)].remedy;
+}
+
+}  // namespace membrane
