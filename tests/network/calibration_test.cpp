@@ -103,7 +103,8 @@ double area_of(const TriangleMesh<double>& mesh) {
 
 }  // namespace
 
-TEST_CASE("patch test: a regular sheet stretched and sheared pulls at every vertex as a continuum does", "[calibration]") {
+TEST_CASE("patch test: a regular sheet stretched and sheared pulls at every vertex as a continuum does",
+          "[calibration]") {
     const Material material{.young_modulus = 3e5, .poisson_ratio = 1.0 / 3, .thickness = 2e-4};
     const auto mesh = lattice(7, 6);
     for (const Tensor& strain : {Tensor{{1, 0}, {0, 0}}, Tensor{{0, 0}, {0, 1}}, shear, Tensor{{1, 0}, {0, 1}}}) {
@@ -159,8 +160,8 @@ TEST_CASE("squares cut by a diagonal are a third too soft in shear, however smal
     }
 }
 
-TEMPLATE_TEST_CASE("stiffnesses are those of the edges, areas and masses those of the vertices", "[calibration]", double,
-                   float) {
+TEMPLATE_TEST_CASE("stiffnesses are those of the edges, areas and masses those of the vertices", "[calibration]",
+                   double, float) {
     using S = TestType;
     Random random(1);
     const auto regular = spherical_cap<S>({.radius = 1, .diameter = 1.5, .rings = 5});
@@ -244,8 +245,10 @@ TEST_CASE("constants that cannot be calibrated are refused by name", "[calibrati
           "Foundation: poisson_ratio must be 0 to 0.49, got 0.495");
     CHECK(refusal([&] { std::ignore = tangential_stiffnesses(mesh, layer); }) ==
           "Foundation: poisson_ratio must be 0 to 0.49, got 0.495");
-    CHECK(refusal([&] { std::ignore = tool_radius(0, 1); }) == "tool_radius: radius must be finite and positive [m], got 0");
-    CHECK(refusal([&] { std::ignore = tool_radius(1, -1); }) == "tool_radius: edge must be finite and positive [m], got -1");
+    CHECK(refusal([&] { std::ignore = tool_radius(0, 1); }) ==
+          "tool_radius: radius must be finite and positive [m], got 0");
+    CHECK(refusal([&] { std::ignore = tool_radius(1, -1); }) ==
+          "tool_radius: edge must be finite and positive [m], got -1");
     CHECK(refusal([&] { std::ignore = tool_radius(0.5, std::sqrt(3.0)); }) ==
           "tool_radius: radius must be more than 1 [m] for triangles with this edge, got 0.5");
 }

@@ -29,7 +29,8 @@ TEST_CASE("moduli are those of Hooke's law", "[material]") {
     for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
-        const double modulus = std::pow(10, random.number(2.0, 7.0)), thickness = std::pow(10, random.number(-6.0, -2.0));
+        const double modulus = std::pow(10, random.number(2.0, 7.0)),
+                     thickness = std::pow(10, random.number(-6.0, -2.0));
         const double nu = random.number(0.0, 0.49);
         const Eigen::Matrix3d soft = compliance(modulus, nu);
 
@@ -83,7 +84,8 @@ TEST_CASE("materials and foundations that make no sense are refused by name", "[
     CHECK(refused_layer(&Foundation::young_modulus, 0) ==
           "Foundation: young_modulus must be finite and positive [Pa], got 0");
     CHECK(refused_layer(&Foundation::poisson_ratio, 0.49) == "");
-    CHECK(refused_layer(&Foundation::poisson_ratio, 0.4901) == "Foundation: poisson_ratio must be 0 to 0.49, got 0.4901");
+    CHECK(refused_layer(&Foundation::poisson_ratio, 0.4901) ==
+          "Foundation: poisson_ratio must be 0 to 0.49, got 0.4901");
     CHECK(refused_layer(&Foundation::poisson_ratio, -0.1) == "Foundation: poisson_ratio must be 0 to 0.49, got -0.1");
     CHECK(refused_layer(&Foundation::thickness, std::numeric_limits<double>::quiet_NaN()) ==
           "Foundation: thickness must be finite and positive [m], got nan");

@@ -60,8 +60,8 @@ template <Real Scalar>
 /// centre in the same place: flat triangles whose corners lie on the one touch the other with their middles. Otherwise
 /// a coarse mesh is pressed in too deep: by edge^2 / (6 radius).
 ///
-/// With it, the force on a ball is within 10 % of that on the finest mesh from a radius of 1.5 edges on, within 3 % from
-/// 2.5 edges on, pressed in by half its radius; smaller ones a mesh does not resolve.
+/// With it, the force on a ball pressed in by half its radius is within 10 % of that on a fine mesh from a radius of 1.5
+/// edges on, within 5 % from 2.5 edges on, within 1 % from 4 on; smaller ones a mesh does not resolve.
 /// @throws InvalidInput for lengths that are not finite and positive, or a radius of no more than edge / sqrt(3)
 [[nodiscard]] inline double tool_radius(double radius, double edge);
 

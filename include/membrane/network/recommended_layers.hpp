@@ -26,7 +26,7 @@ struct DecayLengths {
 
 /// For a solver's threshold of layers.
 struct RecommendedLayers {
-    Index normal;      ///< for what lifts the membrane; a tool that presses moves all it touches as layer 0, and needs less
+    Index normal;  ///< for what lifts the membrane; a tool that presses moves all it touches as layer 0, and needs less
     Index tangential;  ///< for what pulls along it as well
 };
 
