@@ -75,4 +75,4 @@ example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json
     libtinyobjloader-dev)
 bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox
     libbullet-dev libcgal-dev libembree-dev libfcl-dev)
-check_packages=(clang clang-format clang-tidy valgrind)
+check_packages=(clang clang-format clang-tidy libclang-rt-dev valgrind)

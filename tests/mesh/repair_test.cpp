@@ -63,7 +63,7 @@ TEMPLATE_TEST_CASE("repair does nothing unasked", "[mesh]", double, float) {
                                    .split_vertices = true,
                                    .flip_inward = true,
                                    .drop_isolated = true};
-    for (int seed = 1; seed <= cases(200); ++seed) {
+    for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Surface<S> broken = broken_surface<S>(random);
@@ -84,7 +84,7 @@ TEMPLATE_TEST_CASE("repair does nothing unasked", "[mesh]", double, float) {
 TEMPLATE_TEST_CASE("each kind that can be mended is, and nothing else", "[mesh][bad]", double, float) {
     using S = TestType;
     using enum MeshDefect;
-    for (int seed = 1; seed <= cases(200) + 8; ++seed) {
+    for (int seed = 1; seed <= cases(40) + 8; ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Surface<S> given = test::random_surface<S>(random);
@@ -160,7 +160,7 @@ TEMPLATE_TEST_CASE("each kind that can be mended is, and nothing else", "[mesh][
 TEMPLATE_TEST_CASE("whole components are turned outward, and fans parted", "[mesh][bad]", double, float) {
     using S = TestType;
     using enum MeshDefect;
-    for (int seed = 1; seed <= cases(200) + 8; ++seed) {
+    for (int seed = 1; seed <= cases(40) + 8; ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Surface<S> ball = test::random_closed_surface<S>(random);
@@ -199,7 +199,7 @@ TEMPLATE_TEST_CASE("whole components are turned outward, and fans parted", "[mes
 TEMPLATE_TEST_CASE("whatever is broken, repair comes back with what it says", "[mesh][bad]", double, float) {
     using S = TestType;
     using enum MeshDefect;
-    for (int seed = 1; seed <= cases(1000); ++seed) {
+    for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Surface<S> broken = broken_surface<S>(random);

@@ -87,7 +87,7 @@ template <class S, std::size_t m, std::integral I, std::size_t n>
     say("split off", done.split, "vertices");
     say("flipped", done.flipped, "inward triangles");
     say("dropped", done.isolated, "isolated vertices");
-    if (!done.complete) text += text.empty() ? "gave up welding" : ", gave up welding";
+    if (!done.complete) text += " (gave up welding)";
     return text.empty() ? "nothing" : text;
 }
 
@@ -170,8 +170,8 @@ inline void Repair::drop_zero_area(const std::vector<bool>& usable) {
         for (const Index v : corners(f)) {
             if (!usable[static_cast<std::size_t>(v)]) return false;
         }
-        const auto t = triangle_at(x_, corners(f));
-        return !repeats(f) && on_one_line(t.a, t.b, t.c);
+        return !repeats(f) &&
+               on_one_line(point(x_, triangles_(0, f)), point(x_, triangles_(1, f)), point(x_, triangles_(2, f)));
     };
     done_.zero_area = static_cast<Index>(std::erase_if(kept_, flat));
 }

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <string>
+
+#include <membrane/mesh/repair.hpp>
+#include <membrane/mesh/validate.hpp>
+
+// Any bytes as a mesh: validation comes back, its verdict is that of `TriangleMesh`, and so it is after a repair.
+
+namespace {
+
+/// Numbers from the bytes, zeros when they are used up.
+class Bytes {
+  public:
+    Bytes(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
+
+    template <class Number>
+    Number next() {
+        Number number{};
+        if (size_ >= sizeof number) {
+            std::memcpy(&number, data_, sizeof number);
+            data_ += sizeof number;
+            size_ -= sizeof number;
+        } else {
+            size_ = 0;
+        }
+        return number;
+    }
+
+  private:
+    const std::uint8_t* data_;
+    std::size_t size_;
+};
+
+void require(bool holds) {
+    if (!holds) __builtin_trap();
+}
+
+template <class Scalar>
+bool taken(const membrane::Points<Scalar>& x, const membrane::Triangles& triangles) {
+    try {
+        membrane::TriangleMesh<Scalar> mesh(x, triangles);
+    } catch (const membrane::InvalidInput&) {
+        return false;
+    }
+    return true;
+}
+
+template <class Scalar>
+void examine(Bytes bytes) {
+    const auto switches = bytes.next<std::uint8_t>();
+    const auto on = [&](unsigned bit) { return ((static_cast<unsigned>(switches) >> bit) & 1U) != 0; };
+    membrane::Points<Scalar> x(3, bytes.next<std::uint8_t>() % 32);
+    membrane::Triangles triangles(3, bytes.next<std::uint8_t>() % 48);
+    const bool wild_numbers = on(0), wild_indices = on(1);
+    for (Scalar& coordinate : x.reshaped()) {
+        coordinate = wild_numbers ? bytes.next<Scalar>() : static_cast<Scalar>(bytes.next<std::int8_t>() % 8);
+    }
+    for (membrane::Index& corner : triangles.reshaped()) {
+        corner = wild_indices ? bytes.next<membrane::Index>()
+                              : bytes.next<std::uint8_t>() % (static_cast<membrane::Index>(x.cols()) + 1);
+    }
+    const membrane::MeshReport report = membrane::validate(x, triangles);
+    require(report.sound() == taken(x, triangles));
+    require(report.empty() == to_string(report).empty() || !report.complete);
+
+    const membrane::RepairOptions options{.weld = on(2) ? std::optional<double>(on(3) ? 0.0 : 1.0) : std::nullopt,
+                                          .drop_repeated = on(4),
+                                          .drop_zero_area = on(5),
+                                          .drop_duplicates = on(5),
+                                          .orient = on(6),
+                                          .split_vertices = on(7),
+                                          .flip_inward = on(3),
+                                          .drop_isolated = on(4)};
+    try {
+        const auto mended = membrane::repair(x, triangles, options);
+        require(membrane::validate(mended.positions, mended.triangles).sound() ==
+                taken(mended.positions, mended.triangles));
+    } catch (const membrane::InvalidInput&) {
+        require(report.count(membrane::MeshDefect::index_out_of_range) > 0);
+    }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    Bytes bytes(data, size);
+    if (bytes.next<std::uint8_t>() % 2 == 0) {
+        examine<float>(bytes);
+    } else {
+        examine<double>(bytes);
+    }
+    return 0;
+}
