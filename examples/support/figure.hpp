@@ -59,7 +59,7 @@ struct Figure {
         svg.text({left + 32, top + 40}, panel.note, {.size = 11, .colour = "#666"});
     }
     draw_scale_bar(svg, Camera(camera), {16, height - 14}, 0.3 * figure.cell_width);
-    draw_colour_bar(svg, {width - 196, height - 22}, 130, figure.panels.front().picture.full_displacement, figure.name);
+    draw_colour_bar(svg, {width - 196, height - 22}, 130, figure.panels.front().picture.colours, figure.name);
     return svg.str();
 }
 

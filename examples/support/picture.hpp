@@ -28,14 +28,25 @@
 ///     draw(svg, camera, picture, "pressed");
 namespace examples {
 
+/// What colours stand for.
+struct ColourScale {
+    std::string name = "displacement", unit = "mm";
+    double per_unit = 1e3;  ///< How many of `unit` make one in SI.
+    double low = 0;         ///< What has the palest colour, in SI.
+    double high = 1e-3;     ///< What has the strongest, in SI.
+
+    [[nodiscard]] double share(double value) const { return (value - low) / (high - low); }
+};
+
 /// What one picture shows.
 struct Picture {
-    membrane::TriangleMesh<double> mesh;         ///< At rest: triangles, and where displacements start.
-    membrane::Points<double> points;             ///< As it is, 3 x V [m].
-    double full_displacement = 1e-3;             ///< Shown in the strongest colour [m].
-    std::optional<membrane::Tool<double>> tool;  ///< Drawn as what it is, a sphere or a capsule.
-    Vector3d force = Vector3d::Zero();           ///< On the tool [N], drawn as an arrow with its value.
-    double arrow = 0.1;                          ///< Length of an arrow of one newton [m].
+    membrane::TriangleMesh<double> mesh;              ///< At rest: triangles, and where displacements start.
+    membrane::Points<double> points;                  ///< As it is, 3 x V [m].
+    ColourScale colours = {};                         ///< Of what is shown as colour.
+    std::optional<Eigen::VectorXd> values = {};       ///< Of each triangle, in SI; if none, displacements [m].
+    std::optional<membrane::Tool<double>> tool = {};  ///< Drawn as what it is, a sphere or a capsule.
+    Vector3d force = Vector3d::Zero();                ///< On the tool [N], drawn as an arrow with its value.
+    double arrow = 0.1;                               ///< Length of an arrow of one newton [m].
 };
 
 /// Draws `picture` as `camera` sees it; `name` must be unique among the drawings of a page.
@@ -44,8 +55,8 @@ void draw(Svg& svg, const Camera& camera, const Picture& picture, const std::str
 /// A bar of a round length, at most `width` pixels, with that length in millimetres.
 void draw_scale_bar(Svg& svg, const Camera& camera, Pixel left, double width);
 
-/// The colours of displacements from 0 to `full` [m].
-void draw_colour_bar(Svg& svg, Pixel corner, double width, double full, const std::string& name);
+/// The colours, and what they stand for.
+void draw_colour_bar(Svg& svg, Pixel corner, double width, const ColourScale& colours, const std::string& name);
 
 namespace detail {
 
@@ -112,7 +123,8 @@ inline Colour facet_colour(const Camera& camera, const Picture& picture, const F
         normal += normals.col(v);  // softens the facets
         displacement += (picture.points.col(v) - picture.mesh.positions().col(v)).norm() / 3;
     }
-    Colour surface = tissue(displacement / picture.full_displacement);
+    const double value = picture.values ? (*picture.values)[facet.triangle] : displacement;
+    Colour surface = tissue(picture.colours.share(value));
     if (!facet.outside) surface = surface.cwiseProduct(screen(214, 205, 212));
     normal *= (facet.outside ? 1 : -1) / normal.norm();
     return lit(surface, normal, (camera.eye() - triangle.a).normalized(), camera);
@@ -221,14 +233,15 @@ inline void draw_scale_bar(Svg& svg, const Camera& camera, Pixel left, double wi
     svg.text({(left.x + right) / 2, left.y - 6}, number(1e3 * length, 3) + " mm", {.size = 11, .anchor = "middle"});
 }
 
-inline void draw_colour_bar(Svg& svg, Pixel corner, double width, double full, const std::string& name) {
+inline void draw_colour_bar(Svg& svg, Pixel corner, double width, const ColourScale& colours, const std::string& name) {
     svg.add("<linearGradient id='", name, "-bar'>");
     for (int i = 0; i <= 8; ++i) svg.add("<stop offset='", 12.5 * i, "%' stop-color='", hex(tissue(i / 8.0)), "'/>");
     svg.add("</linearGradient>\n");
     svg.rectangle(corner, width, 8, "fill='url(#" + name + "-bar)' stroke='#777' stroke-width='.5'");
-    svg.text({corner.x - 6, corner.y + 8}, "0", {.size = 11, .anchor = "end"});
-    svg.text({corner.x + width + 6, corner.y + 8}, number(1e3 * full, 2) + " mm", {.size = 11});
-    svg.text({corner.x + width / 2, corner.y - 5}, "displacement", {.size = 11, .anchor = "middle"});
+    const auto value = [&](double si) { return number(colours.per_unit * si, 2); };
+    svg.text({corner.x - 6, corner.y + 8}, value(colours.low), {.size = 11, .anchor = "end"});
+    svg.text({corner.x + width + 6, corner.y + 8}, value(colours.high) + " " + colours.unit, {.size = 11});
+    svg.text({corner.x + width / 2, corner.y - 5}, colours.name, {.size = 11, .anchor = "middle"});
 }
 
 }  // namespace examples

@@ -25,7 +25,7 @@ namespace detail {
 inline Picture picture(const Scene& scene, const Snapshot& snapshot) {
     return {.mesh = scene.mesh,
             .points = snapshot.points,
-            .full_displacement = scene.depth,
+            .colours = {.high = scene.depth},
             .tool = snapshot.frame.tool,
             .force = snapshot.frame.reaction};
 }

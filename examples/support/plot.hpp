@@ -26,6 +26,7 @@ struct Curve {
     std::string colour;
     bool dashed = false;
     std::vector<Sample> samples = {};
+    bool dots = false;  ///< In place of a line.
 };
 
 struct PlotPanel {
@@ -42,6 +43,7 @@ struct Plot {
     std::string title;
     std::vector<Phase> phases;  ///< At least one; together they are the time axis.
     std::vector<PlotPanel> panels = {};
+    std::string axis = "time [s]";  ///< Or whatever the curves are over: all that is said of times is of this.
 };
 
 namespace detail {
@@ -87,6 +89,15 @@ inline std::string pen(const Curve& curve) {
            (curve.dashed ? " stroke-dasharray='5 3'" : "");
 }
 
+inline void draw_dot(Svg& svg, Pixel at, const Curve& curve) {
+    svg.add("<circle cx='", at.x, "' cy='", at.y, "' r='3.5' fill='", curve.colour, "'/>\n");
+}
+
+inline void draw_curve(Svg& svg, const Axes& axes, const Curve& curve) {
+    if (!curve.dots) return svg.add("<path d='", path(axes, curve), "' ", pen(curve), "/>\n");
+    for (const Sample& sample : curve.samples) draw_dot(svg, axes.at(sample), curve);
+}
+
 /// From a round value below all samples to one above; zero always shows.
 inline void fit_values(Axes& axes, const PlotPanel& panel) {
     double low = 0, high = 0;
@@ -112,14 +123,14 @@ inline void draw_values(Svg& svg, const Axes& axes, const std::string& label) {
     svg.text({axes.left - 46, axes.top + axes.height / 2}, label, {.size = 12, .anchor = "middle", .upright = true});
 }
 
-inline void draw_times(Svg& svg, const Axes& axes) {
+inline void draw_times(Svg& svg, const Axes& axes, const std::string& label) {
     const double step = round_step(axes.end - axes.begin, 10);
     for (double time = step * std::ceil(axes.begin / step - 1e-9); time < axes.end + 1e-3 * step; time += step) {
         const Pixel p = axes.at({time, axes.low});
         svg.line(p, {p.x, p.y + 5}, "stroke='#333'");
         svg.text({p.x, p.y + 18}, number(time, 3), {.size = 11, .colour = "#555", .anchor = "middle"});
     }
-    svg.text({axes.left + axes.width / 2, axes.bottom() + 36}, "time [s]", {.size = 12, .anchor = "middle"});
+    svg.text({axes.left + axes.width / 2, axes.bottom() + 36}, label, {.size = 12, .anchor = "middle"});
 }
 
 /// Every second phase is shaded, over all panels.
@@ -135,7 +146,8 @@ inline void draw_phases(Svg& svg, const Axes& axes, const std::vector<Phase>& ph
 inline void draw_legend(Svg& svg, const Axes& axes, const PlotPanel& panel) {
     double y = axes.top + 12;
     for (const Curve& curve : panel.curves) {
-        svg.line({axes.right() + 16, y}, {axes.right() + 38, y}, pen(curve));
+        curve.dots ? draw_dot(svg, {axes.right() + 27, y}, curve)
+                   : svg.line({axes.right() + 16, y}, {axes.right() + 38, y}, pen(curve));
         svg.text({axes.right() + 44, y + 4}, curve.name, {.size = 11});
         y += 18;
     }
@@ -155,11 +167,9 @@ inline void draw_legend(Svg& svg, const Axes& axes, const PlotPanel& panel) {
     for (const PlotPanel& panel : plot.panels) {
         detail::fit_values(axes, panel);
         detail::draw_values(svg, axes, panel.label);
-        for (const Curve& curve : panel.curves) {
-            svg.add("<path d='", detail::path(axes, curve), "' ", detail::pen(curve), "/>\n");
-        }
+        for (const Curve& curve : panel.curves) detail::draw_curve(svg, axes, curve);
         detail::draw_legend(svg, axes, panel);
-        if (&panel == &plot.panels.back()) detail::draw_times(svg, axes);
+        if (&panel == &plot.panels.back()) detail::draw_times(svg, axes, plot.axis);
         axes.top += panel_height + gap;
     }
     return svg.str();

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+//
+// Which constants make a membrane answer as a measured one did? Fits springs and backing of a lens to a table of forces
+// and depths, says how sure they are and which of them the table does not tell, and draws both.
+#include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <membrane/accuracy/fit.hpp>
+#include <membrane/accuracy/indentation.hpp>
+#include <membrane/membrane.hpp>
+
+#include "support/force_table.hpp"
+#include "support/plot.hpp"
+#include "support/specimen.hpp"
+
+using Numbers = std::span<const double>;
+
+std::string picture(const membrane::ForceTable& table, Numbers depths, Numbers forces) {
+    const auto curve = [](Numbers d, Numbers f, examples::Curve result) {
+        for (std::size_t i = 0; i < d.size(); ++i) result.samples.push_back({1e3 * d[i], 1e3 * f[i]});  // mm, mN
+        return result;
+    };
+    return drawn(examples::Plot{
+        .title = "A lens under an indenter",
+        .phases = {{"", 0, 1e3 * depths.back()}},
+        .panels = {{"force [mN]",
+                    {curve(depths, forces, {.name = "fitted", .colour = "#12507b"}),
+                     curve(table.depth, table.force, {.name = "measured", .colour = "#b3541e", .dots = true})}}},
+        .axis = "depth [mm]"});
+}
+
+void run(const std::filesystem::path& data, const examples::Specimen& body, const std::filesystem::path& out) {
+    std::ifstream text(data);
+    if (!text) throw std::runtime_error("cannot read " + data.string());
+    const auto table = examples::read_force_table(text);
+
+    const membrane::TriangleMesh lens(body.surface.points, body.surface.triangles);
+    const auto rim = body.rim();
+    const auto build = [&](Numbers constants) {
+        return std::pair(
+            membrane::MassSpringNetwork(lens, membrane::LinearSpring{}, {.stiffness = constants[0], .pinned = rim}),
+            membrane::VirtualVolumeSprings(lens, {.stiffness = constants[1]}));
+    };
+    const membrane::Tool<double> tip{.position = body.above(0) + 2e-3 * body.outward, .radius = 1e-3};
+    const membrane::Indentation model(lens, tip, -body.outward, build);
+    const auto found = membrane::fit(table, {10, 10}, model);  // from a first guess [N/m]
+
+    std::printf("constant          value    95 %% interval      told\n");
+    for (std::size_t k = 0; k < 2; ++k) {
+        std::printf("%-8s [N/m] %8.2f   %6.2f to %6.2f    %s\n", k == 0 ? "springs" : "backing", found.constants[k],
+                    found.intervals[k].lower, found.intervals[k].upper, found.told[k] ? "yes" : "no");
+    }
+    std::printf("misfit %.1f %% of the force, %d evaluations%s\n", 100 * found.misfit, found.evaluations,
+                found.converged ? "" : ", not converged");
+
+    std::vector<double> depths{0};
+    const double deepest = *std::max_element(table.depth.begin(), table.depth.end());
+    for (int i = 1; i <= 20; ++i) depths.push_back(deepest * i / 20);
+    const auto file = out / "fit_constants.svg";
+    std::filesystem::create_directories(out);
+    if (!(std::ofstream(file) << picture(table, depths, model(found.constants, depths)) << std::flush)) {
+        throw std::runtime_error("cannot write " + file.string());
+    }
+    std::printf("picture: %s\n", file.c_str());
+}
+
+int main(int argc, char** argv) {
+    std::string data = MEMBRANE_EXAMPLE_DATA "/lens_indentation.csv";
+    auto out = std::filesystem::path(argv[0]).parent_path() / "pictures";
+    CLI::App app("Fits the constants of a lens to measured forces and depths.");
+    examples::MeshOptions mesh;
+    mesh.add_to(app);
+    app.add_option("--data", data, "a CSV file: depth [m], force [N]")->capture_default_str()->check(CLI::ExistingFile);
+    app.add_option("--out", out, "folder for the picture")->capture_default_str();
+    return examples::run(app, argc, argv, [&] {
+        const auto lens = membrane::spherical_cap<double>({.radius = 0.01, .diameter = 9e-3, .rings = 6});  // [m]
+        run(data, mesh.specimen(lens), out);
+    });
+}

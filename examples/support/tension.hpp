@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+#include <string>
+
+#include <membrane/network/elements.hpp>
+
+#include "support/figure.hpp"
+
+/// Tension as colour.
+namespace examples {
+
+/// The mean tension of each triangle at `x` [N/m], as it is on average around its corners: that of a single triangle, in which
+/// it is constant, jumps from one to the next.
+template <class Sheet>
+[[nodiscard]] Eigen::VectorXd tensions(const Sheet& sheet, const membrane::Points<double>& x) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(x.cols()), count = sum;
+    for (const auto& placed : sheet.all()) {
+        const double tension = placed.element.mean_tension(sheet.where(placed, x));
+        for (const membrane::Index v : placed.corners) {
+            sum[v] += tension;
+            ++count[v];
+        }
+    }
+    Eigen::VectorXd result = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(sheet.all().size()));
+    for (std::size_t f = 0; f < sheet.all().size(); ++f) {
+        for (const membrane::Index v : sheet.all()[f].corners) {
+            result[static_cast<Eigen::Index>(f)] += sum[v] / count[v] / 3;
+        }
+    }
+    return result;
+}
+
+namespace detail {
+
+[[nodiscard]] inline double quantile(Eigen::VectorXd values, double share) {
+    std::sort(values.begin(), values.end());
+    return values[static_cast<Eigen::Index>(share * static_cast<double>(values.size() - 1))];
+}
+
+}  // namespace detail
+
+/// The sheet of `pressed` at rest and pressed, with its tension as colour.
+template <class Sheet>
+[[nodiscard]] Figure tension_figure(const std::string& name, const Sheet& sheet, Picture pressed) {
+    const auto& mesh = pressed.mesh;
+    const Eigen::Vector3d low = mesh.positions().rowwise().minCoeff(), high = mesh.positions().rowwise().maxCoeff();
+    const double width = (high - low).head<2>().maxCoeff(), metre = 260 / width;
+    Picture rest{.mesh = mesh, .points = mesh.positions()};
+    rest.values = tensions(sheet, rest.points);
+    pressed.values = tensions(sheet, pressed.points);
+    pressed.arrow = 0.2 * width / pressed.force.norm();
+    rest.colours = pressed.colours = {.name = "mean tension",
+                                      .unit = "N/m",
+                                      .per_unit = 1,
+                                      .low = detail::quantile(*pressed.values, 0.02),
+                                      .high = detail::quantile(*pressed.values, 0.995)};
+    return {
+        .name = name,
+        .title = name + ": tension at rest and pressed",
+        .panels = {{"At rest", std::to_string(mesh.vertex_count()) + " vertices", rest},
+                   {"Pressed", detail::force_text(pressed.force.norm()), pressed}},
+        .camera = {.target = (low + high) / 2, .azimuth = 20, .elevation = 50, .distance = 8 * width, .metre = metre},
+        .columns = 2,
+        .cell_height = 240,
+        .headroom = 20};
+}
+
+inline void save(const std::filesystem::path& file, const std::string& text) {
+    std::ofstream stream(file);
+    if (!(stream << text << std::flush)) throw std::runtime_error("cannot write " + file.string());
+}
+
+}  // namespace examples
