@@ -3,18 +3,16 @@
 // The paper's figure 2: the unit sphere of its signed distance, by truss forces in 200 iterations, with edges of 0.4 and
 // 0.1. Prints how even the triangles are, and draws them.
 #include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
-#include <stdexcept>
 #include <string>
 
 #include <membrane/mesh/distmesh.hpp>
 #include <membrane/mesh/quality.hpp>
 
 #include "support/camera.hpp"
-#include "support/command_line.hpp"
 #include "support/picture.hpp"
+#include "support/specimen.hpp"
 #include "support/svg.hpp"
 
 using namespace examples;
@@ -22,6 +20,14 @@ using namespace examples;
 constexpr double half = 300, head = 46;  // of a square picture, of the room above it [px]
 
 double paper_sphere(const membrane::Vector3<double>& p) { return membrane::norm(p) - 1; }  // [m]
+
+void print(const membrane::TriangleMesh<double>& mesh) {
+    const auto quality = membrane::quality_of(mesh);
+    std::cout << "  " << mesh.vertex_count() << " vertices, " << mesh.triangle_count() << " triangles; smallest angle "
+              << quality.smallest_angle << ", mean smallest angle " << quality.mean_smallest_angle
+              << " degrees; mean edge " << quality.mean_edge << ", " << 100 * quality.even_edges
+              << " % of the edges within 25 % of it\n";
+}
 
 membrane::TriangleMesh<double> mesh_of(double length, membrane::Index iterations) {
     const membrane::Bounds bounds{{-1, -1, -1}, {1, 1, 1}};
@@ -32,11 +38,7 @@ membrane::TriangleMesh<double> mesh_of(double length, membrane::Index iterations
     };
     const auto mesh = membrane::distmesh(
         paper_sphere, {.edge_length = length, .bounds = bounds, .iterations = iterations, .progress = show});
-    const auto quality = membrane::quality_of(mesh);
-    std::cout << "  " << mesh.vertex_count() << " vertices, " << mesh.triangle_count() << " triangles; smallest angle "
-              << quality.smallest_angle << ", mean smallest angle " << quality.mean_smallest_angle
-              << " degrees; mean edge " << quality.mean_edge << ", " << 100 * quality.even_edges
-              << " % of the edges within 25 % of it\n";
+    print(mesh);
     return mesh;
 }
 
@@ -57,6 +59,8 @@ int main(int argc, char** argv) {
     auto folder = std::filesystem::path(argv[0]).parent_path() / "pictures";
     membrane::Index iterations = 200;
     CLI::App app("Makes a sphere of triangles from its signed distance, coarse and fine, and draws both.");
+    MeshOptions other;
+    other.add_to(app);
     app.add_option("--out", folder, "folder for figure_2_distmesh.svg")->capture_default_str();
     app.add_option("--iterations", iterations, "at most")->capture_default_str();
     return run(app, argc, argv, [&] {
@@ -64,10 +68,14 @@ int main(int argc, char** argv) {
         Svg svg(4 * half, 2 * half + head, "The unit sphere by DistMesh, h = 0.4 and h = 0.1");
         int panel = 0;
         for (const double length : {0.4, 0.1}) draw_panel(svg, panel++, mesh_of(length, iterations), length);
+        if (!other.file.empty()) {
+            const Surface surface = other.specimen(stock_sphere()).surface;
+            std::cout << other.file << ", to compare:\n";
+            print({surface.points, surface.triangles});
+        }
         std::filesystem::create_directories(folder);
         const auto file = folder / "figure_2_distmesh.svg";
-        std::ofstream stream(file);
-        if (!(stream << svg.str() << std::flush)) throw std::runtime_error("cannot write " + file.string());
+        save(file, svg.str());
         std::cout << "picture: " << file.string() << std::endl;
     });
 }

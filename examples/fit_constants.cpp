@@ -50,7 +50,7 @@ void run(const std::filesystem::path& data, const examples::Specimen& body, cons
             membrane::VirtualVolumeSprings(lens, {.stiffness = constants[1]}));
     };
     const membrane::Tool<double> tip{.position = body.above(0) + 2e-3 * body.outward, .radius = 1e-3};
-    const membrane::Indentation model(lens, tip, -body.outward, build);
+    const membrane::Indentation model(lens, tip, Eigen::Vector3d(-body.outward), build);
     const auto found = membrane::fit(table, {10, 10}, model);  // from a first guess [N/m]
 
     std::printf("constant          value    95 %% interval      told\n");
@@ -66,9 +66,7 @@ void run(const std::filesystem::path& data, const examples::Specimen& body, cons
     for (int i = 1; i <= 20; ++i) depths.push_back(deepest * i / 20);
     const auto file = out / "fit_constants.svg";
     std::filesystem::create_directories(out);
-    if (!(std::ofstream(file) << picture(table, depths, model(found.constants, depths)) << std::flush)) {
-        throw std::runtime_error("cannot write " + file.string());
-    }
+    examples::save(file, picture(table, depths, model(found.constants, depths)));
     std::printf("picture: %s\n", file.c_str());
 }
 

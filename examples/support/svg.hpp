@@ -4,6 +4,9 @@
 #include <cmath>
 #include <concepts>
 #include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -13,7 +16,7 @@
 ///     Svg svg(200, 100, "Force over time");
 ///     svg.add("<circle cx='", 3.5, "' cy='", 20, "' r='", radius, "'/>\n");
 ///     svg.text({100, 60}, "0.12 N", {.size = 12, .anchor = "middle"});
-///     std::ofstream("force.svg") << svg.str();
+///     save("force.svg", svg.str());
 namespace examples {
 
 /// A place on the drawing, y downwards [px].
@@ -125,5 +128,11 @@ class Svg {
     double width_, height_;
     std::string title_, body_;
 };
+
+/// Writes a file. @throws std::runtime_error if it cannot
+inline void save(const std::filesystem::path& file, const std::string& text) {
+    std::ofstream stream(file);
+    if (!(stream << text << std::flush)) throw std::runtime_error("cannot write " + file.string());
+}
 
 }  // namespace examples

@@ -2,9 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <filesystem>
-#include <fstream>
-#include <stdexcept>
 #include <string>
 
 #include <membrane/network/elements.hpp>
@@ -68,11 +65,6 @@ template <class Sheet>
         .columns = 2,
         .cell_height = 240,
         .headroom = 20};
-}
-
-inline void save(const std::filesystem::path& file, const std::string& text) {
-    std::ofstream stream(file);
-    if (!(stream << text << std::flush)) throw std::runtime_error("cannot write " + file.string());
 }
 
 }  // namespace examples
