@@ -75,7 +75,7 @@ TEST_CASE("triangles are turned together as their edges ask for", "[mesh]") {
         Collected all;
         detail::check_turns(sides, count, collect(all));
         std::size_t against = 0;
-        for_each_edge(sides, [&](std::span<const HalfEdge> edge) { against += detail::against(edge) ? 1 : 0; });
+        for_each_edge(sides, [&](std::span<const HalfEdge> edge) { against += detail::against(edge) ? 1U : 0U; });
         REQUIRE(all.defects == std::vector<MeshDefect>(against, MeshDefect::inconsistent_orientation));
     }
 }

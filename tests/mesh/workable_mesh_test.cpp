@@ -15,9 +15,9 @@ TEST_CASE("what cannot be worked with is left out, and the rest keeps its number
     surface.triangles.col(8).setConstant(5);
     surface.x(2, 7) = std::numeric_limits<float>::quiet_NaN();
     std::vector<MeshDefect> found;
-    const auto mesh =
-        detail::workable(surface.x, surface.triangles,
-                         [&](MeshDefect defect, const auto&, const auto&, const auto&...) { found.push_back(defect); });
+    const auto mesh = detail::workable(surface.x, surface.triangles,
+                                       [&](MeshDefect defect, const std::vector<Index>&, const std::vector<Index>&,
+                                           const auto&...) { found.push_back(defect); });
     CHECK(found ==
           std::vector{MeshDefect::coordinate_not_finite, MeshDefect::index_out_of_range, MeshDefect::repeated_vertex});
     CHECK(mesh.has_size);

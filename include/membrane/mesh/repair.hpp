@@ -147,18 +147,18 @@ class Repair {
 inline void Repair::weld(std::span<const Index> points, double distance) {
     const NearVertices near(x_, points);
     DisjointSets sets(kept_vertices_.size());
-    for (std::size_t v = 0; v < kept_vertices_.size(); ++v)
-        sets.unite(v, static_cast<std::size_t>(near.same_place()[v]));
+    std::size_t v = 0;
+    for (const Index lowest : near.same_place()) sets.unite(v++, static_cast<std::size_t>(lowest));
     std::int64_t effort = 1'000'000 + 1000 * x_.cols();
-    done_.complete = distance == 0 || near.for_each_pair(distance, effort, [&](Index v, Index w) {
-        sets.unite(static_cast<std::size_t>(v), static_cast<std::size_t>(w));
+    done_.complete = distance == 0 || near.for_each_pair(distance, effort, [&](Index i, Index j) {
+        sets.unite(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
     });
-    for (std::size_t v = 0; v < kept_vertices_.size(); ++v) {
+    for (v = 0; v < kept_vertices_.size(); ++v) {
         kept_vertices_[v] = sets.find(v) == v;
         done_.welded += kept_vertices_[v] ? 0 : 1;
     }
-    for (Index& corner : triangles_.reshaped())
-        corner = static_cast<Index>(sets.find(static_cast<std::size_t>(corner)));
+    const auto one = [&](Index corner) { return static_cast<Index>(sets.find(static_cast<std::size_t>(corner))); };
+    for (Index& corner : triangles_.reshaped()) corner = one(corner);
 }
 
 inline void Repair::drop_repeated() {
@@ -246,9 +246,8 @@ inline void Repair::flip_inward(const std::vector<bool>& usable) {
     std::vector<bool> measured(static_cast<std::size_t>(triangles_.cols()), true);
     for (const Index f : kept_) {
         for (const Index v : corners(f)) {
-            if (!usable[static_cast<std::size_t>(origin_[static_cast<std::size_t>(v)])]) {
-                measured[static_cast<std::size_t>(f)] = false;
-            }
+            const auto given = static_cast<std::size_t>(origin_[static_cast<std::size_t>(v)]);
+            if (!usable[given]) measured[static_cast<std::size_t>(f)] = false;
         }
     }
     const SurfaceParts parts = surface_parts(x_, triangles_, sides(), measured);
