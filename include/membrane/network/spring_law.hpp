@@ -70,7 +70,7 @@ struct LinearSpring {
 struct TensionSpring {
     template <Number Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
-        const Scalar elongation = larger<Scalar>(spring.length - spring.rest_length, Scalar(0));
+        const auto elongation = larger<Scalar>(spring.length - spring.rest_length, Scalar(0));
         const Scalar tension = spring.stiffness * elongation;
         const auto is_slack = spring.length < spring.rest_length;
         return {tension, select(is_slack, Scalar(0), spring.stiffness), tension * elongation / 2};
