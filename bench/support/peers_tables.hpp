@@ -102,7 +102,7 @@ inline Table peers_distmesh_table() {
                 .rows = {},
                 .column = "thousandths",
                 .columns = {200, 100}};
-    for (const std::string body : {"sphere", "lens", "capsule", "merged", "torus", "box"}) {
+    for (const std::string body : {"sphere", "lens", "capsule", "merged", "torus", "ellipsoid"}) {
         const std::string ours = body + "/ours", theirs = body + "/cgal";
         table.rows.push_back({body, ours});
         table.rows.push_back({"  CGAL", theirs, Row::gain, ours});
@@ -110,6 +110,7 @@ inline Table peers_distmesh_table() {
             table.rows.push_back({"  smallest angle" + who, benchmark, Row::counter, "smallest_angle", ""});
             table.rows.push_back({"  mean smallest" + who, benchmark, Row::counter, "mean_smallest_angle", ""});
             table.rows.push_back({"  even edges, %" + who, benchmark, Row::percent, "even_edges", ""});
+            table.rows.push_back({"  mean edge" + who, benchmark, Row::counter, "mean_edge", ""});
             table.rows.push_back({"  vertices" + who, benchmark, Row::counter, "vertices", ""});
         }
     }
