@@ -50,7 +50,7 @@ TEST_CASE("moduli are those of Hooke's law", "[material]") {
 }
 
 TEST_CASE("tissues are materials, typical ones within the range", "[material]") {
-    for (const Tissue& tissue : {materials::cornea(), materials::lens_capsule(), materials::retina()}) {
+    for (const MaterialRange& tissue : {materials::cornea(), materials::lens_capsule(), materials::retina()}) {
         for (const Material& material : {tissue.typical, tissue.least, tissue.most}) {
             CHECK(test::refusal([&] { material.check(); }) == "");
         }
