@@ -24,7 +24,8 @@ struct Settings {
         app.add_option("--series", series, "folder for a time series of every run, for ParaView");
         app.add_option("--layers", solver.layers, "threshold of the propagation queue")->capture_default_str();
         app.add_option("--sweeps", solver.sweeps, "passes over the queue in a step")->capture_default_str();
-        app.add_flag("--quick{10}", pace, "the tool moves ten times as fast");
+        app.add_flag_callback(
+            "--quick", [this] { pace = 10; }, "the tool moves ten times as fast");
     }
 };
 
