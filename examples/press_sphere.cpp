@@ -2,7 +2,6 @@
 #include <cstdio>
 #include <membrane/membrane.hpp>
 #include "support/specimen.hpp"
-
 int main(int argc, char** argv) {
     const auto body = examples::specimen("Presses a membrane and prints the force.", argc, argv);
     const auto& [points, triangles] = body.surface;

@@ -37,11 +37,13 @@ Figure press(const Scene& scene) {
     const membrane::TriangleMesh mesh(scene.body.surface.points, scene.body.surface.triangles);
     const auto none = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
                                                   {.stiffness = 0.0, .pinned = membrane::border(mesh)});
+    // [tissue]
     const auto sheet = membrane::triangular_springs(mesh, scene.material, scene.stretch);
     const auto bending = membrane::bending_springs(mesh, scene.rigidity);  // none for 0, at no cost
     const auto pressure = membrane::pressure(mesh, scene.pressure);
     const auto loads = membrane::balancing_loads(mesh, membrane::Tissue(none, sheet, pressure));
     const auto tissue = membrane::Tissue(none, sheet, bending, pressure, loads);
+    // [/tissue]
     const auto backing =
         membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, scene.foundation),
                                            .tangential = membrane::tangential_stiffnesses(mesh, scene.foundation),
