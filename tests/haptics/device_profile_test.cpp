@@ -54,5 +54,5 @@ TEST_CASE("profiles that make no sense are refused by name", "[profile][bad]") {
         CHECK(refused(field, 0) == (zero ? "" : must + "0"));
     }
     CHECK(refused(&DeviceProfile::continuous_force, 4) ==
-          "DeviceProfile: continuous_force must not exceed the peak_force of 3.29999995 N, got 4 N");
+          "DeviceProfile: continuous_force must not exceed the peak_force of 3.3 N, got 4 N");
 }
