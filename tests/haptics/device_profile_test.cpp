@@ -20,7 +20,7 @@ TEST_CASE("the stock devices are sound, and as strong as their makers say", "[pr
         CHECK(device.stiffness <= 5000);
         CHECK(device.damping < 0.01);  // thousandths, or nothing is known
         CHECK(device.friction < 0.3);
-        CHECK(device.resolution > 0);
+        CHECK((device.resolution > 0) == (device.friction > 0));
         CHECK(device.resolution < 1e-4);
     }
 }

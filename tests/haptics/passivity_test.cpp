@@ -77,6 +77,7 @@ struct Energies {
     EnergyObserver port;         // of the loop, device and hand damping included
     double hand = 0, given = 0;  // by what the hand wants: all it did, and what of it went in [J]
     double least = 0;
+    bool touched = false;
 };
 
 /// The hand between two ticks under a held force, by implicit midpoints, whose energies balance exactly.
@@ -116,6 +117,7 @@ Energies play(const Scene& scene, Policy policy, double tissue, const SampledLoo
         Vector3<double> reaction;
         const Vector3<double> force = policy(scene.state(seen, velocity, reaction, tissue));
         energies.port.update(hand.position, force, loop.tick);
+        energies.touched = energies.touched || norm(force) > 0;
         hand.go(scene, force, tick * loop.tick, loop.tick, energies);
         if (!(norm(hand.position) < 1e3)) break;  // it has blown up
     }
@@ -156,7 +158,7 @@ TEST_CASE("random loops inside the check never give energy", "[passivity]") {
             FAIL("seed " << seed << ": " << energies.port.least() << " of " << energies.port.brought() << " J, "
                          << energies.least << " of " << energies.given << " J");
         }
-        touched += energies.port.brought() > 0 ? 1 : 0;
+        touched += energies.touched ? 1 : 0;
     }
     CHECK(touched > loops / 2);
 }
@@ -260,9 +262,8 @@ TEST_CASE("accepted at 0.9 of the bound, refused at 1.1, on every device", "[pas
         Random random(static_cast<std::uint64_t>(seed));
         constexpr std::array all{devices::touch, devices::phantom_desktop, devices::premium_1_5, devices::premium_3_0,
                                  devices::omega};
-        auto device = all[static_cast<std::size_t>(random.index(5))];
+        const auto device = all[static_cast<std::size_t>(random.index(5))];
         const double hand = random.number(0.0, 5.0);
-        if (device.friction == 0) device.resolution = 0;  // a driver that compensates friction smooths positions, too
         auto loop = random_loop(random, 0.5 * hand);
         const Dissipation there{.hand_damping = hand, .fastest = random.chance(0.5) ? infinity : 0.2};
         const double bound = passivity(loop, device, there).most_stiffness;

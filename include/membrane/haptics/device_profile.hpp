@@ -20,7 +20,7 @@ struct DeviceProfile {
     double stiffness;         ///< the largest it can show [N/m]
     double damping = 0;       ///< of its own, viscous, at the least [N s/m]
     double friction = 0;      ///< of its own, Coulomb: the force it takes to drive it back [N]
-    double resolution = 0;    ///< of its position [m]
+    double resolution = 0;    ///< of its position [m]; 0: not counted
     double thermal_time =
         10;  ///< in which its motors warm up [s]; makers do not say, small motors' windings take 5 to 15
 
@@ -63,13 +63,11 @@ inline constexpr DeviceProfile premium_3_0{.name = "PHANTOM Premium 3.0",
                                            .friction = 0.2,
                                            .resolution = 20e-6};
 
-/// Force Dimension. One force is published, for as long as one likes; no friction, which they compensate.
-inline constexpr DeviceProfile omega{
-    .name = "omega", .peak_force = 12, .continuous_force = 12, .stiffness = 5000, .resolution = 10e-6};
-inline constexpr DeviceProfile delta{
-    .name = "delta", .peak_force = 20, .continuous_force = 20, .stiffness = 5000, .resolution = 20e-6};
-inline constexpr DeviceProfile sigma{
-    .name = "sigma", .peak_force = 20, .continuous_force = 20, .stiffness = 5000, .resolution = 2e-6};
+/// Force Dimension. One force is published, for as long as one likes, and no friction: without it to stand against it, a
+/// resolution would rule out every stiffness, so that none is given either.
+inline constexpr DeviceProfile omega{.name = "omega", .peak_force = 12, .continuous_force = 12, .stiffness = 5000};
+inline constexpr DeviceProfile delta{.name = "delta", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
+inline constexpr DeviceProfile sigma{.name = "sigma", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
 
 }  // namespace devices
 
