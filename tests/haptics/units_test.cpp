@@ -25,6 +25,15 @@ concept Compares = requires(const A& a, const B& b) {
     a == b;
 };
 
+template <class Place>
+concept OfDevice = requires(const DeviceScale& scale, const Place& place) {
+    scale.to_scene(place);
+};
+template <class Force>
+concept OfTissue = requires(const DeviceScale& scale, const Force& force) {
+    scale.to_device(force);
+};
+
 }  // namespace
 
 TEST_CASE("units do not mix", "[units]") {
@@ -41,9 +50,10 @@ TEST_CASE("units do not mix", "[units]") {
     STATIC_REQUIRE_FALSE(std::assignable_from<Metres&, Millimetres>);
     STATIC_REQUIRE_FALSE(std::convertible_to<double, NewtonsPerMetre>);
     STATIC_REQUIRE_FALSE(std::constructible_from<NewtonsPerMetre, NewtonsPerMillimetre>);
-    using Scale = const DeviceScale;
-    STATIC_REQUIRE_FALSE(requires(Scale & scale, Metres position) { scale.to_scene(position); });
-    STATIC_REQUIRE_FALSE(requires(Scale & scale, Millimetres position) { scale.to_device(position); });
+    STATIC_REQUIRE(OfDevice<Millimetres> && OfTissue<Newtons>);
+    STATIC_REQUIRE_FALSE(OfDevice<Metres>);
+    STATIC_REQUIRE_FALSE(OfDevice<Vector3<double>>);
+    STATIC_REQUIRE_FALSE(OfTissue<Millimetres>);
     CHECK((Metres({1, 2, 3}) + Metres({0.5, 0, 0})) - Metres({1, 2, 3}) == 0.5 * Metres({1, 0, 0}));
 }
 
