@@ -43,15 +43,14 @@ template <Real S>
 struct Ticks {
     explicit Ticks(Index vertices) : x(Points<S>::Zero(3, vertices)) {}
 
-    /// The next one: what moves.
-    const std::vector<Index>& operator()() {
+    /// The next one.
+    void operator()() {
         ++number;
         moved.clear();
         for (auto more = random.index(8); more > 0; --more) {
             moved.push_back(random.index(static_cast<Index>(x.cols())));
             x.col(moved.back()).setConstant(static_cast<S>(number));
         }
-        return moved;
     }
 
     Points<S> x;
@@ -103,10 +102,10 @@ TEST_CASE("nothing is torn, goes back or is older than the last complete publish
         last, [&](std::uint64_t number) { latest.publish(Wide::of(number), static_cast<double>(number)); },
         [&](std::uint64_t complete) {
             const auto& read = latest.read();
-            torn += read.value == Wide::of(read.number) && read.time == static_cast<double>(read.number) ? 0 : 1;
-            backward += read.number < before ? 1 : 0;
-            stale += read.number < complete ? 1 : 0;
-            seen += read.number > before ? 1 : 0;
+            if (read.value != Wide::of(read.number) || read.time != static_cast<double>(read.number)) ++torn;
+            if (read.number < before) ++backward;
+            if (read.number < complete) ++stale;
+            if (read.number > before) ++seen;
             return before = read.number;
         });
     INFO("of " << last << " the reader saw " << seen);
@@ -129,7 +128,8 @@ TEMPLATE_TEST_CASE("all that has moved since the last read is read, and hardly m
         const double busy = random.number(0.05, 0.95);
         for (int i = 0; i < 300; ++i) {
             if (random.chance(busy)) {
-                moved.publish(ticks(), ticks.x, static_cast<double>(ticks.number) / 2);
+                ticks();
+                moved.publish(ticks.moved, ticks.x, static_cast<double>(ticks.number) / 2);
                 since.insert(ticks.moved.begin(), ticks.moved.end());
                 and_before.insert(ticks.moved.begin(), ticks.moved.end());
                 continue;
@@ -172,15 +172,19 @@ TEST_CASE("two threads share a membrane, and each snapshot is that of its tick",
     const auto last = static_cast<std::uint64_t>(cases(300'000, 10'000'000));
     std::uint64_t torn = 0, backward = 0, stale = 0, seen = 0;
     at_once(
-        last, [&](std::uint64_t number) { moved.publish(written(), written.x, static_cast<double>(number)); },
+        last,
+        [&](std::uint64_t number) {
+            written();
+            moved.publish(written.moved, written.x, static_cast<double>(number));
+        },
         [&](std::uint64_t complete) {
             const auto news = moved.read();
-            backward += news.number < expected.number ? 1 : 0;
-            stale += news.number < complete ? 1 : 0;
-            seen += news.number > expected.number ? 1 : 0;
+            if (news.number < expected.number) ++backward;
+            if (news.number < complete) ++stale;
+            if (news.number > expected.number) ++seen;
             while (expected.number < news.number) expected();
             for (const Index v : news.moved) shown.col(v) = news.x.col(v);
-            torn += test::same_bits(shown, expected.x) && news.time == static_cast<double>(news.number) ? 0 : 1;
+            if (!test::same_bits(shown, expected.x) || news.time != static_cast<double>(news.number)) ++torn;
             return news.number;
         });
     INFO("of " << last << " the reader saw " << seen);
