@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// A haptic loop of 1 kHz and a drawing loop of 60 Hz, each in a thread and with positions of its own, share one membrane.
-// What has moved goes to the drawing loop; where the tool should be comes from there, as from a mouse, and a simulated
-// hand that feels the force follows. Prints how punctual the one is, and how old what the other draws.
+// A haptic loop of 1 kHz and a drawing loop of 60 Hz, each with its thread and positions, share one membrane. What moves
+// goes to the one that draws; where the tool should be comes from there, as from a mouse; a simulated hand follows it.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -51,8 +50,8 @@ void touch(const membrane::TriangleMesh<double>& mesh, double dt, Loops& loops) 
     for (double due = now(); !loops.over; due = next(due, dt)) {
         const double begin = now();
         const auto& wanted = loops.wanted.read();
-        hand.aim(wanted.value.position + wanted.age(begin) * wanted.value.velocity, wanted.value.velocity);
         auto tool = wanted.value;
+        hand.aim(tool.position + wanted.age(begin) * tool.velocity, tool.velocity);
         tool.position = hand.position();
         tool.velocity = hand.velocity();
         const auto contact = tracker.update(tree, x, tool);
@@ -65,10 +64,9 @@ void touch(const membrane::TriangleMesh<double>& mesh, double dt, Loops& loops) 
     }
 }
 
-void run(const examples::Specimen& body, double seconds, double rate) {
+void run(const examples::Specimen& body, double seconds, double rate, double frame = 1 / 60.0) {
     const auto mesh = membrane::TriangleMesh(body.surface.points, body.surface.triangles);
-    membrane::NullDevice<double> mouse({{0, body.above(0.3)}, {seconds, body.above(0)}},
-                                       {.tick = 1 / 60.0, .radius = body.tool_radius()});
+    membrane::NullDevice<double> mouse({{0, body.above(0.3)}, {seconds, body.above(0)}}, {frame, body.tool_radius()});
     Loops loops{membrane::MovedPoints<double>(mesh.vertex_count())};
     loops.wanted.publish(mouse.read(), now());
     loops.ticks.reserve(static_cast<std::size_t>(2 * seconds * rate));
@@ -76,7 +74,7 @@ void run(const examples::Specimen& body, double seconds, double rate) {
     auto shown = mesh.positions();
     membrane::VertexNormals normals(mesh);
     std::vector<double> ages;
-    for (double due = now(); mouse.running() || ages.empty(); due = next(due, 1 / 60.0)) {
+    for (double due = now(); mouse.running() || ages.empty(); due = next(due, frame)) {
         const auto news = loops.moved.read();
         for (const auto v : news.moved) shown.col(v) = news.x.col(v);
         normals.update(shown, news.moved);
