@@ -85,7 +85,7 @@ struct MovedSnapshot : Stamp {
 /// snapshot, has the writer's positions of that snapshot, bit for bit.
 ///
 /// Wait-free and allocates nothing: a publish copies each moved vertex twice, and at most once more those of the publish
-/// before; a read exchanges one atomic number. Three times V points and 8 bytes are kept, a fourth time the latter.
+/// before; a read exchanges one atomic number. Takes three times 3 numbers and 8 bytes a vertex, and 8 bytes more.
 ///
 /// Why nothing is lost: before publish k, the writer's slot has all that moved in the publishes s + 1 to k - 1, where
 /// they were then, for a snapshot s that the reader has taken (0: it starts with that). Publish k adds what moves in it,

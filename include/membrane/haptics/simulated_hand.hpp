@@ -69,7 +69,8 @@ class SimulatedHand {
 template <Real Scalar>
 SimulatedHand<Scalar>::SimulatedHand(const HandOptions& options) {
     const auto check = [](const char* field, const char* unit, double value, bool allow_zero) {
-        if (is_finite(value) && (value > 0 || (allow_zero && value == 0))) return;
+        const auto number = static_cast<Scalar>(value);
+        if (is_finite(number) && (number > 0 || (allow_zero && number == 0))) return;
         refuse("SimulatedHand", field, " must be finite and ", allow_zero ? "not negative" : "positive", " [", unit,
                "], got ", value);
     };
