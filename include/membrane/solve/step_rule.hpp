@@ -10,7 +10,6 @@
 
 #include <membrane/core/check.hpp>
 #include <membrane/core/lanes.hpp>
-#include <membrane/core/symmetric3.hpp>
 #include <membrane/network/elastic_network.hpp>
 
 /// How far a vertex moves for the force on it.
