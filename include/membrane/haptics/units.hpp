@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string_view>
+#include <utility>
 
 #include <membrane/collision/tool.hpp>
 #include <membrane/core/check.hpp>
@@ -19,7 +20,7 @@ namespace membrane {
 template <class Unit, class Value>
 class In {
   public:
-    explicit In(const Value& value) noexcept : value_(value) {}
+    explicit In(Value value) noexcept : value_(std::move(value)) {}
 
     [[nodiscard]] const Value& value() const noexcept { return value_; }
 
