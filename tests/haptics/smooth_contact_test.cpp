@@ -3,13 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
+#include <limits>
 
 #include <membrane/collision/aabb_tree.hpp>
 #include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/normals.hpp>
 #include <membrane/mesh/shapes.hpp>
 
+#include "support/bits.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
@@ -17,61 +17,159 @@
 using namespace membrane;
 using test::Random;
 
-TEST_CASE("a tool slides over edges and vertices, and the normal turns without a jump", "[smooth]") {
-    const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 2});
-    const auto tree = AabbTree(mesh);
-    const auto normals = VertexNormals(mesh);
-    const auto x = mesh.positions();
-    for (int seed = 1; seed <= cases(20); ++seed) {
+namespace {
+
+template <Real S>
+Contact<S> touching(Index triangle, const Vector3<S>& tool) {
+    Contact<S> contact;
+    contact.phase = ContactPhase::ongoing;
+    contact.triangle = triangle;
+    contact.on_axis = tool;
+    contact.normal = Vector3<S>(1, 0, 0);
+    contact.radius = S(1e-3);
+    return contact;
+}
+
+/// A ball with hills and valleys.
+template <Real S>
+TriangleMesh<S> uneven_ball(Random& random, Index subdivisions, double unevenness) {
+    const auto ball = icosphere<S>({.radius = S(0.01), .subdivisions = subdivisions});
+    Points<S> x = ball.positions();
+    for (Index v = 0; v < x.cols(); ++v) x.col(v) *= 1 + static_cast<S>(unevenness * random.number(-1.0, 1.0));
+    return TriangleMesh<S>(x, ball.triangles());
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("the proxy has the tool along its normal, above and below the surface", "[smooth]", double, float) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        auto tracker = ContactTracker(mesh);
-        // Great circles through a vertex: edges and vertices are all on the way.
-        const Vector3<double> from = point(x, random.index(static_cast<Index>(x.cols()))) / 0.01;
-        const Vector3<double> across = direction<double>(cross<double>(from, random.unit_vector()), {1, 0, 0});
-        const double step = 2e-3;  // [rad]; an edge is 0.3 long
-        Vector3<double> last = Vector3<double>::Zero(), last_flat = last;
-        double jump = 0, flat_jump = 0;
-        for (int i = 0; i < 500; ++i) {
-            Tool<double> tool{.radius = 1e-3};
-            tool.position = 0.0107 * (std::cos(step * i) * from + std::sin(step * i) * across);
-            tool.time = 1e-3 * i;
-            const auto contact = tracker.update(tree, x, tool);
-            REQUIRE(contact.touching());
-            const auto smooth = smooth_contact(contact, normals.values());
-            REQUIRE(std::abs(norm(smooth.normal) - 1) < 1e-12);
-            REQUIRE(dot<double>(smooth.normal, contact.normal) > 0.9);
-            REQUIRE(smooth.depth == contact.depth);
-            if (i > 0) {
-                jump = std::max(jump, norm<double>(smooth.normal - last));
-                flat_jump = std::max(flat_jump, norm<double>(contact.normal - last_flat));
-            }
-            last = smooth.normal;
-            last_flat = contact.normal;
+        const auto mesh = uneven_ball<S>(random, 2, 0.02);
+        const auto normals = VertexNormals(mesh).values();
+        const auto smooth = SmoothContact(mesh);
+        const auto tree = AabbTree(mesh);
+        for (int i = 0; i < 10; ++i) {
+            const Index f = random.index(mesh.triangle_count());
+            const Vector3<S> weights = random.barycentric().cast<S>();
+            const auto corners = mesh.triangles().col(f);
+            const Vector3<S> normal = direction<S>(point_at(triangle_at(normals, corners), weights), {1, 0, 0});
+            const auto height = static_cast<S>(random.number(-2e-3, 2e-3));
+            const Vector3<S> foot = point_at(triangle_at(mesh.positions(), corners), weights);
+            const Vector3<S> tool = foot + height * normal;
+            auto contact = touching<S>(tree.closest_point(mesh.positions(), tool).triangle, tool);
+            contact.side = random.chance(0.5) ? S(1) : S(-1);
+            const auto found = smooth(contact);
+            CHECK(norm<S>(found.normal - contact.side * normal) < 2e3 * std::numeric_limits<S>::epsilon());
+            CHECK(found.depth == contact.depth);
+            CHECK(found.triangle == contact.triangle);
         }
-        CHECK(jump < 3 * step);
-        CHECK(flat_jump > 5 * step);  // the triangles themselves
     }
 }
 
-TEMPLATE_TEST_CASE("at a vertex its normal, on an edge both, on the other side the other way", "[smooth]", double,
-                   float) {
+TEST_CASE("however small the steps of a tool, its normal turns in proportion", "[smooth]") {
+    for (int seed = 1; seed <= cases(10); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = uneven_ball<double>(random, 2, 0.01);
+        const auto x = mesh.positions();
+        const auto tree = AabbTree(mesh);
+        const auto smooth = SmoothContact(mesh);
+        const Vector3<double> from = point(x, random.index(static_cast<Index>(x.cols()))) / 0.01;
+        const Vector3<double> across = direction<double>(cross<double>(from, random.unit_vector()), {1, 0, 0});
+        for (const double height :
+             {0.5e-3, -0.7e-3}) {  // of the centre: where faces meet the nearest point jumps below
+            double turned = 0, jumped = 0;
+            for (const double step : {4e-3, 2e-3, 1e-3}) {  // [rad]; an edge is 0.3 long
+                auto tracker = ContactTracker(mesh);
+                Vector3<double> last = Vector3<double>::Zero(), last_flat = last;
+                double largest = 0, flat = 0;
+                for (int i = -1; i * step < 1; ++i) {
+                    Tool<double> tool{.radius = 1e-3};
+                    const double way = i * step;
+                    // From outside, then at one height.
+                    tool.position = (i < 0 ? 0.0105 : 0.01 + height) * (std::cos(way) * from + std::sin(way) * across);
+                    const auto contact = tracker.update(tree, x, tool);
+                    REQUIRE(contact.touching());
+                    const auto found = smooth(contact);
+                    REQUIRE(std::abs(norm(found.normal) - 1) < 1e-12);
+                    if (i > 0) {
+                        largest = std::max(largest, norm<double>(found.normal - last));
+                        flat = std::max(flat, norm<double>(contact.normal - last_flat));
+                    }
+                    last = found.normal;
+                    last_flat = contact.normal;
+                }
+                if (turned > 0) {
+                    CHECK(largest > 0.4 * turned);
+                    CHECK(largest < 0.6 * turned);
+                    if (height < 0) CHECK(flat > 0.8 * jumped);  // the triangles themselves
+                }
+                turned = largest;
+                jumped = flat;
+            }
+        }
+    }
+}
+
+TEMPLATE_TEST_CASE("at a vertex its normal, on an edge both, beyond a border the border's", "[smooth]", double, float) {
     using S = TestType;
-    Points<S> normals(3, 3);
-    normals << 0, 1, 0, 0, 0, 1, 1, 0, 0;
-    Contact<S> contact;
-    CHECK(smooth_contact(contact, normals).normal == contact.normal);  // no contact, nothing read
-    contact.phase = ContactPhase::ongoing;
-    contact.corners = {0, 1, 2};
-    contact.normal = {0, 0, 1};
-    contact.barycentric = {0, 1, 0};
-    CHECK(smooth_contact(contact, normals).normal == Vector3<S>(1, 0, 0));
-    contact.side = -1;
-    CHECK(smooth_contact(contact, normals).normal == Vector3<S>(-1, 0, 0));
-    contact.side = 1;
-    contact.barycentric = {S(0.5), 0, S(0.5)};
-    const Vector3<S> between(0, std::sqrt(S(0.5)), std::sqrt(S(0.5)));
-    CHECK(norm<S>(smooth_contact(contact, normals).normal - between) < S(1e-6));
-    normals.col(2) = -normals.col(0);  // they cancel out
-    CHECK(smooth_contact(contact, normals).normal == contact.normal);
+    const auto mesh = sheet<S>({.width = 2, .height = 2, .columns = 1, .rows = 1});  // two triangles
+    const auto smooth = SmoothContact(mesh);
+    Points<S> normals(3, 4);
+    normals << 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1;
+    const auto corners = mesh.triangles().col(0);
+    const auto at = [&](const Vector3<S>& place) {
+        return smooth(touching<S>(0, place), mesh.positions(), normals).normal;
+    };
+    for (int k = 0; k < 3; ++k) {
+        const Vector3<S> corner = point(mesh.positions(), corners[k]),
+                         next = point(mesh.positions(), corners[(k + 1) % 3]);
+        const Vector3<S> here = point(normals, corners[k]), there = point(normals, corners[(k + 1) % 3]);
+        CHECK(norm<S>(at(corner) - here) < S(1e-6));
+        CHECK(norm<S>(at((corner + next) / 2) - direction<S>(here + there, here)) < S(1e-6));
+        CHECK(norm<S>(at(2 * corner) - here) < S(1e-6));  // outside
+    }
+}
+
+TEST_CASE("what is no contact, or not finite, or has no normal, stays as it is", "[smooth]") {
+    const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 1});
+    const auto smooth = SmoothContact(mesh);
+    Contact<double> contact;
+    CHECK(smooth(contact).normal == contact.normal);
+    contact = touching<double>(AabbTree(mesh).closest_point(mesh.positions(), {0, 0, 1}).triangle, {0, 0, 0.0105});
+    const Points<double> none = Points<double>::Zero(3, mesh.vertex_count());
+    CHECK(smooth(contact, mesh.positions(), none).normal == contact.normal);
+    CHECK(smooth(contact, none, none).normal == contact.normal);
+    const Points<double> wild =
+        Points<double>::Constant(3, mesh.vertex_count(), std::numeric_limits<double>::quiet_NaN());
+    CHECK(smooth(contact, wild, wild).normal == contact.normal);
+    for (const double far : {0.0, 1e300, -1e300}) {
+        contact.on_axis = {0, far, 0};
+        const auto found = smooth(contact).normal;
+        CHECK((found == contact.normal || std::abs(norm(found) - 1) < 1e-12));
+    }
+    contact.on_axis.x() = std::numeric_limits<double>::infinity();
+    CHECK(smooth(contact).normal == contact.normal);
+    contact.on_axis = {0, 0, 0.0105};  // and it goes on
+    CHECK(norm<double>(smooth(contact).normal - Vector3<double>(0, 0, 1)) < 1e-12);
+}
+
+TEST_CASE("a body that moves takes its normals along", "[smooth]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = uneven_ball<double>(random, 2, 0.02);
+        const auto smooth = SmoothContact(mesh);
+        const auto turn = random.rotation();
+        const Vector3<double> way = 0.01 * random.unit_vector();
+        const Points<double> anchors = (turn * mesh.positions()).colwise() + way;
+        const Points<double> normals = turn * VertexNormals(mesh).values();
+        const Vector3<double> tool = 0.0105 * random.unit_vector();
+        const auto contact = touching(AabbTree(mesh).closest_point(mesh.positions(), tool).triangle, tool);
+        auto seen = contact;
+        seen.on_axis = turn * contact.on_axis + way;
+        CHECK(norm<double>(smooth(seen, anchors, normals).normal - turn * smooth(contact).normal) < 1e-9);
+    }
 }

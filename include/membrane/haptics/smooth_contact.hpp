@@ -1,30 +1,137 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include <membrane/collision/contact.hpp>
-#include <membrane/core/types.hpp>
+#include <membrane/mesh/adjacency.hpp>
+#include <membrane/mesh/normals.hpp>
+#include <membrane/mesh/triangle.hpp>
+#include <membrane/mesh/triangle_mesh.hpp>
 
+/// A normal that does not jump as the tool slides over edges and vertices.
+///
+///     const auto smooth = membrane::SmoothContact(mesh);
+///     device.write(feel({tool, smooth(contact), report}));          // for the force; the solver takes the contact itself
 namespace membrane {
 
-/// The contact with a normal that changes continuously as the contact point slides over edges and vertices: the normals
-/// of the corners, in the shares of the point. For the force; the solver takes the contact as it is.
+/// The contact with the normal of a smooth surface: that without the tool, as the depth has it, under normals that are
+/// interpolated between its vertices. A proxy on it has the tool straight above itself or below, along its normal. It
+/// moves as continuously as the tool, over concave edges too, and nothing is remembered: no delay is added. The depth,
+/// continuous already, stays as it is.
 ///
-///     device.write(feel({tool, membrane::smooth_contact(contact, normals.values()), report}));
-///
-/// `normals` 3 x V, of length 1, as `VertexNormals` has them. Where they cancel out, the normal as it was. A point that
-/// jumps, as it does from one side of a crease that the tool is in to the other, still takes its normal along.
+/// Where the tool's radius is larger than that of a fold which it lies in there is more than one proxy, and going from
+/// one to the other is a jump; so is going from one end of a shaft to the other, which the contact does. Beyond a border
+/// the proxy stays on it. One for any number of tools and threads.
 template <Real Scalar>
-[[nodiscard]] Contact<Scalar> smooth_contact(const Contact<Scalar>& contact, const Points<Scalar>& normals) noexcept {
-    Contact<Scalar> smooth = contact;
-    if (!contact.touching()) return smooth;
-    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
-    for (int i = 0; i < 3; ++i) {
-        sum += contact.barycentric[i] * point(normals, contact.corners[static_cast<std::size_t>(i)]);
+class SmoothContact {
+  public:
+    /// Cost: O(V + F log F).
+    explicit SmoothContact(const TriangleMesh<Scalar>& mesh)
+        : triangles_(mesh.triangles()),
+          adjacency_(mesh),
+          at_rest_(mesh.positions()),
+          normals_(VertexNormals<Scalar>(mesh).values()) {}
+
+    /// Online. Cost: a few triangles, from the contact's to the proxy's.
+    /// @pre the contact is with this mesh (asserted)
+    [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact) const noexcept {
+        return (*this)(contact, at_rest_, normals_);
     }
-    smooth.normal = direction<Scalar>(contact.side * sum, contact.normal);
+
+    /// The same on a body that moves: `anchors` is where the membrane would be without the tool (3 x V [m]), `normals`
+    /// are of length 1, such as `VertexNormals` has for the anchors.
+    [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
+                                             const ConstPointsRef<Scalar>& normals) const noexcept;
+
+  private:
+    [[nodiscard]] Vector3<Scalar> normal_at(Index f, const Vector3<Scalar>& q, const ConstPointsRef<Scalar>& anchors,
+                                            const ConstPointsRef<Scalar>& normals) const noexcept;
+    [[nodiscard]] Index across(Index f, const Vector3<Scalar>& weights) const noexcept;
+
+    static constexpr int most_triangles = 64;  // on the way from the contact to the proxy
+
+    Triangles triangles_;
+    Adjacency adjacency_;
+    Points<Scalar> at_rest_, normals_;
+};
+
+namespace detail {
+
+/// The weights of the corners for which `q` is on the line through the point they give, along the normal that they give:
+/// those of `q` in the triangle that lies higher by so much, each corner along its normal, that it contains it.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> weights_below(const Triangle<Scalar>& triangle, const Triangle<Scalar>& normals,
+                                            const Vector3<Scalar>& q) noexcept {
+    const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
+    const Vector3<Scalar> turn_b = normals.b - normals.a, turn_c = normals.c - normals.a;
+    Scalar height = dot(aq, direction<Scalar>(cross(ab, ac), normals.a));
+    for (int i = 0; i < 8; ++i) {  // Newton's method on the volume that they span
+        const Vector3<Scalar> b = ab + height * turn_b, c = ac + height * turn_c, to_q = aq - height * normals.a;
+        const Vector3<Scalar> area = cross(b, c);
+        const Scalar volume = dot(to_q, area);
+        const Scalar slope = dot<Scalar>(to_q, cross(turn_b, c) + cross(b, turn_c)) - dot(normals.a, area);
+        const Scalar way = volume / slope;
+        if (!is_finite(way)) break;
+        height -= way;
+        if (std::abs(way) <= std::numeric_limits<Scalar>::epsilon() * norm(aq)) break;
+    }
+    const Vector3<Scalar> b = ab + height * turn_b, c = ac + height * turn_c, to_q = aq - height * normals.a;
+    const Vector3<Scalar> area = cross(b, c);
+    const Scalar square = squared_norm(area);
+    const Scalar second = dot<Scalar>(cross(to_q, c), area) / square,
+                 third = dot<Scalar>(cross(b, to_q), area) / square;
+    return {1 - second - third, second, third};
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+Contact<Scalar> SmoothContact<Scalar>::operator()(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
+                                                  const ConstPointsRef<Scalar>& normals) const noexcept {
+    MEMBRANE_ASSERT(anchors.cols() == at_rest_.cols() && normals.cols() == at_rest_.cols());
+    MEMBRANE_ASSERT(!contact.touching() || contact.triangle < static_cast<Index>(triangles_.cols()));
+    if (!contact.touching() || !is_sound(contact)) return contact;
+    Contact<Scalar> smooth = contact;
+    const Vector3<Scalar> normal = normal_at(contact.triangle, contact.on_axis, anchors, normals);
+    if (is_finite(normal)) smooth.normal = direction<Scalar>(contact.side * normal, contact.normal);
     return smooth;
+}
+
+// From triangle `f` on always across the side that the proxy is farthest beyond.
+template <Real Scalar>
+Vector3<Scalar> SmoothContact<Scalar>::normal_at(Index f, const Vector3<Scalar>& q,
+                                                 const ConstPointsRef<Scalar>& anchors,
+                                                 const ConstPointsRef<Scalar>& normals) const noexcept {
+    for (int left = most_triangles;; --left) {
+        const auto turned = triangle_at(normals, triangles_.col(f));
+        const Vector3<Scalar> weights = detail::weights_below(triangle_at(anchors, triangles_.col(f)), turned, q);
+        const Index next = left > 0 ? across(f, weights) : no_index;
+        if (next == no_index) {
+            const Vector3<Scalar> within = weights.cwiseMax(Scalar(0));
+            return point_at<Scalar>(turned, within / within.sum());
+        }
+        f = next;
+    }
+}
+
+// The triangle in which a point with these weights rather is; none if it is in `f`, or beyond a border.
+template <Real Scalar>
+Index SmoothContact<Scalar>::across(Index f, const Vector3<Scalar>& weights) const noexcept {
+    Index next = no_index;
+    Scalar least = -std::numeric_limits<Scalar>::epsilon();  // on the side itself either will do
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Index other = adjacency_.triangle_neighbours(f)[(k + 1) % 3];  // across from corner k
+        const Scalar weight = weights[static_cast<Eigen::Index>(k)];
+        if (other == no_index || !(weight < least)) continue;
+        least = weight;
+        next = other;
+    }
+    return next;
 }
 
 }  // namespace membrane
