@@ -153,26 +153,44 @@ inline void draw_legend(Svg& svg, const Axes& axes, const PlotPanel& panel) {
     }
 }
 
-}  // namespace detail
+inline constexpr double plot_head = 62, panel_height = 150, panel_gap = 18, plot_foot = 46;
 
-/// The plot as SVG.
-[[nodiscard]] inline std::string drawn(const Plot& plot) {
-    constexpr double left = 66, top = 62, width = 620, panel_height = 150, gap = 18, legend = 200, foot = 46;
-    const double panels_height = static_cast<double>(plot.panels.size()) * (panel_height + gap) - gap;
-    Svg svg(left + width + legend, top + panels_height + foot, plot.title);
-    svg.text({left, 22}, plot.title, {.size = 14, .bold = true});
-    detail::Axes axes{left, top, width, panels_height, plot.phases.front().begin, plot.phases.back().end, 0, 1};
-    detail::draw_phases(svg, axes, plot.phases);
+inline double height_of(const Plot& plot) {
+    return plot_head + static_cast<double>(plot.panels.size()) * (panel_height + panel_gap) - panel_gap + plot_foot;
+}
+
+inline void draw_plot(Svg& svg, const Plot& plot, double left, double top, double width) {
+    svg.text({left, top + 22}, plot.title, {.size = 14, .bold = true});
+    const double panels_height = height_of(plot) - plot_head - plot_foot;
+    Axes axes{left, top + plot_head, width, panels_height, plot.phases.front().begin, plot.phases.back().end, 0, 1};
+    draw_phases(svg, axes, plot.phases);
     axes.height = panel_height;
     for (const PlotPanel& panel : plot.panels) {
-        detail::fit_values(axes, panel);
-        detail::draw_values(svg, axes, panel.label);
-        for (const Curve& curve : panel.curves) detail::draw_curve(svg, axes, curve);
-        detail::draw_legend(svg, axes, panel);
-        if (&panel == &plot.panels.back()) detail::draw_times(svg, axes, plot.axis);
-        axes.top += panel_height + gap;
+        fit_values(axes, panel);
+        draw_values(svg, axes, panel.label);
+        for (const Curve& curve : panel.curves) draw_curve(svg, axes, curve);
+        draw_legend(svg, axes, panel);
+        if (&panel == &plot.panels.back()) draw_times(svg, axes, plot.axis);
+        axes.top += panel_height + panel_gap;
+    }
+}
+
+}  // namespace detail
+
+/// The plots as one SVG, one below the other.
+[[nodiscard]] inline std::string drawn(const std::vector<Plot>& plots) {
+    constexpr double left = 66, width = 620, legend = 200;
+    double height = 0;
+    for (const Plot& plot : plots) height += detail::height_of(plot);
+    Svg svg(left + width + legend, height, plots.front().title);
+    double top = 0;
+    for (const Plot& plot : plots) {
+        detail::draw_plot(svg, plot, left, top, width);
+        top += detail::height_of(plot);
     }
     return svg.str();
 }
+
+[[nodiscard]] inline std::string drawn(const Plot& plot) { return drawn(std::vector<Plot>{plot}); }
 
 }  // namespace examples

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+//
+// A sphere slides over a membrane, at 50 mm/s over the stock one: what the hand feels of its triangles, with their own
+// normals and with smooth ones, over time and as a spectrum above 100 Hz.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include <membrane/haptics/smooth_contact.hpp>
+#include <membrane/membrane.hpp>
+
+#include "support/plot.hpp"
+#include "support/specimen.hpp"
+#include "support/spectrum.hpp"
+
+using namespace examples;
+
+constexpr double tick = 1e-3, press_for = 0.05;  // [s]
+constexpr double turn = 4.8, widest = 0.7;       // [rad/s]; on either side of the middle [rad]
+
+struct Felt {
+    std::vector<Eigen::Vector3d> flat, smooth;  // in each tick [N]
+};
+
+/// On its way about a point under the surface, as far off as a ball of this size curves.
+membrane::Tool<double> tool_at(double now, const Specimen& body) {
+    const double height = 1.05 * body.size, radius = 0.1 * body.size, angle = turn * (now - press_for) - widest;
+    const Eigen::Vector3d up = body.outward;
+    const auto aside = membrane::direction<double>(membrane::cross<double>(up, {1, 3, 2}), up);
+    const Eigen::Vector3d out = std::cos(angle) * up + std::sin(angle) * aside;
+    const double above = radius * std::max(0.0, 1 - now / press_for);
+    return {.position = body.above(-1) + (height + above) * out,
+            .radius = radius,
+            .velocity = turn * height * (std::cos(angle) * aside - std::sin(angle) * up)};
+}
+
+Felt slide(const Specimen& body) {
+    const auto mesh = membrane::TriangleMesh(body.surface.points, body.surface.triangles);
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
+    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};
+    const auto smooth = membrane::SmoothContact(mesh);
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto x = mesh.positions();
+    Felt felt;
+    for (double now = 0; turn * (now - press_for) < 2 * widest; now += tick) {
+        const auto tool = tool_at(now, body);
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, tick, network, backing, press(tool, contact));
+        tree.refit(x, report.moved);
+        if (now < press_for) continue;
+        felt.flat.push_back(feel({tool, contact, report}));
+        felt.smooth.push_back(feel({tool, smooth(contact), report}));
+    }
+    return felt;
+}
+
+/// Force over time and spectrum of each way to it.
+std::string picture(const Felt& felt) {
+    Curve before{.name = "normals of the triangles", .colour = "#d0532f"},
+        after{.name = "smooth normals", .colour = "#12507b"};
+    PlotPanel force{"force [mN]", {before, after}}, above{"amplitude [mN]", {before, after}};
+    for (std::size_t k = 0; k < 2; ++k) {
+        const auto& forces = k == 0 ? felt.flat : felt.smooth;
+        double now = 0;
+        for (const auto& f : forces) force.curves[k].samples.push_back({now += tick, 1e3 * f.norm()});
+        above.curves[k].samples = spectrum(forces, tick, 100);
+    }
+    const double end = tick * static_cast<double>(felt.flat.size());
+    const Plot time{"A slide over triangles: the force on the hand", {{"", 0, end}}, {force}};
+    const Plot frequency{"Its spectrum above 100 Hz", {{"", 100, 0.5 / tick}}, {above}, "frequency [Hz]"};
+    return drawn(std::vector<Plot>{time, frequency});
+}
+
+double largest_change(const std::vector<Eigen::Vector3d>& forces) {
+    double largest = 0;
+    for (std::size_t i = 1; i < forces.size(); ++i) largest = std::max(largest, (forces[i] - forces[i - 1]).norm());
+    return 1e3 * largest;
+}
+
+int main(int argc, char** argv) {
+    auto folder = std::filesystem::path(argv[0]).parent_path() / "pictures";
+    MeshOptions mesh;
+    CLI::App app("Slides over a membrane, and draws what the hand feels of its triangles.");
+    mesh.add_to(app);
+    app.add_option("--out", folder, "folder for pictures")->capture_default_str();
+    return run(app, argc, argv, [&] {
+        const auto felt = slide(mesh.specimen(stock_sphere()));
+        std::filesystem::create_directories(folder);
+        save(folder / "slide.svg", picture(felt));
+        std::printf("Largest change in a tick: %.2g mN with the normals of the triangles, %.2g mN with smooth ones.\n",
+                    largest_change(felt.flat), largest_change(felt.smooth));
+    });
+}
