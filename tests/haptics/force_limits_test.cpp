@@ -11,6 +11,7 @@
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/haptic_loop.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
 #include "support/traps.hpp"
@@ -130,6 +131,52 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
     CHECK(whole > ticks / 20);
     CHECK(warmth < 1);
     CHECK(limit.warmth() < 1);
+}
+
+TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the device bears", "[limits]", double,
+                   float) {
+    using S = TestType;
+    const LimitOptions options;
+    test::HapticLoop<S> loop(11);
+    test::Mishaps mishaps(5);
+    const auto device = loop.limit.device();
+    const double slew = device.peak_force / options.rise_time;
+    double before = 0, asked_before = 0, last = 0, clean_since = 0, last_solve = 0;
+    std::uint64_t solves = 0;
+    long frozen = 0, whole = 0, pushed = 0;
+    const int ticks = cases(8'000, 500'000);  // of each scalar
+    for (int i = 0; i < ticks; ++i) {
+        const auto mishap = mishaps.next();
+        loop.tick(mishap);
+        const double size = size_of(loop.felt), asked = size_of(loop.asked);
+        const double grows = slew * std::clamp(loop.now - last, 0.0, options.longest_tick);
+        if (!(is_finite(loop.felt) && size <= device.peak_force && size <= before + grows)) {
+            FAIL("tick " << i << ": " << size << " N after " << before << " N");
+        }
+        if (loop.solves != solves) last_solve = loop.now;
+        if (loop.now - last_solve > 0.1) {
+            ++frozen;
+            if (size != 0) FAIL("frozen, and " << size << " N at tick " << i);
+        }
+        // A policy that asks for more than the device bears, or for it too suddenly, is no fault, but is limited.
+        const bool bearable = asked <= device.continuous_force && asked - asked_before <= slew * loop.dt;
+        if (mishap.any() || loop.solves == solves || !bearable) clean_since = loop.now;
+        if (loop.now - clean_since > 0.2) {
+            ++whole;
+            pushed += asked > 0;
+            if (loop.felt != loop.asked || loop.limit.acted().any()) FAIL("not the policy's force at tick " << i);
+        }
+        before = size;
+        asked_before = asked;
+        last = loop.now;
+        solves = loop.solves;
+    }
+    CHECK(loop.x.allFinite());
+    if (ticks < 8'000) return;
+    CHECK(frozen > ticks / 200);  // the cases that the test is about did occur
+    CHECK(whole > ticks / 5);
+    CHECK(pushed > ticks / 20);
+    CHECK(loop.refused > ticks / 1000);
 }
 
 TEMPLATE_TEST_CASE("inside the limits a force passes with the same bits", "[limits]", double, float) {

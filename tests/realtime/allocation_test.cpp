@@ -16,6 +16,7 @@
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/haptic_loop.hpp"
 #include "support/whole_loop.hpp"
 
 using namespace membrane;
@@ -84,6 +85,23 @@ TEST_CASE("a million ticks allocate nothing", "[allocation]") {
     CHECK(loop.touching > cases(300'000));
     CHECK(loop.holding > cases(100'000));
     CHECK(loop.x.allFinite());
+}
+
+TEMPLATE_TEST_CASE("nor do a million of the complete loop of a hand, whatever goes wrong", "[allocation]", double,
+                   float) {
+    test::HapticLoop<TestType> loop(8);
+    test::Mishaps mishaps(9);
+    const int ticks = cases(6'000, 500'000);  // of each scalar
+    const long allocated = allocated_by([&] {
+        for (int i = 0; i < ticks; ++i) loop.tick(i % 20'000 < 10'000 ? test::Mishap() : mishaps.next());
+    });
+    CHECK(allocated == 0);
+    CHECK(loop.x.allFinite());
+    CHECK(loop.drawn_right);
+    if (ticks < 6'000) return;
+    CHECK(loop.touching > ticks / 10);
+    CHECK(loop.holding > ticks / 20);
+    for (const int pushed : loop.pushed) CHECK(pushed > ticks / 100);
 }
 
 TEST_CASE("nor does a step that several threads share", "[allocation]") {

@@ -2,6 +2,16 @@
 #include <array>
 #include <span>
 
+#include <membrane/haptics/contact_friction.hpp>
+#include <membrane/haptics/extrapolated_reaction.hpp>
+#include <membrane/haptics/force_limits.hpp>
+#include <membrane/haptics/grasp_transition.hpp>
+#include <membrane/haptics/handover.hpp>
+#include <membrane/haptics/passivity.hpp>
+#include <membrane/haptics/simulated_hand.hpp>
+#include <membrane/haptics/smooth_contact.hpp>
+#include <membrane/haptics/units.hpp>
+#include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 
@@ -135,6 +145,52 @@ TEMPLATE_TEST_CASE("the device is served without exceptions", "[noexcept]", doub
         static_assert(noexcept(device.running())&& noexcept(device.read())&& noexcept(device.write(force)));
         static_assert(noexcept(device.force())&& noexcept(device.time())&& noexcept(device.restart()));
         static_assert(noexcept(springs(state))&& noexcept(reaction(state)));
+    });
+    SUCCEED();
+}
+
+TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept]", double, float) {
+    using S = TestType;
+    static_cast<void>([](ContactFriction<SpringDamperForce, S>& friction, ExtrapolatedReaction<S>& extrapolated,
+                         GraspTransition<SpringDamperForce, S>& transition, VirtualCoupling<S>& coupling,
+                         const SmoothContact<S>& smooth, const HapticState<S>& state, const ConstPointsRef<S>& x,
+                         const Vector3<S>& p, const Symmetric3<S>& stiffness) {
+        static_assert(noexcept(friction(state))&& noexcept(friction.slips()));
+        static_assert(noexcept(extrapolated(state))&& noexcept(extrapolated.solved(p, stiffness, p)));
+        static_assert(noexcept(transition(state))&& noexcept(transition.under_way()));
+        static_assert(noexcept(coupling.follow(state.tool, p, S(1)))&& noexcept(coupling(state)));
+        static_assert(noexcept(coupling.force())&& noexcept(coupling.restart()));
+        static_assert(noexcept(smooth(state.contact))&& noexcept(smooth(state.contact, x, x)));
+    });
+    static_cast<void>([](ForceLimiter& limit, EnergyObserver& observer, Watchdog& watchdog, SoftStart& start,
+                         MotorHeat& heat, const Vector3<S>& force) {
+        static_assert(noexcept(limit(force, 0.0, 1))&& noexcept(limit.acted())&& noexcept(limit.warmth()));
+        static_assert(noexcept(limit.share())&& noexcept(limit.device())&& noexcept(limit.restart()));
+        static_assert(noexcept(observer.update(force, force, 1e-3))&& noexcept(observer.energy()));
+        static_assert(noexcept(observer.brought())&& noexcept(observer.least())&& noexcept(observer.restart()));
+        static_assert(noexcept(watchdog.update(1, 0.0))&& noexcept(start.update(1.0, 0.0)));
+        static_assert(noexcept(heat.add(1.0, 1.0))&& noexcept(heat.most_force()));
+    });
+    SUCCEED();
+}
+
+TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", double, float) {
+    using S = TestType;
+    static_cast<void>([](SimulatedHand<S>& hand, NullDevice<S, SimulatedHand<S>>& device, const Vector3<S>& p) {
+        static_assert(noexcept(hand.place(p))&& noexcept(hand.aim(p, p))&& noexcept(hand.move(p, S(1))));
+        static_assert(noexcept(hand.position())&& noexcept(hand.velocity()));
+        static_assert(noexcept(device.running())&& noexcept(device.read())&& noexcept(device.write(p)));
+    });
+    static_cast<void>([](MovedPoints<S>& moved, Latest<Tool<S>>& pose, std::span<const Index> vertices,
+                         const ConstPointsRef<S>& x, const Tool<S>& tool) {
+        static_assert(noexcept(moved.publish(vertices, x, 0.0))&& noexcept(moved.read()));
+        static_assert(noexcept(pose.publish(tool, 0.0))&& noexcept(pose.read())&& noexcept(pose.read().age(0.0)));
+    });
+    static_cast<void>([](const DeviceScale& scale, const Millimetres& place, const MillimetresPerSecond& speed,
+                         const Newtons& force, NewtonsPerMetre stiffness) {
+        static_assert(noexcept(scale.to_scene(place))&& noexcept(scale.to_scene(speed)));
+        static_assert(noexcept(scale.to_scene(place, speed))&& noexcept(scale.to_device(force)));
+        static_assert(noexcept(scale.at_device(stiffness))&& noexcept(in_metres(place))&& noexcept(in_metres(speed)));
     });
     SUCCEED();
 }

@@ -8,6 +8,7 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/child_process.hpp"
+#include "support/haptic_loop.hpp"
 #include "support/system_call_guard.hpp"
 #include "support/whole_loop.hpp"
 
@@ -51,6 +52,19 @@ void check_without_system_calls(int ticks) {
 
 TEST_CASE("a million ticks do not call the system", "[system_call]") {
     check_without_system_calls<test::WholeLoop<double>>(cases(1'000'000));
+}
+
+TEMPLATE_TEST_CASE("nor do a million of the complete loop of a hand, whatever goes wrong", "[system_call]", double,
+                   float) {
+    test::HapticLoop<TestType> loop(10);
+    test::Mishaps mishaps(11);
+    const auto child = without_system_calls([&] {
+        for (int i = 0; i < cases(6'000, 500'000); ++i)
+            loop.tick(i % 20'000 < 10'000 ? test::Mishap() : mishaps.next());
+        if (!loop.x.allFinite() || !loop.drawn_right || loop.solves == 0) std::abort();
+    });
+    CHECK(child.signal == 0);
+    CHECK(child.code == 0);
 }
 
 TEMPLATE_TEST_CASE("nor do the ticks of other loops", "[system_call]", (test::WholeLoop<float>),
