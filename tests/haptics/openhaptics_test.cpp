@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
+#include <cmath>
+#include <cstdio>
 #include <limits>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "openhaptics/open_haptics_device.hpp"
@@ -239,9 +242,10 @@ TEST_CASE("a step of the start that fails is named, and those before it are undo
         CHECK_THAT(message, ContainsSubstring(": a fault"));
         CHECK_FALSE(device.running());
         Names expected(opening.begin(), opening.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-        const Names undone = i == 6   ? in_turn({{{"hdStopScheduler"}, 1}, {release, 1}, {{"hdUnschedule"}, 1}})
-                             : i == 0 ? Names{}
-                                      : Names{};
+        Names undone;  // the scheduler may run, although it says that it does not
+        if (call == "hdStartScheduler") {
+            undone = in_turn({{{"hdStopScheduler"}, 1}, {release, 1}, {{"hdUnschedule"}, 1}});
+        }
         expected.insert(expected.end(), undone.begin(), undone.end());
         if (i > 0) expected.push_back("hdDisableDevice");
         CHECK(names(hd) == expected);
@@ -320,7 +324,7 @@ TEST_CASE("a device that falls silent is closed with no force", "[openhaptics]")
 
 TEST_CASE("no force is more than the device bears, or not a number", "[openhaptics]") {
     HdDouble hd;
-    hd.hand.stiffness = 1e6;  // the device is held fast
+    hd.hand.stiffness = 1e4;  // the device is held fast
     hd.hand.damping = 20;
     OpenHaptics device;
     OpenHaptics::Force force;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -66,7 +67,7 @@ class HdDouble {
 
     // What is to go wrong.
 
-    /// `error` at the first call of `name` in tick `tick` or later.
+    /// `error` at the first call of `name` in tick `tick` or later; of several there, the last is on top of the stack.
     void fail(const std::string& name, long tick, HDerror error) { faults_.push_back({name, tick, error}); }
     /// A tick that comes late by `seconds`, one that does not come, and the first of those that never come again.
     void delay(long tick, double seconds) { delays_[tick] = seconds; }
@@ -243,13 +244,13 @@ class HdDouble {
     /// Whether the call fails.
     bool enter(const char* name) {
         calls_.push_back({name, ticks_, servo()});
-        for (std::size_t i = 0; i < faults_.size(); ++i) {
-            if (faults_[i].name != name || ticks_ < faults_[i].tick) continue;
-            errors_.push_back(faults_[i].error);
-            faults_.erase(faults_.begin() + static_cast<std::ptrdiff_t>(i));
-            return true;
+        const auto due = [&](const Fault& fault) { return fault.name == name && ticks_ >= fault.tick; };
+        const std::size_t before = errors_.size();
+        for (const Fault& fault : faults_) {
+            if (due(fault)) errors_.push_back(fault.error);
         }
-        return false;
+        faults_.erase(std::remove_if(faults_.begin(), faults_.end(), due), faults_.end());
+        return errors_.size() > before;
     }
 
     void tick() {
@@ -266,7 +267,7 @@ class HdDouble {
             ++ticks_;
             frames_ = 0;
             beat_ += dt;
-            time_ = beat_ + (delays_.count(ticks_) != 0 ? delays_[ticks_] : 0);
+            time_ = std::max(time_, beat_ + (delays_.count(ticks_) != 0 ? delays_[ticks_] : 0));
             if (scheduling_ && missed_.count(ticks_) == 0 && ticks_ < silent_) callback = callback_;
         }
         if (callback == nullptr) return;
