@@ -215,7 +215,7 @@ TEST_CASE("of several errors the last is told, and none is left", "[openhaptics]
     HdDouble hd;
     OpenHaptics device;
     device.start(push);
-    for (const HDerror error : {HD_DEVICE_FAULT, HD_FORCE_ERROR, HD_WARM_MOTORS}) hd.fail("hdBeginFrame", 3, error);
+    for (const HDerror error : errors) hd.fail("hdBeginFrame", 3, error);
     hd.fail("hdGetIntegerv", 3, HD_COMM_ERROR);  // later in the tick: on top of the stack
     hd.run(5);
     device.stop();

@@ -158,17 +158,15 @@ class HdDouble {
         if (!limit && !in_frame_) wrong("asked outside of a frame");
         const HdHand& seen =
             past_.empty() ? hand : past_[past_.size() > options_.latency ? past_.size() - 1 - options_.latency : 0];
-        const Eigen::Vector3d position = 1e3 * seen.position, velocity = 1e3 * seen.velocity;
+        const auto give = [&](const auto& numbers) { std::copy_n(numbers.data(), numbers.size(), values); };
+        Eigen::Matrix4d columns = Eigen::Matrix4d::Identity();
+        columns.col(2).head<3>() = stylus;
+        columns.col(3).head<3>() = 1e3 * seen.position;
         if (limit) *values = options_.peak;
-        if (what == HD_CURRENT_POSITION) Eigen::Map<Eigen::Vector3d>(values) = position;
-        if (what == HD_CURRENT_VELOCITY) Eigen::Map<Eigen::Vector3d>(values) = velocity;
-        if (what == HD_MOTOR_TEMPERATURE) Eigen::Map<Eigen::Vector3d>(values).setConstant(temperature_);
-        if (what == HD_CURRENT_TRANSFORM) {
-            Eigen::Map<Eigen::Matrix4d> columns(values);
-            columns.setIdentity();
-            columns.col(2).head<3>() = stylus;
-            columns.col(3).head<3>() = position;
-        }
+        if (what == HD_CURRENT_POSITION) give(Eigen::Vector3d(1e3 * seen.position));
+        if (what == HD_CURRENT_VELOCITY) give(Eigen::Vector3d(1e3 * seen.velocity));
+        if (what == HD_MOTOR_TEMPERATURE) give(Eigen::Vector3d(temperature_, temperature_, temperature_));
+        if (what == HD_CURRENT_TRANSFORM) give(columns);
     }
     void get(HDenum what, HDint* values) {
         const Lock lock(mutex_);
