@@ -100,6 +100,68 @@ auto floor_of(double stiffness) {
 
 }  // namespace
 
+TEST_CASE("the double notices what the interface does not allow", "[openhaptics]") {
+    using Violations = std::vector<std::string>;
+    const auto noticed = [](auto misuse) {
+        HdDouble hd;
+        const HHD device = hdInitDevice(nullptr);
+        misuse(hd, device);
+        return hd.violations();
+    };
+    const double force[3]{0, 0, 1}, none[3]{0, 0, std::numeric_limits<double>::quiet_NaN()};
+    const auto two_frames = [](void* device) -> HDCallbackCode {
+        for (int i = 0; i < 2; ++i) {
+            hdBeginFrame(*static_cast<HHD*>(device));
+            hdEndFrame(*static_cast<HHD*>(device));
+        }
+        return HD_CALLBACK_CONTINUE;
+    };
+    const auto left_open = [](void* device) -> HDCallbackCode {
+        hdBeginFrame(*static_cast<HHD*>(device));
+        return HD_CALLBACK_DONE;
+    };
+    CHECK(noticed([](auto&, HHD device) {
+              hdBeginFrame(device);
+              hdEndFrame(device);
+              hdDisableDevice(device);
+          }) == Violations{});
+    CHECK(noticed([](auto&, HHD device) {
+              hdBeginFrame(device);
+              hdBeginFrame(device);
+          }) == Violations{"a frame begun in a frame in tick 0"});
+    CHECK(noticed([](auto&, HHD device) { hdEndFrame(device); }).size() == 1);
+    CHECK(noticed([&](auto&, HHD) { hdSetDoublev(HD_CURRENT_FORCE, force); }).size() == 1);
+    CHECK(noticed([&](auto&, HHD device) {
+              hdBeginFrame(device);
+              hdSetDoublev(HD_CURRENT_FORCE, none);
+          }).size() == 1);
+    CHECK(noticed([](auto&, HHD device) { hdBeginFrame(device + 1); }).size() == 1);
+    CHECK(noticed([](auto&, HHD device) {
+              hdStartScheduler();
+              hdBeginFrame(device);
+          }) == Violations{"a frame beside the device's own thread in tick 0"});
+    CHECK(noticed([](auto&, HHD device) {
+              hdStartScheduler();
+              hdDisableDevice(device);
+          }).size() == 1);
+    CHECK(noticed([&](auto& hd, HHD device) {
+              hdScheduleAsynchronous(two_frames, &device, HD_DEFAULT_SCHEDULER_PRIORITY);
+              hdStartScheduler();
+              hd.run(1);
+          }) == Violations{"two frames in a tick in tick 1"});
+    CHECK(noticed([&](auto& hd, HHD device) {
+              hdScheduleAsynchronous(left_open, &device, HD_DEFAULT_SCHEDULER_PRIORITY);
+              hdStartScheduler();
+              hd.run(2);
+          }) == Violations{"a frame left open in tick 1"});
+    CHECK(noticed([](auto&, HHD device) {
+              const auto schedule = hdScheduleAsynchronous(nullptr, nullptr, HD_DEFAULT_SCHEDULER_PRIORITY);
+              hdStartScheduler();
+              hdUnschedule(schedule);
+              hdDisableDevice(device);
+          }).size() == 2);
+}
+
 TEST_CASE("a device is opened, asked in each tick and closed in order", "[openhaptics]") {
     HdDouble hd;
     OpenHaptics device;
