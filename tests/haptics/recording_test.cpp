@@ -82,7 +82,7 @@ std::size_t differing(Loop<S>& loop, const Recording<S>& recording) {
 
 TEMPLATE_TEST_CASE("a replay from reset gives the same forces to the bit", "[recording]", double, float) {
     using S = TestType;
-    const int ticks = cases(20'000, 100'000);
+    const int ticks = cases(10'000, 100'000);
     Loop<S> loop;
     const auto recording = recorded(loop, 1, ticks);
     const Points<S> end = loop.x;
