@@ -65,14 +65,14 @@ int main(int argc, char** argv) {
     app.add_option("--iterations", iterations, "at most")->capture_default_str();
     return run(app, argc, argv, [&] {
         std::cout << std::setprecision(3);
+        if (!other.file.empty()) {
+            const Surface surface = other.specimen(stock_sphere()).surface;
+            std::cout << other.file << ":\n";
+            print({surface.points, surface.triangles});
+        }
         Svg svg(4 * half, 2 * half + head, "The unit sphere by DistMesh, h = 0.4 and h = 0.1");
         int panel = 0;
         for (const double length : {0.4, 0.1}) draw_panel(svg, panel++, mesh_of(length, iterations), length);
-        if (!other.file.empty()) {
-            const Surface surface = other.specimen(stock_sphere()).surface;
-            std::cout << other.file << ", to compare:\n";
-            print({surface.points, surface.triangles});
-        }
         std::filesystem::create_directories(folder);
         const auto file = folder / "figure_2_distmesh.svg";
         save(file, svg.str());

@@ -38,6 +38,7 @@ std::string picture(const membrane::ForceTable& table, Numbers depths, Numbers f
 }
 
 void run(const std::filesystem::path& data, const examples::Specimen& body, const std::filesystem::path& out) {
+    std::filesystem::create_directories(out);
     std::ifstream text(data);
     if (!text) throw std::runtime_error("cannot read " + data.string());
     const auto table = examples::read_force_table(text);
@@ -65,7 +66,6 @@ void run(const std::filesystem::path& data, const examples::Specimen& body, cons
     const double deepest = *std::max_element(table.depth.begin(), table.depth.end());
     for (int i = 1; i <= 20; ++i) depths.push_back(deepest * i / 20);
     const auto file = out / "fit_constants.svg";
-    std::filesystem::create_directories(out);
     examples::save(file, picture(table, depths, model(found.constants, depths)));
     std::printf("picture: %s\n", file.c_str());
 }

@@ -247,7 +247,7 @@ TEMPLATE_TEST_CASE("triangles that meet are those that CGAL finds", "[mesh][cgal
         REQUIRE(report.count(self_intersection) == pairs.size());
         ++counts[pairs.empty() ? 0 : 1];
     }
-    CHECK(counts[1] > cases(20));
+    CHECK(counts[1] >= cases(20));
     CHECK(counts[0] >= cases(5));
 }
 

@@ -432,14 +432,16 @@ TEST_CASE("a curved pull is the pull, and bounds the energy all around", "[netwo
         REQUIRE(norm<double>(curved.force - pull.force) <= 1e-12 * norm(pull.force));
         REQUIRE(curved.stiffness == Approx(pull.stiffness));
 
-        const Vector3<double> here = point(odd.x, odd.v),
-                              way = std::pow(10, random.number(-4.0, 1.0)) * random.vector();
+        const Vector3<double> way = std::pow(10, random.number(-4.0, 1.0)) * random.vector();
         const double longest = norm(way) * (1 + random.index(2) * random.number());
         const Vector3<double> relieved = curved.relief * way;
         const double bend = curved.stiffness * squared_norm(way) - dot(way, relieved) / (1 + longest / curved.size);
-        const double before = odd.network.energy(odd.v, here, odd.x),
-                     after = odd.network.energy(odd.v, here + way, odd.x);
+        Points<double> there = odd.x;
+        there.col(odd.v) += way;
+        const double before = odd.network.energy(odd.x), after = odd.network.energy(there);
         REQUIRE(after <= before - dot(curved.force, way) + bend / 2 + 1e-12 * (before + after));
+        const auto energy = odd.network.energy_change(odd.v, way, odd.x);
+        REQUIRE(std::abs(energy.change - (after - before)) <= 1e-12 * (before + after + energy.size));
         REQUIRE(dot(way, relieved) >= -1e-12 * curved.stiffness * squared_norm(way));
         REQUIRE(curved.relief.trace() <= 2 * curved.stiffness * (1 + 1e-12));
     }

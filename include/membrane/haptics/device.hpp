@@ -45,13 +45,52 @@ struct NullDeviceOptions {
     double radius = 0;   ///< of the tool [m]
 };
 
-/// A device without a device: its tool follows a script in straight lines from waypoint to waypoint, at the velocity
-/// that takes, whatever force is written.
+/// What holds the tool of a `NullDevice`: `place` puts it somewhere, at rest; `aim` says where it should be now and at
+/// which velocity that moves; `move` lets a time go by under a force. Then it is at `position`, with `velocity`.
+template <class H, class Scalar>
+concept Hand = Real<Scalar> && std::copyable<H> &&
+    requires(H& hand, const H& idle, const Vector3<Scalar>& vector, Scalar dt) {
+    { hand.place(vector) }
+    noexcept;
+    { hand.aim(vector, vector) }
+    noexcept;
+    { hand.move(vector, dt) }
+    noexcept;
+    { idle.position() }
+    noexcept->std::convertible_to<Vector3<Scalar>>;
+    { idle.velocity() }
+    noexcept->std::convertible_to<Vector3<Scalar>>;
+};
+
+/// Is where it should be, whatever the force. One that gives way: `SimulatedHand`.
 template <Real Scalar>
+class FirmHand {
+  public:
+    void place(const Vector3<Scalar>& position) noexcept { aim(position, Vector3<Scalar>::Zero()); }
+    void aim(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
+        position_ = target;
+        velocity_ = velocity;
+    }
+    void move(const Vector3<Scalar>& /*force*/, Scalar /*dt*/) const noexcept {}
+
+    [[nodiscard]] const Vector3<Scalar>& position() const noexcept { return position_; }
+    [[nodiscard]] const Vector3<Scalar>& velocity() const noexcept { return velocity_; }
+
+  private:
+    Vector3<Scalar> position_ = Vector3<Scalar>::Zero(), velocity_ = Vector3<Scalar>::Zero();
+};
+
+static_assert(Hand<FirmHand<float>, float> && Hand<FirmHand<double>, double>);
+
+/// A device without a device: its tool follows a script in straight lines from waypoint to waypoint, at the velocity
+/// that takes, whatever force is written. Held by another hand, it follows as far as that hand lets it: from rest at the
+/// first waypoint, under the force that was written last before each tick.
+template <Real Scalar, Hand<Scalar> Holder = FirmHand<Scalar>>
 class NullDevice {
   public:
     /// @throws InvalidInput for a script that is empty or not finite or does not go forward in time, or bad options
-    explicit NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options = {});
+    explicit NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options = {},
+                        const Holder& hand = Holder());
 
     /// Whether the script is not yet over.
     [[nodiscard]] bool running() const noexcept { return time() < script_.back().time + tick_ / 2; }
@@ -72,21 +111,27 @@ class NullDevice {
         ticks_ = 0;
         next_ = 0;
         force_.setZero();
+        hand_.place(script_.front().position);
     }
 
   private:
+    [[nodiscard]] Tool<Scalar> scripted(Scalar now) noexcept;
+
     std::vector<Waypoint<Scalar>> script_;
     Scalar tick_, radius_;
     std::size_t ticks_ = 0;
     std::size_t next_ = 0;  // the first waypoint that is not over
     Vector3<Scalar> force_ = Vector3<Scalar>::Zero();
+    Holder hand_;
 };
 
-template <Real Scalar>
-NullDevice<Scalar>::NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options)
+template <Real Scalar, Hand<Scalar> Holder>
+NullDevice<Scalar, Holder>::NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options,
+                                       const Holder& hand)
     : script_(std::move(script)),
       tick_(static_cast<Scalar>(options.tick)),
-      radius_(static_cast<Scalar>(options.radius)) {
+      radius_(static_cast<Scalar>(options.radius)),
+      hand_(hand) {
     constexpr std::string_view component = "NullDevice";
     if (!is_finite(tick_) || !(tick_ > 0)) refuse(component, "tick must be finite and positive [s], got ", tick_);
     if (!is_finite(radius_) || radius_ < 0) {
@@ -103,12 +148,22 @@ NullDevice<Scalar>::NullDevice(std::vector<Waypoint<Scalar>> script, const NullD
                    " s");
         }
     }
+    hand_.place(script_.front().position);
 }
 
-template <Real Scalar>
-Tool<Scalar> NullDevice<Scalar>::read() noexcept {
-    const Scalar now = time();
+template <Real Scalar, Hand<Scalar> Holder>
+Tool<Scalar> NullDevice<Scalar, Holder>::read() noexcept {
+    Tool<Scalar> tool = scripted(time());
+    if (ticks_ > 0) hand_.move(force_, tick_);
+    hand_.aim(tool.position, tool.velocity);
     ++ticks_;
+    tool.position = hand_.position();
+    tool.velocity = hand_.velocity();
+    return tool;
+}
+
+template <Real Scalar, Hand<Scalar> Holder>
+Tool<Scalar> NullDevice<Scalar, Holder>::scripted(Scalar now) noexcept {
     while (next_ < script_.size() && script_[next_].time <= now) ++next_;
     Tool<Scalar> tool{.radius = radius_, .time = now};
     const auto& from = script_[next_ == 0 ? 0 : next_ - 1];

@@ -25,10 +25,11 @@ struct HapticState {
 };
 
 /// The force on the hand [N]. What the compiler cannot see: finite for every finite state, and no energy given that the hand did
-/// not bring. The stock policies give zero for what is not finite.
+/// not bring. The stock policies give zero for what is not finite. A policy may remember (friction does): then it is called
+/// once in each tick, and belongs to one tool.
 /// A policy that is to be called with a list in braces, as above, names the scalar of its argument.
 template <class Policy, class Scalar>
-concept ForcePolicy = Real<Scalar> && requires(const Policy& policy, const HapticState<Scalar>& state) {
+concept ForcePolicy = Real<Scalar> && requires(Policy& policy, const HapticState<Scalar>& state) {
     { policy(state) }
     noexcept->std::same_as<Vector3<Scalar>>;
 };

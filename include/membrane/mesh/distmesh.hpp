@@ -49,7 +49,7 @@ struct DistMeshOptions {
 ///
 /// @throws InvalidInput if bounds are missing, not finite or empty, for iterations below 0, a spacing or edge length that
 /// is not finite and positive, and for what `isosurface` refuses
-/// Cost: O(grid) + O(vertices) for each iteration: 0.2 s for 1,500 vertices and 200 iterations.
+/// Cost: O(grid) + O(vertices) for each iteration: 0.3 s for 1,500 vertices and 200 iterations.
 template <Real Scalar = double, SignedDistance Body>
 [[nodiscard]] TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options);
 
@@ -63,7 +63,7 @@ inline constexpr std::string_view distmesh_name = "distmesh";
 
 template <class Surface>
 [[nodiscard]] Bounds checked_bounds(const Surface& surface, const DistMeshOptions& options) {
-    const Bounds bounds = options.bounds ? *options.bounds : bounds_of(surface);
+    Bounds bounds = options.bounds ? *options.bounds : bounds_of(surface);
     for (int k = 0; k < 3; ++k) {
         const double low = bounds.low[k], high = bounds.high[k];
         if (is_finite(low) && is_finite(high) && low < high) continue;
@@ -82,9 +82,13 @@ template <class Surface>
     constexpr int steps = 16;
     const Vector3<double> size = bounds.high - bounds.low;
     double least = size.minCoeff() / 12;
-    for (int i = 0; i < (steps + 1) * (steps + 1) * (steps + 1); ++i) {
-        const Vector3<double> part(i % (steps + 1), i / (steps + 1) % (steps + 1), i / ((steps + 1) * (steps + 1)));
-        least = (std::min)(least, 0.8 * options.edge_length(bounds.low + size.cwiseProduct(part / steps)));
+    for (int i = 0; i <= steps; ++i) {
+        for (int j = 0; j <= steps; ++j) {
+            for (int k = 0; k <= steps; ++k) {
+                const Vector3<double> part = Vector3<double>(i, j, k) / steps;
+                least = (std::min)(least, 0.8 * options.edge_length(bounds.low + size.cwiseProduct(part)));
+            }
+        }
     }
     return least;
 }

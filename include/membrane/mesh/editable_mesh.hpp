@@ -249,7 +249,7 @@ inline TriangleMesh<double> EditableMesh::mesh() const {
         if (!exists(side)) continue;
         triangles.col(count++) << number[at(from(side))], number[at(to(side))], number[at(apex(side))];
     }
-    return TriangleMesh<double>(points.leftCols(used), triangles.leftCols(count));
+    return {points.leftCols(used), triangles.leftCols(count)};
 }
 
 }  // namespace membrane

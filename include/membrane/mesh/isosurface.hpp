@@ -63,7 +63,7 @@ struct Soup {
                 corners(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(f)) = mine;
             }
         }
-        return TriangleMesh<double>(points.leftCols(used), corners);
+        return {points.leftCols(used), corners};
     }
 };
 

@@ -215,7 +215,7 @@ inline void Repair::orient() {
 inline void Repair::split_vertices() {
     const std::vector<HalfEdge> all = sides();
     DisjointSets sets = fans(triangles_, all);
-    constexpr std::size_t none = static_cast<std::size_t>(-1);
+    constexpr auto none = static_cast<std::size_t>(-1);
     std::vector<std::size_t> first_fan(kept_vertices_.size(), none);
     std::vector<Index> vertex_of_fan(static_cast<std::size_t>(triangles_.size()), no_index);
     std::vector<Index> origins;

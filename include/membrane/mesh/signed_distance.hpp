@@ -236,7 +236,7 @@ inline Vector3<double> Ellipsoid::nearest(const Vector3<double>& p) const {
 
 inline double Ellipsoid::operator()(const Vector3<double>& p) const {
     const Vector3<double> from_centre = (p - centre).cwiseQuotient(radii);
-    const double distance = norm<double>(p - nearest(p));
+    const auto distance = norm<double>(p - nearest(p));
     return squared_norm(from_centre) < 1 ? -distance : distance;
 }
 

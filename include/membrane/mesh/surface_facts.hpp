@@ -152,7 +152,7 @@ inline void measure(SurfaceFacts& facts, const Points<double>& x, std::span<cons
     Extent extent;
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
         if (!measured[static_cast<std::size_t>(edge[0].triangle)]) return;
-        const double length = norm<double>(point(x, edge[0].second) - point(x, edge[0].first));
+        const auto length = norm<double>(point(x, edge[0].second) - point(x, edge[0].first));
         facts.shortest_edge = (std::min)(facts.shortest_edge, length);
         facts.longest_edge = (std::max)(facts.longest_edge, length);
         sum += length;

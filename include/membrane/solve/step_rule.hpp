@@ -9,8 +9,8 @@
 #include <utility>
 
 #include <membrane/core/check.hpp>
-#include <membrane/core/symmetric3.hpp>
-#include <membrane/network/spring_law.hpp>
+#include <membrane/core/lanes.hpp>
+#include <membrane/network/elastic_network.hpp>
 
 /// How far a vertex moves for the force on it.
 ///

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include <membrane/haptics/device_profile.hpp>
+#include <membrane/haptics/force_policy.hpp>
+
+/// Friction on whatever a policy presses with.
+///
+///     auto feel = membrane::ContactFriction(membrane::SpringDamperForce{.stiffness = 100},
+///                                           {.coefficient = 0.1, .stiffness = 100});
+///     device.write(feel({tool, contact, report}));
+namespace membrane {
+
+struct FrictionOptions {
+    double coefficient;  ///< of Coulomb: force along the surface over force along the normal, at the most
+    double stiffness;    ///< of what sticks, as felt by the hand [N/m]
+
+    /// @throws InvalidInput for a number out of its range
+    void check() const;
+};
+
+/// The force of another policy and Coulomb friction against it. A tool that touches sticks to where it did first, as by
+/// a spring along the surface; when that would pull with more than `coefficient` times the force along the normal, it
+/// slips, and drags the place where it sticks along. From sticking to slipping the force changes continuously. It takes
+/// energy and never gives any but what the spring has stored; the largest stiffness that passivity has to reckon with is
+/// the larger of the policy's and `stiffness`.
+template <class Policy, Real Scalar = double>
+    requires ForcePolicy<Policy, Scalar>
+class ContactFriction {
+  public:
+    /// @throws InvalidInput for an option out of its range
+    ContactFriction(Policy policy, const FrictionOptions& options)
+        : policy_((options.check(), std::move(policy))),
+          coefficient_(static_cast<Scalar>(options.coefficient)),
+          stiffness_(static_cast<Scalar>(options.stiffness)) {}
+
+    [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& state) noexcept;
+
+    /// Whether the tool slipped in the last tick.
+    [[nodiscard]] bool slips() const noexcept { return slips_; }
+
+  private:
+    Policy policy_;
+    Scalar coefficient_, stiffness_;
+    bool sticks_ = false, slips_ = false;
+    Vector3<Scalar> anchor_ = Vector3<Scalar>::Zero();  // where the tool sticks [m]
+};
+
+inline void FrictionOptions::check() const {
+    constexpr std::string_view component = "ContactFriction";
+    detail::check_option(component, coefficient, "coefficient", "1");
+    detail::check_option(component, stiffness, "stiffness", "N/m", false);
+}
+
+template <class Policy, Real Scalar>
+requires ForcePolicy<Policy, Scalar> Vector3<Scalar> ContactFriction<Policy, Scalar>::operator()(
+    const HapticState<Scalar>& state) noexcept {
+    const Vector3<Scalar> force = policy_(state);
+    const auto& [tool, contact, report, grasp] = state;
+    const bool touches = contact.touching() && !grasp.holding();
+    if (!touches || !sticks_) anchor_ = tool.position;
+    sticks_ = touches && is_finite(tool.position) && is_finite(contact.normal) && is_finite(force);
+    slips_ = false;
+    if (!sticks_) return force;
+
+    const Scalar load = (std::max)(dot(force, contact.normal), Scalar(0));
+    const Scalar farthest = coefficient_ * load / stiffness_;
+    Vector3<Scalar> way = tool.position - anchor_;
+    way -= dot(way, contact.normal) * contact.normal;
+    const Scalar length = norm(way);
+    slips_ = length > farthest;
+    if (slips_) way *= farthest / length;
+    anchor_ = tool.position - way;
+    const Vector3<Scalar> both = force - stiffness_ * way;
+    sticks_ = is_finite(both) && is_finite(anchor_);
+    return sticks_ ? both : force;
+}
+
+}  // namespace membrane

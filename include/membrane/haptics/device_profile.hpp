@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string_view>
+
+#include <membrane/core/check.hpp>
+
+/// What haptic devices bear, and what they feel like by themselves.
+///
+///     auto limit = membrane::ForceLimiter(membrane::devices::touch);
+///     auto mine  = membrane::devices::touch;
+///     mine.peak_force = 2;                                             // [N]: gentler than the maker allows
+namespace membrane {
+
+/// A device by its numbers. Zero is on the safe side for damping and friction: what is not known is not counted on.
+struct DeviceProfile {
+    std::string_view name;
+    double peak_force;        ///< the largest it may be asked for, for a short time [N]
+    double continuous_force;  ///< what its motors bear for ever [N]; the peak: heating is left to the device
+    double stiffness;         ///< the largest it can show [N/m]
+    double damping = 0;       ///< of its own, viscous, at the least [N s/m]
+    double friction = 0;      ///< of its own, Coulomb: the force it takes to drive it back [N]
+    double resolution = 0;    ///< of its position [m]; 0: not counted
+    double thermal_time =
+        10;  ///< in which its motors warm up [s]; makers do not say, small motors' windings take 5 to 15
+
+    /// @throws InvalidInput for a number that is not finite or out of its range
+    void check() const;
+};
+
+/// Forces, stiffness, back-drive friction and resolution from the makers' data sheets, where a sheet gives several
+/// directions the least stiffness. Damping is published for the PHANToM 1.0 only [Diolaiti06], the Premium's forerunner.
+namespace devices {
+
+/// 3D Systems Touch, before that Geomagic Touch and SensAble PHANTOM Omni.
+inline constexpr DeviceProfile touch{.name = "Touch",
+                                     .peak_force = 3.3,
+                                     .continuous_force = 0.88,
+                                     .stiffness = 500,
+                                     .friction = 0.26,
+                                     .resolution = 55e-6};
+
+/// SensAble PHANTOM Desktop, the device of [Liu07].
+inline constexpr DeviceProfile phantom_desktop{.name = "PHANTOM Desktop",
+                                               .peak_force = 7.9,
+                                               .continuous_force = 1.75,
+                                               .stiffness = 1000,
+                                               .friction = 0.06,
+                                               .resolution = 23e-6};
+
+inline constexpr DeviceProfile premium_1_5{.name = "PHANTOM Premium 1.5",
+                                           .peak_force = 8.5,
+                                           .continuous_force = 1.4,
+                                           .stiffness = 800,
+                                           .damping = 0.005,
+                                           .friction = 0.04,
+                                           .resolution = 30e-6};
+
+inline constexpr DeviceProfile premium_3_0{.name = "PHANTOM Premium 3.0",
+                                           .peak_force = 22,
+                                           .continuous_force = 3,
+                                           .stiffness = 1000,
+                                           .friction = 0.2,
+                                           .resolution = 20e-6};
+
+/// Force Dimension. One force is published, for as long as one likes, and no friction: without it to stand against it, a
+/// resolution would rule out every stiffness, so that none is given either.
+inline constexpr DeviceProfile omega{.name = "omega", .peak_force = 12, .continuous_force = 12, .stiffness = 5000};
+inline constexpr DeviceProfile delta{.name = "delta", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
+inline constexpr DeviceProfile sigma{.name = "sigma", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
+
+}  // namespace devices
+
+namespace detail {
+
+/// Refuses an option that is not finite, or negative, or zero where it must not be.
+inline void check_option(std::string_view component, double value, std::string_view field, std::string_view unit,
+                         bool allow_zero = true) {
+    if (is_finite(value) && (value > 0 || (allow_zero && value == 0))) return;
+    refuse(component, field, " must be finite and ", allow_zero ? "not negative" : "positive", " [", unit, "], got ",
+           value);
+}
+
+}  // namespace detail
+
+inline void DeviceProfile::check() const {
+    constexpr std::string_view component = "DeviceProfile";
+    detail::check_option(component, peak_force, "peak_force", "N", false);
+    detail::check_option(component, continuous_force, "continuous_force", "N", false);
+    detail::check_option(component, stiffness, "stiffness", "N/m", false);
+    detail::check_option(component, damping, "damping", "N s/m");
+    detail::check_option(component, friction, "friction", "N");
+    detail::check_option(component, resolution, "resolution", "m");
+    detail::check_option(component, thermal_time, "thermal_time", "s", false);
+    if (continuous_force > peak_force) {
+        refuse(component, "continuous_force must not exceed the peak_force of ", peak_force, " N, got ",
+               continuous_force, " N");
+    }
+}
+
+}  // namespace membrane

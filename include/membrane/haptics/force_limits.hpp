@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+
+#include <membrane/haptics/device_profile.hpp>
+
+/// The last thing before the device: whatever a policy asks for, the hand gets what it and the device bear.
+///
+///     auto limit = membrane::ForceLimiter(membrane::devices::touch);
+///     device.write(limit(feel({tool, contact, report}), now, solves));   // [N], [s], a number that each solve changes
+namespace membrane {
+
+/// All limits are on; each can be taken off.
+struct LimitOptions {
+    double rise_time = 0.02;     ///< from zero to the peak force at the quickest [s]; 0: no slew limit
+    double soft_start = 0.1;     ///< from nothing to the whole force, at first and after a fault [s]; 0: at once
+    double fresh_for = 0.04;     ///< a state of the solver may be this old [s]; infinity: no watchdog
+    double fade_time = 0.05;     ///< and then the force fades to zero in this time [s]
+    double longest_tick = 2e-3;  ///< a force grows as if no tick had been longer [s]
+    bool heating = true;         ///< whether motors that grow hot get no more than the continuous force
+
+    /// @throws InvalidInput for an option out of its range
+    void check() const;
+};
+
+/// Which limits have made the force of this tick smaller.
+struct LimitsActed {
+    bool fault = false;  ///< force or clock was not finite: no force
+    bool faded =
+        false;          ///< the solver's state is old, or the force is still coming in after that, a fault or the start
+    bool peak = false;  ///< of the device
+    bool heat = false;  ///< of its motors
+    bool slew = false;  ///< the force may not grow that fast
+
+    [[nodiscard]] bool any() const noexcept { return fault || faded || peak || heat || slew; }
+};
+
+/// How much of the force an old state of the solver is good for: 1 while it is fresh, then down to 0.
+class Watchdog {
+  public:
+    Watchdog(double fresh_for, double fade_time) noexcept : fresh_for_(fresh_for), fade_time_(fade_time) {}
+
+    /// `state`: a number that the solver changes with each solve; `dt` since the last call [s].
+    double update(std::uint64_t state, double dt) noexcept;
+
+  private:
+    double fresh_for_, fade_time_;
+    double age_ = 0;
+    std::uint64_t state_ = 0;
+};
+
+/// What share of the force comes through: falls at once to what is allowed, and rises to it slowly.
+class SoftStart {
+  public:
+    explicit SoftStart(double time) noexcept : time_(time) {}
+
+    double update(double allowed, double dt) noexcept;
+    [[nodiscard]] double share() const noexcept { return share_; }
+
+  private:
+    double time_;
+    double share_ = 0;
+};
+
+/// Warmth of a motor: what it takes up goes with the square of the force, what it gives off with its warmth. In parts of
+/// what the continuous force comes to in the end. From three quarters on less than the peak is allowed, at 1 the
+/// continuous force: so 1 is not passed.
+class MotorHeat {
+  public:
+    explicit MotorHeat(const DeviceProfile& device) noexcept
+        : peak_(device.peak_force), continuous_(device.continuous_force), time_(device.thermal_time) {}
+
+    /// `force` was held for `dt` [N], [s].
+    void add(double force, double dt) noexcept;
+    [[nodiscard]] double warmth() const noexcept { return warmth_; }
+    [[nodiscard]] double most_force() const noexcept;
+
+  private:
+    double peak_, continuous_, time_;
+    double warmth_ = 0;
+};
+
+/// Makes a force fit for a device. The order is fixed:
+/// 1. not a number, no force: everything after reckons with it;
+/// 2. watchdog and soft start: a share of what is asked for, since they doubt the force itself;
+/// 3. peak and heat: of that share, what the device bears;
+/// 4. slew last: against what the device really got a tick ago. Only growth of its size is slowed; a force may fall to
+///    zero, or turn, at once.
+/// Each only shortens the force, so none undoes the one before, and none turns it. A force that all of them let pass
+/// comes out with the same bits.
+///
+/// With the options as they are a force is at zero 91 ms after the solver has stopped, and whole again 0.1 s after a
+/// fault is over (as far as motors are not hot).
+class ForceLimiter {
+  public:
+    /// @throws InvalidInput for a profile or an option out of its range
+    explicit ForceLimiter(const DeviceProfile& device, const LimitOptions& options = {});
+
+    /// The force to write [N]. `now` from a steady clock [s]; `state`: a number that the solver changes with each solve,
+    /// such as how many there were. Call it in each tick: the time in between counts for watchdog and motors.
+    template <Real Scalar>
+    [[nodiscard]] Vector3<Scalar> operator()(const Vector3<Scalar>& force, double now, std::uint64_t state) noexcept;
+
+    /// What limited the last force.
+    [[nodiscard]] const LimitsActed& acted() const noexcept { return acted_; }
+    /// Of the motors, 0 to 1.
+    [[nodiscard]] double warmth() const noexcept { return heat_.warmth(); }
+    /// Of the force that came through watchdog and soft start, 0 to 1.
+    [[nodiscard]] double share() const noexcept { return soft_start_.share(); }
+    [[nodiscard]] const DeviceProfile& device() const noexcept { return device_; }
+
+    /// As new, but for the heat.
+    void restart() noexcept;
+
+  private:
+    double time_since_last(double now) noexcept;
+
+    DeviceProfile device_;
+    LimitOptions options_;
+    double slew_;  // [N/s]
+    Watchdog watchdog_;
+    SoftStart soft_start_;
+    MotorHeat heat_;
+    LimitsActed acted_;
+    bool began_ = false;
+    double time_ = 0;
+    double size_ = 0;  // of the last force [N]
+};
+
+namespace detail {
+
+/// `force`, no longer than `most`; with the same bits if it is not.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> shortened(const Vector3<Scalar>& force, double most) noexcept {
+    Vector3<double> exact = force.template cast<double>();
+    const double largest = exact.cwiseAbs().maxCoeff();
+    if (largest > most) exact *= most / largest;  // the squares of what is left do not overflow
+    const double length = norm(exact);
+    if (largest <= most && length <= most) return force;
+    // Rounding must not lead beyond it.
+    constexpr double a_little = 4 * static_cast<double>(std::numeric_limits<Scalar>::epsilon());
+    if (!(length > 0)) return Vector3<Scalar>::Zero();
+    return (exact * (most * (1 - a_little) / length)).template cast<Scalar>();
+}
+
+}  // namespace detail
+
+inline void LimitOptions::check() const {
+    constexpr std::string_view component = "ForceLimiter";
+    detail::check_option(component, rise_time, "rise_time", "s");
+    detail::check_option(component, soft_start, "soft_start", "s");
+    detail::check_option(component, fade_time, "fade_time", "s");
+    detail::check_option(component, longest_tick, "longest_tick", "s", false);
+    if (!(is_finite(fresh_for) ? fresh_for > 0 : fresh_for == std::numeric_limits<double>::infinity())) {
+        refuse(component, "fresh_for must be positive [s], got ", fresh_for);
+    }
+}
+
+inline double Watchdog::update(std::uint64_t state, double dt) noexcept {
+    age_ = state == state_ ? age_ + dt : 0;
+    state_ = state;
+    if (age_ <= fresh_for_) return 1;
+    return age_ < fresh_for_ + fade_time_ ? 1 - (age_ - fresh_for_) / fade_time_ : 0;
+}
+
+inline double SoftStart::update(double allowed, double dt) noexcept {
+    const double risen = dt < time_ ? share_ + dt / time_ : 1.0;
+    share_ = (std::min)({allowed, risen, 1.0});
+    return share_;
+}
+
+inline void MotorHeat::add(double force, double dt) noexcept {
+    const double part = dt / time_, relative = force / continuous_;
+    warmth_ = (warmth_ + part * (relative * relative)) / (1 + part);
+}
+
+inline double MotorHeat::most_force() const noexcept {
+    constexpr double warm = 0.75;
+    const double room = std::clamp((1 - warmth_) / (1 - warm), 0.0, 1.0);
+    return continuous_ + room * (peak_ - continuous_);
+}
+
+inline ForceLimiter::ForceLimiter(const DeviceProfile& device, const LimitOptions& options)
+    : device_((device.check(), device)),
+      options_((options.check(), options)),
+      slew_(options.rise_time > 0 ? device.peak_force / options.rise_time : 0),
+      watchdog_(options.fresh_for, options.fade_time),
+      soft_start_(options.soft_start),
+      heat_(device) {}
+
+inline double ForceLimiter::time_since_last(double now) noexcept {
+    const double dt = began_ ? now - time_ : 0;
+    time_ = now;
+    began_ = true;
+    return dt;
+}
+
+template <Real Scalar>
+Vector3<Scalar> ForceLimiter::operator()(const Vector3<Scalar>& force, double now, std::uint64_t state) noexcept {
+    acted_ = {};
+    acted_.fault = !is_finite(force) || !is_finite(now);
+    const double dt = is_finite(now) ? time_since_last(now) : 0;
+    // A clock that stands still or jumps back stops no watchdog, and lets no force grow.
+    const double passed = dt > 0 && is_finite(dt) ? dt : options_.longest_tick;
+    const double growing = std::clamp(dt, 0.0, options_.longest_tick);
+    heat_.add(size_, passed);
+
+    const double fresh = watchdog_.update(state, passed);
+    const double share = soft_start_.update(acted_.fault ? 0.0 : fresh, growing);
+    if (acted_.fault) {
+        size_ = 0;
+        return Vector3<Scalar>::Zero();
+    }
+    acted_.faded = share < 1;
+    Vector3<Scalar> felt = acted_.faded ? Vector3<Scalar>(static_cast<Scalar>(share) * force) : force;
+
+    const auto at_most = [&felt](double most) {
+        const Vector3<Scalar> before = felt;
+        felt = detail::shortened(before, most);
+        return felt != before;
+    };
+    acted_.peak = at_most(device_.peak_force);
+    acted_.heat = options_.heating && at_most(heat_.most_force());
+    acted_.slew = slew_ > 0 && at_most(size_ + slew_ * growing);
+    size_ = norm<double>(felt.template cast<double>());
+    return felt;
+}
+
+inline void ForceLimiter::restart() noexcept {
+    watchdog_ = Watchdog(options_.fresh_for, options_.fade_time);
+    soft_start_ = SoftStart(options_.soft_start);
+    acted_ = {};
+    began_ = false;
+    size_ = 0;
+}
+
+}  // namespace membrane

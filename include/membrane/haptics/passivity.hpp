@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string_view>
+
+#include <membrane/haptics/device_profile.hpp>
+
+/// Whether a loop can buzz: before it runs, and while it does.
+///
+///     const membrane::SampledLoop loop{.stiffness = 40 * 12.0, .damping = 0.5, .tick = 1e-3};   // after the scale
+///     const auto device = membrane::devices::touch;
+///     membrane::require_passive(loop, device, {.hand_damping = 2});     // throws, and says what would do
+///     const auto most = membrane::passivity(loop, device, {.hand_damping = 2}).most_stiffness;  // [N/m]
+namespace membrane {
+
+/// What is shown to the hand.
+struct SampledLoop {
+    double stiffness;    ///< K, the largest tangent stiffness at the device, tissue-to-device scale included [N/m]
+    double damping = 0;  ///< B, the largest damping of the policy, by differences of the position [N s/m]
+    double tick = 1e-3;  ///< T, from one force to the next [s]
+    double delay = 0;    ///< from a position to the tick in which it is answered, a multiple of the tick [s]
+
+    /// @throws InvalidInput for a number that is not finite or out of its range
+    void check() const;
+};
+
+/// What else takes energy out of the loop, beside the device's own damping and friction.
+struct Dissipation {
+    double hand_damping;  ///< the least a hand that holds the device ever has [N s/m]; 0: it may let go
+    /// In contact the tool is never faster [m/s]. Friction takes as much as a damper of friction / speed up to there, and
+    /// is counted so. Infinity: it is not counted, but against a coarse resolution.
+    double fastest = std::numeric_limits<double>::infinity();
+
+    /// @throws InvalidInput for a number out of its range
+    void check() const;
+};
+
+/// What a check comes to.
+struct PassivityReport {
+    bool passive = false;
+    double most_stiffness = 0;  ///< of the loop, the rest as it is; 0: none [N/m]
+    double damping_needed = 0;  ///< by the loop as it is [N s/m]
+    double damping_there = 0;   ///< of device and hand, and of friction as far as it is counted [N s/m]
+};
+
+/// Whether a held, sampled force gives the hand no energy that the hand has not brought.
+///
+/// The force of a tick is held until the next, so a spring that is let go pushes as it did where it was pressed deeper:
+/// that makes at most K / 2 d^2 for a tick in which the tool goes by d, a delay by n ticks n K d^2 more in the mean, a
+/// damper by differences B d^2 / T. A damper b takes b d^2 / T. So the loop is passive if
+///
+///     b >= K (T / 2 + delay) + B,                                                                [Colgate97]
+///
+/// for any force with a potential whose slope is nowhere above K: springs that harden, walls that end. A position
+/// coarse by r makes the force wrong by (K / 2 + B / T) r, against which friction has to stand [Abbott05]; what is left of
+/// friction, c, takes c d, no less than c / v d^2 / T at speeds up to v [Diolaiti06]. Sufficient; necessary where the hand
+/// may be anything passive.
+///
+/// @throws InvalidInput for a number out of its range
+[[nodiscard]] inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device,
+                                               const Dissipation& dissipation);
+
+/// @throws InvalidInput for a loop that is not passive, naming the stiffness that would be
+inline void require_passive(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation);
+
+/// The energy a hand has put into the loop, tick by tick [Hannaford02]. Where it sinks below zero, the loop has given more
+/// than it got.
+///
+///     membrane::EnergyObserver observer(2.0);             // least damping of device and hand [N s/m]
+///     observer.update(tool.position, force, dt);          // the force that is written in this tick
+///     if (observer.energy() < 0) ...                      // active
+class EnergyObserver {
+  public:
+    /// With damping and friction of device and hand, what they take counts too: without, each sampled spring gives some.
+    explicit EnergyObserver(double damping = 0, double friction = 0) noexcept
+        : damping_(damping), friction_(friction) {}
+
+    /// `position` of the tool now [m], `force` on the hand from now on [N], `dt` since the last call [s]. What is not
+    /// finite, or no time, is passed over.
+    template <Real Scalar>
+    void update(const Vector3<Scalar>& position, const Vector3<Scalar>& force, double dt) noexcept;
+
+    /// What the hand has put in, less what it got back [J].
+    [[nodiscard]] double energy() const noexcept { return energy_; }
+    /// What went in, not counting what came back [J].
+    [[nodiscard]] double brought() const noexcept { return brought_; }
+    /// The least there ever was [J].
+    [[nodiscard]] double least() const noexcept { return least_; }
+    void restart() noexcept { *this = EnergyObserver(damping_, friction_); }
+
+  private:
+    double damping_, friction_;
+    bool began_ = false;
+    Vector3<double> position_ = Vector3<double>::Zero(), force_ = Vector3<double>::Zero();
+    double energy_ = 0, brought_ = 0, least_ = 0;
+};
+
+inline void SampledLoop::check() const {
+    constexpr std::string_view component = "SampledLoop";
+    detail::check_option(component, stiffness, "stiffness", "N/m");
+    detail::check_option(component, damping, "damping", "N s/m");
+    detail::check_option(component, tick, "tick", "s", false);
+    detail::check_option(component, delay, "delay", "s");
+}
+
+inline void Dissipation::check() const {
+    detail::check_option("Dissipation", hand_damping, "hand_damping", "N s/m");
+    if (!(fastest > 0)) refuse("Dissipation", "fastest must be positive [m/s], got ", fastest);
+}
+
+inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation) {
+    loop.check();
+    device.check();
+    dissipation.check();
+    const double lag = loop.tick / 2 + loop.delay, coarse = device.resolution;
+    const double viscous = device.damping + dissipation.hand_damping;
+    const double per_speed = 1 / dissipation.fastest;
+    const auto friction_left = [&](double stiffness) {
+        return device.friction - (stiffness / 2 + loop.damping / loop.tick) * coarse;
+    };
+    PassivityReport report;
+    const double left = friction_left(loop.stiffness);
+    report.damping_needed = loop.stiffness * lag + loop.damping;
+    report.damping_there = viscous + (std::max)(left, 0.0) * per_speed;
+    // Both grow less with the stiffness: damping, and what friction leaves of the resolution.
+    const double by_damping = (viscous + friction_left(0) * per_speed - loop.damping) / (lag + coarse / 2 * per_speed);
+    const double by_resolution = coarse > 0 ? 2 * friction_left(0) / coarse : std::numeric_limits<double>::infinity();
+    report.most_stiffness = (std::max)((std::min)({by_damping, by_resolution, device.stiffness}), 0.0);
+    // A wall of no stiffness and no damping is no wall.
+    const bool shows_nothing = loop.stiffness == 0 && loop.damping == 0;
+    const bool enough = left >= 0 && report.damping_there >= report.damping_needed;
+    report.passive = shows_nothing || (enough && loop.stiffness <= device.stiffness);
+    return report;
+}
+
+inline void require_passive(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation) {
+    const auto report = passivity(loop, device, dissipation);
+    if (report.passive) return;
+    refuse("passivity", "with damping ", loop.damping, " N s/m and a tick of ", loop.tick, " s on ", device.name,
+           " stiffness must be at most ", report.most_stiffness, " [N/m], got ", loop.stiffness);
+}
+
+template <Real Scalar>
+void EnergyObserver::update(const Vector3<Scalar>& position, const Vector3<Scalar>& force, double dt) noexcept {
+    if (!is_finite(position) || !is_finite(force) || !is_finite(dt)) return;
+    const Vector3<double> now = position.template cast<double>();
+    if (began_ && dt > 0) {
+        const Vector3<double> way = now - position_;
+        const double more = damping_ / dt * squared_norm(way) + friction_ * norm(way) - dot(force_, way);
+        energy_ += more;
+        brought_ += (std::max)(more, 0.0);
+        least_ = (std::min)(least_, energy_);
+    }
+    began_ = true;
+    position_ = now;
+    force_ = force.template cast<double>();
+}
+
+}  // namespace membrane

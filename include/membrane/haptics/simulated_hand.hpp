@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+
+#include <membrane/core/check.hpp>
+
+/// A hand at a desk: it gives way to the force, as one that holds a device would.
+///
+///     using Hand = membrane::SimulatedHand<double>;
+///     membrane::NullDevice<double, Hand> device({{0.0, above}, {1.0, below}}, {.radius = 1e-3},
+///                                               Hand({.mass = 0.1, .damping = 2, .stiffness = 300}));
+///     while (device.running()) { const auto tool = device.read(); ...; device.write(force); }     // a closed loop
+namespace membrane {
+
+/// Hand and device together. There are no usual values: they are of the person, the grip and the device, and a loop that
+/// is stable for one hand need not be for another.
+struct HandOptions {
+    double mass = 0;       ///< m [kg]
+    double damping = 0;    ///< b, of the velocity relative to the target's [N s/m]
+    double stiffness = 0;  ///< k, to the target [N/m]
+};
+
+/// A mass that a spring and a damper draw to a target, m a = F - k (p - target) - b (v - target velocity). The target is
+/// where the hand means to be; it goes on at its velocity until it is told anew. The force is held from one call to the
+/// next, as a device holds it.
+///
+/// Each move is the exact solution: any time step is stable, many small ones come to where one large one does, and a
+/// loop that gains energy does so by itself. It takes `exp` and `sin`, which differ from one mathematics library to the
+/// next in the last digits.
+template <Real Scalar>
+class SimulatedHand {
+  public:
+    /// @throws InvalidInput unless mass and stiffness are finite and positive, and damping finite and not negative
+    explicit SimulatedHand(const HandOptions& options);
+
+    /// At rest, there and nowhere else.
+    void place(const Vector3<Scalar>& position) noexcept {
+        position_ = target_ = position;
+        velocity_ = target_velocity_ = Vector3<Scalar>::Zero();
+    }
+
+    /// Where it means to be now [m], and at which velocity that moves [m/s].
+    void aim(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
+        target_ = target;
+        target_velocity_ = velocity;
+    }
+
+    /// Lets `dt` [s] go by under a force [N]. Returns false, and leaves all as it was, where a number is not finite or
+    /// `dt` negative.
+    bool move(const Vector3<Scalar>& force, Scalar dt) noexcept;
+
+    [[nodiscard]] const Vector3<Scalar>& position() const noexcept { return position_; }  ///< [m]
+    [[nodiscard]] const Vector3<Scalar>& velocity() const noexcept { return velocity_; }  ///< [m/s]
+
+  private:
+    /// After a time, what has become of a displacement of 1 and of a velocity of 1, with nothing else.
+    struct Response {
+        Scalar position_by_position, position_by_velocity, velocity_by_position, velocity_by_velocity;
+    };
+    [[nodiscard]] Response response(double time) const noexcept;
+
+    double rate_ = 0, square_ = 0;  // b / 2m [1/s], k / m [1/s^2]
+    Scalar stiffness_ = 0;
+    Vector3<Scalar> position_ = Vector3<Scalar>::Zero(), velocity_ = Vector3<Scalar>::Zero();
+    Vector3<Scalar> target_ = Vector3<Scalar>::Zero(), target_velocity_ = Vector3<Scalar>::Zero();
+};
+
+template <Real Scalar>
+SimulatedHand<Scalar>::SimulatedHand(const HandOptions& options) {
+    const auto check = [](const char* field, const char* unit, double value, bool allow_zero) {
+        const auto number = static_cast<Scalar>(value);
+        if (is_finite(number) && (number > 0 || (allow_zero && number == 0))) return;
+        refuse("SimulatedHand", field, " must be finite and ", allow_zero ? "not negative" : "positive", " [", unit,
+               "], got ", value);
+    };
+    check("mass", "kg", options.mass, false);
+    check("damping", "N s/m", options.damping, true);
+    check("stiffness", "N/m", options.stiffness, false);
+    rate_ = options.damping / options.mass / 2;
+    square_ = options.stiffness / options.mass;
+    stiffness_ = static_cast<Scalar>(options.stiffness);
+}
+
+template <Real Scalar>
+bool SimulatedHand<Scalar>::move(const Vector3<Scalar>& force, Scalar dt) noexcept {
+    if (!(dt >= 0)) return false;
+    const Response by = response(static_cast<double>(dt));
+    // Seen from where the force would hold it, which moves as the target does, it swings freely.
+    const Vector3<Scalar> held = target_ + force / stiffness_, away = position_ - held;
+    const Vector3<Scalar> speed = velocity_ - target_velocity_, way = dt * target_velocity_;
+    const Vector3<Scalar> position = held + way + (by.position_by_position * away + by.position_by_velocity * speed);
+    const Vector3<Scalar> velocity =
+        target_velocity_ + (by.velocity_by_position * away + by.velocity_by_velocity * speed);
+    if (!is_finite(position) || !is_finite(velocity)) return false;
+    position_ = position;
+    velocity_ = velocity;
+    target_ += way;
+    return true;
+}
+
+template <Real Scalar>
+auto SimulatedHand<Scalar>::response(double time) const noexcept -> Response {
+    const double discriminant = rate_ * rate_ - square_;
+    // Of the position by velocity, `sine` after the time; of the rest, the part `other` that has none of it.
+    double sine, other, forward = rate_, back = rate_;
+    if (discriminant < 0) {
+        const double turn = std::sqrt(-discriminant), decay = std::exp(-rate_ * time);
+        sine = decay * std::sin(turn * time) / turn;
+        other = decay * std::cos(turn * time);
+    } else {  // two decays; the slow one from their product, the difference would cancel
+        const double half = std::sqrt(discriminant);
+        forward = rate_ + half;
+        back = square_ / forward;
+        sine = std::exp(-back * time) * (half > 0 ? -std::expm1(-2 * half * time) / (2 * half) : time);
+        other = std::exp(-forward * time);
+    }
+    return {static_cast<Scalar>(other + forward * sine), static_cast<Scalar>(sine),
+            static_cast<Scalar>(-square_ * sine), static_cast<Scalar>(other - back * sine)};
+}
+
+}  // namespace membrane

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <string_view>
+#include <utility>
+
+#include <membrane/collision/tool.hpp>
+#include <membrane/core/check.hpp>
+#include <membrane/core/rigid_frame.hpp>
+
+/// Between a device that counts in millimetres and a scene in metres; between a tissue of millinewtons and a hand.
+///
+///     const membrane::DeviceScale scale{.force = 40, .motion = 0.1};     // the tool goes a tenth of what the hand does
+///     membrane::Tool<double> tool = scale.to_scene(membrane::Millimetres(position), membrane::MillimetresPerSecond(velocity));
+///     const auto felt = scale.to_device(membrane::Newtons(reaction));           // felt.on_hand, felt.by_tissue, felt.scale
+///     write(felt.on_hand.value());                                       // [N]
+namespace membrane {
+
+/// A number or vector together with its unit: units do not mix, nothing turns into a bare number unasked.
+template <class Unit, class Value>
+class In {
+  public:
+    explicit In(Value value) noexcept : value_(std::move(value)) {}
+
+    [[nodiscard]] const Value& value() const noexcept { return value_; }
+
+    [[nodiscard]] friend In operator+(const In& a, const In& b) noexcept { return In(a.value_ + b.value_); }
+    [[nodiscard]] friend In operator-(const In& a, const In& b) noexcept { return In(a.value_ - b.value_); }
+    [[nodiscard]] friend In operator*(double times, const In& a) noexcept { return In(times * a.value_); }
+    [[nodiscard]] friend bool operator==(const In& a, const In& b) noexcept { return a.value_ == b.value_; }
+
+  private:
+    Value value_;
+};
+
+namespace unit {
+struct Metre;
+struct Millimetre;
+struct MetrePerSecond;
+struct MillimetrePerSecond;
+struct Newton;
+struct NewtonPerMetre;
+struct NewtonPerMillimetre;
+}  // namespace unit
+
+using Metres = In<unit::Metre, Vector3<double>>;
+using Millimetres = In<unit::Millimetre, Vector3<double>>;
+using MetresPerSecond = In<unit::MetrePerSecond, Vector3<double>>;
+using MillimetresPerSecond = In<unit::MillimetrePerSecond, Vector3<double>>;
+using Newtons = In<unit::Newton, Vector3<double>>;
+using NewtonsPerMetre = In<unit::NewtonPerMetre, double>;
+using NewtonsPerMillimetre = In<unit::NewtonPerMillimetre, double>;
+
+// Each is right to the last bit: 1000 is a number of the machine, 0.001 is none.
+[[nodiscard]] inline Metres in_metres(const Millimetres& a) noexcept { return Metres(a.value() / 1000); }
+[[nodiscard]] inline Millimetres in_millimetres(const Metres& a) noexcept { return Millimetres(a.value() * 1000); }
+[[nodiscard]] inline MetresPerSecond in_metres(const MillimetresPerSecond& a) noexcept {
+    return MetresPerSecond(a.value() / 1000);
+}
+[[nodiscard]] inline MillimetresPerSecond in_millimetres(const MetresPerSecond& a) noexcept {
+    return MillimetresPerSecond(a.value() * 1000);
+}
+[[nodiscard]] inline NewtonsPerMetre in_metres(NewtonsPerMillimetre a) noexcept {
+    return NewtonsPerMetre(a.value() * 1000);
+}
+[[nodiscard]] inline NewtonsPerMillimetre in_millimetres(NewtonsPerMetre a) noexcept {
+    return NewtonsPerMillimetre(a.value() / 1000);
+}
+
+/// A force with the scale it was magnified by, so that nobody takes the one for the other.
+struct FeltForce {
+    Newtons on_hand;    ///< what to write, in the device's frame
+    Newtons by_tissue;  ///< what the tissue does to the tool, in the scene
+    double scale;       ///< the first is so many times the second
+};
+
+/// How hand and tool correspond. A lens capsule tears at 15 to 35 mN, of which a hand feels nothing: `force` is 30 to 100
+/// there.
+struct DeviceScale {
+    double force = 1;                ///< newtons of the hand for one of the tissue
+    double motion = 1;               ///< metres of the tool for one of the hand
+    RigidFrame<double> device = {};  ///< the device's frame in the scene, at rest there; origin in metres of the scene
+
+    /// @throws InvalidInput for a scale that is not finite and positive
+    void check() const;
+
+    [[nodiscard]] Metres to_scene(const Millimetres& position) const noexcept {
+        return Metres(device.point_out(motion * in_metres(position).value()));
+    }
+    [[nodiscard]] MetresPerSecond to_scene(const MillimetresPerSecond& velocity) const noexcept {
+        return MetresPerSecond(device.direction_out(motion * in_metres(velocity).value()));
+    }
+    /// The tool of the scene; radius, axis, time and grasping are the caller's.
+    [[nodiscard]] Tool<double> to_scene(const Millimetres& position,
+                                        const MillimetresPerSecond& velocity) const noexcept {
+        Tool<double> tool;
+        tool.position = to_scene(position).value();
+        tool.velocity = to_scene(velocity).value();
+        return tool;
+    }
+    [[nodiscard]] FeltForce to_device(const Newtons& by_tissue) const noexcept {
+        return {Newtons(device.direction_in(force * by_tissue.value())), by_tissue, force};
+    }
+
+    /// What the stiffness of a tissue becomes at the device, for `passivity`.
+    [[nodiscard]] NewtonsPerMetre at_device(NewtonsPerMetre tissue) const noexcept {
+        return NewtonsPerMetre(force * motion * tissue.value());
+    }
+};
+
+inline void DeviceScale::check() const {
+    const auto check_scale = [](double value, std::string_view field) {
+        if (!is_finite(value) || !(value > 0)) {
+            refuse("DeviceScale", field, " must be finite and positive, got ", value);
+        }
+    };
+    check_scale(force, "force");
+    check_scale(motion, "motion");
+    if (!is_finite(device.rotation) || !is_finite(device.origin)) refuse("DeviceScale", "device must be finite");
+}
+
+}  // namespace membrane

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <string_view>
+
+#include <membrane/haptics/device_profile.hpp>
+#include <membrane/haptics/force_policy.hpp>
+
+/// A spring between the hand and the tool that meets the membrane: what the hand feels is no stiffer than that, however
+/// stiff the tissue is.
+///
+///     auto coupling = membrane::VirtualCoupling<double>({.stiffness = 300, .scale = 40});
+///     const auto tool    = coupling.follow(device.read(), reaction, dt);     // what the membrane meets
+///     const auto contact = tracker.update(tree, x, tool);
+///     const auto report  = solver.step(x, dt, network, backing, press(tool, contact));
+///     reaction = report.total_reaction();                                    // for the next tick
+///     device.write(coupling.force());                                        // [N]
+namespace membrane {
+
+struct CouplingOptions {
+    double stiffness;    ///< between hand and tool [N/m]
+    double damping = 0;  ///< that holds the tool back where it is, see `least_damping` [N s/m]
+    double scale = 1;    ///< from the tissue to the hand
+
+    /// @throws InvalidInput for a number out of its range
+    void check() const;
+};
+
+/// The `damping` that a tissue asks for whose stiffness, after the scale, is `tissue` [N/m]: none if the coupling is
+/// stiffer. It is felt as a drag in free air, too.
+[[nodiscard]] inline double least_damping(double tissue, double coupling, double tick) noexcept {
+    return (std::max)(tissue - coupling, 0.0) * tick / 2;
+}
+
+/// A tool without mass between the coupling's spring and the membrane's reaction [Colgate95]. With `least_damping` it
+/// makes no energy of its own: passivity has to reckon with the coupling's stiffness only.
+template <Real Scalar>
+class VirtualCoupling {
+  public:
+    /// @throws InvalidInput for an option out of its range
+    explicit VirtualCoupling(const CouplingOptions& options)
+        : stiffness_((options.check(), static_cast<Scalar>(options.stiffness))),
+          damping_(static_cast<Scalar>(options.damping)),
+          scale_(static_cast<Scalar>(options.scale)) {}
+
+    /// The tool where spring, damping and the membrane's `reaction` on it, as of the last tick [N], balance. The hand's
+    /// tool where something is not finite.
+    Tool<Scalar> follow(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction, Scalar dt) noexcept;
+
+    /// On the hand [N].
+    [[nodiscard]] const Vector3<Scalar>& force() const noexcept { return force_; }
+    /// The same as a force policy, for what takes one.
+    [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& /*state*/) const noexcept { return force_; }
+
+    void restart() noexcept { began_ = false; }
+
+  private:
+    Scalar stiffness_, damping_, scale_;
+    bool began_ = false;
+    Vector3<Scalar> position_ = Vector3<Scalar>::Zero(), force_ = Vector3<Scalar>::Zero();
+};
+
+inline void CouplingOptions::check() const {
+    constexpr std::string_view component = "VirtualCoupling";
+    detail::check_option(component, stiffness, "stiffness", "N/m", false);
+    detail::check_option(component, damping, "damping", "N s/m");
+    detail::check_option(component, scale, "scale", "1");
+}
+
+template <Real Scalar>
+Tool<Scalar> VirtualCoupling<Scalar>::follow(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction,
+                                             Scalar dt) noexcept {
+    Tool<Scalar> tool = hand;
+    const bool sound = is_sound(hand) && is_finite(reaction) && is_finite(dt) && dt > 0;
+    if (!sound || !began_) {
+        began_ = sound;
+        position_ = hand.position;
+        force_.setZero();
+        return tool;
+    }
+    const Vector3<Scalar> push = stiffness_ * (hand.position - position_) + scale_ * reaction;
+    const Vector3<Scalar> way = push / (stiffness_ + damping_ / dt);
+    position_ += way;
+    tool.position = position_;
+    tool.velocity = way / dt;
+    force_ = stiffness_ * (position_ - hand.position);
+    if (is_finite(force_) && is_finite(tool.velocity)) return tool;
+    began_ = false;
+    force_.setZero();
+    return hand;
+}
+
+}  // namespace membrane

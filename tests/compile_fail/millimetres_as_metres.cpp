@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: MIT
+// A position of a device in millimetres where metres are meant.
+// expect: Millimetre
+// expect: no match for|invalid operands|no viable
+#include <membrane/haptics/units.hpp>
+
+membrane::Metres moved(const membrane::Metres& place, const membrane::Millimetres& way) {
+#ifdef CORRECT
+    return place + membrane::in_metres(way);
+#else
+    return place + way;
+#endif
+}

@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/haptics/force_limits.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/refusal.hpp"
+#include "support/traps.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+
+template <class S>
+double size_of(const Vector3<S>& force) {
+    return norm<double>(force.template cast<double>());
+}
+
+/// Nothing but the device's peak.
+constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .fresh_for = infinity, .heating = false};
+
+/// A limiter in its loop: a tick of 1 ms, a solve in each.
+template <class S>
+struct Loop {
+    ForceLimiter limit;
+    double now = 0;
+    std::uint64_t solves = 0;
+
+    Vector3<S> tick(const Vector3<S>& force, double dt = 1e-3) {
+        now += dt;
+        return limit(force, now, ++solves);
+    }
+};
+
+/// A hand that taps and strokes, a solver that takes its time, and whatever can go wrong.
+template <class S>
+class Mishaps {
+  public:
+    explicit Mishaps(std::uint64_t seed) : random_(seed) {}
+
+    void tick() {
+        if (left_ == 0) {
+            fault_ = fault_ == 0 && random_.chance(0.7) ? 1 + random_.index(7) : 0;
+            left_ = fault_ == 0 ? 1 + random_.index(900) : 1 + random_.index(fault_ == 4 ? 300 : 20);
+        }
+        --left_;
+        tip_ += 1e-3 * random_.number(1.0, 9.0);
+        dt = fault_ == 5 ? 0.05 : 1e-3 * random_.number(0.5, 1.5);
+        if (fault_ == 6) tip_ += random_.number(0.0, 100.0);  // teleported
+        if (fault_ == 7) dt = -dt;
+        now += dt;
+        if (fault_ != 4 && random_.chance(0.2)) state += 1;
+        force = size_ * Vector3<S>(static_cast<S>(std::sin(tip_)), static_cast<S>(std::cos(0.3 * tip_)), S(0.2));
+        const auto wild = [&] {
+            constexpr std::array<double, 4> numbers{nan_value, infinity, -infinity, nan_value};
+            return static_cast<S>(numbers[static_cast<std::size_t>(random_.index(4))]);
+        };
+        if (fault_ == 1) force[random_.index(3)] = wild();
+        if (fault_ == 2) force = static_cast<S>(1e6) * random_.unit_vector<S>();
+        if (fault_ == 3) force = std::numeric_limits<S>::max() * random_.unit_vector<S>();
+    }
+
+    [[nodiscard]] bool faulty() const { return fault_ != 0; }
+
+    double now = 0, dt = 0;
+    std::uint64_t state = 1;
+    Vector3<S> force = Vector3<S>::Zero();
+
+  private:
+    static constexpr S size_ = S(0.5);  // with all three numbers less than the Touch bears for ever
+    Random random_;
+    int fault_ = 0, left_ = 0;
+    double tip_ = 0;
+};
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew", "[limits]", double, float) {
+    using S = TestType;
+    const auto device = devices::touch;
+    const LimitOptions options;
+    const double slew = device.peak_force / options.rise_time;
+    ForceLimiter limit(device, options);
+    Mishaps<S> scene(7);
+    double before = 0, clean_since = 0, last_solve = 0, last = 0, warmth = 0;
+    std::uint64_t state = 0;
+    long whole = 0, frozen = 0;
+    const int ticks = cases(500'000);  // of each scalar
+    for (int i = 0; i < ticks; ++i) {
+        scene.tick();
+        const Vector3<S> felt = limit(scene.force, scene.now, scene.state);
+        const double size = size_of(felt);
+        if (scene.state != state || scene.dt < 0) last_solve = scene.now;
+        state = scene.state;
+        if (scene.faulty() || scene.now - last_solve > options.fresh_for) clean_since = scene.now;
+        warmth += scene.dt > 0 ? (before * before / (device.continuous_force * device.continuous_force) - warmth) *
+                                     (1 - std::exp(-scene.dt / device.thermal_time))
+                               : 0;
+
+        const double may_grow = slew * std::clamp(scene.now - last, 0.0, options.longest_tick);
+        last = scene.now;
+        const bool within = is_finite(felt) && size <= device.peak_force && size <= before + may_grow;
+        if (!within) {
+            CAPTURE(i, size, before);
+            REQUIRE(within);
+        }
+        if (scene.now - last_solve > 0.1) {
+            ++frozen;
+            if (size != 0) FAIL("frozen, and " << size << " N at tick " << i);
+        }
+        if (scene.now - clean_since > 0.2) {
+            ++whole;
+            if (felt != scene.force || limit.acted().any()) FAIL("not the policy's force at tick " << i);
+        }
+        before = size;
+    }
+    CHECK(frozen > ticks / 200);  // the cases that the test is about did occur
+    CHECK(whole > ticks / 20);
+    CHECK(warmth < 1);
+    CHECK(limit.warmth() < 1);
+}
+
+TEMPLATE_TEST_CASE("inside the limits a force passes with the same bits", "[limits]", double, float) {
+    using S = TestType;
+    const auto device = devices::phantom_desktop;
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Loop<S> loop{ForceLimiter(device)};
+        Vector3<S> force = Vector3<S>::Zero();
+        for (int i = 0; i < 110; ++i) (void)loop.tick(force);
+        for (int i = 0; i < 200; ++i) {
+            Vector3<S> next = force + random.vector<S>(S(-0.1), S(0.1));
+            if (random.chance(0.02)) next *= S(0.1);  // falls at once
+            if (random.chance(0.02)) next = -next;    // and turns
+            if (size_of(next) > 1.7) next *= S(0.5);
+            force = next;
+            REQUIRE(loop.tick(force) == force);
+            REQUIRE_FALSE(loop.limit.acted().any());
+        }
+    }
+    Loop<double> loop{ForceLimiter(device)};
+    for (int i = 0; i < 110; ++i) (void)loop.tick({0, 0, 0});
+    CHECK(std::signbit(loop.tick({-0.0, 0, 0}).x()));
+}
+
+TEST_CASE("a force is shortened along itself, never beyond the limit", "[limits]") {
+    const test::FloatingPointTraps traps;
+    for (int seed = 1; seed <= cases(20'000); ++seed) {
+        Random random(static_cast<std::uint64_t>(seed));
+        const double most = std::pow(10, random.number(-3.0, 2.0));
+        const Vector3<double> force = std::pow(10, random.number(-4.0, 300.0)) * random.unit_vector();
+        const Vector3<double> felt = detail::shortened(force, most);
+        const double size = force.stableNorm();
+        const bool good = size <= most ? felt == force
+                                       : norm(felt) <= most && norm(felt) >= most * (1 - 1e-14) &&
+                                             (felt / most - force / size).norm() < 1e-14;
+        if (!good) FAIL("seed " << seed);
+        const Vector3<float> single = random.number<float>(0, 100) * random.unit_vector<float>();
+        if (size_of(detail::shortened(single, most)) > most) FAIL("float, seed " << seed);
+    }
+    CHECK(detail::shortened<double>({3, 0, 4}, 0) == Vector3<double>(0, 0, 0));
+}
+
+TEST_CASE("a solver that stops is felt no longer than 91 ms", "[limits]") {
+    Loop<double> loop{ForceLimiter(devices::touch)};
+    const Vector3<double> force(0, 0, 0.5);
+    for (int i = 0; i < 150; ++i) (void)loop.tick(force);
+    double before = 0.5;
+    for (int i = 1; i <= 300; ++i) {
+        loop.now += 1e-3;
+        const double felt = loop.limit(force, loop.now, loop.solves).z();
+        CAPTURE(i, felt);
+        if (i <= 39) REQUIRE(felt == 0.5);
+        if (i > 41) REQUIRE((felt < before || felt == 0));
+        if (i >= 91) REQUIRE(felt == 0);
+        REQUIRE(loop.limit.acted().faded == (felt < 0.5));
+        before = felt;
+    }
+    int back = 0;
+    while (loop.tick(force) != force) ++back;
+    CHECK(back < 102);
+    CHECK(back > 95);
+}
+
+TEST_CASE("after a fault the force is zero at once, and comes back slowly", "[limits]") {
+    for (const Vector3<double>& bad : {Vector3<double>(nan_value, 0, 0), Vector3<double>(0, infinity, 0)}) {
+        Loop<double> loop{ForceLimiter(devices::touch)};
+        const Vector3<double> force(0.5, 0, 0);
+        for (int i = 0; i < 150; ++i) (void)loop.tick(force);
+        CHECK(loop.tick(bad) == Vector3<double>(0, 0, 0));
+        CHECK(loop.limit.acted().fault);
+        for (int i = 1; i <= 99; ++i) {
+            const auto felt = loop.tick(force);
+            REQUIRE(felt.x() == Approx(0.005 * i));
+            REQUIRE(loop.limit.share() == Approx(0.01 * i));
+        }
+        (void)loop.tick(force);
+        (void)loop.tick(force);
+        CHECK(loop.tick(force) == force);
+        CHECK(loop.limit(force, nan_value, 1) == Vector3<double>(0, 0, 0));  // a clock that is none
+        CHECK(loop.limit.acted().fault);
+    }
+}
+
+TEST_CASE("only growth is slowed, also in a gap", "[limits]") {
+    const LimitOptions options{.soft_start = 0};
+    Loop<double> loop{ForceLimiter(devices::touch, options)};
+    CHECK(loop.tick({3, 0, 0}) == Vector3<double>(0, 0, 0));  // no time has passed
+    for (int i = 1; i <= 18; ++i) {
+        REQUIRE(loop.tick({3, 0, 0}).x() == Approx(0.165 * i));
+        REQUIRE(loop.limit.acted().slew);
+    }
+    CHECK(loop.tick({3, 0, 0}).x() == 3);
+    CHECK(loop.tick({0.1, 0, 0}).x() == 0.1);
+    CHECK(loop.tick({0, -0.1, 0}).y() == -0.1);
+    CHECK(loop.tick({3, 0, 0}, 0.05).x() == Approx(0.1 + 2 * 0.165));  // 50 ms count for 2
+    CHECK(loop.tick({3, 0, 0}, 0).x() == Approx(0.1 + 2 * 0.165));     // a clock that stands still
+    CHECK(loop.tick({3, 0, 0}, -5).x() == Approx(0.1 + 2 * 0.165));    // or jumps back
+    CHECK(loop.tick({0, 0, 0}).x() == 0);
+}
+
+TEST_CASE("a clock that stands still does not blind the watchdog", "[limits]") {
+    ForceLimiter limit(devices::touch, {.rise_time = 0, .soft_start = 0});
+    int ticks = 0;
+    while (limit(Vector3<double>(0.5, 0, 0), 1.0, 1).x() > 0 && ticks < 1000) ++ticks;
+    CHECK(ticks > 20);
+    CHECK(ticks < 50);  // each counts as the longest tick
+}
+
+TEST_CASE("the watchdog fades from fresh to nothing, and forgives at once", "[limits]") {
+    Watchdog dog(0.04, 0.05);
+    CHECK(dog.update(1, 0.01) == 1);
+    CHECK(dog.update(1, 0.04) == 1);
+    CHECK(dog.update(1, 0.025) == Approx(0.5));
+    CHECK(dog.update(1, 0.025) == Approx(0).margin(1e-12));
+    CHECK(dog.update(1, 1) == 0);
+    CHECK(dog.update(2, 1) == 1);
+    Watchdog strict(0.04, 0);
+    (void)strict.update(1, 0);
+    CHECK(strict.update(1, 0.041) == 0);
+    Watchdog patient(infinity, 0.05);
+    CHECK(patient.update(0, 1e9) == 1);
+}
+
+TEST_CASE("a soft start rises evenly and falls at once", "[limits]") {
+    SoftStart start(0.1);
+    for (int i = 1; i <= 9; ++i) CHECK(start.update(1, 0.01) == Approx(0.1 * i));
+    CHECK(start.update(0.3, 0.01) == 0.3);
+    CHECK(start.update(1, 0.01) == Approx(0.4));
+    CHECK(start.update(1, 1) == 1);
+    CHECK(SoftStart(0).update(1, 0) == 1);
+}
+
+TEST_CASE("motors warm up as a first-order model does, and are not asked for more than they bear", "[limits]") {
+    const auto device = devices::touch;
+    MotorHeat heat(device);
+    CHECK(heat.most_force() == device.peak_force);
+    const double relative = 0.5;
+    for (int i = 1; i <= 30'000; ++i) {
+        heat.add(relative * device.continuous_force, 1e-3);
+        if (i % 5000 == 0) {
+            const double exact = relative * relative * (1 - std::exp(-1e-3 * i / device.thermal_time));
+            REQUIRE(heat.warmth() == Approx(exact).epsilon(1e-3));
+        }
+    }
+    for (const auto& strong : {devices::touch, devices::phantom_desktop, devices::premium_1_5, devices::premium_3_0}) {
+        Loop<double> loop{ForceLimiter(strong)};
+        double least = strong.peak_force, at_once = 0;
+        for (int i = 0; i < 60'000; ++i) {  // a minute of too much
+            const double felt = loop.tick({0, 100, 0}).y();
+            if (i > 110) {
+                REQUIRE(felt >= strong.continuous_force * (1 - 1e-12));
+                at_once = std::max(at_once, least - felt);
+                least = std::min(least, felt);
+            }
+            REQUIRE(loop.limit.warmth() <= 1);
+        }
+        CHECK(least == Approx(strong.continuous_force).epsilon(0.02));
+        CHECK(loop.limit.acted().heat);
+        CHECK(at_once < 0.03 * strong.peak_force);  // down in small steps
+    }
+}
+
+TEST_CASE("each limit can be taken off", "[limits]") {
+    Loop<double> loop{ForceLimiter(devices::touch, only_peak)};
+    CHECK(loop.tick({3.2, 0, 0}).x() == 3.2);
+    CHECK(loop.tick({0, -3.2, 0}).y() == -3.2);
+    CHECK_FALSE(loop.limit.acted().any());
+    CHECK(loop.tick({0, 0, 5}).z() == Approx(3.3));
+    CHECK(loop.limit.acted().peak);
+    for (int i = 0; i < 20'000; ++i) REQUIRE(loop.limit(Vector3<double>(0, 3.2, 0), 1e-3 * i, 1).y() == 3.2);
+    CHECK(loop.limit.warmth() > 1);  // it still counts
+}
+
+TEST_CASE("a limiter that restarts begins softly, with motors as warm as they are", "[limits]") {
+    Loop<double> loop{ForceLimiter(devices::touch)};
+    for (int i = 0; i < 300; ++i) (void)loop.tick({0.8, 0, 0});
+    const double warmth = loop.limit.warmth();
+    loop.limit.restart();
+    CHECK(loop.limit.warmth() == warmth);
+    CHECK(loop.tick({0.8, 0, 0}).x() == 0);
+    CHECK(loop.tick({0.8, 0, 0}).x() == Approx(0.008));
+    STATIC_REQUIRE(noexcept(loop.limit(std::declval<const Vector3<float>&>(), 0.0, 0)));
+}
+
+TEST_CASE("limits that make no sense are refused by name", "[limits][bad]") {
+    const auto refused = [](const LimitOptions& options) {
+        return test::refusal([&] { const ForceLimiter limit(devices::touch, options); });
+    };
+    CHECK(refused({}) == "");
+    CHECK(refused(only_peak) == "");
+    CHECK(refused({.rise_time = -1}) == "ForceLimiter: rise_time must be finite and not negative [s], got -1");
+    CHECK(refused({.soft_start = infinity}) == "ForceLimiter: soft_start must be finite and not negative [s], got inf");
+    CHECK(refused({.fade_time = -2}) == "ForceLimiter: fade_time must be finite and not negative [s], got -2");
+    CHECK(refused({.longest_tick = 0}) == "ForceLimiter: longest_tick must be finite and positive [s], got 0");
+    CHECK(refused({.fresh_for = 0}) == "ForceLimiter: fresh_for must be positive [s], got 0");
+    CHECK(refused({.fresh_for = -infinity}) == "ForceLimiter: fresh_for must be positive [s], got -inf");
+    CHECK(refused({.fresh_for = nan_value}) != "");
+    auto device = devices::touch;
+    device.peak_force = -1;
+    CHECK(test::refusal([&] { const ForceLimiter limit(device); }) ==
+          "DeviceProfile: peak_force must be finite and positive [N], got -1");
+}

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/haptics/handover.hpp>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <set>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <membrane/collision/tool.hpp>
+
+#include "support/bits.hpp"
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/refusal.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+/// Large enough for a copy to be caught in the middle: every word follows from the number.
+struct Wide {
+    std::array<std::uint64_t, 24> words{};
+
+    static Wide of(std::uint64_t number) {
+        Wide wide;
+        for (std::size_t i = 0; i < wide.words.size(); ++i) wide.words[i] = number * (2 * i + 1);
+        return wide;
+    }
+    bool operator==(const Wide&) const = default;
+};
+
+/// A writer's membrane: each tick moves some vertices, the same ones to the same places for everybody who counts along.
+template <Real S>
+struct Ticks {
+    explicit Ticks(Index vertices) : x(Points<S>::Zero(3, vertices)) {}
+
+    /// The next one.
+    void operator()() {
+        ++number;
+        moved.clear();
+        for (auto more = random.index(8); more > 0; --more) {
+            moved.push_back(random.index(static_cast<Index>(x.cols())));
+            x.col(moved.back()).setConstant(static_cast<S>(number));
+        }
+    }
+
+    Points<S> x;
+    std::vector<Index> moved;
+    std::uint64_t number = 0;
+    Random random{7};
+};
+
+/// `write(number)` for numbers up to `last` in one thread, `read(complete)` in another until it returns the last number;
+/// `complete` is that of a write that was over before.
+template <class Write, class Read>
+void at_once(std::uint64_t last, Write write, Read read) {
+    std::atomic<std::uint64_t> complete{0};
+    std::thread writer([&] {
+        for (std::uint64_t number = 1; number <= last; ++number) {
+            write(number);
+            complete.store(number, std::memory_order_release);
+            if (number % 1024 == 0) std::this_thread::yield();  // where there is one processor for both
+        }
+    });
+    while (read(complete.load(std::memory_order_acquire)) < last) {
+    }
+    writer.join();
+}
+
+}  // namespace
+
+TEST_CASE("the latest is read, whole, with its number and age", "[handover]") {
+    Latest<Tool<double>> pose(Tool<double>{.radius = 1e-3});
+    CHECK(pose.read().number == 0);
+    CHECK(pose.read().value.radius == 1e-3);
+    pose.publish({.position = {1, 2, 3}}, 5);
+    pose.publish({.position = {4, 5, 6}}, 7);
+    for (int again = 0; again < 2; ++again) {
+        const Snapshot<Tool<double>>& read = pose.read();
+        CHECK(read.number == 2);
+        CHECK(read.age(7.5) == 0.5);
+        CHECK(read.value.position == Vector3<double>(4, 5, 6));
+    }
+    STATIC_REQUIRE(noexcept(pose.read()));
+    STATIC_REQUIRE(noexcept(pose.publish(std::declval<const Tool<double>&>(), 0.0)));
+}
+
+TEST_CASE("nothing is torn, goes back or is older than the last complete publish", "[handover]") {
+    Latest<Wide> latest;
+    const auto last = static_cast<std::uint64_t>(cases(300'000, 10'000'000));
+    std::uint64_t torn = 0, backward = 0, stale = 0, before = 0, seen = 0;
+    at_once(
+        last, [&](std::uint64_t number) { latest.publish(Wide::of(number), static_cast<double>(number)); },
+        [&](std::uint64_t complete) {
+            const auto& read = latest.read();
+            if (read.value != Wide::of(read.number) || read.time != static_cast<double>(read.number)) ++torn;
+            if (read.number < before) ++backward;
+            if (read.number < complete) ++stale;
+            if (read.number > before) ++seen;
+            return before = read.number;
+        });
+    INFO("of " << last << " the reader saw " << seen);
+    CHECK(torn == 0);
+    CHECK(backward == 0);
+    CHECK(stale == 0);
+    CHECK(seen > 1);
+}
+
+TEMPLATE_TEST_CASE("all that has moved since the last read is read, and hardly more", "[handover]", double, float) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Ticks<S> ticks(1 + random.index(60));
+        MovedPoints<S> moved(static_cast<Index>(ticks.x.cols()));
+        Points<S> shown = ticks.x;
+        std::set<Index> since, and_before;  // what has moved since the last snapshot read, and since the one before
+        std::uint64_t last = 0;
+        const double busy = random.number(0.05, 0.95);
+        for (int i = 0; i < 300; ++i) {
+            if (random.chance(busy)) {
+                ticks();
+                moved.publish(ticks.moved, ticks.x, static_cast<double>(ticks.number) / 2);
+                since.insert(ticks.moved.begin(), ticks.moved.end());
+                and_before.insert(ticks.moved.begin(), ticks.moved.end());
+                continue;
+            }
+            const auto news = moved.read();
+            REQUIRE(news.number == ticks.number);
+            REQUIRE(news.age(static_cast<double>(ticks.number)) == static_cast<double>(ticks.number) / 2);
+            for (const Index v : news.moved) shown.col(v) = news.x.col(v);
+            REQUIRE(test::same_bits(shown, ticks.x));
+            const std::set<Index> told(news.moved.begin(), news.moved.end());
+            REQUIRE(told.size() == news.moved.size());
+            REQUIRE(std::includes(told.begin(), told.end(), since.begin(), since.end()));
+            REQUIRE(std::includes(and_before.begin(), and_before.end(), told.begin(), told.end()));
+            if (std::exchange(last, news.number) < news.number) and_before = std::exchange(since, {});
+            REQUIRE(moved.read().moved.empty());
+        }
+    }
+}
+
+TEST_CASE("what moved long before does not pile up, at whatever rate one looks", "[handover]") {
+    for (int every = 1; every <= 40; ++every) {
+        CAPTURE(every);
+        constexpr Index count = 10'000;
+        MovedPoints<double> moved(count);
+        const Points<double> x = Points<double>::Zero(3, count);
+        std::size_t most = 0;
+        for (Index tick = 0; tick < count; ++tick) {  // each vertex moves once
+            moved.publish(std::array{tick}, x, 0);
+            if (tick % every == 0) most = std::max(most, moved.read().moved.size());
+        }
+        CHECK(most == static_cast<std::size_t>(every == 1 ? 2 : every));
+    }
+}
+
+TEST_CASE("two threads share a membrane, and each snapshot is that of its tick", "[handover]") {
+    constexpr Index count = 64;
+    MovedPoints<double> moved(count);
+    Ticks<double> written(count), expected(count);
+    Points<double> shown = expected.x;
+    const auto last = static_cast<std::uint64_t>(cases(300'000, 10'000'000));
+    std::uint64_t torn = 0, backward = 0, stale = 0, seen = 0;
+    at_once(
+        last,
+        [&](std::uint64_t number) {
+            written();
+            moved.publish(written.moved, written.x, static_cast<double>(number));
+        },
+        [&](std::uint64_t complete) {
+            const auto news = moved.read();
+            if (news.number < expected.number) ++backward;
+            if (news.number < complete) ++stale;
+            if (news.number > expected.number) ++seen;
+            while (expected.number < news.number) expected();
+            for (const Index v : news.moved) shown.col(v) = news.x.col(v);
+            if (!test::same_bits(shown, expected.x) || news.time != static_cast<double>(news.number)) ++torn;
+            return news.number;
+        });
+    INFO("of " << last << " the reader saw " << seen);
+    CHECK(torn == 0);
+    CHECK(backward == 0);
+    CHECK(stale == 0);
+    CHECK(seen > 1);
+}
+
+TEST_CASE("a membrane of no vertices is not handed over", "[handover][bad]") {
+    const std::string text = "MovedPoints: there must be at least 1 vertex, got ";
+    CHECK(test::refusal([] { MovedPoints<double> none(0); }) == text + "0");
+    CHECK(test::refusal([] { MovedPoints<float> none(-3); }) == text + "-3");
+    STATIC_REQUIRE(noexcept(std::declval<MovedPoints<double>&>().read()));
+    STATIC_REQUIRE(noexcept(std::declval<MovedPoints<double>&>().publish(
+        std::declval<std::span<const Index>>(), std::declval<const ConstPointsRef<double>&>(), 0.0)));
+}
