@@ -3,6 +3,7 @@
 // Are two runs the same? Compares two recordings tick by tick and draws what the hand did and felt in both. With none
 // named, records a press itself, plays it again, and keeps both.
 #include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <filesystem>
 #include <string>
@@ -11,7 +12,6 @@
 #include <membrane/haptics/recording.hpp>
 #include <membrane/membrane.hpp>
 
-#include "support/plot.hpp"
 #include "support/recordings.hpp"
 #include "support/specimen.hpp"
 
@@ -40,38 +40,20 @@ Recording recorded(const examples::Specimen& body, Device device) {
     return recorder.recording();
 }
 
-// What the hand did and felt: way from the first tool [mm], force [N].
-std::vector<examples::Curve> curves(const Recording& run, examples::Curve way) {
-    auto force = way;
-    for (const auto& [tool, felt] : run.ticks) {
-        way.samples.push_back({tool.time, 1e3 * (tool.position - run.ticks[0].tool.position).norm()});
-        force.samples.push_back({tool.time, felt.norm()});
-    }
-    return {way, force};
-}
-
 void compare(const Recording& a, const Recording& b, const std::filesystem::path& out) {
+    examples::save(out / "compare_traces.svg", drawn(examples::plot_of(a, b)));
     const std::size_t ticks = std::min(a.ticks.size(), b.ticks.size());
     std::size_t same = 0, first_other = ticks;
-    examples::Curve apart{.name = "second less first", .colour = "#555"};
     double largest = 0;  // [N]
     for (std::size_t i = 0; i < ticks; ++i) {
         const bool identical = membrane::identical(a.ticks[i], b.ticks[i]);
         same += identical;
         if (!identical) first_other = std::min(first_other, i);
-        apart.samples.push_back({a.ticks[i].tool.time, (b.ticks[i].force - a.ticks[i].force).norm()});
-        largest = std::max(largest, apart.samples.back().value);
+        largest = std::max(largest, (b.ticks[i].force - a.ticks[i].force).norm());
     }
     std::printf("ticks: %zu and %zu, %zu the same to the bit\n", a.ticks.size(), b.ticks.size(), same);
     if (first_other < ticks) std::printf("the first that is not: %zu\n", first_other);
     std::printf("largest difference of forces: %g N\n", largest);
-    if (ticks < 2) return;
-    const auto first = curves(a, {.name = "first", .colour = "#12507b"});
-    const auto second = curves(b, {.name = "second", .colour = "#b3541e", .dashed = true});
-    const double begin = a.ticks.front().tool.time, end = std::max(a.ticks.back().tool.time, b.ticks.back().tool.time);
-    examples::Plot plot{.title = "Two traces", .phases = {{"", begin, end}}};
-    plot.panels = {{"way [mm]", {first[0], second[0]}}, {"force [N]", {first[1], second[1]}}, {"apart [N]", {apart}}};
-    examples::save(out / "compare_traces.svg", drawn(plot));
 }
 
 int main(int argc, char** argv) {

@@ -5,6 +5,8 @@
 #include <limits>
 #include <sstream>
 
+#include <membrane/haptics/contact_friction.hpp>
+#include <membrane/haptics/grasp_transition.hpp>
 #include <membrane/haptics/recording_file.hpp>
 #include <membrane/membrane.hpp>
 
@@ -22,6 +24,20 @@ using test::Random;
 static_assert(Device<ReplayDevice<double>, double> && Device<ReplayDevice<float>, float>);
 
 namespace {
+
+/// A device that now and then says what no device should.
+template <Real S>
+struct FaultyDevice : NullDevice<S> {
+    using NullDevice<S>::NullDevice;
+    [[nodiscard]] Tool<S> read() noexcept {
+        auto tool = NullDevice<S>::read();
+        if (++reads % 97 == 0) tool.position.y() = std::numeric_limits<S>::quiet_NaN();
+        if (reads % 89 == 0) tool.radius = S(-1);
+        if (reads % 83 == 0) tool.velocity.setConstant(std::numeric_limits<S>::infinity());
+        return tool;
+    }
+    int reads = 0;
+};
 
 /// A user's loop with forceps, whatever the device; small, so that many ticks take little time.
 template <Real S>
@@ -45,6 +61,7 @@ struct Loop {
         tracker.reset();
         grasper.reset();
         tree.refit(x);
+        feel = Loop{}.feel;
     }
 
     TriangleMesh<S> mesh = icosphere<S>({.radius = 0.01, .subdivisions = 1});
@@ -54,13 +71,14 @@ struct Loop {
     AabbTree<S> tree{mesh};
     ContactTracker<S> tracker{mesh};
     Grasper<S> grasper{mesh};
-    ReactionForce feel{.scale = 30};
+    using Friction = ContactFriction<ReactionForce, S>;
+    GraspTransition<Friction, S> feel{Friction({.scale = 30}, {.coefficient = 0.2, .stiffness = 200})};
     Points<S> x = mesh.positions();
 };
 
 template <Real S>
 Recording<S> recorded(Loop<S>& loop, std::uint64_t seed, int ticks) {
-    NullDevice<S> device(test::busy_script<S>(seed, 40), {.tick = 1e-3, .radius = 1e-3});
+    FaultyDevice<S> device(test::busy_script<S>(seed, 40), {.tick = 1e-3, .radius = 1e-3});
     Recorder<S> recorder(static_cast<std::size_t>(ticks), loop.mesh.vertex_count());
     for (int i = 0; i < ticks; ++i) {
         if (!device.running()) device.restart();

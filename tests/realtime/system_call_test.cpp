@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <csignal>
 #include <cstdlib>
+#include <vector>
 
 #include <sys/syscall.h>
 #include <unistd.h>
+
+#include <membrane/haptics/recording.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -51,6 +54,21 @@ void check_without_system_calls(int ticks) {
 
 TEST_CASE("a million ticks do not call the system", "[system_call]") {
     check_without_system_calls<test::WholeLoop<double>>(cases(1'000'000));
+}
+
+TEST_CASE("nor does a recorder, full or not, or a replay", "[system_call]") {
+    membrane::Recorder<double> recorder(100, 12);
+    membrane::ReplayDevice<double> replay({.ticks = std::vector<membrane::RecordedTick<double>>(100)});
+    const auto child = without_system_calls([&] {
+        for (int i = 0; i < 150; ++i) recorder.add({}, {1, 2, 3});
+        while (replay.running()) {
+            const auto tool = replay.read();
+            replay.write(tool.position);
+        }
+        if (recorder.missed() != 50 || replay.differing() != 0) std::abort();
+    });
+    CHECK(child.signal == 0);
+    CHECK(child.code == 0);
 }
 
 TEMPLATE_TEST_CASE("nor do the ticks of other loops", "[system_call]", (test::WholeLoop<float>),

@@ -20,8 +20,8 @@
 ///     while (again.running()) { ...; again.write(force); }                         // then again.differing() == 0
 ///
 /// A replay gives the same forces to the bit if it is the same binary, and begins as the recorded run began: same mesh,
-/// network and options, same positions, and parts that are new or `reset()`, the tree refitted. Steps that end at a
-/// deadline do not repeat themselves.
+/// network and options, same positions, parts and force policies that are new or `reset()`, the tree refitted. Steps that end
+/// at a deadline of a real clock do not repeat themselves.
 namespace membrane {
 
 /// One turn of the loop: what the device said, and what it was told.
@@ -45,7 +45,7 @@ struct Recording {
 template <Real Scalar>
 class Recorder {
   public:
-    /// Room for `most_ticks`, 112 bytes each in `double`, of which every page has been touched.
+    /// Room for `most_ticks`, 120 bytes each in `double`, of which every page has been touched.
     /// @throws InvalidInput for no room, or a negative number of vertices
     explicit Recorder(std::size_t most_ticks, Index vertex_count) : ticks_(most_ticks), vertex_count_(vertex_count) {
         if (most_ticks == 0) refuse("Recorder", "most_ticks must be positive, got 0");
