@@ -41,7 +41,8 @@ Recording recorded(const examples::Specimen& body, Device device) {
 }
 
 void compare(const Recording& a, const Recording& b, const std::filesystem::path& out) {
-    examples::save(out / "compare_traces.svg", drawn(examples::plot_of(a, b)));
+    const auto picture = out / "compare_traces.svg";
+    examples::save(picture, drawn(examples::plot_of(a, b)));
     const std::size_t ticks = std::min(a.ticks.size(), b.ticks.size());
     std::size_t same = 0, first_other = ticks;
     double largest = 0;  // [N]
@@ -54,6 +55,7 @@ void compare(const Recording& a, const Recording& b, const std::filesystem::path
     std::printf("ticks: %zu and %zu, %zu the same to the bit\n", a.ticks.size(), b.ticks.size(), same);
     if (first_other < ticks) std::printf("the first that is not: %zu\n", first_other);
     std::printf("largest difference of forces: %g N\n", largest);
+    std::printf("picture: %s\n", picture.string().c_str());
 }
 
 int main(int argc, char** argv) {
