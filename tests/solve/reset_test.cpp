@@ -33,15 +33,19 @@ struct LastFirst {
     }
 };
 
-/// A part of a sphere in a user's loop.
+template <Real S>
+struct Sphere {
+    TriangleMesh<S> mesh = icosphere<S>({.radius = 1, .subdivisions = 2});
+    MassSpringNetwork<S, LinearSpring> network{mesh, {}, {.stiffness = S(40), .mass = S(1e-3), .pinned = {7, 8}}};
+    VirtualVolumeSprings<S> backing{mesh, {.stiffness = S(8), .damping = S(0.02)}};
+};
+
+/// A sphere in a user's loop.
 template <Real S, class Rule, class Threads>
 struct Loop {
-    static inline const TriangleMesh<S> mesh = icosphere<S>({.radius = 1, .subdivisions = 2});
-    static inline const MassSpringNetwork<S, LinearSpring> network{
-        mesh, {}, {.stiffness = S(40), .mass = S(1e-3), .pinned = {7, 8}}};
-    static inline const VirtualVolumeSprings<S> backing{mesh, {.stiffness = S(8), .damping = S(0.02)}};
+    static inline const Sphere<S> sphere;
 
-    explicit Loop(const SolverOptions<S>& options) : solver(network, options) {}
+    explicit Loop(const SolverOptions<S>& options) : solver(sphere.network, options) {}
 
     /// One tick of what `random` thinks of, and what came of it.
     struct Outcome {
@@ -62,7 +66,7 @@ struct Loop {
         const std::vector<Index> woken{random.index(162), random.index(162)};
         const auto weight = random.vector<S>(S(-0.1), S(0.1));
         const Index held = random.chance(0.5) ? 20 : 21;
-        const Vector3<S> target = random.number<S>(S(0.95), S(1.05)) * point(mesh.positions(), held);
+        const Vector3<S> target = random.number<S>(S(0.95), S(1.05)) * point(sphere.mesh.positions(), held);
         const int most_reads = random.index(12);
         const bool hurries = random.chance(0.3);
 
@@ -78,14 +82,16 @@ struct Loop {
         const Deadline deadline([&reads] { return ++reads; }, most_reads);
         now.report =
             hurries
-                ? step([&](const auto&... all) { return solver.step_until(deadline, x, dt, network, backing, all...); })
-                : step([&](const auto&... all) { return solver.step(x, dt, network, backing, all...); });
+                ? step([&](const auto&... all) {
+                      return solver.step_until(deadline, x, dt, sphere.network, sphere.backing, all...);
+                  })
+                : step([&](const auto&... all) { return solver.step(x, dt, sphere.network, sphere.backing, all...); });
         tree.refit(x, now.report.moved);
         return now;
     }
 
     void reset() {
-        x = mesh.positions();
+        x = sphere.mesh.positions();
         solver.reset();
         tracker.reset();
         grasper.reset();
@@ -96,10 +102,10 @@ struct Loop {
     }
 
     QuasiStaticSolver<S, Rule, Threads> solver;
-    AabbTree<S> tree{mesh};
-    ContactTracker<S> tracker{mesh, {.check_every = 3}};
-    Grasper<S> grasper{mesh};
-    Points<S> x = mesh.positions();
+    AabbTree<S> tree{sphere.mesh};
+    ContactTracker<S> tracker{sphere.mesh, {.check_every = 3}};
+    Grasper<S> grasper{sphere.mesh};
+    Points<S> x = sphere.mesh.positions();
     std::vector<Index> pins{30, 31};
     Vector3<double> place{0, 0, 1};
     double height = 1.2;
