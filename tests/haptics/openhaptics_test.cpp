@@ -688,3 +688,18 @@ TEST_CASE("a thread of a thousand ticks a second is the only one to call the dev
     }
     check_closed(hd);
 }
+
+TEST_CASE("a stop in the middle of a tick takes the force of that tick", "[openhaptics]") {
+    HdDouble hd({.real_clock = true});
+    OpenHaptics device({.limits = only_peak});
+    std::atomic<bool> inside{false};
+    device.start([&](const Tool<double>&) {
+        inside = true;
+        std::this_thread::sleep_for(std::chrono::milliseconds(20));
+        return Answer{pushed, 0};
+    });
+    while (!inside) std::this_thread::yield();
+    device.stop();
+    check_closed(hd);
+    CHECK(device.report().most_force == 0);
+}
