@@ -273,9 +273,9 @@ typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::answer(const Tool& 
     const bool held = std::exchange(held_, false);
     if (held) force.setConstant(none);
     if (!held) warning_ = nullptr;
-    const Force felt = limiter_(force, now, solves_);
+    force = limiter_(force, now, solves_);
     report_.count(limiter_.acted(), held);
-    return felt;
+    return force;
 }
 
 template <class Hd>

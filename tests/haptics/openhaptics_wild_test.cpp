@@ -18,7 +18,6 @@
 using namespace membrane;
 using namespace test;
 using examples::Answer;
-using Force = Vector3<double>;
 
 namespace {
 

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -29,6 +31,25 @@ struct DoubleHd : examples::VendorHd {
     }
 };
 using OpenHaptics = examples::OpenHapticsDevice<DoubleHd>;
+using Force = membrane::Vector3<double>;
+
+/// The same force always, of a solver that never stops; whole after so many ticks.
+inline const Force pushed(0.25, -0.5, 0.125);
+inline constexpr int settled = 103;
+struct Push {
+    examples::Answer operator()(const membrane::Tool<double>&) { return {pushed, ++solves}; }
+    std::uint64_t solves = 0;
+};
+
+/// What `start` throws.
+inline std::string start_refused(OpenHaptics& device) {
+    try {
+        device.start(Push{});
+    } catch (const std::runtime_error& error) {
+        return error.what();
+    }
+    return "";
+}
 
 using Names = std::vector<std::string_view>;
 
