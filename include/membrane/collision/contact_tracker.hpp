@@ -55,7 +55,7 @@ class ContactTracker {
     /// How often the tree has been asked for what the tool touches during contact, since the beginning.
     [[nodiscard]] Index tree_checks() const noexcept { return tree_checks_; }
 
-    /// Forgets contact and tool: from here on the same to the bit as a new one.
+    /// Forgets contact and tool: from here on it does what a new one does, to the bit.
     void reset() noexcept;
 
   private:

@@ -74,8 +74,8 @@ class QuasiStaticSolver {
     void wake(std::span<const Index> vertices) noexcept;
     void wake_all() noexcept;
 
-    /// Forgets everything that was remembered: a membrane that is not at rest stays as it is until woken. From here on the
-    /// same to the bit as a new one, but for what it knows of the time that steps take. O(V).
+    /// Forgets everything that was remembered: a membrane that is not at rest stays as it is until woken. From here on
+    /// what a new solver does is done, to the bit. Cost: O(V).
     void reset() noexcept;
 
     /// The propagation queue of the last step.
@@ -260,6 +260,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
     predictor_.forget();
     last_held_.clear();
     resume_ = 0;
+    costs_ = {};
 }
 
 }  // namespace membrane
