@@ -2,6 +2,7 @@
 //
 // Press a membrane with a Touch or another device of the OpenHaptics family, and feel it. Needs the vendor's SDK.
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <stdexcept>
 #include <string>
@@ -23,30 +24,36 @@ void press(const examples::Specimen& body, const std::string& name, double secon
     auto tracker = membrane::ContactTracker(mesh);
     const membrane::ReactionForce feel{.scale = 20};
     auto x = mesh.positions();
+    std::uint64_t solves = 0;
 
-    // The middle of the device's workspace is just above the membrane, and its "up" is outward there.
-    membrane::RigidFrame<double> scene;
-    scene.rotation = Eigen::Quaterniond::FromTwoVectors(body.outward, Eigen::Vector3d::UnitY()).toRotationMatrix();
-    scene.origin = -scene.direction_out(body.above(0.4));
+    // 5 cm of the hand are the membrane's size. The middle of the device's workspace is just above it, "up" is outward.
+    membrane::DeviceScale scale{.motion = body.size / 0.05};
+    scale.device.rotation =
+        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), body.outward).toRotationMatrix();
+    scale.device.origin = body.above(0.4);
 
     examples::OpenHapticsDevice<examples::VendorHd> device(
-        {.name = name, .scale = body.size / 0.05, .radius = body.tool_radius()});  // 5 cm of the hand are its size
-    device.start([&](const membrane::Tool<double>& hand) {
-        const auto tool = carried_in(hand, scene);
+        {.name = name, .scale = scale, .radius = body.tool_radius()});
+    device.start([&](const membrane::Tool<double>& tool) {
         const auto contact = tracker.update(tree, x, tool);
         const auto report = solver.step(x, 1e-3, network, backing, press(tool, contact));
         tree.refit(x, report.moved);
-        return scene.direction_out(feel({tool, contact, report}));
+        if (report.status == membrane::StepStatus::advanced) ++solves;
+        return examples::Answer{feel({tool, contact, report}), solves};
     });
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-    while (device.running() && std::chrono::steady_clock::now() < end) {
+    while (device.running() && std::chrono::steady_clock::now() < end) {  // here one would draw
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     device.stop();
-    if (!device.trouble().empty()) throw std::runtime_error(device.trouble());
     const auto& report = device.report();
-    std::printf("%ld ticks, %ld late; the longest took %.2f ms; %ld forces cut to what the device bears\n",
-                report.ticks, report.late, 1e3 * report.longest_tick, report.limited);
+    std::printf("%ld ticks, %ld late, the longest of %.2f ms; at most %.3f N\n", report.ticks, report.late,
+                1e3 * report.longest_tick, report.most_force);
+    std::printf("no force: %ld for errors (%s), %ld for what is not finite\n", report.errors, report.last_error,
+                report.refused);
+    std::printf("less force: %ld fading, %ld above the peak, %ld for heat, %ld too fast\n", report.faded, report.peak,
+                report.heat, report.slew);
+    if (!device.trouble().empty()) throw std::runtime_error(device.trouble());
 }
 
 int main(int argc, char** argv) {

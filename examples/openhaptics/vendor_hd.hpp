@@ -5,9 +5,11 @@
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <limits>
 #include <thread>
 
 #include <HD/hd.h>
+#include <membrane/haptics/units.hpp>
 
 /// The few functions of the vendor's HD interface that the adapter calls, each by what it is for.
 namespace examples {
@@ -21,6 +23,11 @@ struct VendorHd {
     /// The last error, taken off the stack; 0 if there is none.
     static unsigned take_error() noexcept { return static_cast<unsigned>(hdGetError().errorCode); }
     static const char* text_of(unsigned error) noexcept { return hdGetErrorString(static_cast<HDerror>(error)); }
+    /// Whether the device gets over it by itself: what the vendor calls force errors.
+    static bool passes(unsigned error) noexcept {
+        return error == HD_WARM_MOTORS || error == HD_EXCEEDED_MAX_FORCE || error == HD_EXCEEDED_MAX_FORCE_IMPULSE ||
+               error == HD_EXCEEDED_MAX_VELOCITY || error == HD_FORCE_ERROR;
+    }
 
     /// No name: the default device.
     static Device open(const char* name) noexcept { return hdInitDevice(name); }
@@ -29,8 +36,8 @@ struct VendorHd {
     static bool calibrated() noexcept { return hdCheckCalibration() == HD_CALIBRATION_OK; }
     static void enable_force() noexcept { hdEnable(HD_FORCE_OUTPUT); }
 
-    /// Peak [N].
-    static double most_force() noexcept { return number(HD_NOMINAL_MAX_FORCE); }
+    static double peak_force() noexcept { return numbers<1>(HD_NOMINAL_MAX_FORCE)[0]; }                   // [N]
+    static double continuous_force() noexcept { return numbers<1>(HD_NOMINAL_MAX_CONTINUOUS_FORCE)[0]; }  // [N]
 
     /// Calls `adapter->servo()` in every tick until that is false.
     template <class Adapter>
@@ -43,23 +50,30 @@ struct VendorHd {
 
     static void begin_frame(Device device) noexcept { hdBeginFrame(device); }
     static void end_frame(Device device) noexcept { hdEndFrame(device); }
-    static std::array<double, 3> position() noexcept { return numbers<3>(HD_CURRENT_POSITION); }  // [mm]
-    static std::array<double, 3> velocity() noexcept { return numbers<3>(HD_CURRENT_VELOCITY); }  // [mm/s]
-    static std::array<double, 16> transform() noexcept {
-        return numbers<16>(HD_CURRENT_TRANSFORM);
-    }  // by columns, [mm]
-    static bool button() noexcept {
-        HDint buttons = 0;
+
+    // Not numbers where the device does not answer.
+    static membrane::Millimetres position() noexcept { return membrane::Millimetres(vector(HD_CURRENT_POSITION)); }
+    static membrane::MillimetresPerSecond velocity() noexcept {
+        return membrane::MillimetresPerSecond(vector(HD_CURRENT_VELOCITY));
+    }
+    /// Along the stylus, from the tip to the hand, of length 1.
+    static membrane::Vector3<double> stylus() noexcept {
+        const auto columns = numbers<16>(HD_CURRENT_TRANSFORM);
+        return {columns[8], columns[9], columns[10]};
+    }
+    /// `before` where the device does not answer.
+    static bool button(bool before) noexcept {
+        HDint buttons = before ? HD_DEVICE_BUTTON_1 : 0;
         hdGetIntegerv(HD_CURRENT_BUTTONS, &buttons);
         return (buttons & HD_DEVICE_BUTTON_1) != 0;
     }
     /// Of the hottest motor: 0 is cold, 1 too hot.
     static double temperature() noexcept {
-        const auto motors = numbers<6>(HD_MOTOR_TEMPERATURE);  // devices have three or six
+        const auto motors = numbers<6>(HD_MOTOR_TEMPERATURE, 0);  // devices have three or six
         return *std::max_element(motors.begin(), motors.end());
     }
-    static void set_force(const std::array<double, 3>& newtons) noexcept {
-        hdSetDoublev(HD_CURRENT_FORCE, newtons.data());
+    static void set_force(const membrane::Newtons& force) noexcept {
+        hdSetDoublev(HD_CURRENT_FORCE, force.value().data());
     }
 
     static double seconds() noexcept {
@@ -70,12 +84,17 @@ struct VendorHd {
 
   private:
     template <std::size_t n>
-    static std::array<double, n> numbers(HDenum what) noexcept {
+    static std::array<double, n> numbers(HDenum what,
+                                         double unread = std::numeric_limits<double>::quiet_NaN()) noexcept {
         std::array<double, n> result{};
+        result.fill(unread);
         hdGetDoublev(what, result.data());
         return result;
     }
-    static double number(HDenum what) noexcept { return numbers<1>(what)[0]; }
+    static membrane::Vector3<double> vector(HDenum what) noexcept {
+        const auto xyz = numbers<3>(what);
+        return {xyz[0], xyz[1], xyz[2]};
+    }
 
     template <class Adapter>
     static HDCallbackCode HDCALLBACK call(void* adapter) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/mesh/distmesh.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -72,7 +73,9 @@ void check_body(const Body& body, double length, const Bars& bars, double size =
                 const std::optional<Bounds>& bounds = {}) {
     const auto mesh = distmesh(body, {.edge_length = length, .bounds = bounds});
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
-        REQUIRE(std::abs(body(point(mesh.positions(), v))) <= 1e-9 * size);
+        const Point p = point(mesh.positions(), v);
+        const double steepness = (std::max)(norm(gradient_at(body, p, 1e-6 * size)), 1.0);  // of a level set
+        REQUIRE(std::abs(body(p)) <= 1e-9 * size * steepness);
     }
     check_soundness(mesh, bars.euler, true);
     if (!bars.has_edges) check_facing(mesh, body, 1e-6 * size);
@@ -128,6 +131,18 @@ TEST_CASE("bodies with edges lose them, and some evenness there", "[distmesh][cg
     check_body(Cuboid{}, 0.15, {.smallest_angle = 28, .mean_smallest_angle = 48, .has_edges = true});
     check_body(intersection(Ball{}, HalfSpace{.point = {0, 0, 0.3}}), 0.2,
                {.smallest_angle = 28, .mean_smallest_angle = 48, .has_edges = true});
+}
+
+TEST_CASE("thin plates, and bodies that touch, get no more vertices than their edges ask for", "[distmesh][cgal]") {
+    check_body(Cuboid{.half_size = {0.5, 0.5, 0.1}}, 0.1,
+               {.smallest_angle = 25, .mean_smallest_angle = 48, .has_edges = true});
+    const auto check_count = [](const auto& body, double length, double area) {
+        const auto mesh = distmesh(body, {.edge_length = length});
+        CHECK(mesh.vertex_count() < 1.3 * area / (std::sqrt(0.75) * length * length));
+        CHECK(mesh.vertex_count() > 0.7 * area / (std::sqrt(0.75) * length * length));
+    };
+    check_count(united(Ball{}, Ball{.centre = {2, 0, 0}}), 0.2, 8 * std::numbers::pi);
+    check_count(difference(Ball{}, Ball{.centre = {0.5, 0, 0}, .radius = 0.5}), 0.1, 5 * std::numbers::pi);
 }
 
 TEST_CASE("surfaces with a border keep the sphere's bars", "[distmesh][cgal]") {
@@ -197,6 +212,11 @@ TEST_CASE("options that make no surface are refused by name", "[distmesh][bad]")
     const Bounds flat{{-1, -1, 2}, {1, 1, 2}};
     CHECK(refusal([&] { (void)distmesh(Ball{}, {.edge_length = 0.1, .bounds = flat}); }) ==
           "distmesh: bounds along z must be finite, low below high [m], got 2 to 2");
+    CHECK(refusal([&] {
+              (void)distmesh(Ball{.centre = {0, 0, -1e8}}, {.edge_length = 0.1});
+          }) ==
+          "distmesh: bounds must be within 1e7 times their size of 0, here 20000000 [m], or numbers are too coarse for "
+          "the surface, got 100000001");
     CHECK(refusal([&] { (void)distmesh(Ball{}, {.edge_length = 0.1, .iterations = -1}); }) ==
           "distmesh: iterations must be at least 0, got -1");
     CHECK_THAT(refusal([&] { (void)distmesh(Ball{}, {}); }), ContainsSubstring("EdgeLength: the length at ("));

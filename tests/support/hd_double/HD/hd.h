@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT
-   What our adapter needs of the HD interface, declared for the test double (support/hd_double.hpp), under the interface's
+   What our adapter needs of the HD interface, declared for the test double (support/hd_double.cpp), under the interface's
    own names and numbers. It is in the place of the vendor's header, which is not ours to give away. */
 #pragma once
 
@@ -36,12 +36,14 @@ typedef struct {
 #define HD_DEVICE_FAULT 0x0300
 #define HD_COMM_ERROR 0x0302
 #define HD_TIMER_ERROR 0x0304
+#define HD_FRAME_ERROR 0x0402
 
 #define HD_CURRENT_BUTTONS 0x2000
 #define HD_CURRENT_POSITION 0x2050
 #define HD_CURRENT_VELOCITY 0x2051
 #define HD_CURRENT_TRANSFORM 0x2052
 #define HD_NOMINAL_MAX_FORCE 0x2603
+#define HD_NOMINAL_MAX_CONTINUOUS_FORCE 0x2604
 #define HD_MOTOR_TEMPERATURE 0x2605
 #define HD_CURRENT_FORCE 0x2700
 #define HD_FORCE_OUTPUT 0x4000
