@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 #include <system_error>
+#include <utility>
 
 namespace examples {
 namespace {
@@ -102,10 +103,35 @@ std::string plain_text(const std::string& file, std::string_view bytes) {
     return text;
 }
 
+namespace {
+
+/// Lines that end in a backslash go on in the next one, but for comments; its end is put after them, so that all other
+/// lines keep their numbers.
+std::string joined(std::string_view text) {
+    std::string result;
+    std::size_t ends = 1;
+    bool comment = false;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        comment = text[i] == '#' || (comment && text[i] != '\n');
+        if (!comment && text.substr(i, 2) == "\\\n") {
+            result += ' ';
+            ++ends;
+            ++i;
+        } else if (text[i] == '\n') {
+            result.append(std::exchange(ends, 1), '\n');
+        } else {
+            result += text[i];
+        }
+    }
+    return result;
+}
+
+}  // namespace
+
 /// Vertices and faces, each in the line where it was found, so that tinyobjloader's messages name that.
 std::string checked_obj(const std::string& file, std::string_view bytes) {
-    std::string text = plain_text(file, bytes), result;
-    for (std::size_t at = 0; (at = text.find("\\\n", at)) != text.npos;) text.replace(at, 2, "  ");  // goes on
+    const std::string text = joined(plain_text(file, bytes));
+    std::string result;
     Lines lines(file, text);
     std::size_t written = 1;
     std::int64_t vertices = 0;

@@ -70,13 +70,30 @@ struct Axes {
     [[nodiscard]] double bottom() const { return top + height; }
 };
 
+/// Where the samples are: of those that share a column of pixels, the first, the lowest, the highest and the last.
+inline std::vector<Pixel> pixels(const Axes& axes, const std::vector<Sample>& samples) {
+    const auto column = [&](const Sample& sample) { return std::floor(axes.at(sample).x); };
+    std::vector<Pixel> result;
+    for (auto next = samples.begin(); next != samples.end();) {
+        const auto first = next;
+        next = std::find_if(first, samples.end(), [&](const Sample& s) { return column(s) != column(*first); });
+        const auto [low, high] = std::minmax_element(
+            first, next, [](const Sample& one, const Sample& other) { return one.value < other.value; });
+        for (auto sample = first; sample != next; ++sample) {
+            if (sample == first || sample == low || sample == high || sample == next - 1) {
+                result.push_back(axes.at(*sample));
+            }
+        }
+    }
+    return result;
+}
+
 /// The curve as a path, without samples that would not show.
 inline std::string path(const Axes& axes, const Curve& curve) {
     constexpr double least = 0.6;  // [px]
     std::string d;
     Pixel last;
-    for (const Sample& sample : curve.samples) {
-        const Pixel p = axes.at(sample);
+    for (const Pixel& p : pixels(axes, curve.samples)) {
         if (!d.empty() && std::hypot(p.x - last.x, p.y - last.y) < least) continue;
         d += (d.empty() ? 'M' : 'L') + number(p.x) + ' ' + number(p.y);
         last = p;

@@ -353,6 +353,9 @@ TEST_CASE("A fit refuses what it cannot work with") {
     CHECK(by({1, 2}) == "fit: the model must give one force for each depth, 3, got 2");
     CHECK(by({1, 2, nan}) == "fit: the model must give sound forces at the start, got one that is not");
     CHECK(by({1, 2, 0}) == "fit: the model must give sound forces at the start, got one that is not");
+    const ForceTable overflowing{.depth = {1, 2, 3}, .force = {1, 2, 3}, .deviation = {1e-160, 1e-160, 1e-160}};
+    CHECK(refusal([&] { static_cast<void>(fit(overflowing, {2}, proportional)); }) ==
+          "fit: the model must give sound forces at the start, got one that is not");
 
     const auto asking = [&](const FitOptions& options) {
         return refusal([&] { static_cast<void>(fit(sound, {1}, proportional, options)); });

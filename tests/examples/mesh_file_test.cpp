@@ -262,6 +262,9 @@ TEST_CASE("OBJ has corners of many kinds") {
     CHECK(is_solid("a.obj", vt + with(text, "f 1 3 2", "f 1/1 3/1 2/1")));
     CHECK(is_solid("a.obj", with(text, "f 1 3 2", "f -4 -2 -3")));
     CHECK(is_solid("a.obj", with(text, "f 1 3 2", "f 1 3 \\\n2")));
+    CHECK(is_solid("a.obj", with(text, "f 1 3 2", "# by C:\\lens\\\nf 1 3 2")));  // a comment ends with its line
+    CHECK_THAT(verdict("a.obj", with(text, "v 0 0 0", "v 0 \\\n0 \\\n0") + "wrong\n"),
+               ContainsSubstring("line 11: expected a statement"));
     CHECK(is_solid("a.obj", with(text, "f 1 3 2", "o body\ng one two\ns off\nusemtl skin\nf 1 3 2\ng three")));
     CHECK(is_solid("a.obj", with(text, "v 0 0 1", "v 0 0 1 1")));
     CHECK(is_solid("a.obj", with(text, "v 0 0 1", "v 0 0 1 0.5 0.5 0.5")));

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <vector>
 
 #include <membrane/haptics/passivity.hpp>
 
@@ -45,6 +47,28 @@ TEMPLATE_TEST_CASE("at rest two springs in a row are felt", "[coupling]", double
                 Approx(static_cast<double>(S(0.01) * firm * between / (firm + between))).epsilon(1e-3));
         REQUIRE(static_cast<double>(scale * reaction.z()) == Approx(static_cast<double>(felt)).epsilon(1e-3));
     }
+}
+
+TEST_CASE("a coupling that restarts is as a new one", "[coupling]") {
+    const CouplingOptions options{.stiffness = 300, .damping = 0.02, .scale = 30};
+    VirtualCoupling<double> used(options), other(options);
+    const auto follows = [&](VirtualCoupling<double>& coupling, std::uint64_t seed) {
+        Random way(seed);
+        std::vector<double> numbers{coupling.force().x(), coupling.force().y(), coupling.force().z()};
+        for (int i = 0; i < 20; ++i) {
+            Tool<double> hand;
+            hand.position = 0.01 * way.vector();
+            const auto tool = coupling.follow(hand, way.vector(), 1e-3);
+            for (const auto& v : {tool.position, tool.velocity, coupling.force()}) {
+                numbers.insert(numbers.end(), {v.x(), v.y(), v.z()});
+            }
+        }
+        return numbers;
+    };
+    static_cast<void>(follows(used, 1));
+    REQUIRE(norm(used.force()) > 0);
+    used.restart();
+    CHECK(follows(used, 2) == follows(other, 2));
 }
 
 TEST_CASE("in free air without damping the tool is where the hand is", "[coupling]") {

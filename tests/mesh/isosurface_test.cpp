@@ -133,8 +133,15 @@ TEST_CASE("surfaces that a grid cannot find are refused", "[isosurface][bad]") {
     CHECK_THAT(refusal([&] { (void)raw(trimmed(HalfSpace{}, Ball{.radius = 9}), bounds, 0.5); }),
                ContainsSubstring("isosurface: the surface must be within the bounds"));
     CHECK(refusal([&] { (void)raw(Ball{}, bounds, 1e-3); }) ==
-          "isosurface: a grid of cells of 0.001 [m] over the bounds has more than 1.3e8 points; use longer edges or "
-          "narrower bounds");
+          "isosurface: a grid of cells of 0.001 [m] over the bounds has more than 1.3e8 points, or 2e6 in a plane; use "
+          "longer edges, a wider spacing or narrower bounds");
+    const Cuboid plate{.half_size = {1, 5e-3, 1}};  // 2400 x 12 x 2400 cells, 5e7 vertices
+    CHECK_THAT(refusal([&] { (void)raw(plate, plate.bounds(), 1e-2 / 12); }),
+               ContainsSubstring("isosurface: a grid of cells of 0.000833333333 [m] over the bounds has more than"));
+    const auto inside_out = [](const Point& p) { return 1 - norm(p); };
+    CHECK(refusal([&] { (void)raw(inside_out, bounds, 0.5); }) ==
+          "isosurface: the distance must be positive out of the bounds, got one that is negative: it must be negative "
+          "inside the body, positive outside");
     for (const double wrong : {std::nan(""), std::numeric_limits<double>::infinity()}) {
         const auto body = [&](const Point& p) { return p.x() > 1 ? wrong : norm(p) - 1; };
         CHECK_THAT(refusal([&] { (void)raw(body, bounds, 0.5); }),

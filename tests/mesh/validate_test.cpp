@@ -555,4 +555,7 @@ TEST_CASE("the time of validation is bounded", "[mesh]") {
               CHECK(!report.complete);
           }) < 10);
     CHECK(validate(heap.x, heap.triangles, {.tolerance = 0.0, .most_of_a_kind = 3}).findings.size() <= 6);
+    const MeshReport one_of_a_kind = validate(heap.x, heap.triangles, {.tolerance = 0.0, .most_of_a_kind = 1});
+    CHECK(one_of_a_kind.findings.size() <= 2);
+    CHECK_THAT(to_string(one_of_a_kind), ContainsSubstring("components, one with triangle 0, one with triangle 1;"));
 }

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/network/elements.hpp>
 
+#include <cmath>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include <membrane/mesh/shapes.hpp>
@@ -53,6 +56,30 @@ TEST_CASE("a force that is nothing beside the others grows with stiffness and si
     CHECK(force(0.01, 1e6) < 1e-6 * 1e6 * 1e-4 * 0.01);
     CHECK(force(0.02, 1e6) == Approx(2 * force(0.01, 1e6)));
     CHECK(force(0.01, 3e6) == Approx(3 * force(0.01, 1e6)));
+}
+
+TEMPLATE_TEST_CASE("an element that pulls with what is not finite is refused", "[elements][bad]", float, double) {
+    const TestType tiny = std::sqrt(std::sqrt(std::numeric_limits<TestType>::min()));
+    Points<TestType> x(3, 4);
+    x << 0, 1, TestType(0.5), TestType(0.5), 0, 0, tiny * tiny, -1, 0, 0, 0, 0;  // the first triangle all but flat
+    Triangles triangles(3, 2);
+    triangles << 0, 1, 1, 0, 2, 3;
+    const TriangleMesh<TestType> mesh(x, triangles);
+    const Material material{.young_modulus = 1e6, .poisson_ratio = 0.3, .thickness = 1e-3};
+    const auto said = [](int element, int vertex) {
+        return "Elements: element " + std::to_string(element) + " at vertex " + std::to_string(vertex) +
+               " must pull with a finite force and stiffness at rest: its triangle is too thin, or a constant too "
+               "large";
+    };
+    CHECK(refusal([&] { (void)triangular_springs(mesh, material); }) == said(0, 0));
+    const auto sphere = icosphere<TestType>({.subdivisions = 0});
+    const auto& corners = sphere.triangles();
+    CHECK(refusal([&] { (void)pressure(sphere, 1e100); }) == (sizeof(TestType) == 4 ? said(0, corners(0, 0)) : ""));
+    CHECK(refusal([&] { (void)triangular_springs(sphere, material, 1e-160); }) == said(0, corners(0, 0)));
+    CHECK(refusal([&] { (void)triangular_springs(sphere, material, 100); }).empty());
+    const auto infinite = std::numeric_limits<TestType>::infinity();
+    using Loads = Elements<TestType, DeadLoad<TestType>>;
+    CHECK(refusal([&] { (void)Loads(sphere, {{{5}, {{0, infinite, 0}}}}); }) == said(0, 5));
 }
 
 TEST_CASE("an element at no vertex is refused", "[elements][bad]") {

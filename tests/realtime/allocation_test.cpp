@@ -13,6 +13,7 @@
 #include <membrane/accuracy/factored_convexity.hpp>
 #include <membrane/accuracy/tangent_stiffness.hpp>
 #include <membrane/core/thread_pool.hpp>
+#include <membrane/haptics/recording.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -187,4 +188,22 @@ TEMPLATE_TEST_CASE("copied and moved parts run on to the same bits, and allocate
         CHECK(allocated == 0);
     }
     CHECK(same);
+}
+
+TEST_CASE("nor does a recorder, full or not, or a replay", "[allocation]") {
+    Recorder<double> recorder(100, 12);
+    const Tool<double> tool;
+    const Vector3<double> force(1, 2, 3);
+    CHECK(allocated_by([&] {
+              for (int i = 0; i < 150; ++i) recorder.add(tool, force);
+          }) == 0);
+    CHECK(recorder.missed() == 50);
+    ReplayDevice<double> replay(recorder.recording());
+    CHECK(allocated_by([&] {
+              while (replay.running()) {
+                  used(replay.read().position.data());
+                  replay.write(force);
+              }
+          }) == 0);
+    CHECK(replay.differing() == 0);
 }

@@ -8,6 +8,7 @@
 #include <membrane/haptics/grasp_transition.hpp>
 #include <membrane/haptics/handover.hpp>
 #include <membrane/haptics/passivity.hpp>
+#include <membrane/haptics/recording.hpp>
 #include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/haptics/units.hpp>
@@ -145,6 +146,10 @@ TEMPLATE_TEST_CASE("the device is served without exceptions", "[noexcept]", doub
         static_assert(noexcept(device.running())&& noexcept(device.read())&& noexcept(device.write(force)));
         static_assert(noexcept(device.force())&& noexcept(device.time())&& noexcept(device.restart()));
         static_assert(noexcept(springs(state))&& noexcept(reaction(state)));
+    });
+    static_cast<void>([](Recorder<S>& recorder, ReplayDevice<S>& replay, const Tool<S>& tool, const Vector3<S>& force) {
+        static_assert(noexcept(recorder.add(tool, force))&& noexcept(recorder.clear())&& noexcept(recorder.missed()));
+        static_assert(noexcept(replay.differing())&& noexcept(replay.first_difference())&& noexcept(replay.restart()));
     });
     SUCCEED();
 }

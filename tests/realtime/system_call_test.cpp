@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <csignal>
 #include <cstdlib>
+#include <vector>
 
 #include <sys/syscall.h>
 #include <unistd.h>
+
+#include <membrane/haptics/recording.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -62,6 +65,21 @@ TEMPLATE_TEST_CASE("nor do a million of the complete loop of a hand, whatever go
         for (int i = 0; i < cases(6'000, 500'000); ++i)
             loop.tick(i % 20'000 < 10'000 ? test::Mishap() : mishaps.next());
         if (!loop.x.allFinite() || !loop.drawn_right || loop.solves == 0) std::abort();
+    });
+    CHECK(child.signal == 0);
+    CHECK(child.code == 0);
+}
+
+TEST_CASE("nor does a recorder, full or not, or a replay", "[system_call]") {
+    membrane::Recorder<double> recorder(100, 12);
+    membrane::ReplayDevice<double> replay({.ticks = std::vector<membrane::RecordedTick<double>>(100)});
+    const auto child = without_system_calls([&] {
+        for (int i = 0; i < 150; ++i) recorder.add({}, {1, 2, 3});
+        while (replay.running()) {
+            const auto tool = replay.read();
+            replay.write(tool.position);
+        }
+        if (recorder.missed() != 50 || replay.differing() != 0) std::abort();
     });
     CHECK(child.signal == 0);
     CHECK(child.code == 0);

@@ -13,6 +13,7 @@
 #include <membrane/haptics/grasp_transition.hpp>
 #include <membrane/haptics/handover.hpp>
 #include <membrane/haptics/passivity.hpp>
+#include <membrane/haptics/recording.hpp>
 #include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/haptics/units.hpp>
@@ -40,7 +41,7 @@ struct Mishap {
 };
 
 /// A device with a hand, in millimetres and in a frame of its own; contact and solver; every policy, each in its turn; the
-/// limits; an observer; both sides of the hand-over.
+/// limits; an observer; a recorder; both sides of the hand-over.
 template <membrane::Real S>
 struct HapticLoop {
     using V = membrane::Vector3<S>;
@@ -60,6 +61,8 @@ struct HapticLoop {
         asked += mishap.force.cast<S>();
         felt = limit(asked, now, solves);
         observer.update(hand.position, felt, dt);
+        if (recorder.missed() > 100) recorder.clear();
+        recorder.add(hand, felt);
         const auto on_hand = scale.to_device(membrane::Newtons(felt.template cast<double>())).on_hand;
         device.write(on_hand.value().template cast<S>());
         draw(hand);
@@ -88,6 +91,7 @@ struct HapticLoop {
     membrane::VirtualCoupling<S> coupling{{.stiffness = 200, .damping = 0.2, .scale = 5}};
     membrane::ForceLimiter limit{membrane::devices::touch};
     membrane::EnergyObserver observer;
+    membrane::Recorder<S> recorder{1000, mesh.vertex_count()};
 
     /// The hand goes twice as far as the tool, elsewhere and turned.
     membrane::DeviceScale scale = [] {

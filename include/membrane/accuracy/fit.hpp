@@ -200,7 +200,7 @@ Fit FitSearch<Model>::run() {
     }
 }
 
-// What the model is off by, for each row; nothing where it has no forces.
+// What the model is off by, for each row; nothing where it has no forces, or such that squares overflow.
 template <class Model>
 std::optional<Eigen::VectorXd> FitSearch<Model>::off(const Eigen::VectorXd& logs) {
     ++evaluations_;
@@ -218,6 +218,7 @@ std::optional<Eigen::VectorXd> FitSearch<Model>::off(const Eigen::VectorXd& logs
         result[static_cast<Eigen::Index>(i)] =
             relative ? std::log(forces[i] / table_.force[i]) : (forces[i] - table_.force[i]) / table_.deviation[i];
     }
+    if (!is_finite(result.squaredNorm())) return std::nullopt;
     return result;
 }
 

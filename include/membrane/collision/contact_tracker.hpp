@@ -55,7 +55,7 @@ class ContactTracker {
     /// How often the tree has been asked for what the tool touches during contact, since the beginning.
     [[nodiscard]] Index tree_checks() const noexcept { return tree_checks_; }
 
-    /// Forgets contact and tool.
+    /// Forgets contact and tool: from here on it does what a new one does, to the bit.
     void reset() noexcept;
 
   private:
@@ -127,6 +127,7 @@ void ContactTracker<Scalar>::reset() noexcept {
     last_ = {};
     last_tool_.reset();
     origin_triangles_.fill(no_index);
+    ticks_ = 0;
     lively_ticks_ = 0;
 }
 

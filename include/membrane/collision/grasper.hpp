@@ -48,8 +48,11 @@ class Grasper {
     [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                        const Tool<Scalar>& tool) noexcept;
 
-    /// Lets go.
-    void reset() noexcept { grasp_ = {}; }
+    /// Lets go and forgets whether it was closed: from here on it does what a new one does, to the bit.
+    void reset() noexcept {
+        grasp_ = {};
+        closed_ = false;
+    }
 
   private:
     Points<Scalar> origins_;

@@ -31,11 +31,10 @@ struct LimitOptions {
 /// Which limits have made the force of this tick smaller.
 struct LimitsActed {
     bool fault = false;  ///< force or clock was not finite: no force
-    bool faded =
-        false;          ///< the solver's state is old, or the force is still coming in after that, a fault or the start
-    bool peak = false;  ///< of the device
-    bool heat = false;  ///< of its motors
-    bool slew = false;  ///< the force may not grow that fast
+    bool faded = false;  ///< the state is old, or the force still comes in after that, a fault or the start
+    bool peak = false;   ///< of the device
+    bool heat = false;   ///< of its motors
+    bool slew = false;   ///< the force may not grow that fast
 
     [[nodiscard]] bool any() const noexcept { return fault || faded || peak || heat || slew; }
 };

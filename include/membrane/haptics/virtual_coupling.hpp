@@ -53,7 +53,11 @@ class VirtualCoupling {
     /// The same as a force policy, for what takes one.
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& /*state*/) const noexcept { return force_; }
 
-    void restart() noexcept { began_ = false; }
+    /// As new.
+    void restart() noexcept {
+        began_ = false;
+        force_.setZero();
+    }
 
   private:
     Scalar stiffness_, damping_, scale_;

@@ -47,9 +47,10 @@ struct DistMeshOptions {
 /// The grid's `spacing` is 0.8 of the smallest edge length found at 17^3 places, but at most a twelfth of the shortest
 /// side of the bounds; features smaller than that can be lost.
 ///
-/// @throws InvalidInput if bounds are missing, not finite or empty, for iterations below 0, a spacing or edge length that
-/// is not finite and positive, and for what `isosurface` refuses
-/// Cost: O(grid) + O(vertices) for each iteration: 0.3 s for 1,500 vertices and 200 iterations.
+/// @throws InvalidInput if bounds are missing, not finite, empty, or farther from 0 than 1e7 times their size, for
+/// iterations below 0, a spacing or edge length that is not finite and positive, and for what `isosurface` refuses
+/// Cost: O(grid) + O(vertices) for each iteration: 0.3 s for 1,500 vertices and 200 iterations. A body much thinner than
+/// the edges are long is found in many more vertices than are left, some 20 us each: give a wider `spacing`.
 template <Real Scalar = double, SignedDistance Body>
 [[nodiscard]] TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options);
 
@@ -70,6 +71,12 @@ template <class Surface>
         refuse(distmesh_name, "bounds along ", std::string_view("xyz").substr(static_cast<std::size_t>(k), 1),
                " must be finite, low below high [m], got ", low, " to ", high,
                options.bounds ? "" : "; give bounds where the body has none");
+    }
+    const double far = bounds.low.cwiseAbs().cwiseMax(bounds.high.cwiseAbs()).maxCoeff();
+    const double most = 1e7 * (bounds.high - bounds.low).maxCoeff();
+    if (far > most) {
+        refuse(distmesh_name, "bounds must be within 1e7 times their size of 0, here ", most,
+               " [m], or numbers are too coarse for the surface, got ", far);
     }
     return bounds;
 }

@@ -26,8 +26,9 @@ namespace membrane {
 /// edges cross the border. Every vertex is within the surface's tolerance of it, those of the border of both distances.
 ///
 /// Features smaller than a cell can be lost.
-/// @throws InvalidInput if there is no surface, if it reaches out of the bounds, if a distance is not finite, if the grid
-/// has more than 1.3e8 points, and if the border cannot be found because two distances touch
+/// @throws InvalidInput if there is no surface, if it reaches out of the bounds, if one without a border has its inside out
+/// there, if a distance is not finite, if the grid has more than 1.3e8 points or 2e6 in a plane, and if the border cannot
+/// be found because two distances touch
 /// O(points of the grid) time, O(one layer of the grid + surface) memory.
 template <class Surface>
 [[nodiscard]] TriangleMesh<double> isosurface(const Surface& surface, const Bounds& bounds, double spacing);
@@ -100,13 +101,14 @@ class MarchingTetrahedra {
   public:
     MarchingTetrahedra(const Surface& surface, const Bounds& bounds, double spacing)
         : surface_(surface), spacing_(spacing) {
-        double points = 1;
+        double points = 1, fewest = 1.3e8;
         for (int k = 0; k < 3; ++k) {
             const double cells = std::ceil((bounds.high[k] - bounds.low[k]) / spacing) + 3;
             points *= cells + 1;
-            if (points > 1.3e8) {
+            fewest = (std::min)(fewest, cells + 1);
+            if (points > 1.3e8 || (k == 2 && points / fewest > 2e6)) {
                 refuse(isosurface_name, "a grid of cells of ", spacing, " [m] over the bounds has more than 1.3e8 ",
-                       "points; use longer edges or narrower bounds");
+                       "points, or 2e6 in a plane; use longer edges, a wider spacing or narrower bounds");
             }
             points_[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(cells) + 1;
             // Off the middle, so that the planes of symmetric bodies do not lie on those of the grid.
@@ -116,6 +118,7 @@ class MarchingTetrahedra {
 
     [[nodiscard]] Soup march() {
         std::vector<double> below = layer(0), above;
+        starts_inside_ = below[0] < 0;
         for (std::int64_t z = 0; z + 1 < points_[2]; ++z) {
             above = layer(z + 1);
             for (std::int64_t y = 0; y + 1 < points_[1]; ++y) {
@@ -125,6 +128,9 @@ class MarchingTetrahedra {
         }
         return std::move(soup_);
     }
+
+    /// Whether a corner of the grid is in the body.
+    [[nodiscard]] bool starts_inside() const noexcept { return starts_inside_; }
 
   private:
     using Cell = std::array<std::int64_t, 3>;
@@ -221,6 +227,7 @@ class MarchingTetrahedra {
     double spacing_;
     Vector3<double> origin_;
     std::array<std::int64_t, 3> points_{};
+    bool starts_inside_ = false;
     Soup soup_;
     EdgeVertices vertices_;
 };
@@ -273,7 +280,8 @@ template <class Surface>
 
 template <class Surface>
 TriangleMesh<double> isosurface(const Surface& surface, const Bounds& bounds, double spacing) {
-    detail::Soup soup = detail::MarchingTetrahedra<Surface>(surface, bounds, spacing).march();
+    detail::MarchingTetrahedra<Surface> grid(surface, bounds, spacing);
+    detail::Soup soup = grid.march();
     const auto crossed = static_cast<Index>(soup.x.size());
     if constexpr (Surface::has_border) soup = detail::cut_at_border(surface, std::move(soup));
     if (soup.triangles.empty()) {
@@ -291,6 +299,11 @@ TriangleMesh<double> isosurface(const Surface& surface, const Bounds& bounds, do
         refuse(detail::isosurface_name, "the surface must be within the bounds, got a point out of them near (", p.x(),
                ", ", p.y(), ", ", p.z(), ")");
     });
+    if (!Surface::has_border && grid.starts_inside()) {
+        refuse(detail::isosurface_name,
+               "the distance must be positive out of the bounds, got one that is negative: it "
+               "must be negative inside the body, positive outside");
+    }
     return soup.mesh();
 }
 

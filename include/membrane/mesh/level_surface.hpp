@@ -90,7 +90,8 @@ std::optional<OnSurface> LevelSurface<Body, Within>::project(const Vector3<doubl
         const Vector3<double> slope = gradient(surface_.body, x);
         const double squared = squared_norm(slope);
         if (!is_finite(off) || !is_finite(squared) || !(squared > 0)) return std::nullopt;
-        if (std::abs(off) <= tolerance()) return OnSurface{x, slope / std::sqrt(squared)};
+        const double steepness = std::sqrt(squared);
+        if (std::abs(off) <= tolerance() * steepness) return OnSurface{x, slope / steepness};
         x -= off / squared * slope;
     }
     return std::nullopt;
@@ -105,7 +106,10 @@ std::optional<OnSurface> LevelSurface<Body, Within>::project_to_border(const Vec
         const double aa = squared_norm(a), ab = dot(a, b), bb = squared_norm(b), whole = aa * bb - ab * ab;
         if (!is_finite(off) || !is_finite(beyond) || !is_finite(whole)) return std::nullopt;
         if (!(whole > 1e-6 * aa * bb)) return std::nullopt;  // the surfaces touch: no border to be found
-        if (std::abs(off) <= tolerance() && std::abs(beyond) <= tolerance()) return OnSurface{x, a / std::sqrt(aa)};
+        const double steepness = std::sqrt(aa);
+        if (std::abs(off) <= tolerance() * steepness && std::abs(beyond) <= tolerance() * std::sqrt(bb)) {
+            return OnSurface{x, a / steepness};
+        }
         x -= (bb * off - ab * beyond) / whole * a + (aa * beyond - ab * off) / whole * b;
     }
     return std::nullopt;

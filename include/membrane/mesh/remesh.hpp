@@ -115,17 +115,17 @@ class Remesher {
     }
 
     /// The cosine between a triangle and the normals at its corners; -1 if it has no area.
-    [[nodiscard]] double facing(Index a, Index b, Index c) const {
-        return facing(mesh_.position(a), mesh_.position(b), mesh_.position(c),
-                      normals_[at(a)] + normals_[at(b)] + normals_[at(c)]);
-    }
-    [[nodiscard]] static double facing(const Vector3<double>& a, const Vector3<double>& b, const Vector3<double>& c,
-                                       const Vector3<double>& normal) {
-        const Vector3<double> area = cross<double>(b - a, c - a);
+    [[nodiscard]] double facing(const OnSurface& a, Index b, Index c) const {
+        const Vector3<double> normal = a.normal + normals_[at(b)] + normals_[at(c)];
+        const Vector3<double> area = cross<double>(mesh_.position(b) - a.point, mesh_.position(c) - a.point);
         const double size = std::sqrt(squared_norm(area) * squared_norm(normal));
         return size > 0 ? dot(area, normal) / size : -1;
     }
+    [[nodiscard]] double facing(Index a, Index b, Index c) const {
+        return facing(OnSurface{mesh_.position(a), normals_[at(a)]}, b, c);
+    }
 
+    [[nodiscard]] inline bool may_split(Index side, const OnSurface& middle) const;
     [[nodiscard]] inline bool may_flip(Index side) const;
     [[nodiscard]] inline bool may_move(Index v, const OnSurface& to, Index but_next_to = no_index) const;
     [[nodiscard]] inline bool is_delaunay(Index side) const;
@@ -147,12 +147,21 @@ bool Remesher<Surface>::may_move(Index v, const OnSurface& to, Index but_next_to
     mesh_.around(v, [&](Index side) {
         const Index b = mesh_.to(side), c = mesh_.apex(side);
         if (b == but_next_to || c == but_next_to) return;
-        const Vector3<double> normal = to.normal + normals_[at(b)] + normals_[at(c)];
-        after = (std::min)(after, facing(to.point, mesh_.position(b), mesh_.position(c), normal));
+        after = (std::min)(after, facing(to, b, c));
     });
     if (after >= least_facing) return true;
     mesh_.around(v, [&](Index side) { before = (std::min)(before, facing(v, mesh_.to(side), mesh_.apex(side))); });
     return after >= before;
+}
+
+/// Whether no half of a triangle at the edge would turn away from the surface, more than all of it does.
+template <class Surface>
+bool Remesher<Surface>::may_split(Index side, const OnSurface& middle) const {
+    const auto may = [&](Index s) {
+        const Index a = mesh_.from(s), b = mesh_.to(s), c = mesh_.apex(s);
+        return (std::min)(facing(middle, b, c), facing(middle, c, a)) >= (std::min)(facing(a, b, c), least_facing);
+    };
+    return may(side) && (mesh_.twin(side) == no_index || may(mesh_.twin(side)));
 }
 
 template <class Surface>
@@ -198,7 +207,7 @@ void Remesher<Surface>::split_edges(double longer) {
         if (!is_first(side) || squared_norm(edge(side)) < square(longer * wanted(side))) continue;
         const Vector3<double> middle = (mesh_.position(mesh_.from(side)) + mesh_.position(mesh_.to(side))) / 2;
         const auto place = project(middle, mesh_.twin(side) == no_index);
-        if (!place || norm<double>(place->point - middle) > norm(edge(side)) / 2) continue;
+        if (!place || norm<double>(place->point - middle) > norm(edge(side)) / 2 || !may_split(side, *place)) continue;
         add_vertex(place->normal, place->point);
         mesh_.split(side, place->point);
     }

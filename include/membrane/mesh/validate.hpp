@@ -105,9 +105,11 @@ void check_extras(const WorkableMesh& mesh, const SurfaceParts& parts, std::span
               "the triangle of vertices ", corners[0], ", ", corners[1], " and ", corners[2], " is missing");
     }
     if (parts.parts.size() < 2) return;
-    std::vector<Index> first;
+    std::vector<Index> first;  // two at least, for the text
     for (const SurfacePart& part : parts.parts) {
-        if (first.size() < static_cast<std::size_t>(most_of_a_kind)) first.push_back(part.first_triangle);
+        if (first.size() < 2 || first.size() < static_cast<std::size_t>(most_of_a_kind)) {
+            first.push_back(part.first_triangle);
+        }
     }
     found(MeshDefect::several_components, {}, first, "the surface has ", parts.parts.size(),
           " components, one with triangle ", first[0], ", one with triangle ", first[1]);

@@ -61,7 +61,8 @@ class Elements {
         Each element;
     };
 
-    /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex. Linear.
+    /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, and for one that is pulled at
+    /// rest by what is not finite: a triangle too thin, or a constant too large, for the scalar. Linear.
     Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all);
 
     [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
@@ -105,7 +106,13 @@ Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<P
             if (v >= 0 && v < mesh.vertex_count()) continue;
             refuse("Elements", "element ", i, " names vertex ", v, ", expected 0 to ", mesh.vertex_count() - 1);
         }
-        negligible_force_ = (std::max)(negligible_force_, negligible_force_of(all_[i], mesh.positions()));
+        const Scalar negligible = negligible_force_of(all_[i], mesh.positions());
+        if (!is_finite(negligible)) {
+            refuse("Elements", "element ", i, " at vertex ", all_[i].corners[0],
+                   " must pull with a finite force and stiffness at rest: its triangle is too thin, or a constant too "
+                   "large");
+        }
+        negligible_force_ = (std::max)(negligible_force_, negligible);
     }
     corners_of_ = CompressedRows<Corner>(mesh.vertex_count(), [this](auto put) {
         for (std::size_t i = 0; i < all_.size(); ++i) {
@@ -122,6 +129,8 @@ Scalar Elements<Scalar, Each>::negligible_force_of(const Placed& placed, const P
     Scalar largest = 0, stiffness = 0, size = 0;
     for (std::size_t i = 0; i < corner_count; ++i) {
         const auto pull = placed.element.pull(corners, i);
+        if (!is_finite(pull.force) || !is_finite(pull.curvature.trace()))
+            return std::numeric_limits<Scalar>::infinity();
         stiffness = (std::max)(stiffness, pull.curvature.trace());
         size = (std::max)(size, norm<Scalar>(corners[i] - corners[0]));
         largest = (std::max)(largest, norm(pull.force));

@@ -15,7 +15,7 @@
 ///
 ///     const auto springs = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 0.0});   // none
 ///     const auto tissue = membrane::Tissue(springs, membrane::triangular_springs(mesh, material),
-///                                          membrane::bending_springs(mesh, material));
+///                                          membrane::bending_springs(mesh, membrane::flexural_rigidity(material)));
 ///     auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 8});
 ///     const auto report = solver.step(x, dt, tissue, backing, press(tool, contact));
 namespace membrane {

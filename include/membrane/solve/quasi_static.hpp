@@ -74,7 +74,8 @@ class QuasiStaticSolver {
     void wake(std::span<const Index> vertices) noexcept;
     void wake_all() noexcept;
 
-    /// Forgets everything that was remembered: a membrane that is not at rest stays as it is until woken.
+    /// Forgets everything that was remembered: a membrane that is not at rest stays as it is until woken. From here on
+    /// what a new solver does is done, to the bit. Cost: O(V).
     void reset() noexcept;
 
     /// The propagation queue of the last step.
@@ -255,10 +256,11 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::wake_all() noexcept {
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
     active_.clear();
-    work_.forget();
+    work_.clear();
     predictor_.forget();
     last_held_.clear();
     resume_ = 0;
+    costs_ = {};
 }
 
 }  // namespace membrane

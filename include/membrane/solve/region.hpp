@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <span>
@@ -41,6 +42,7 @@ struct Workspace {
     void open() noexcept;           ///< Begins a step.
     void close() noexcept;          ///< Keeps the touches of the step that ends for the next one.
     void forget() noexcept;         ///< Keeps no touches.
+    void clear() noexcept;          ///< Nor what vertices answered at their last visit: as new.
     void drop_external() noexcept;  ///< Takes all pushes back.
 
     struct Range {
@@ -269,6 +271,13 @@ template <Real Scalar>
 void Workspace<Scalar>::forget() noexcept {
     touches_before.clear();
     ranges_before = {};
+}
+
+template <Real Scalar>
+void Workspace<Scalar>::clear() noexcept {
+    forget();
+    for (auto* answers : {&compliance, &resistance, &firmness}) std::fill(answers->begin(), answers->end(), Scalar(0));
+    std::fill(block_compliance.begin(), block_compliance.end(), Symmetric3<Scalar>{});
 }
 
 template <Real Scalar>

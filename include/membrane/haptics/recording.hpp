@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <membrane/haptics/device.hpp>
+
+/// A run, kept tick by tick, and played again. Files of it: `haptics/recording_file.hpp`.
+///
+///     membrane::Recorder<double> recorder(60'000, mesh.vertex_count());            // a minute at 1 kHz
+///     while (device.running()) { ...; device.write(force); recorder.add(tool, force); }
+///     membrane::ReplayDevice<double> again(recorder.recording());                  // in place of the device
+///     while (again.running()) { ...; again.write(force); }                         // then again.differing() == 0
+///
+/// A replay gives the same forces to the bit if it is the same binary, and begins as the recorded run began: same mesh,
+/// network and options, same positions, parts and force policies that are new or `reset()`, the tree refitted. Steps that end
+/// at a deadline of a real clock do not repeat themselves.
+namespace membrane {
+
+/// One turn of the loop: what the device said, and what it was told.
+template <Real Scalar>
+struct RecordedTick {
+    Tool<Scalar> tool;
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
+};
+
+/// Whether two ticks have the same bits: unlike ==, zeros of either sign differ, and NaN is NaN.
+template <Real Scalar>
+[[nodiscard]] bool identical(const RecordedTick<Scalar>& a, const RecordedTick<Scalar>& b) noexcept;
+
+template <Real Scalar>
+struct Recording {
+    Index vertex_count = 0;  ///< of the membrane, so that it is not played to another
+    std::vector<RecordedTick<Scalar>> ticks = {};
+};
+
+/// Takes down a run, in memory that it has from the beginning. What is not finite is kept as it is.
+template <Real Scalar>
+class Recorder {
+  public:
+    /// Room for `most_ticks`, 120 bytes each in `double`, of which every page has been touched.
+    /// @throws InvalidInput for no room, or a negative number of vertices
+    explicit Recorder(std::size_t most_ticks, Index vertex_count) : ticks_(most_ticks), vertex_count_(vertex_count) {
+        if (most_ticks == 0) refuse("Recorder", "most_ticks must be positive, got 0");
+        if (vertex_count < 0) refuse("Recorder", "vertex_count must not be negative, got ", vertex_count);
+    }
+
+    /// One tick more; when there is no room left it is only counted, for a replay needs the beginning. Online.
+    void add(const Tool<Scalar>& tool, const Vector3<Scalar>& force) noexcept {
+        if (size_ < ticks_.size()) {
+            ticks_[size_++] = {tool, force};
+        } else {
+            ++missed_;
+        }
+    }
+
+    [[nodiscard]] std::size_t size() const noexcept { return size_; }
+
+    /// How many ticks there was no room for.
+    [[nodiscard]] std::size_t missed() const noexcept { return missed_; }
+
+    /// A copy of what there is so far; not while another thread adds to it.
+    [[nodiscard]] Recording<Scalar> recording() const {
+        return {vertex_count_, {ticks_.begin(), ticks_.begin() + static_cast<std::ptrdiff_t>(size_)}};
+    }
+
+    /// Forgets all ticks and keeps the room.
+    void clear() noexcept { size_ = missed_ = 0; }
+
+  private:
+    std::vector<RecordedTick<Scalar>> ticks_;
+    Index vertex_count_;
+    std::size_t size_ = 0, missed_ = 0;
+};
+
+/// A device that hands out a recording's tools one after the other, and compares the forces with the recorded ones.
+template <Real Scalar>
+class ReplayDevice {
+  public:
+    /// @throws InvalidInput for a recording without a tick
+    explicit ReplayDevice(Recording<Scalar> recording) : ticks_(std::move(recording.ticks)) {
+        if (ticks_.empty()) refuse("ReplayDevice", "the recording must have a tick, got none");
+    }
+
+    /// Whether there is a tick left.
+    [[nodiscard]] bool running() const noexcept { return next_ < ticks_.size(); }
+
+    /// The tool of the next tick; beyond the end, the last.
+    [[nodiscard]] Tool<Scalar> read() noexcept {
+        if (running()) ++next_;
+        return ticks_[(std::max)(next_, std::size_t{1}) - 1].tool;
+    }
+
+    /// The force of the tick that was read last.
+    void write(const Vector3<Scalar>& force) noexcept {
+        if (next_ == 0) return;
+        const auto& tick = ticks_[next_ - 1];
+        if (identical(tick, {tick.tool, force})) return;
+        if (differing_++ == 0) first_difference_ = next_ - 1;
+    }
+
+    /// How many forces so far were not the recorded ones to the bit, and the tick of the first of them.
+    [[nodiscard]] std::size_t differing() const noexcept { return differing_; }
+    [[nodiscard]] std::size_t first_difference() const noexcept { return first_difference_; }
+
+    /// Back to the beginning.
+    void restart() noexcept { next_ = differing_ = first_difference_ = 0; }
+
+  private:
+    std::vector<RecordedTick<Scalar>> ticks_;
+    std::size_t next_ = 0, differing_ = 0, first_difference_ = 0;
+};
+
+namespace detail {
+
+/// The numbers of a tick in the order of the file: position, axis, radius, velocity, time, force.
+inline constexpr std::size_t numbers_of_tick = 14;
+
+template <Real Scalar>
+using BitsOf = std::conditional_t<sizeof(Scalar) == 4, std::uint32_t, std::uint64_t>;
+
+template <Real Scalar>
+[[nodiscard]] std::array<Scalar, numbers_of_tick> numbers_of(const RecordedTick<Scalar>& tick) noexcept {
+    const auto& [position, axis, radius, velocity, time, grasping] = tick.tool;
+    const auto& force = tick.force;
+    return {position.x(), position.y(), position.z(), axis.x(), axis.y(),  axis.z(),  radius,
+            velocity.x(), velocity.y(), velocity.z(), time,     force.x(), force.y(), force.z()};
+}
+
+template <Real Scalar>
+[[nodiscard]] RecordedTick<Scalar> tick_of(const std::array<Scalar, numbers_of_tick>& n, bool grasping) noexcept {
+    return {.tool = {.position = {n[0], n[1], n[2]},
+                     .axis = {n[3], n[4], n[5]},
+                     .radius = n[6],
+                     .velocity = {n[7], n[8], n[9]},
+                     .time = n[10],
+                     .grasping = grasping},
+            .force = {n[11], n[12], n[13]}};
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+bool identical(const RecordedTick<Scalar>& a, const RecordedTick<Scalar>& b) noexcept {
+    const auto left = detail::numbers_of(a), right = detail::numbers_of(b);
+    return std::memcmp(left.data(), right.data(), sizeof left) == 0 && a.tool.grasping == b.tool.grasping;
+}
+
+}  // namespace membrane

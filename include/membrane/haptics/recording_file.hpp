@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <istream>
+#include <limits>
+#include <locale>
+#include <ostream>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <membrane/haptics/recording.hpp>
+
+/// Recordings to and from files. Offline.
+///
+///     std::ofstream file("run.rec", std::ios::binary);
+///     membrane::write_recording(file, recorder.recording());
+///     const auto recording = membrane::read_recording<double>(stream, mesh.vertex_count());
+///
+/// The file, whatever the machine, least byte first: 8 bytes of magic; version, bytes of a number (4 or 8), vertices (4
+/// bytes each); ticks (8 bytes); checksum. Then each tick: 14 numbers (position, axis, radius, velocity, time, force;
+/// IEEE 754), a byte that is 1 while grasping, checksum. A checksum is the CRC-32 of everything before it, checksums
+/// left out, so that it also tells of ticks that are lost or out of order.
+namespace membrane {
+
+inline constexpr std::uint32_t recording_version = 1;
+
+/// Whether all could be written is the stream's to say.
+template <Real Scalar>
+void write_recording(std::ostream& file, const Recording<Scalar>& recording);
+
+/// To the bit what was written.
+/// @throws InvalidInput for a file that is not a whole recording in this scalar, or (given one) with another number of
+/// vertices; the message says where, what was found and what must be there
+template <Real Scalar>
+[[nodiscard]] Recording<Scalar> read_recording(std::istream& file, Index vertex_count = no_index);
+
+/// A line of names and units, then one for each tick, with digits enough to tell all numbers apart.
+template <Real Scalar>
+void write_csv(std::ostream& text, const Recording<Scalar>& recording);
+
+namespace detail {
+
+inline constexpr std::string_view reader_name = "read_recording";
+
+// No text begins like this, and a file that passed as text from one system to another does not survive it.
+inline constexpr std::array<unsigned char, 8> recording_magic{0x89, 'M', 'R', 'E', 'C', '\r', '\n', 0x1a};
+
+/// CRC-32 as in zip and png: reflected polynomial 0xEDB88320.
+class Checksum {
+  public:
+    void add(unsigned char byte) noexcept { state_ = table[(state_ ^ byte) & 0xffU] ^ (state_ >> 8U); }
+    [[nodiscard]] std::uint32_t value() const noexcept { return ~state_; }
+
+  private:
+    static constexpr std::array<std::uint32_t, 256> table = [] {
+        std::array<std::uint32_t, 256> result{};
+        for (std::uint32_t i = 0; i < 256; ++i) {
+            std::uint32_t value = i;
+            for (int bit = 0; bit < 8; ++bit) value = (value >> 1U) ^ ((value & 1U) != 0 ? 0xedb88320U : 0U);
+            result[i] = value;
+        }
+        return result;
+    }();
+
+    std::uint32_t state_ = 0xffffffffU;
+};
+
+class RecordingWriter {
+  public:
+    explicit RecordingWriter(std::ostream& file) : file_(&file) {}
+
+    template <class Unsigned>
+    void write(Unsigned value) {
+        for (std::size_t i = 0; i < sizeof value; ++i) {
+            const auto byte = static_cast<unsigned char>(value >> (8 * i) & 0xffU);
+            sum_.add(byte);
+            file_->put(static_cast<char>(byte));
+        }
+    }
+
+    void write_checksum() {
+        const Checksum before = sum_;
+        write(before.value());
+        sum_ = before;
+    }
+
+  private:
+    std::ostream* file_;
+    Checksum sum_;
+};
+
+class RecordingReader {
+  public:
+    explicit RecordingReader(std::istream& file) : file_(&file) {}
+
+    /// What is being read, for messages: "the header", or "tick i of n".
+    void enter(std::string part) { part_ = std::move(part); }
+
+    template <class Unsigned>
+    [[nodiscard]] Unsigned read() {
+        Unsigned value = 0;
+        for (std::size_t i = 0; i < sizeof value; ++i) {
+            const int byte = file_->get();
+            if (byte == std::istream::traits_type::eof()) {
+                refuse(reader_name, "the file must go on, but ends after ", count_, " bytes, in ", part_);
+            }
+            ++count_;
+            sum_.add(static_cast<unsigned char>(byte));
+            value = static_cast<Unsigned>(value | static_cast<Unsigned>(byte) << (8 * i));
+        }
+        return value;
+    }
+
+    void check_sum() {
+        const Checksum before = sum_;
+        const auto found = read<std::uint32_t>();
+        sum_ = before;
+        if (found != sum_.value()) {
+            refuse(reader_name, "checksum of ", part_, " must be ", sum_.value(), ", got ", found);
+        }
+    }
+
+    void check_end() {
+        if (file_->peek() != std::istream::traits_type::eof()) {
+            refuse(reader_name, "the file must end after ", part_, ", but goes on beyond ", count_, " bytes");
+        }
+    }
+
+  private:
+    std::istream* file_;
+    Checksum sum_;
+    std::size_t count_ = 0;
+    std::string part_ = "the header";
+};
+
+struct RecordingHeader {
+    std::uint32_t vertex_count;
+    std::uint64_t ticks;
+};
+
+inline RecordingHeader read_header(RecordingReader& file, std::size_t scalar_size, Index vertex_count) {
+    for (std::size_t i = 0; i < recording_magic.size(); ++i) {
+        const unsigned found = file.read<unsigned char>();
+        if (found != recording_magic[i]) {
+            refuse(reader_name, "byte ", i, " of a recording must be ", unsigned{recording_magic[i]}, ", got ", found);
+        }
+    }
+    if (const auto version = file.read<std::uint32_t>(); version != recording_version) {
+        refuse(reader_name, "version must be ", recording_version, ", got ", version);
+    }
+    if (const auto size = file.read<std::uint32_t>(); size != scalar_size) {
+        refuse(reader_name, "numbers must be of ", scalar_size, " bytes, got ", size);
+    }
+    const auto vertices = file.read<std::uint32_t>();
+    const auto ticks = file.read<std::uint64_t>();
+    file.check_sum();
+    const auto most = static_cast<std::uint32_t>(unlimited);
+    if (vertices > most) refuse(reader_name, "vertices must be at most ", most, ", got ", vertices);
+    if (vertex_count != no_index && static_cast<Index>(vertices) != vertex_count) {
+        refuse(reader_name, "the membrane recorded must have ", vertex_count, " vertices, got ", vertices);
+    }
+    return {vertices, ticks};
+}
+
+template <Real Scalar>
+[[nodiscard]] RecordedTick<Scalar> read_tick(RecordingReader& file) {
+    std::array<Scalar, numbers_of_tick> numbers;
+    for (Scalar& number : numbers) {
+        const auto bits = file.read<BitsOf<Scalar>>();
+        std::memcpy(&number, &bits, sizeof number);
+    }
+    const unsigned grasping = file.read<unsigned char>();
+    file.check_sum();
+    if (grasping > 1) refuse(reader_name, "grasping must be 0 or 1, got ", grasping);
+    return tick_of(numbers, grasping == 1);
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+void write_recording(std::ostream& file, const Recording<Scalar>& recording) {
+    detail::RecordingWriter writer(file);
+    for (const unsigned char byte : detail::recording_magic) writer.write(byte);
+    writer.write(recording_version);
+    writer.write(static_cast<std::uint32_t>(sizeof(Scalar)));
+    writer.write(static_cast<std::uint32_t>(recording.vertex_count));
+    writer.write(static_cast<std::uint64_t>(recording.ticks.size()));
+    writer.write_checksum();
+    for (const auto& tick : recording.ticks) {
+        for (const Scalar number : detail::numbers_of(tick)) {
+            detail::BitsOf<Scalar> bits;
+            std::memcpy(&bits, &number, sizeof bits);
+            writer.write(bits);
+        }
+        writer.write(static_cast<unsigned char>(tick.tool.grasping ? 1 : 0));
+        writer.write_checksum();
+    }
+}
+
+template <Real Scalar>
+Recording<Scalar> read_recording(std::istream& file, Index vertex_count) {
+    detail::RecordingReader reader(file);
+    const auto header = detail::read_header(reader, sizeof(Scalar), vertex_count);
+    Recording<Scalar> recording{.vertex_count = static_cast<Index>(header.vertex_count)};
+    const std::string total = " of " + std::to_string(header.ticks);
+    for (std::uint64_t i = 0; i < header.ticks; ++i) {  // no more memory than there is file, whatever the header says
+        reader.enter("tick " + std::to_string(i) + total);
+        recording.ticks.push_back(detail::read_tick<Scalar>(reader));
+    }
+    reader.check_end();
+    return recording;
+}
+
+template <Real Scalar>
+void write_csv(std::ostream& text, const Recording<Scalar>& recording) {
+    text << "x_m,y_m,z_m,axis_x_m,axis_y_m,axis_z_m,radius_m,velocity_x_m_s,velocity_y_m_s,velocity_z_m_s,time_s,"
+            "force_x_N,force_y_N,force_z_N,grasping\n";
+    for (const auto& tick : recording.ticks) {
+        std::ostringstream line;  // the text's own locale and precision stay as they are, and do not matter
+        line.imbue(std::locale::classic());
+        line.precision(std::numeric_limits<Scalar>::max_digits10);
+        for (const Scalar number : detail::numbers_of(tick)) line << number << ',';
+        text << line.str() << (tick.tool.grasping ? "1\n" : "0\n");
+    }
+}
+
+}  // namespace membrane

@@ -1,0 +1,42 @@
+# cmake -D program=FILE -D folder=DIR -P compare_traces.cmake: a press and its replay are the same to the bit, of other
+# recordings the first difference is told, and what is no recording is refused.
+file(REMOVE_RECURSE ${folder})
+function(compare)
+    execute_process(COMMAND ${program} --out ${folder} ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
+    foreach(result code output error)
+        set(${result} "${${result}}" PARENT_SCOPE)
+    endforeach()
+endfunction()
+
+compare()
+set(same "ticks: 801 and 801, 801 the same to the bit\nlargest difference of forces: 0 N\npicture: ${folder}/compare_traces.svg\n")
+if(NOT code EQUAL 0 OR NOT output STREQUAL same OR NOT error STREQUAL "")
+    message(FATAL_ERROR "a replay is not the same, exit code ${code}:\n${output}${error}")
+endif()
+file(READ ${folder}/compare_traces.svg svg)
+file(STRINGS ${folder}/press.rec.csv lines)
+list(LENGTH lines count)
+if(NOT count EQUAL 802 OR NOT svg MATCHES "^<svg .*</svg>\n$" OR svg MATCHES "nan|inf[^o]")
+    message(FATAL_ERROR "expected a drawing and a table of 802 lines, got ${count}")
+endif()
+
+compare(${folder}/press.rec ${folder}/replay.rec)
+if(NOT code EQUAL 0 OR NOT output STREQUAL same)
+    message(FATAL_ERROR "files are not compared, exit code ${code}:\n${output}${error}")
+endif()
+
+# Another membrane.
+file(RENAME ${folder}/press.rec ${folder}/sphere.rec)
+compare(--mesh ${data}/lens.obj --unit mm)
+compare(${folder}/sphere.rec ${folder}/press.rec)
+if(NOT code EQUAL 0 OR NOT output MATCHES "ticks: 801 and 801, 0 the same to the bit\nthe first that is not: 0\nlargest difference of forces: [0-9.]+ N\npicture: ")
+    message(FATAL_ERROR "expected two runs that differ, exit code ${code}:\n${output}${error}")
+endif()
+
+file(WRITE ${folder}/words.rec "time,x,y,z\n")
+foreach(bad words.rec press.rec.csv)
+    compare(${folder}/press.rec ${folder}/${bad})
+    if(NOT code EQUAL 2 OR NOT output STREQUAL "" OR NOT error MATCHES "^compare_traces: [^\n]+/${bad}: read_recording: [^\n]+\n$")
+        message(FATAL_ERROR "${bad}: expected one line and exit code 2, got ${code}:\n${output}${error}")
+    endif()
+endforeach()
