@@ -10,12 +10,14 @@
 
 #include <membrane/membrane.hpp>
 #include <membrane/mesh/distmesh.hpp>
-#include <membrane/network/bending.hpp>
 #include <membrane/network/calibration.hpp>
 #include <membrane/network/foundation_springs.hpp>
+// [tissue]
+#include <membrane/network/bending.hpp>
 #include <membrane/network/pressure.hpp>
 #include <membrane/network/tissue.hpp>
 #include <membrane/network/triangular_springs.hpp>
+// [/tissue]
 
 #include "support/figure.hpp"
 #include "support/specimen.hpp"
@@ -35,9 +37,9 @@ struct Scene {
 
 Figure press(const Scene& scene) {
     const membrane::TriangleMesh mesh(scene.body.surface.points, scene.body.surface.triangles);
-    const auto none = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
-                                                  {.stiffness = 0.0, .pinned = membrane::border(mesh)});
     // [tissue]
+    const auto none = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
+                                                  {.stiffness = 0.0, .pinned = membrane::border(mesh)});  // no springs
     const auto sheet = membrane::triangular_springs(mesh, scene.material, scene.stretch);
     const auto bending = membrane::bending_springs(mesh, scene.rigidity);  // none for 0, at no cost
     const auto pressure = membrane::pressure(mesh, scene.pressure);
@@ -88,6 +90,7 @@ int main(int argc, char** argv) {
         const double bending = flexural_rigidity(thick);
         std::filesystem::create_directories(folder);
         const auto show = [&](const Scene& s) { save(folder / ("tissue_" + s.name + ".svg"), drawn(press(s))); };
+        std::cout << "pictures: " << folder.string() << std::endl;
         show({"lens_capsule", mesh.specimen(lens), thin, 0, 1.01, 0, fibres, 1e-3, 0.5e-3});
         if (!mesh.file.empty()) return;
         const auto cap = specimen_of(distmesh(front, {.edge_length = 0.5e-3}));

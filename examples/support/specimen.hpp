@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iostream>
 #include <map>
 #include <string>
 #include <utility>
@@ -11,6 +12,7 @@
 #include <membrane/mesh/adjacency.hpp>
 #include <membrane/mesh/normals.hpp>
 #include <membrane/mesh/shapes.hpp>
+#include <membrane/mesh/surface_facts.hpp>
 
 #include "support/command_line.hpp"
 #include "support/mesh_file.hpp"
@@ -117,7 +119,17 @@ struct MeshOptions {
         const auto metres =
             std::map<std::string, double>{{"m", 1}, {"cm", 1e-2}, {"mm", 1e-3}, {"um", 1e-6}, {"inch", 0.0254}};
         const Surface surface = read_mesh(file, metres.at(unit));
-        return specimen_of(membrane::TriangleMesh(surface.points, surface.triangles));
+        const membrane::TriangleMesh mesh(surface.points, surface.triangles);
+        doubt_unit(mesh.positions());
+        return specimen_of(mesh);
+    }
+
+  private:
+    /// A note, if it looks as if the unit had been forgotten.
+    void doubt_unit(const membrane::Points<double>& x) const {
+        const double size = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).maxCoeff();
+        if (membrane::likely_unit(size) != membrane::LengthUnit::millimetre) return;
+        std::cerr << "note: " << file << " is " << size << " m large; in millimetres? --unit mm\n";
     }
 };
 

@@ -2,6 +2,8 @@
 #include "support/specimen.hpp"
 
 #include <algorithm>
+#include <iostream>
+#include <sstream>
 #include <string>
 
 #include <Eigen/Geometry>
@@ -15,6 +17,19 @@
 #include "support/refusal.hpp"
 
 using namespace test;
+
+namespace {
+
+/// What is said of the file.
+std::string noted(const examples::MeshOptions& options) {
+    std::ostringstream said;
+    auto* const error = std::cerr.rdbuf(said.rdbuf());
+    (void)options.specimen(examples::stock_sphere());
+    std::cerr.rdbuf(error);
+    return said.str();
+}
+
+}  // namespace
 
 TEST_CASE("a sphere is met where it is highest, a disc in its middle") {
     const auto sphere = examples::specimen_of(examples::stock_sphere());
@@ -68,6 +83,9 @@ TEST_CASE("the lens that comes with the examples is a membrane") {
 
     options.unit = "cm";
     CHECK(options.specimen(examples::stock_sphere()).size == Approx(4.48742e-2));
+    CHECK(noted(options).empty());
+    options.unit = "m";
+    CHECK_THAT(noted(options), ContainsSubstring("lens.obj is 9 m large; in millimetres? --unit mm"));
     options.file = "";
     CHECK(options.specimen(examples::stock_sphere()).surface.points.cols() == 642);
 

@@ -16,7 +16,8 @@
 /// Where the membrane really comes to rest, and what it then pushes back with: the reference for one's own scenes.
 ///
 ///     #include <membrane/accuracy/equilibrium.hpp>
-///     const auto rest = membrane::equilibrium(x, mesh, network, backing, {}, press(tool, contact), pull(7, target));
+///     const auto rest = membrane::equilibrium(x, mesh, network, backing, {}, press(tool, contact),
+///                                             membrane::pull(7, target));
 ///     if (!rest.converged) ...
 ///     (x - rest.x).colwise().norm().maxCoeff();                              // error of a step's positions [m]
 ///     rest.reactions[0];                                                     // force of the membrane on the tool [N]

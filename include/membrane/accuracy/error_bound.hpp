@@ -18,8 +18,8 @@
 /// How far a membrane is from rest, proven.
 ///
 ///     membrane::ErrorBound bound(network);                                          // offline: allocates all it needs
-///     const auto report = solver.step(x, dt, network, backing, pull(7, target));
-///     const auto error = bound.of(x, network, backing, pull(7, target));
+///     const auto report = solver.step(x, dt, network, backing, membrane::pull(7, target));
+///     const auto error = bound.of(x, network, backing, membrane::pull(7, target));
 ///     if (error.certified()) {
 ///         error.position                                                            // no vertex is farther off [m]
 ///         error.reactions[0].farthest_from(report.reactions[0])                     // the force is no farther off [N]

@@ -8,7 +8,7 @@
 
 /// What is known of how far a membrane is from rest.
 ///
-///     const membrane::ErrorReport error = bound.of(x, network, backing, pull(7, target));
+///     const membrane::ErrorReport error = bound.of(x, network, backing, membrane::pull(7, target));
 ///     if (error.certified()) error.position; error.reactions[0].farthest_from(report.reactions[0]);   // [m], [N]
 namespace membrane {
 

@@ -18,7 +18,7 @@
 /// What has to balance where a membrane of linear springs is at rest.
 ///
 ///     membrane::RestProblem problem(network);                                            // offline
-///     if (problem.take(x, network, backing, pull(7, target)) != ProblemStatus::sound) ...
+///     if (problem.take(x, network, backing, membrane::pull(7, target)) != ProblemStatus::sound) ...
 ///     problem.forces(problem.centre(), force, magnitude);                                // [N]
 namespace membrane {
 

@@ -12,7 +12,7 @@
 /// How stiff a membrane feels to whoever holds it.
 ///
 ///     membrane::TangentStiffness tangent(network);                                  // offline: allocates all it needs
-///     const auto feel = tangent.of(solver.queue().vertices(), x, network, backing, pull(7, target));
+///     const auto feel = tangent.of(solver.queue().vertices(), x, network, backing, membrane::pull(7, target));
 ///     if (feel.status == TangentStatus::found) largest_eigenvalue(feel.stiffness);  // [N/m]
 namespace membrane {
 

@@ -1,0 +1,291 @@
+// SPDX-License-Identifier: MIT
+//
+// What the README shows beside the examples, as a user's program: nothing of the library's is known by its bare name.
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <iostream>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include <membrane/membrane.hpp>
+
+// [threads]
+#include <membrane/core/thread_pool.hpp>  // the stock one; waking its threads is a system call
+// [/threads]
+
+// [hand]
+#include <membrane/haptics/force_limits.hpp>
+#include <membrane/haptics/passivity.hpp>
+// [/hand]
+
+// [smooth]
+#include <membrane/haptics/smooth_contact.hpp>
+// [/smooth]
+
+// [handover]
+#include <membrane/haptics/handover.hpp>
+// [/handover]
+
+// [units]
+#include <membrane/haptics/units.hpp>
+// [/units]
+
+// [recording]
+#include <membrane/haptics/recording_file.hpp>
+// [/recording]
+
+// [distmesh]
+#include <membrane/mesh/distmesh.hpp>
+// [/distmesh]
+
+// [validate]
+#include <membrane/mesh/repair.hpp>
+#include <membrane/mesh/validate.hpp>
+// [/validate]
+
+// [constants]
+#include <membrane/network/calibration.hpp>
+#include <membrane/network/foundation_springs.hpp>
+#include <membrane/network/recommended_layers.hpp>
+// [/constants]
+
+// [equilibrium]
+#include <membrane/accuracy/equilibrium.hpp>
+// [/equilibrium]
+
+// [bound]
+#include <membrane/accuracy/error_bound.hpp>
+// [/bound]
+
+// [settings]
+#include <membrane/accuracy/choose_settings.hpp>
+// [/settings]
+
+#include "support/catch.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+double now() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
+
+struct AtRest {
+    membrane::TriangleMesh<double> mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 2});
+    membrane::MassSpringNetwork<double, membrane::LinearSpring> network{mesh, {}, {.stiffness = 40.0}};
+    membrane::VirtualVolumeSprings<double> backing{mesh, {.stiffness = 40.0}};
+    const double dt = 1e-3;
+};
+
+/// A ball touches a little.
+struct Touched : AtRest {
+    membrane::QuasiStaticSolver<double> solver{network};
+    membrane::AabbTree<double> tree{mesh};
+    membrane::ContactTracker<double> tracker{mesh};
+    membrane::Grasper<double> grasper{mesh};
+    membrane::Points<double> x = mesh.positions();
+    membrane::Tool<double> tool{.position = {0, 0, 0.0108}, .radius = 1e-3};
+    membrane::Contact<double> contact = tracker.update(tree, x, tool);
+    membrane::SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
+    std::uint64_t steps = 1;
+};
+
+/// What a sphere tool meets that goes down for some ticks.
+std::vector<membrane::Tool<double>> stroke_of_ticks() {
+    std::vector<membrane::Tool<double>> tools;
+    for (int i = 0; i < 12; ++i) tools.push_back({.position = {0, 0, 0.0118 - i * 2e-5}, .radius = 2e-3});
+    return tools;
+}
+
+}  // namespace
+
+TEST_CASE_METHOD(Touched, "the README's constraints") {
+    tool.grasping = true;
+    const auto& triangles = mesh.triangles();
+    const std::array<membrane::Index, 3> corners{triangles(0, 9), triangles(1, 9), triangles(2, 9)};
+    const Eigen::Vector3d barycentric(0.2, 0.3, 0.5), force(0, 0, 0.01);
+    const std::vector<membrane::Index> vertices{100, 101};
+    // [constraints]
+    const auto grasp = grasper.update(contact, x, tool);  // forceps: membrane::Grasper(mesh)
+    const auto report = solver.step(x, dt, network, backing, press(tool, contact, grasp), pull(tool, grasp),
+                                    membrane::load(corners, barycentric, force), membrane::pin(vertices));
+    // [/constraints]
+    CHECK(grasp.holding());
+    CHECK(report.status == membrane::StepStatus::advanced);
+    CHECK(report.reactions.size() == 4);
+    CHECK((report.reactions[2] + force).norm() < 1e-15);
+}
+
+TEST_CASE_METHOD(Touched, "the README's deadline") {
+    // [deadline]
+    const auto deadline = membrane::Deadline([] { return Clock::now(); }, Clock::now() + 300us);
+    const auto report = solver.step_until(deadline, x, dt, network, backing, press(tool, contact));
+    // [/deadline]
+    CHECK(report.status == membrane::StepStatus::advanced);
+}
+
+TEST_CASE_METHOD(AtRest, "the README's threads") {
+    // [threads]
+    const membrane::ThreadPool pool;
+    auto solver = membrane::QuasiStaticSolver(network,
+                                              {.layers = membrane::unlimited,
+                                               .sweeps = 16,
+                                               .order = membrane::VisitOrder::colours,
+                                               .most_in_groups = membrane::unlimited},  // for more than 32,768 vertices
+                                              membrane::BlockStep{}, pool.executor());
+    // [/threads]
+    auto x = mesh.positions();
+    const auto report = solver.step(x, dt, network, backing, membrane::pull(7, 1.01 * x.col(7)));
+    CHECK(report.status == membrane::StepStatus::advanced);
+}
+
+TEST_CASE_METHOD(Touched, "the README's hand") {
+    membrane::NullDevice<double> device({{.time = 0}}, {.tick = 1e-3});
+    const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+    // [hand]
+    const auto profile = membrane::devices::touch;
+    membrane::require_passive({.stiffness = 100, .damping = 0.5, .tick = 1e-3}, profile, {.hand_damping = 2});
+    auto limit = membrane::ForceLimiter(profile);  // each limit can be taken off
+    device.write(limit(feel({tool, contact, report}), now(), steps));
+    // [/hand]
+    // [smooth]
+    const auto smooth = membrane::SmoothContact(mesh);
+    device.write(limit(feel({tool, smooth(contact), report}), now(), steps));
+    // [/smooth]
+    CHECK(limit.acted().faded);  // it has only begun
+
+    const auto force = device.force();
+    std::stringstream file;
+    // [recording]
+    membrane::Recorder<double> recorder(60'000, mesh.vertex_count());              // room for a minute at 1 kHz
+    recorder.add(tool, force);                                                     // each tick
+    membrane::write_recording(file, recorder.recording());                         // afterwards; write_csv for a table
+    membrane::ReplayDevice<double> again(membrane::read_recording<double>(file));  // in place of the device
+    // [/recording]
+    CHECK(again.read().position == tool.position);
+}
+
+TEST_CASE("the README's device in millimetres") {
+    const Eigen::Vector3d position(0, 0, 108), velocity(0, 0, -50);
+    const membrane::Vector3<double> force(0, 0, 0.01);
+    membrane::NullDevice<double> device({{.time = 0}}, {.tick = 1e-3});
+    // [units]
+    const auto scale = membrane::DeviceScale{.force = 40, .motion = 0.1};  // 40 times the force, 10 times the way
+    const auto seen = scale.to_scene(membrane::Millimetres(position), membrane::MillimetresPerSecond(velocity));
+    device.write(scale.to_device(membrane::Newtons(force)).on_hand.value());
+    // [/units]
+    CHECK(seen.position.z() == Approx(0.0108));
+    CHECK(device.force().z() == 0.4);
+    CHECK(scale.at_device(membrane::NewtonsPerMetre(40)).value() == Approx(160));
+}
+
+TEST_CASE_METHOD(Touched, "the README's two loops") {
+    auto shown = x;
+    const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+    // [handover]
+    membrane::MovedPoints<double> moved(mesh.vertex_count());
+    moved.publish(report.moved, x, now());  // haptic loop, each tick
+    const auto news = moved.read();         // drawing loop, each frame
+    for (const auto v : news.moved) shown.col(v) = news.x.col(v);
+    // [/handover]
+    CHECK_FALSE(news.moved.empty());
+    CHECK(shown == x);
+}
+
+TEST_CASE("the README's meshes from formulas") {
+    // [distmesh]
+    const auto lens = membrane::distmesh(membrane::Ellipsoid{.radii = {4.5e-3, 4.5e-3, 2e-3}}, {.edge_length = 0.3e-3});
+    const auto front = membrane::trimmed(membrane::Ball{.radius = 8e-3}, membrane::HalfSpace{.point = {0, 0, -5e-3}});
+    const auto cornea = membrane::distmesh(front, {.edge_length = 0.8e-3});  // with a border
+    const auto torus = [](const Eigen::Vector3d& p) {                        // or any function of your own
+        return std::hypot(std::hypot(p.x(), p.y()) - 6e-3, p.z()) - 2e-3;
+    };
+    const auto ring = membrane::distmesh(
+        torus, {.edge_length = 0.8e-3, .bounds = membrane::Bounds{{-0.01, -0.01, -0.003}, {0.01, 0.01, 0.003}}});
+    // [/distmesh]
+    CHECK(membrane::validate(lens).facts.closed());
+    CHECK(membrane::validate(cornea).facts.borders == 1);
+    CHECK(membrane::validate(ring).facts.genus == 1);
+}
+
+TEST_CASE("the README's mesh from elsewhere") {
+    const auto good = membrane::icosphere<double>({.radius = 10, .subdivisions = 2});
+    auto triangles = good.triangles();
+    membrane::Points<double> points(3, good.vertex_count() + 1);  // triangle 7 has a corner of its own, as in an STL
+    points << good.positions(), good.positions().col(triangles(0, 7));
+    triangles(0, 7) = good.vertex_count();
+    std::swap(triangles(0, 9), triangles(1, 9));
+    // [validate]
+    const auto report = membrane::validate(points, triangles);  // any numbers, 3 x V [m] and 3 x F
+    std::cout << to_string(report);                             // each defect with its indices and what to do
+    if (report.facts.likely_unit == membrane::LengthUnit::millimetre) points /= 1000;  // facts: what the mesh is
+    const auto mended = membrane::repair(points, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true});
+    const auto mesh = membrane::TriangleMesh(mended.positions, mended.triangles);  // throws where more is wrong
+    // [/validate]
+    CHECK_FALSE(report.sound());
+    CHECK(membrane::validate(mesh).empty());
+    CHECK(mesh.vertex_count() == good.vertex_count());
+    CHECK(mesh.positions().colwise().norm().maxCoeff() == Approx(0.01));
+}
+
+TEST_CASE("the README's constants") {
+    const auto mesh = membrane::icosphere<double>({.radius = 4e-3, .subdivisions = 2});
+    membrane::Tool<double> tool{.radius = 2e-3};
+    // [constants]
+    const auto capsule = membrane::materials::lens_capsule().typical;  // with the source of each number
+    const auto fibres = membrane::Foundation{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
+                                                     {.stiffness = membrane::spring_stiffnesses(mesh, capsule)});
+    const auto backing =
+        membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, fibres),
+                                           .tangential = membrane::tangential_stiffnesses(mesh, fibres),
+                                           .recovery_time = 0.2});
+    const auto layers = membrane::recommended_layers(mesh, capsule, fibres).tangential;
+    tool.radius = membrane::tool_radius(tool.radius, membrane::mean_edge(mesh));  // flat triangles meet a ball sooner
+    // [/constants]
+    CHECK(layers > 0);
+    CHECK(tool.radius < 2e-3);
+}
+
+TEST_CASE_METHOD(Touched, "the README's equilibrium") {
+    const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+    // [equilibrium]
+    const auto rest = membrane::equilibrium(x, mesh, network, backing, {}, press(tool, contact));
+    const double way = (x - rest.x).colwise().norm().maxCoeff();            // error of the positions [m]
+    const double force = (report.reactions[0] - rest.reactions[0]).norm();  // and of the force [N]
+    // [/equilibrium]
+    CHECK(rest.converged);
+    CHECK(way < 1e-5);
+    CHECK(force < 0.1 * rest.reactions[0].norm());
+}
+
+TEST_CASE_METHOD(Touched, "the README's bound") {
+    const Eigen::Vector3d target = 1.01 * x.col(7);
+    const auto report = solver.step(x, dt, network, backing, membrane::pull(7, target));
+    // [bound]
+    auto bound = membrane::ErrorBound(network);                                   // once: allocates all it needs
+    const auto error = bound.of(x, network, backing, membrane::pull(7, target));  // allocates nothing
+    if (error.certified()) {
+        const double way = error.position;                                           // no vertex is farther off [m]
+        const double force = error.reactions[0].farthest_from(report.reactions[0]);  // the force is no farther off [N]
+        std::printf("%g m, %g N\n", way, force);
+    }
+    // [/bound]
+    CHECK(error.certified());
+}
+
+TEST_CASE_METHOD(AtRest, "the README's settings") {
+    const auto tools = stroke_of_ticks();
+    // [settings]
+    const auto stroke = membrane::Stroke(mesh, tools, 1e-3);  // a tool for each tick of 1 ms
+    const auto choice = membrane::choose_settings(mesh, network, backing, stroke, {.force_error = 0.05});  // or .time
+    if (!choice.met) std::puts("Nothing that was tried is enough. What came nearest:");
+    std::printf("%g of the force, %g s\n", choice.force_error, choice.time);  // as the experiment has measured
+    auto solver = membrane::QuasiStaticSolver(network, choice.options);
+    // [/settings]
+    CHECK(choice.met);
+}
