@@ -94,7 +94,7 @@ TEMPLATE_TEST_CASE("nor do a million of the complete loop of a hand, whatever go
     test::Mishaps mishaps(9);
     const int ticks = cases(6'000, 500'000);  // of each scalar
     const long allocated = allocated_by([&] {
-        for (int i = 0; i < ticks; ++i) loop.tick(i % 20'000 < 10'000 ? test::Mishap() : mishaps.next());
+        for (int i = 0; i < ticks; ++i) loop.tick(i % 2'000 < 1'000 ? test::Mishap() : mishaps.next());
     });
     CHECK(allocated == 0);
     CHECK(loop.x.allFinite());

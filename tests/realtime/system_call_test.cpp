@@ -62,8 +62,7 @@ TEMPLATE_TEST_CASE("nor do a million of the complete loop of a hand, whatever go
     test::HapticLoop<TestType> loop(10);
     test::Mishaps mishaps(11);
     const auto child = without_system_calls([&] {
-        for (int i = 0; i < cases(6'000, 500'000); ++i)
-            loop.tick(i % 20'000 < 10'000 ? test::Mishap() : mishaps.next());
+        for (int i = 0; i < cases(6'000, 500'000); ++i) loop.tick(i % 2'000 < 1'000 ? test::Mishap() : mishaps.next());
         if (!loop.x.allFinite() || !loop.drawn_right || loop.solves == 0) std::abort();
     });
     CHECK(child.signal == 0);

@@ -193,7 +193,7 @@ class Mishaps {
 
   private:
     Random random_;
-    membrane::Index kind_ = 0, left_ = 1000;
+    membrane::Index kind_ = 0, left_ = 100;
 };
 
 }  // namespace test
