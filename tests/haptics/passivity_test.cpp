@@ -337,7 +337,7 @@ TEST_CASE("what is not passive is refused, and the message says what would be", 
     const SampledLoop loop{.stiffness = 1000, .damping = 0.25, .tick = 1e-3};
     CHECK(test::refusal([&] { require_passive(loop, bare(0.25), {.hand_damping = 0.25}); }) ==
           "passivity: with damping 0.25 N s/m and a tick of 0.001 s on bare stiffness must be at most 500 [N/m], got "
-          "1000");
+          "1000; damping needed 0.75 [N s/m], there is 0.5");
     const auto refused = [](const SampledLoop& wrong, const Dissipation& dissipation) {
         return test::refusal([&] { static_cast<void>(passivity(wrong, bare(1), dissipation)); });
     };

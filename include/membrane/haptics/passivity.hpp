@@ -63,7 +63,7 @@ struct PassivityReport {
 [[nodiscard]] inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device,
                                                const Dissipation& dissipation);
 
-/// @throws InvalidInput for a loop that is not passive, naming the stiffness that would be
+/// @throws InvalidInput for a loop that is not passive, naming the stiffness that would be, and the damping
 inline void require_passive(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation);
 
 /// The energy a hand has put into the loop, tick by tick [Hannaford02]. Where it sinks below zero, the loop has given more
@@ -140,7 +140,8 @@ inline void require_passive(const SampledLoop& loop, const DeviceProfile& device
     const auto report = passivity(loop, device, dissipation);
     if (report.passive) return;
     refuse("passivity", "with damping ", loop.damping, " N s/m and a tick of ", loop.tick, " s on ", device.name,
-           " stiffness must be at most ", report.most_stiffness, " [N/m], got ", loop.stiffness);
+           " stiffness must be at most ", report.most_stiffness, " [N/m], got ", loop.stiffness, "; damping needed ",
+           report.damping_needed, " [N s/m], there is ", report.damping_there);
 }
 
 template <Real Scalar>

@@ -52,16 +52,16 @@ class QuasiStaticSolver {
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, in layer 0 `contact_visits` in each
-    /// sweep; a visit costs the vertex's springs.
+    /// sweep; a visit costs the vertex's springs. @pre `x`, network and backing are of the solver's vertices (asserted)
     template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                           const Constraints&... constraints) noexcept {
         return step_in(NoHurry{}, x, dt, network, volume, constraints...);
     }
 
-    /// The same, over at `deadline`, or later by what it misjudged its end by; or by what comes in any case, one
-    /// round over layer 0, 32 vertices beyond, and a look at all that are at work. One thread visits. The next step goes on where time ran
-    /// out, so that a membrane comes to rest however little time its steps have.
+    /// The same, over at `deadline`, or later by what it misjudged its end by; or by what comes in any case, one round
+    /// over layer 0, 32 vertices beyond, and a look at all that are at work. One thread visits. The next step goes on
+    /// where time ran out, so that a membrane comes to rest however little time its steps have.
     template <class Now, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
                                                 const Network& network, const Volume& volume,
