@@ -52,7 +52,7 @@ class QuasiStaticSolver {
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, in layer 0 `contact_visits` in each
-    /// sweep; a visit costs the vertex's springs. @pre `x`, network and backing are of the solver's vertices (asserted)
+    /// sweep; a visit costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
     template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                           const Constraints&... constraints) noexcept {
