@@ -141,4 +141,16 @@ void refuse(std::string_view component, const Parts&... parts) {
     detail::invalid_input(message);
 }
 
+namespace detail {
+
+/// Refuses an option that is not finite, or negative, or zero where it must not be.
+inline void check_option(std::string_view component, double value, std::string_view field, std::string_view unit,
+                         bool allow_zero = true) {
+    if (is_finite(value) && (value > 0 || (allow_zero && value == 0))) return;
+    refuse(component, field, " must be finite and ", allow_zero ? "not negative" : "positive", " [", unit, "], got ",
+           value);
+}
+
+}  // namespace detail
+
 }  // namespace membrane

@@ -5,7 +5,7 @@
 #include <string_view>
 #include <utility>
 
-#include <membrane/haptics/device_profile.hpp>
+#include <membrane/core/check.hpp>
 #include <membrane/haptics/force_policy.hpp>
 
 /// Friction on whatever a policy presses with.

@@ -133,10 +133,8 @@ NullDevice<Scalar, Holder>::NullDevice(std::vector<Waypoint<Scalar>> script, con
       radius_(static_cast<Scalar>(options.radius)),
       hand_(hand) {
     constexpr std::string_view component = "NullDevice";
-    if (!is_finite(tick_) || !(tick_ > 0)) refuse(component, "tick must be finite and positive [s], got ", tick_);
-    if (!is_finite(radius_) || radius_ < 0) {
-        refuse(component, "radius must be finite and not negative [m], got ", radius_);
-    }
+    detail::check_option(component, tick_, "tick", "s", false);
+    detail::check_option(component, radius_, "radius", "m");
     if (script_.empty()) refuse(component, "the script must have a waypoint, got none");
     for (std::size_t i = 0; i < script_.size(); ++i) {
         const auto& waypoint = script_[i];

@@ -15,14 +15,13 @@ namespace membrane {
 /// A device by its numbers. Zero is on the safe side for damping and friction: what is not known is not counted on.
 struct DeviceProfile {
     std::string_view name;
-    double peak_force;        ///< the largest it may be asked for, for a short time [N]
-    double continuous_force;  ///< what its motors bear for ever [N]; the peak: heating is left to the device
-    double stiffness;         ///< the largest it can show [N/m]
-    double damping = 0;       ///< of its own, viscous, at the least [N s/m]
-    double friction = 0;      ///< of its own, Coulomb: the force it takes to drive it back [N]
-    double resolution = 0;    ///< of its position [m]; 0: not counted
-    double thermal_time =
-        10;  ///< in which its motors warm up [s]; makers do not say, small motors' windings take 5 to 15
+    double peak_force;         ///< the largest it may be asked for, for a short time [N]
+    double continuous_force;   ///< what its motors bear for ever [N]; the peak: heating is left to the device
+    double stiffness;          ///< the largest it can show [N/m]
+    double damping = 0;        ///< of its own, viscous, at the least [N s/m]
+    double friction = 0;       ///< of its own, Coulomb: the force it takes to drive it back [N]
+    double resolution = 0;     ///< of its position [m]; 0: not counted
+    double thermal_time = 10;  ///< in which its motors warm up [s]; makers do not say, small windings take 5 to 15
 
     /// @throws InvalidInput for a number that is not finite or out of its range
     void check() const;
@@ -70,18 +69,6 @@ inline constexpr DeviceProfile delta{.name = "delta", .peak_force = 20, .continu
 inline constexpr DeviceProfile sigma{.name = "sigma", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
 
 }  // namespace devices
-
-namespace detail {
-
-/// Refuses an option that is not finite, or negative, or zero where it must not be.
-inline void check_option(std::string_view component, double value, std::string_view field, std::string_view unit,
-                         bool allow_zero = true) {
-    if (is_finite(value) && (value > 0 || (allow_zero && value == 0))) return;
-    refuse(component, field, " must be finite and ", allow_zero ? "not negative" : "positive", " [", unit, "], got ",
-           value);
-}
-
-}  // namespace detail
 
 inline void DeviceProfile::check() const {
     constexpr std::string_view component = "DeviceProfile";

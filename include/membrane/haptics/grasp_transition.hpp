@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include <membrane/haptics/device_profile.hpp>
+#include <membrane/core/check.hpp>
 #include <membrane/haptics/force_policy.hpp>
 
 /// From touching to grasping and back, without a jump.

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include <membrane/haptics/device_profile.hpp>
+#include <membrane/core/check.hpp>
 #include <membrane/haptics/force_policy.hpp>
 
 /// A spring between the hand and the tool that meets the membrane: what the hand feels is no stiffer than that, however

@@ -83,8 +83,8 @@ template <class Surface>
 
 [[nodiscard]] inline double spacing_for(const Bounds& bounds, const DistMeshOptions& options) {
     if (options.spacing) {
-        if (is_finite(*options.spacing) && *options.spacing > 0) return *options.spacing;
-        refuse(distmesh_name, "spacing must be finite and positive [m], got ", *options.spacing);
+        check_option(distmesh_name, *options.spacing, "spacing", "m", false);
+        return *options.spacing;
     }
     constexpr int steps = 16;
     const Vector3<double> size = bounds.high - bounds.low;

@@ -301,9 +301,7 @@ RepairedMesh<typename P::Scalar> repair(const Eigen::MatrixBase<P>& positions, c
     using Scalar = typename P::Scalar;
     detail::check_types<P, T>();
     static_assert(Real<Scalar>, "positions must be float or double");
-    if (options.weld && !(is_finite(*options.weld) && *options.weld >= 0)) {
-        refuse("repair", "weld must be finite and not negative [m], got ", *options.weld);
-    }
+    if (options.weld) detail::check_option("repair", *options.weld, "weld", "m");
     const auto found = [](MeshDefect defect, const std::vector<Index>&, const std::vector<Index>&,
                           const auto&... parts) {
         if (defect == MeshDefect::index_out_of_range) refuse("repair", parts...);

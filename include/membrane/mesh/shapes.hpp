@@ -69,9 +69,7 @@ template <Real Scalar = double>
 namespace detail {
 
 inline void check_length(std::string_view shape, std::string_view option, double length) {
-    if (!is_finite(length) || length <= 0) {
-        refuse(shape, option, " must be finite and positive [m], got ", length);
-    }
+    check_option(shape, length, option, "m", false);
 }
 
 inline void check_count(std::string_view shape, std::string_view option, Index count, Index least, Index most) {

@@ -73,9 +73,7 @@ namespace detail {
 
 inline void check_options(const ValidateOptions& options) {
     constexpr std::string_view component = "validate";
-    if (options.tolerance && !(is_finite(*options.tolerance) && *options.tolerance >= 0)) {
-        refuse(component, "tolerance must be finite and not negative [m], got ", *options.tolerance);
-    }
+    if (options.tolerance) check_option(component, *options.tolerance, "tolerance", "m");
     if (options.most_of_a_kind < 1) {
         refuse(component, "most_of_a_kind must be at least 1, got ", options.most_of_a_kind);
     }

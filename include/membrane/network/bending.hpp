@@ -142,9 +142,7 @@ Eigen::Matrix3d Hinge<Scalar>::second_derivative(const Corners<double, 4>& x, st
 
 template <Real Scalar>
 Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh, double rigidity) {
-    if (!is_finite(rigidity) || rigidity < 0) {
-        refuse("bending_springs", "rigidity must be finite and not negative [N m], got ", rigidity);
-    }
+    detail::check_option("bending_springs", rigidity, "rigidity", "N m");
     using All = Elements<Scalar, Hinge<Scalar>>;
     std::vector<typename All::Placed> all;
     const auto sides = half_edges(mesh.triangles());

@@ -140,8 +140,8 @@ Scalar mean_edge(const TriangleMesh<Scalar>& mesh) {
 }
 
 inline double tool_radius(double radius, double edge) {
-    detail::check_constant("tool_radius", "radius", "m", radius);
-    detail::check_constant("tool_radius", "edge", "m", edge);
+    detail::check_option("tool_radius", radius, "radius", "m", false);
+    detail::check_option("tool_radius", edge, "edge", "m", false);
     const double least = edge / std::sqrt(3.0);
     if (!(radius > least)) {
         refuse("tool_radius", "radius must be more than ", least, " [m] for triangles with this edge, got ", radius);

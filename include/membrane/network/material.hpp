@@ -88,11 +88,6 @@ namespace materials {
 
 namespace detail {
 
-inline void check_constant(std::string_view component, std::string_view name, std::string_view unit, double value) {
-    if (is_finite(value) && value > 0) return;
-    refuse(component, name, " must be finite and positive [", unit, "], got ", value);
-}
-
 inline void check_poisson_ratio(std::string_view component, double value, double most) {
     if (is_finite(value) && value >= 0 && value <= most) return;
     refuse(component, "poisson_ratio must be 0 to ", most, ", got ", value);
@@ -102,17 +97,17 @@ inline void check_poisson_ratio(std::string_view component, double value, double
 
 inline void Material::check() const {
     constexpr std::string_view component = "Material";
-    detail::check_constant(component, "young_modulus", "Pa", young_modulus);
+    detail::check_option(component, young_modulus, "young_modulus", "Pa", false);
     detail::check_poisson_ratio(component, poisson_ratio, 0.5);
-    detail::check_constant(component, "thickness", "m", thickness);
-    detail::check_constant(component, "density", "kg/m^3", density);
+    detail::check_option(component, thickness, "thickness", "m", false);
+    detail::check_option(component, density, "density", "kg/m^3", false);
 }
 
 inline void Foundation::check() const {
     constexpr std::string_view component = "Foundation";
-    detail::check_constant(component, "young_modulus", "Pa", young_modulus);
+    detail::check_option(component, young_modulus, "young_modulus", "Pa", false);
     detail::check_poisson_ratio(component, poisson_ratio, 0.49);
-    detail::check_constant(component, "thickness", "m", thickness);
+    detail::check_option(component, thickness, "thickness", "m", false);
 }
 
 }  // namespace membrane

@@ -175,7 +175,7 @@ template <Real Scalar>
 Elements<Scalar, TriangularSpring<Scalar>> triangular_springs(const TriangleMesh<Scalar>& mesh,
                                                               const Material& material, double stretch) {
     material.check();
-    detail::check_constant("triangular_springs", "stretch", "1", stretch);
+    detail::check_option("triangular_springs", stretch, "stretch", "1", false);
     using All = Elements<Scalar, TriangularSpring<Scalar>>;
     std::vector<typename All::Placed> all;
     for (const auto& corners : mesh.triangles().colwise()) {

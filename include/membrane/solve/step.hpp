@@ -87,9 +87,7 @@ void SolverOptions<Scalar>::check() const {
     at_least(most_visits, 1, "most_visits");
     at_least(most_touches, 0, "most_touches");
     at_least(most_in_groups, 0, "most_in_groups");
-    if (!is_finite(negligible_force) || negligible_force < 0) {
-        refuse(component, "negligible_force must be finite and not negative [N], got ", negligible_force);
-    }
+    detail::check_option(component, negligible_force, "negligible_force", "N");
 }
 
 }  // namespace membrane
