@@ -87,13 +87,13 @@ int main(int argc, char** argv) {
         const Material thin = materials::lens_capsule().typical, thick = materials::cornea().typical;
         const Foundation fibres{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
         const Foundation aqueous{.young_modulus = 10, .poisson_ratio = 0.3, .thickness = 1e-3};  // next to nothing
-        const double bending = flexural_rigidity(thick);
+        const Specimen body = mesh.specimen(lens);
         std::filesystem::create_directories(folder);
         const auto show = [&](const Scene& s) { save(folder / ("tissue_" + s.name + ".svg"), drawn(press(s))); };
         std::cout << "pictures: " << folder.string() << std::endl;
-        show({"lens_capsule", mesh.specimen(lens), thin, 0, 1.01, 0, fibres, 1e-3, 0.5e-3});
+        show({"lens_capsule", body, thin, 0, 1.01, 0, fibres, 1e-3, 0.5e-3});
         if (!mesh.file.empty()) return;
         const auto cap = specimen_of(distmesh(front, {.edge_length = 0.5e-3}));
-        show({"cornea", cap, thick, bending, 1.03, 2000, aqueous, 1e-3, 0.5e-3});
+        show({"cornea", cap, thick, flexural_rigidity(thick), 1.03, 2000, aqueous, 1e-3, 0.5e-3});
     });
 }
