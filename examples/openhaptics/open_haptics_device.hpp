@@ -99,6 +99,7 @@ class OpenHapticsDevice {
     [[nodiscard]] Force answer(const Tool& tool, double now) noexcept;
     void write(const Force& force) noexcept;
     bool look_for_errors() noexcept;
+    static void forget_errors() noexcept;
     void release() noexcept;
     void close() noexcept;
 
@@ -143,8 +144,7 @@ OpenHapticsDevice<Hd>::OpenHapticsDevice(OpenHapticsOptions options)
 template <class Hd>
 void OpenHapticsDevice<Hd>::start(Tick tick) {
     if (device_ != Hd::no_device) throw std::runtime_error("OpenHapticsDevice: must be stopped to be started");
-    for (int i = 0; i < detail::most_errors && Hd::take_error() != 0; ++i) {  // what others have left behind
-    }
+    forget_errors();  // what others have left behind
     tick_ = std::move(tick);
     report_ = {};
     error_ = 0;
@@ -210,8 +210,7 @@ void OpenHapticsDevice<Hd>::close() noexcept {
     if (scheduling_ && !ended_) release();  // the device's own thread is gone and has not done so
     if (schedule_ != Hd::not_scheduled) Hd::unschedule(schedule_);
     if (device_ != Hd::no_device) Hd::close(device_);
-    for (int i = 0; i < detail::most_errors && Hd::take_error() != 0; ++i) {  // nobody is left to tell
-    }
+    forget_errors();  // nobody is left to tell
     scheduling_ = false;
     schedule_ = Hd::not_scheduled;
     device_ = Hd::no_device;
@@ -304,6 +303,12 @@ bool OpenHapticsDevice<Hd>::look_for_errors() noexcept {
         }
     }
     return found > 0;
+}
+
+template <class Hd>
+void OpenHapticsDevice<Hd>::forget_errors() noexcept {
+    int left = detail::most_errors;
+    while (left > 0 && Hd::take_error() != 0) --left;
 }
 
 template <class Hd>

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "support/openhaptics_on_double.hpp"
@@ -21,84 +23,84 @@ std::string told(HDerror error) {
     return std::string("HD error ") + code + ": a fault";
 }
 
-}  // namespace
-
-TEST_CASE("an error that passes, in any call of any tick, takes the force for so long and no longer", "[openhaptics]") {
+/// Each of these errors in each call of a tick: the first, the second, and one long after the force is whole. `check` is
+/// called after that tick.
+template <std::size_t count, class Check>
+void for_each_failure(const std::array<HDerror, count>& errors, Check check) {
     for (std::size_t call = 0; call < in_tick.size(); ++call) {
-        for (const HDerror error : passing_errors) {
+        for (const HDerror error : errors) {
             for (const int at : {1, 2, settled + 10}) {
                 CAPTURE(in_tick[call], call, error, at);
                 HdDouble hd;
                 OpenHaptics device;
                 device.start(Push{});
                 hd.run(at - 1);
-                const bool of_force = in_tick[call] == "hdSetDoublev", of_end = in_tick[call] == "hdEndFrame";
                 hd.fail(in_tick[call], at, error, calls_before(in_tick, call));
                 hd.run(1);
-                CHECK(device.running());
-                if (!of_end) CHECK(hd.force().isZero(0));
-                CHECK(std::string(device.warning()) == (error == HD_WARM_MOTORS ? "warm motors" : "a fault"));
-                if (of_force || of_end) hd.run(1);  // known too late for the force of its own tick
-                CHECK(hd.force().isZero(0));
-                for (int i = 1; i < 100; ++i) {
-                    hd.run(1);
-                    REQUIRE(hd.force().norm() == Approx(0.01 * i * pushed.norm()));
-                }
-                CHECK(device.warning() == nullptr);
-                hd.run(settled - 100);
-                CHECK(hd.force() == pushed);
-                const int ticks = static_cast<int>(hd.ticks());
-                device.stop();
-                check_closed(hd);
-                CHECK(device.trouble().empty());
-                CHECK(device.report().errors == 1);
-                CHECK(std::string(device.report().last_error) != "none");
-                CHECK(names(hd) == in_turn({{opening, 1},
-                                            {in_tick, at - 1},
-                                            {of_force ? in_tick_withdrawn : in_tick, 1},
-                                            {in_tick, ticks - at + 1},
-                                            {closing, 1}}));
+                check(hd, device, in_tick[call], error, at);
             }
         }
     }
 }
 
-TEST_CASE("any other error, in any call of any tick, ends the run with no force", "[openhaptics]") {
-    for (std::size_t call = 0; call < in_tick.size(); ++call) {
-        for (const HDerror error : final_errors) {
-            for (const int at : {1, 2, settled + 10}) {
-                CAPTURE(in_tick[call], call, error, at);
-                HdDouble hd;
-                OpenHaptics device;
-                device.start(Push{});
-                hd.run(at - 1);
-                const bool of_force = in_tick[call] == "hdSetDoublev", of_end = in_tick[call] == "hdEndFrame";
-                hd.fail(in_tick[call], at, error, calls_before(in_tick, call));
-                hd.run(1);
-                CHECK_FALSE(device.running());
-                if (!of_end) CHECK(hd.force().isZero(0));
-                hd.run(1);
-                CHECK(hd.force().isZero(0));
-                hd.run(3);
-                device.stop();
-                check_closed(hd);
-                CHECK(names(hd) == in_turn({{opening, 1},
-                                            {in_tick, at - 1},
-                                            {of_force ? in_tick_withdrawn : in_tick, 1},
-                                            {in_tick, of_force || of_end ? 1 : 0},
-                                            {closing, 1}}));
-                CHECK(device.trouble() == told(error));
+}  // namespace
 
-                device.start(Push{});
-                CHECK(device.trouble().empty());
-                hd.run(settled);
-                CHECK(device.running());
-                CHECK(hd.force() == pushed);
-                device.stop();
-                check_closed(hd);
-            }
+TEST_CASE("an error that passes, in any call of any tick, takes the force for so long and no longer", "[openhaptics]") {
+    const auto check = [](HdDouble& hd, OpenHaptics& device, std::string_view call, HDerror error, int at) {
+        const bool of_force = call == "hdSetDoublev", of_end = call == "hdEndFrame";
+        CHECK(device.running());
+        if (!of_end) CHECK(hd.force().isZero(0));
+        CHECK(std::string(device.warning()) == (error == HD_WARM_MOTORS ? "warm motors" : "a fault"));
+        if (of_force || of_end) hd.run(1);  // known too late for the force of its own tick
+        CHECK(hd.force().isZero(0));
+        for (int i = 1; i < 100; ++i) {
+            hd.run(1);
+            REQUIRE(hd.force().norm() == Approx(0.01 * i * pushed.norm()));
         }
-    }
+        CHECK(device.warning() == nullptr);
+        hd.run(settled - 100);
+        CHECK(hd.force() == pushed);
+        const int ticks = static_cast<int>(hd.ticks());
+        device.stop();
+        check_closed(hd);
+        CHECK(device.trouble().empty());
+        CHECK(device.report().errors == 1);
+        CHECK(std::string(device.report().last_error) != "none");
+        CHECK(names(hd) == in_turn({{opening, 1},
+                                    {in_tick, at - 1},
+                                    {of_force ? in_tick_withdrawn : in_tick, 1},
+                                    {in_tick, ticks - at + 1},
+                                    {closing, 1}}));
+    };
+    for_each_failure(passing_errors, check);
+}
+
+TEST_CASE("any other error, in any call of any tick, ends the run with no force", "[openhaptics]") {
+    const auto check = [](HdDouble& hd, OpenHaptics& device, std::string_view call, HDerror error, int at) {
+        const bool of_force = call == "hdSetDoublev", of_end = call == "hdEndFrame";
+        CHECK_FALSE(device.running());
+        if (!of_end) CHECK(hd.force().isZero(0));
+        hd.run(1);
+        CHECK(hd.force().isZero(0));
+        hd.run(3);
+        device.stop();
+        check_closed(hd);
+        CHECK(names(hd) == in_turn({{opening, 1},
+                                    {in_tick, at - 1},
+                                    {of_force ? in_tick_withdrawn : in_tick, 1},
+                                    {in_tick, of_force || of_end ? 1 : 0},
+                                    {closing, 1}}));
+        CHECK(device.trouble() == told(error));
+
+        device.start(Push{});
+        CHECK(device.trouble().empty());
+        hd.run(settled);
+        CHECK(device.running());
+        CHECK(hd.force() == pushed);
+        device.stop();
+        check_closed(hd);
+    };
+    for_each_failure(final_errors, check);
 }
 
 TEST_CASE("of several errors the worst is told, the last of those, and none is left", "[openhaptics]") {
