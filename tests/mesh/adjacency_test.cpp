@@ -138,15 +138,7 @@ TEST_CASE("adjacency outlives the mesh and what it was copied from", "[mesh]") {
 }
 
 TEST_CASE("a vertex may have a hundred thousand neighbours", "[mesh]") {
-    const Index count = 100'000;
-    Points<double> x(3, count + 1);
-    Triangles triangles(3, count);
-    x.col(0).setZero();
-    for (Index i = 0; i < count; ++i) {
-        x.col(i + 1) << 10 * std::cos(6.283185 * i / count), 10 * std::sin(6.283185 * i / count), 0;
-        triangles.col(i) << 0, 1 + i, 1 + (i + 1) % count;
-    }
-    const Adjacency adjacency(TriangleMesh(x, triangles));
+    const Adjacency adjacency(test::fan<double>(100'000).mesh());
     CHECK(adjacency.neighbours(0).size() == 100'000);
     CHECK(adjacency.triangles_of(0).size() == 100'000);
     CHECK(adjacency.edges().size() == 200'000);

@@ -2,11 +2,9 @@
 #include <membrane/mesh/triangle_mesh.hpp>
 
 #include <array>
-#include <chrono>
 #include <cstdint>
 #include <cstring>
 #include <limits>
-#include <numbers>
 #include <set>
 #include <string>
 #include <vector>
@@ -533,22 +531,11 @@ TEMPLATE_TEST_CASE("what is odd but sound is accepted as it is", "[mesh]", doubl
     }
 }
 
-TEST_CASE("a vertex may have a hundred thousand triangles, in no more than a moment", "[mesh]") {
-    const Index count = 100'000;
-    Surface<double> fan;
-    fan.x.resize(3, count + 1);
-    fan.triangles.resize(3, count);
-    fan.x.col(0).setZero();
-    for (Index i = 0; i < count; ++i) {
-        const double angle = 2 * std::numbers::pi * i / count;
-        fan.x.col(i + 1) << 10 * std::cos(angle), 10 * std::sin(angle), 0;
-        fan.triangles.col(i) << 0, 1 + i, 1 + (i + 1) % count;
-    }
-    const auto start = std::chrono::steady_clock::now();
+TEMPLATE_TEST_CASE("a vertex may have a hundred thousand triangles", "[mesh]", double, float) {
+    auto fan = test::fan<TestType>(100'000);
     CHECK(accepted_unchanged(fan));
     Random random(1);
     CHECK(accepted_unchanged(test::shuffled(fan, random)));
-    CHECK(std::chrono::steady_clock::now() - start < std::chrono::seconds(20));
 
     fan.remove_triangle(5);
     CHECK(accepted_unchanged(fan));

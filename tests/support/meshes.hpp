@@ -88,6 +88,19 @@ Surface<Scalar> shuffled(const Surface<Scalar>& surface, Random& random) {
     return result;
 }
 
+/// A flat disc of 10 m, all triangles around its middle, vertex 0.
+template <membrane::Real Scalar>
+Surface<Scalar> fan(membrane::Index triangles) {
+    Surface<Scalar> surface{membrane::Points<Scalar>(3, triangles + 1), membrane::Triangles(3, triangles)};
+    surface.x.col(0).setZero();
+    for (membrane::Index i = 0; i < triangles; ++i) {
+        const double angle = 2 * std::numbers::pi * i / triangles;
+        surface.x.col(i + 1) << static_cast<Scalar>(10 * std::cos(angle)), static_cast<Scalar>(10 * std::sin(angle)), 0;
+        surface.triangles.col(i) << 0, 1 + i, 1 + (i + 1) % triangles;
+    }
+    return surface;
+}
+
 /// A closed surface: an icosphere of 12 to 162 vertices, jittered, turned, moved, shuffled, 1 mm to 10 m large.
 template <membrane::Real Scalar>
 Surface<Scalar> random_closed_surface(Random& random) {
