@@ -71,8 +71,7 @@ std::string picture(const Felt& felt) {
         for (const auto& f : forces) force.curves[k].samples.push_back({now += tick, 1e3 * f.norm()});
         above.curves[k].samples = spectrum(forces, tick, 100);
     }
-    const double end = tick * static_cast<double>(felt.flat.size());
-    const Plot time{"A slide over triangles: the force on the hand", {{"", 0, end}}, {force}};
+    const Plot time{"A slide over triangles: the force on the hand", {{"", 0, 2 * widest / turn}}, {force}};
     const Plot frequency{"Its spectrum above 100 Hz", {{"", 100, 0.5 / tick}}, {above}, "frequency [Hz]"};
     return drawn(std::vector<Plot>{time, frequency});
 }
@@ -95,5 +94,6 @@ int main(int argc, char** argv) {
         save(folder / "slide.svg", picture(felt));
         std::printf("Largest change in a tick: %.2g mN with the normals of the triangles, %.2g mN with smooth ones.\n",
                     largest_change(felt.flat), largest_change(felt.smooth));
+        std::printf("picture: %s\n", (folder / "slide.svg").c_str());
     });
 }
