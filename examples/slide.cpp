@@ -18,8 +18,8 @@
 
 using namespace examples;
 
-constexpr double tick = 1e-3, press_for = 0.05;  // [s]
-constexpr double turn = 4.8, widest = 0.7;       // [rad/s]; on either side of the middle [rad]
+constexpr double turn = 4.8, widest = 0.7;  // [rad/s]; on either side of the middle [rad]
+constexpr double tick = 1e-3, press_for = 0.05, slide_for = 2 * widest / turn;  // [s]
 
 struct Felt {
     std::vector<Eigen::Vector3d> flat, smooth;  // in each tick [N]
@@ -48,7 +48,7 @@ Felt slide(const Specimen& body) {
     auto tracker = membrane::ContactTracker(mesh);
     auto x = mesh.positions();
     Felt felt;
-    for (double now = 0; turn * (now - press_for) < 2 * widest; now += tick) {
+    for (double now = 0; now < press_for + slide_for; now += tick) {
         const auto tool = tool_at(now, body);
         const auto contact = tracker.update(tree, x, tool);
         const auto report = solver.step(x, tick, network, backing, press(tool, contact));
@@ -71,7 +71,7 @@ std::string picture(const Felt& felt) {
         for (const auto& f : forces) force.curves[k].samples.push_back({now += tick, 1e3 * f.norm()});
         above.curves[k].samples = spectrum(forces, tick, 100);
     }
-    const Plot time{"A slide over triangles: the force on the hand", {{"", 0, 2 * widest / turn}}, {force}};
+    const Plot time{"A slide over triangles: the force on the hand", {{"", 0, slide_for}}, {force}};
     const Plot frequency{"Its spectrum above 100 Hz", {{"", 100, 0.5 / tick}}, {above}, "frequency [Hz]"};
     return drawn(std::vector<Plot>{time, frequency});
 }
