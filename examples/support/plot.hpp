@@ -196,7 +196,7 @@ inline void draw_plot(Svg& svg, const Plot& plot, double left, double top, doubl
 
 /// The plots as one SVG, one below the other.
 [[nodiscard]] inline std::string drawn(const std::vector<Plot>& plots) {
-    constexpr double left = 66, width = 620, legend = 200;
+    constexpr double left = 66, width = 620, legend = 240;
     double height = 0;
     for (const Plot& plot : plots) height += detail::height_of(plot);
     Svg svg(left + width + legend, height, plots.front().title);
