@@ -31,16 +31,14 @@ class ActiveVertices {
     explicit ActiveVertices(Index vertex_count);
 
     /// Begins a step: builds the queue where the seeds are others than before, and lines up what is to be visited: the
-    /// queue, then the restless, then what the queue has left behind, as many as `options` leaves room for, layer 0 in
-    /// any case. To be followed by `settle` and `close`, or by `cancel`. Online.
+    /// queue, then the restless, then what the queue has left behind, as many as `options` leaves room for, layer 0 and
+    /// one more in any case. What of the queue there is no room for has its turns among the restless. To be followed by `settle` and `close`, or by `cancel`. Online.
     template <class Network, class Options>
     void arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept;
 
     /// This step's vertices in the order of their visits, and those of them that are layer 0.
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return visited_.items(); }
-    [[nodiscard]] std::span<const Index> touched() const noexcept {
-        return vertices().first(queue_.layer_count() > 0 ? queue_.layer(0).size() : 0);
-    }
+    [[nodiscard]] std::span<const Index> touched() const noexcept { return vertices().first(layer_0().size()); }
     [[nodiscard]] std::span<const Index> beyond() const noexcept { return vertices().subspan(touched().size()); }
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return queue_; }
 
@@ -57,6 +55,9 @@ class ActiveVertices {
     [[nodiscard]] std::span<const Index> frontier() const noexcept {
         return has_frontier_ ? queue_.layer(queue_.layer_count() - 1) : std::span<const Index>();
     }
+
+    /// Whether some have to wait for a later step, for lack of room.
+    [[nodiscard]] bool truncated() const noexcept { return truncated_; }
 
     /// Adds the frontier to what is visited, those of it that had not been so far at the end. Online.
     template <class Network, class Options>
@@ -87,6 +88,9 @@ class ActiveVertices {
     void clear() noexcept;
 
   private:
+    [[nodiscard]] std::span<const Index> layer_0() const noexcept {
+        return queue_.layer_count() > 0 ? queue_.layer(0) : std::span<const Index>();
+    }
     template <class Network>
     void build_queue(const Network& network, std::span<const Index> seeds, Index layers) noexcept;
     template <class Network, class Options>
@@ -105,6 +109,7 @@ class ActiveVertices {
     VisitOrder order_ = VisitOrder::arrival;
     bool as_needed_ = false, has_frontier_ = false;
     bool has_new_queue_ = false;
+    bool truncated_ = false;
     bool queue_at_rest_ = true;
 };
 
@@ -130,28 +135,37 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     next_seeds_.clear();
     for (const Index v : seeds) next_seeds_.insert(v);
     left_.clear();
+    // What a constraint has let go of: the force that was balanced there is another one now.
+    const auto leave = [&](std::span<const Index> vertices) {
+        for (const Index v : vertices) left_.insert(v);
+    };
     const auto before = seeds_.items(), now = next_seeds_.items();
-    if (as_needed_) {
-        build_queue(network, seeds, 0);
-    } else if (!std::equal(now.begin(), now.end(), before.begin(), before.end())) {
-        for (const Index v : queue_.vertices()) left_.insert(v);
-        build_queue(network, seeds, options.layers);
+    const bool is_new = as_needed_ || !std::equal(now.begin(), now.end(), before.begin(), before.end());
+    if (is_new) {
+        leave(as_needed_ ? layer_0() : queue_.vertices());
+        build_queue(network, seeds, as_needed_ ? 0 : options.layers);
     }
-    const Index touched = queue_.layer_count() > 0 ? static_cast<Index>(queue_.layer(0).size()) : 0;
+    const auto touched = static_cast<Index>(layer_0().size());
     const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_visits + 1);
     const auto passes = (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // a look before a layer is added
-    const auto spare = (std::max)(options.most_visits - own, std::int64_t{0}) / passes;
-    room_ = limited ? (std::max)(touched + static_cast<Index>(spare), Index(1)) : unlimited;
+    const auto spare = (std::max)((options.most_visits - own) / passes, std::int64_t{1});
+    room_ = limited ? touched + static_cast<Index>(spare) : unlimited;
+    // What there is no room for in the queue takes turns with the restless.
+    if (is_new && static_cast<Index>(queue_.vertices().size()) > room_) leave(queue_.vertices());
     const Index others =
-        (std::min)(restless_.count() + left_.count(), room_ / 4);  // their turn under a lasting contact
+        (std::min)(restless_.count() + left_.count(), std::clamp(room_ / 4, Index(1), room_ - touched));
     visited_.clear();
+    truncated_ = false;
     const auto line_up = [&](std::span<const Index> vertices, Index most) {
         for (const Index v : vertices) {
-            if (visited_.count() >= most) return;
+            if (visited_.count() >= most) {
+                truncated_ = true;
+                return;
+            }
             visited_.insert(v);
         }
     };
-    line_up(queue_.vertices(), (std::max)(touched, room_ - others));
+    line_up(queue_.vertices(), room_ - others);
     from_queue_ = static_cast<std::size_t>(visited_.count());
     line_up(restless_.items(), room_);
     line_up(left_.items(), room_);
@@ -180,6 +194,7 @@ void ActiveVertices::extend(const Network& network, const Options& options) noex
     if (vertices().size() + frontier().size() <= static_cast<std::size_t>(room_)) return;
     for (const Index v : frontier()) left_.insert(v);
     has_frontier_ = false;
+    truncated_ = true;
 }
 
 template <class IsBalanced>
@@ -190,18 +205,18 @@ void ActiveVertices::settle(IsBalanced is_balanced) noexcept {
             if (!visited_.contains(v)) next_restless_.insert(v);
         }
     }
-    std::size_t balanced = 0;
+    queue_at_rest_ = true;
+    const bool queue_returns = !as_needed_ && !truncated_;  // in the next step, whole
     const auto judge = [&](Index v) {
         stirred_.insert(v);
-        const bool rests = is_balanced(v), in_queue = queue_.contains(v);
-        if (rests && in_queue) ++balanced;
-        if (!rests && (as_needed_ || !in_queue)) next_restless_.insert(v);
+        if (is_balanced(v)) return;
+        if (queue_.contains(v)) queue_at_rest_ = false;
+        if (!queue_returns || !queue_.contains(v)) next_restless_.insert(v);
     };
     for (const Index v : vertices()) judge(v);
     for (const Index v : frontier()) {
         if (!visited_.contains(v)) judge(v);
     }
-    queue_at_rest_ = balanced == queue_.vertices().size();
 }
 
 template <class Network>

@@ -104,6 +104,7 @@ class QuasiStaticSolver {
     Predictor<Scalar, Workspace<Scalar>::most_constraints> predictor_;
     std::array<Vector3<Scalar>, Workspace<Scalar>::most_constraints> reactions_{};
     StepReport<Scalar> report_;
+    bool complete_ = false;   // the last step visited all that were at work, as often as it should
     std::size_t resume_ = 0;  // the vertex beyond layer 0 at which the last sweep ran out of time
     StepCosts costs_;
 };
@@ -168,6 +169,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
     }
     resume_ = resume;
     settle(scene, sweeps.mended());
+    complete_ = !report_.out_of_time && !active_.truncated();
     work_.close();
     pace.done();
     return report_;
@@ -181,7 +183,9 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::open(std::size_t constraint_count
     report_.reactions = {reactions_.data(), constraint_count};
 }
 
-// Those that moved go on, as far as what leads them does. They are to be visited, wherever they are now.
+// Those that moved go on, as far as what leads them does. They are to be visited, wherever they are now. A step that was
+// cut short is not expected again: where vertices were not visited, what was predicted for them would be predicted anew,
+// and grow from step to step.
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <class Acting>
 void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const Acting& acting, Region<Scalar>& region) noexcept {
@@ -189,7 +193,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const Acting& acting, Reg
     std::array<Lead<Scalar>, Workspace<Scalar>::most_constraints> leads{};
     acting.tell(leads);
     const Scalar part = predictor_.expect(leads);
-    if (part == 0) return;
+    if (part == 0 || !complete_) return;
     for (const Index v : moved_.items()) {
         region.shift(v, part * point(ways_, v));
         active_.wake(v);
@@ -258,6 +262,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
     active_.clear();
     work_.clear();
     predictor_.forget();
+    complete_ = false;
     last_held_.clear();
     resume_ = 0;
     costs_ = {};

@@ -30,8 +30,9 @@ struct SolverOptions {
     Index sweeps = 2;               ///< passes over the queue in each step
     Index contact_visits = 4;       ///< visits of layer 0 in each sweep: what touches the tool settles last
     VisitOrder order = VisitOrder::groups;
-    bool predict = true;            ///< a step begins with the ways of the last one, as far as what leads goes on
-    Index most_visits = unlimited;  ///< visits of vertices in a step; layer 0 and what is held get theirs anyway
+    bool predict = true;  ///< a step begins with the ways of the last one, as far as what leads goes on
+    Index most_visits =
+        unlimited;  ///< visits of vertices in a step; layer 0, what is held and one vertex get theirs anyway
     Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
     Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time
     Index most_in_groups = 32'768;  ///< room for vertices moved several at once: each 260 bytes, 460 in double
@@ -61,7 +62,7 @@ template <Real Scalar>
 struct StepReport {
     StepStatus status = StepStatus::advanced;
     bool converged = false;    ///< nothing is left to do: no force above the negligible one on any vertex that may move
-    bool out_of_time = false;  ///< the deadline came before that, and before the last sweep had ended
+    bool out_of_time = false;  ///< the deadline cut the step short: without it, more would have been done
     Scalar residual = 0;       ///< largest unbalanced force on a free vertex at work, at the end [N]
     Index visits = 0;          ///< of vertices, those that only look included
     std::span<const Index> moved;                ///< vertices whose position changed

@@ -85,7 +85,8 @@ class Sweeps {
     CompactBlock<Scalar>& block_;
     Pace& pace_;
     StepReport<Scalar>& report_;
-    const Index* next_ = nullptr;  // where time ran out
+    const Index* next_ = nullptr;    // the vertex beyond layer 0 at which time ran out, if it did there
+    bool constraints_hold_ = false;  // seen when they were last enforced, and nothing has moved since
     bool mended_ = false;
     bool in_lanes_ = false;  // the groups of the block are visited all at once
 };
@@ -99,7 +100,10 @@ StepStatus Sweeps<Method, Scalar, Scene, Acting, Pace>::run(std::size_t& resume)
         changed = sweep(resume);
         if (report_.status != StepStatus::advanced) return report_.status;
     }
-    mended_ = changed && (report_.out_of_time || !pace_.has_time_to_enforce() || acting_.enforce());
+    if (changed && !constraints_hold_) {
+        if (!pace_.has_time_to_enforce()) report_.out_of_time = true;
+        mended_ = report_.out_of_time || acting_.enforce();
+    }
     if (look()) return StepStatus::advanced;
     region_.put_back([&](Index v) { return !region_.held(v); });
     return look() ? StepStatus::unstable : StepStatus::bad_input;  // no better: what was handed in is to blame
@@ -125,24 +129,29 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::sweep(std::size_t& resume) noe
     if (report_.status != StepStatus::advanced) return changed;
     const auto beyond = active_.beyond();
     const std::size_t begin = (std::min)(std::exchange(resume, 0), beyond.size());
-    changed |= pass(beyond.subspan(begin));
-    changed |= pass(beyond.first(begin));
-    while (grow()) changed = true;
-    if (report_.out_of_time) resume = static_cast<std::size_t>(next_ - beyond.data());
-    return changed;
+    bool moved = pass(beyond.subspan(begin));
+    moved |= pass(beyond.first(begin));
+    while (grow()) moved = true;
+    if (moved) constraints_hold_ = false;
+    if (next_ != nullptr) resume = static_cast<std::size_t>(next_ - beyond.data());
+    return changed || moved;
 }
 
 template <class Method, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Method, Scalar, Scene, Acting, Pace>::rounds() noexcept {
     const auto touched = active_.touched();
     bool changed = false;
-    for (Index i = 0; i < method_.options.contact_visits && pace_.has_time_for_round(touched.size()); ++i) {
+    for (Index i = 0; i < method_.options.contact_visits; ++i) {
+        if (!pace_.has_time_for_round(touched.size())) {
+            report_.out_of_time = true;
+            break;
+        }
         for (const Index v : touched) changed |= visit(v);
         pace_.visited(touched.size());
         if (report_.status != StepStatus::advanced) break;
-        const bool mended = acting_.enforce();
+        constraints_hold_ = !acting_.enforce();
         pace_.enforced();
-        if (!mended) break;
+        if (constraints_hold_) break;
         changed = true;
     }
     return changed;
@@ -157,9 +166,9 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> ve
         changed = pass_in_lanes(begin, end);
         vertices = vertices.subspan(end - begin);
     }
-    while (!vertices.empty() && !report_.out_of_time) {
-        report_.out_of_time = !pace_.has_time_for_batch();
-        if (report_.out_of_time) {
+    while (!vertices.empty() && next_ == nullptr) {
+        if (!pace_.has_time_for_batch()) {
+            report_.out_of_time = true;
             next_ = vertices.data();
             break;
         }
@@ -180,9 +189,9 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::pass_in_lanes(std::size_t begi
         packs.load(scene_.x, method_.executor);
         std::size_t p = packs.pack_from(begin);
         const std::size_t last = packs.pack_from(end);
-        while (p < last && !report_.out_of_time && report_.status == StepStatus::advanced) {
-            report_.out_of_time = !pace_.has_time_for_batch();
-            if (report_.out_of_time) {
+        while (p < last && next_ == nullptr && report_.status == StepStatus::advanced) {
+            if (!pace_.has_time_for_batch()) {
+                report_.out_of_time = true;
                 next_ = active_.beyond().data() + packs.place_of(p);
                 break;
             }
@@ -244,7 +253,11 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::take(std::size_t p,
 template <class Method, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Method, Scalar, Scene, Acting, Pace>::grow() noexcept {
     const auto frontier = active_.frontier();
-    if (frontier.empty() || report_.out_of_time || !pace_.has_time_for_batch()) return false;
+    if (frontier.empty() || next_ != nullptr) return false;
+    if (!pace_.has_time_for_batch()) {
+        report_.out_of_time = true;
+        return false;
+    }
     report_.visits += static_cast<Index>(frontier.size());
     const bool needed = std::any_of(frontier.begin(), frontier.end(), [&](Index v) {
         return !region_.fixed(v) && norm(pull_on(scene_, v).force) > scene_.work.negligible_force;
