@@ -187,12 +187,11 @@ void ActiveVertices::grow(const Network& network, const Options& options) noexce
     extend(network, options);
 }
 
-// A next layer, to be looked at; one that there is no room for has to wait for its turn among the restless.
+// A next layer, to be looked at. Of one that there is no room for those are restless whose neighbours move.
 template <class Network, class Options>
 void ActiveVertices::extend(const Network& network, const Options& options) noexcept {
     has_frontier_ = as_needed_ && queue_.layer_count() <= options.layers && queue_.grow(network);
     if (vertices().size() + frontier().size() <= static_cast<std::size_t>(room_)) return;
-    for (const Index v : frontier()) left_.insert(v);
     has_frontier_ = false;
     truncated_ = true;
 }
@@ -221,9 +220,10 @@ void ActiveVertices::settle(IsBalanced is_balanced) noexcept {
 
 template <class Network>
 void ActiveVertices::stir_neighbours(const Network& network, Index v) noexcept {
+    const auto judged = [&](Index other) { return has_frontier_ && queue_.contains(other); };
     for (const auto& end : network.neighbours(v)) {
         const bool takes_part =
-            as_needed_ ? !network.pinned(end.other) && !queue_.contains(end.other) : stirred_.contains(end.other);
+            as_needed_ ? !network.pinned(end.other) && !judged(end.other) : stirred_.contains(end.other);
         if (takes_part && !visited_.contains(end.other)) next_restless_.insert(end.other);
     }
 }

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/quasi_static.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include <membrane/collision/aabb_tree.hpp>
+#include <membrane/collision/contact_tracker.hpp>
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/solve/press.hpp>
+
+#include "support/bits.hpp"
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+using namespace membrane;
+using test::Random;
+using test::same_bits;
+
+// Whatever ends a step early, deadline or limit, and whatever it is combined with: the membrane stays near the tool, the
+// force near what it would be with all the time in the world, and the report tells what is left.
+namespace {
+
+constexpr double radius = 0.01, dt = 1e-3;  // [m], [s]
+
+/// A sphere of 10 mm by [Liu07], as the README has it.
+template <class Scalar>
+struct Membrane {
+    TriangleMesh<Scalar> mesh = icosphere<Scalar>({.radius = Scalar(radius), .subdivisions = 2});
+    MassSpringNetwork<Scalar, LinearSpring> network{mesh, {}, {.stiffness = Scalar(40), .mass = Scalar(1.5e-4)}};
+    VirtualVolumeSprings<Scalar> backing{mesh, {.stiffness = Scalar(8), .damping = Scalar(0.02)}};
+};
+
+/// What a step of a run may cost: parts of what it would cost without an end, and visits.
+struct Budget {
+    double time;  // the deadline, as a part of a whole step's looks at the clock
+    Index most_visits;
+};
+
+/// Each look at it takes one unit of time; none is late before `end`.
+struct CountingClock {
+    double* looks;
+    double operator()() const { return *looks += 1; }
+};
+
+/// Counts how often it is enforced.
+template <class Scalar>
+struct CountedPress : Press<Scalar> {
+    int* enforced;
+    bool enforce(Region<Scalar>& region) const noexcept {
+        ++*enforced;
+        return Press<Scalar>::enforce(region);
+    }
+};
+
+enum class Path { press, hold, slide, turn_back, jerk };
+
+/// A ball on its way: into the membrane, then along `path`, then at rest.
+template <class Scalar>
+std::vector<Tool<Scalar>> tools(Path path, Random& random) {
+    const Vector3<double> out = random.unit_vector();
+    const Vector3<double> along = cross<double>(out, random.unit_vector()).normalized();
+    const double r = random.number(1e-3, 3e-3), depth = random.number(0.2e-3, 1.5e-3), pace = random.number(2e-5, 1e-4);
+    std::vector<Tool<Scalar>> list;
+    Vector3<double> from = (radius + r + 1e-4) * out;
+    double angle = 0, below = -1e-4;
+    const auto add = [&] {
+        const Vector3<double> at = (radius + r - below) * (std::cos(angle) * out + std::sin(angle) * along);
+        list.push_back({.position = at.cast<Scalar>(), .radius = Scalar(r), .time = Scalar(dt * double(list.size()))});
+    };
+    for (; below < depth; below += path == Path::jerk ? 4 * pace : pace) add();
+    const int ticks = 40;
+    for (int i = 0; i < ticks; ++i, add()) {
+        if (path == Path::slide) angle += pace / radius;
+        if (path == Path::turn_back) angle += (i < ticks / 2 ? pace : -pace) / radius;
+        if (path == Path::press) below += pace / 8;
+        if (path == Path::jerk && i % 10 == 5) angle += random.number(0.0, 0.3 * r) / radius;
+    }
+    return list;
+}
+
+/// One membrane under one tool.
+template <class Scalar, class Rule>
+struct Run {
+    Run(const Membrane<Scalar>& scene, const SolverOptions<Scalar>& options, Rule rule)
+        : membrane(scene), solver(scene.network, options, rule), tree(scene.mesh), tracker(scene.mesh) {}
+
+    /// A tick whose step has time for so many looks at the clock; returns how many it took.
+    double tick(const Tool<Scalar>& tool, double looks_left) {
+        contact = tracker.update(tree, x, tool);
+        depth = std::max(depth, double(contact.depth));
+        return step(tool, looks_left);
+    }
+    double step(const Tool<Scalar>& tool, double looks_left) {
+        double looks = 0;
+        start = x;
+        enforced = 0;
+        const CountedPress<Scalar> presses{press(tool, contact), &enforced};
+        const Deadline deadline(CountingClock{&looks}, looks_left);
+        report = solver.step_until(deadline, x, Scalar(dt), membrane.network, membrane.backing, presses);
+        tree.refit(x, report.moved);
+        return looks;
+    }
+    double force() const { return double(norm(report.reactions[0])); }
+    double farthest() const { return double((x - membrane.mesh.positions()).colwise().norm().maxCoeff()); }
+
+    /// The stiffness with which all that touches would resist, were nothing else to move [N/m].
+    double stiffness_of_layer_0() const {
+        double sum = 0;
+        if (solver.queue().layer_count() == 0) return sum;
+        for (const Index v : solver.queue().layer(0)) {
+            sum += double(membrane.network.pull(v, x).stiffness) + 8 + 0.02 / dt;
+        }
+        return sum;
+    }
+
+    const Membrane<Scalar>& membrane;
+    QuasiStaticSolver<Scalar, Rule> solver;
+    AabbTree<Scalar> tree;
+    ContactTracker<Scalar> tracker;
+    Points<Scalar> x = membrane.mesh.positions(), start = x;
+    Contact<Scalar> contact;
+    StepReport<Scalar> report;
+    double depth = 0;
+    int enforced = 0;          // in the last step
+    bool looks_at_all = true;  // no limit of visits leaves out any of the queue
+};
+
+constexpr double no_end = 1e9;
+
+/// What the report of the last step says, against a step that is then let run to its end, and against the forces.
+template <class Scalar, class Rule>
+void check_report(Run<Scalar, Rule>& run, Run<Scalar, Rule> before, const Tool<Scalar>& tool) {
+    const auto& report = run.report;
+    before.contact = run.contact;
+    before.step(tool, no_end);
+    REQUIRE_FALSE(before.report.out_of_time);
+    if (report.out_of_time) {
+        REQUIRE((report.visits < before.report.visits || run.enforced < before.enforced));
+    } else {
+        REQUIRE(same_bits(run.x, before.x));
+        REQUIRE(report.visits == before.report.visits);
+        REQUIRE(report.converged == before.report.converged);
+    }
+    const auto& queue = run.solver.queue();
+    double beyond = 0;  // layer 0
+    for (const Index v : queue.vertices()) {
+        if (queue.layer_count() > 0 && std::ranges::count(queue.layer(0), v) > 0) continue;
+        const Vector3<Scalar> here = point(run.x, v);
+        const Vector3<Scalar> backing = run.membrane.backing.pull(v, here, point(run.start, v), Scalar(dt)).force;
+        beyond = std::max(beyond, double(norm<Scalar>(run.membrane.network.pull(v, run.x).force + backing)));
+    }
+    const double rounding = 1e4 * radius * double(std::numeric_limits<Scalar>::epsilon());
+    if (run.looks_at_all) REQUIRE(beyond <= double(report.residual) + rounding);
+    if (report.converged) REQUIRE(double(report.residual) <= 1e-6 * (1 + 1e-6));
+}
+
+template <class Scalar>
+SolverOptions<Scalar> random_options(Random& random) {
+    constexpr std::array<Index, 4> layers{0, 1, 6, unlimited};
+    SolverOptions<Scalar> options{.layers = layers[std::size_t(random.index(4))], .sweeps = 1 + random.index(3)};
+    options.layers_as_needed = random.chance(0.2);
+    options.order =
+        std::array{VisitOrder::arrival, VisitOrder::groups, VisitOrder::colours}[std::size_t(random.index(3))];
+    options.predict = random.chance(0.7);
+    options.negligible_force = Scalar(1e-6);  // of some 10 mN
+    return options;
+}
+
+template <class Scalar, class Rule>
+void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
+    CAPTURE(seed);
+    Random random(seed);
+    const auto path = static_cast<Path>(random.index(5));
+    const auto strokes = tools<Scalar>(path, random);
+    auto options = random_options<Scalar>(random);
+    Run<Scalar, Rule> whole(scene, options, rule);
+    constexpr std::array parts{0.0, 0.05, 0.1, 0.2, 0.4, 0.8};
+    const bool by_deadline = random.chance(0.6);
+    const double part = by_deadline ? parts[std::size_t(random.index(6))] : 1;
+    if (!by_deadline) {
+        options.most_visits = Index(std::exp(random.number(0.0, std::log(2000.0))));
+        options.sweeps = random.chance(0.3) ? 1 : options.sweeps;
+    }
+    CAPTURE(int(path), part, options.most_visits, options.layers, options.layers_as_needed, options.sweeps,
+            options.predict, int(options.order));
+    Run<Scalar, Rule> cut(scene, options, rule);
+
+    double largest = 0;
+    std::vector<double> looks, forces;
+    for (const auto& tool : strokes) {
+        looks.push_back(whole.tick(tool, no_end));
+        REQUIRE(whole.report.status == StepStatus::advanced);
+        forces.push_back(whole.force());
+        largest = std::max(largest, whole.force());
+    }
+    cut.looks_at_all = by_deadline && !options.layers_as_needed;
+    for (std::size_t i = 0; i < strokes.size(); ++i) {
+        const auto before = cut;
+        cut.tick(strokes[i], by_deadline ? part * looks[i] : no_end);
+        REQUIRE(cut.report.status == StepStatus::advanced);
+        check_report(cut, before, strokes[i]);
+        const double motion = i == 0 ? 0 : double(norm<Scalar>(strokes[i].position - strokes[i - 1].position));
+        CAPTURE(i, cut.force(), largest, motion, cut.farthest(), cut.depth);
+        REQUIRE(cut.force() <= 1.5 * largest + cut.stiffness_of_layer_0() * motion);
+        REQUIRE(cut.farthest() <= 2 * cut.depth + 1e-6);
+    }
+    for (int i = 0; i < 20'000 && !whole.report.converged; ++i) whole.tick(strokes.back(), no_end);
+    for (int i = 0; i < 20'000 && !cut.report.converged; ++i) {
+        cut.tick(strokes.back(), by_deadline ? part * looks.back() : no_end);
+    }
+    constexpr double tolerance = 1e-2;
+    CHECK(cut.report.converged);
+    CHECK(whole.report.converged);
+    CHECK(cut.force() == Approx(whole.force()).epsilon(tolerance));
+    CHECK(double((cut.x - whole.x).cwiseAbs().maxCoeff()) <= tolerance * whole.depth);
+}
+
+}  // namespace
+
+TEST_CASE("no budget makes a step worse than what the tool explains", "[solver][deadline][budget]") {
+    const Membrane<double> in_double;
+    const Membrane<float> in_float;
+    const int runs = cases(160, 20'000);
+    for (int seed = 1; seed <= runs; ++seed) {
+        const auto number = static_cast<std::uint64_t>(seed);
+        if (seed % 4 == 0) check_run(in_float, number, BlockStep{});
+        if (seed % 4 == 1) check_run(in_double, number, SafeStep{});
+        if (seed % 4 == 2) check_run(in_double, number, MassStep{});
+        if (seed % 4 == 3) check_run(in_double, number, BlockStep{});
+    }
+}
