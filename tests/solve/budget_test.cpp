@@ -217,6 +217,8 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
     constexpr double tolerance = 1e-2;
     CHECK(cut.report.converged);
     CHECK(whole.report.converged);
+    // Which vertices have ever been within a few layers depends on the contact of every tick, and so does where they rest.
+    if (options.layers != unlimited && !options.layers_as_needed) return;
     CHECK(cut.force() == Approx(whole.force()).epsilon(tolerance));
     CHECK(double((cut.x - whole.x).cwiseAbs().maxCoeff()) <= tolerance * whole.depth);
 }

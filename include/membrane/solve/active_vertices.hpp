@@ -109,7 +109,7 @@ class ActiveVertices {
     VisitOrder order_ = VisitOrder::arrival;
     bool as_needed_ = false, has_frontier_ = false;
     bool has_new_queue_ = false;
-    bool truncated_ = false;
+    bool queue_fits_ = true, truncated_ = false;
     bool queue_at_rest_ = true;
 };
 
@@ -150,10 +150,14 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     const auto passes = (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // a look before a layer is added
     const auto spare = (std::max)((options.most_visits - own) / passes, std::int64_t{1});
     room_ = limited ? touched + static_cast<Index>(spare) : unlimited;
-    // What there is no room for in the queue takes turns with the restless.
-    if (is_new && static_cast<Index>(queue_.vertices().size()) > room_) leave(queue_.vertices());
-    const Index others =
-        (std::min)(restless_.count() + left_.count(), std::clamp(room_ / 4, Index(1), room_ - touched));
+    // The others' turn under a lasting contact. What of the queue does not fit in beside them takes turns with them.
+    const auto share = [&] {
+        return (std::min)(restless_.count() + left_.count(), std::clamp(room_ / 4, Index(1), room_ - touched));
+    };
+    const bool fits = static_cast<Index>(queue_.vertices().size()) <= room_ - share();
+    if (!fits && (is_new || queue_fits_)) leave(queue_.vertices());
+    queue_fits_ = fits;
+    const Index others = share();
     visited_.clear();
     truncated_ = false;
     const auto line_up = [&](std::span<const Index> vertices, Index most) {
@@ -238,12 +242,13 @@ inline bool ActiveVertices::close() noexcept {
 template <class Network>
 void ActiveVertices::cancel(const Network& network) noexcept {
     build_queue(network, seeds_.items(), layers_before_);
+    queue_fits_ = true;
     has_frontier_ = false;
 }
 
 inline void ActiveVertices::clear() noexcept {
     queue_.clear();
-    has_new_queue_ = true;
+    has_new_queue_ = queue_fits_ = true;
     for (IndexSet* set : {&seeds_, &restless_, &left_, &visited_, &stirred_}) set->clear();
 }
 

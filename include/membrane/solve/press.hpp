@@ -42,6 +42,7 @@ struct Press {
     void give_way(Region<Scalar>& region) const noexcept;
     void find_touches(Region<Scalar>& region) const noexcept;
     void keep_side(Region<Scalar>& region) const noexcept;
+    [[nodiscard]] bool has_new_overlap(const Region<Scalar>& region) const noexcept;
     Scalar aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept;
     [[nodiscard]] static Scalar most_pressure(const Region<Scalar>& region, const Touch<Scalar>& touch,
                                               Scalar gap) noexcept;
@@ -241,6 +242,7 @@ template <Real Scalar>
 bool Press<Scalar>::enforce(Region<Scalar>& region) const noexcept {
     if (!contact.touching()) return false;
     Scalar first = 0;  // largest change of a force in the first turn [N]
+    bool wedged = false;
     for (int turn = 0; turn < detail::most_turns; ++turn) {
         Scalar largest = 0;
         for (auto& touch : region.touches()) {
@@ -249,7 +251,10 @@ bool Press<Scalar>::enforce(Region<Scalar>& region) const noexcept {
             const Scalar pressure = -dot(touch.force, touch.normal);
             if (!(compliance > 0) || (pressure == 0 && gap >= 0)) continue;
             Scalar more = (std::max)(-gap / compliance, -pressure);
-            if (pressure + more > most_pressure(region, touch, gap)) more = -pressure;  // wedged: let go
+            if (pressure + more > most_pressure(region, touch, gap)) {
+                more = -pressure;  // let go
+                wedged = true;
+            }
             if (!(std::abs(more) * compliance > negligible_shift(region, touch))) continue;
             change_force<Scalar>(region, touch, -more * touch.normal);
             largest = (std::max)(largest, std::abs(more));
@@ -258,7 +263,29 @@ bool Press<Scalar>::enforce(Region<Scalar>& region) const noexcept {
         if (!(largest > first / 2)) break;  // the vertices have to find their balance anew
     }
     keep_side(region);
-    return first > 0;
+    return first > 0 || wedged || has_new_overlap(region);
+}
+
+// Whether a triangle that was out of reach when the step began, and is no contact point of it, has come into the tool.
+template <Real Scalar>
+bool Press<Scalar>::has_new_overlap(const Region<Scalar>& region) const noexcept {
+    const int pairs = feature_pairs(tool);
+    const auto touches = region.touches();
+    auto next = touches.begin();  // in the same order
+    for (const auto& touched : contact.touched) {
+        const auto triangle = triangle_of(region, touched.corners);
+        for (int pair = 0; pair < pairs; ++pair) {
+            if (next != touches.end() && next->triangle == touched.triangle && next->pair == pair) {
+                ++next;
+                continue;
+            }
+            const auto nearest = proximity(triangle, tool, pair);
+            if (!nearest || is_rigid(region, touched.corners, nearest->barycentric)) continue;
+            const Scalar slack = region.negligible_force() * region.compliance(touched.corners[0]);
+            if (norm(nearest->reach) < contact.radius - slack) return true;
+        }
+    }
+    return false;
 }
 
 template <Real Scalar>

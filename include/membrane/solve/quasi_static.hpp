@@ -225,9 +225,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::settle(const Handed& scene, bool 
         if (way.isZero(0)) continue;
         moved_.push(v);
         if (method_.options.predict) ways_.col(v) = way;
-        const Scalar compliance = work_.compliance[static_cast<std::size_t>(v)];
-        const Scalar negligible = method_.options.layers_as_needed ? Scalar(0) : compliance * work_.negligible_force;
-        if (norm(way) > negligible) active_.stir_neighbours(scene.network, v);
+        active_.stir_neighbours(scene.network, v);
     }
     report_.moved = moved_.items();
     report_.converged = active_.close() && !mended && report_.residual <= work_.negligible_force;

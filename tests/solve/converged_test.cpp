@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/quasi_static.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <membrane/collision/aabb_tree.hpp>
+#include <membrane/collision/contact_tracker.hpp>
+#include <membrane/collision/grasper.hpp>
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/solve/press.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+using namespace membrane;
+using test::Random;
+
+// `converged` against the forces on all vertices and the distance to the tools, from nothing but positions.
+namespace {
+
+constexpr double radius = 0.01, dt = 1e-3;  // [m], [s]
+
+/// A sphere, or a cap with or without a pinned rim, on a foundation that is softer than its springs or much stiffer.
+struct Scene {
+    explicit Scene(Random& random)
+        : mesh(random.chance(0.3)
+                   ? spherical_cap({.radius = radius, .diameter = 1.5 * radius, .rings = 4 + random.index(5)})
+                   : icosphere({.radius = radius, .subdivisions = 1 + random.index(2)})),
+          network(mesh, {}, {.stiffness = 40.0, .pinned = random.chance(0.5) ? border(mesh) : std::vector<Index>{}}),
+          foundation(40 * std::pow(10.0, random.number(-1.0, 3.0))),
+          backing(mesh, {.stiffness = foundation, .damping = random.chance(0.5) ? 0.02 : 0.0}) {}
+
+    TriangleMesh<double> mesh;
+    MassSpringNetwork<double, LinearSpring> network;
+    double foundation;  // [N/m]
+    VirtualVolumeSprings<double> backing;
+};
+
+SolverOptions<double> random_options(Random& random) {
+    constexpr std::array<Index, 4> layers{0, 2, 6, unlimited};
+    constexpr std::array orders{VisitOrder::arrival, VisitOrder::groups, VisitOrder::colours};
+    SolverOptions<double> options;
+    options.layers = layers[static_cast<std::size_t>(random.index(4))];
+    options.layers_as_needed = random.chance(0.4);
+    options.sweeps = 1 + random.index(8);
+    options.contact_visits = 1 + random.index(6);
+    options.order = orders[static_cast<std::size_t>(random.index(3))];
+    options.predict = random.chance(0.7);
+    if (random.chance(0.3)) options.most_visits = 1 + random.index(1000);
+    if (random.chance(0.6)) options.negligible_force = std::pow(10.0, random.number(-7.0, -3.0));
+    return options;
+}
+
+/// A sphere, a capsule or a point that comes within 30 ticks, stays, goes along, and leaves: slowly, or in one tick. Some
+/// are forceps, which close and open meanwhile.
+struct Stroke {
+    Stroke(const TriangleMesh<double>& mesh, Random& random) {
+        const Vector3<double> target = point(mesh.positions(), random.index(mesh.vertex_count()));
+        out = (target + 0.1 * radius * random.vector()).normalized();
+        along = cross<double>(out, random.unit_vector()).normalized();
+        const double shape = random.number();
+        tool_radius = shape < 0.2 ? 0 : random.number(0.3e-3, 3e-3);
+        if (shape > 0.7) axis = random.number(2e-3, 20e-3) * (random.number() * out + random.number(-1.0, 1.0) * along);
+        depth = random.number(0.05e-3, 1.5e-3);
+        slide = random.chance(0.5) ? 0 : random.number(0.0, 5e-3);
+        ticks_to_leave = random.chance(0.4) ? 1 : 1 + random.index(40);
+        grasps = random.chance(0.3);
+        opens = 80 + random.index(70);
+    }
+    Tool<double> at(int tick) const {
+        const double in = std::min(tick / 30.0, 1.0), go = std::clamp((tick - 60) / 40.0, 0.0, 1.0);
+        const double leave = std::clamp((tick - 130) / static_cast<double>(ticks_to_leave), 0.0, 1.0);
+        const double height = tool_radius + 0.1e-3 - (depth + 0.1e-3) * in + leave * (depth + 8e-3);
+        return {.position = (radius + height) * out + go * slide * along,
+                .axis = axis,
+                .radius = tool_radius,
+                .time = dt * tick,
+                .grasping = grasps && tick > 40 && tick < opens};
+    }
+
+    Vector3<double> out, along, axis = Vector3<double>::Zero();
+    double tool_radius, depth, slide;  // [m]
+    int ticks_to_leave, opens;
+    bool grasps;
+};
+
+/// By how much the tool overlaps the surface [m], where no corner of the nearest triangle is fixed.
+template <class IsFixed>
+double overlap(const TriangleMesh<double>& mesh, const Points<double>& x, const Tool<double>& tool, IsFixed is_fixed) {
+    double nearest = std::numeric_limits<double>::infinity();
+    bool gives_way = false;
+    for (Index f = 0; f < mesh.triangle_count(); ++f) {
+        const auto corners = mesh.triangles().col(f);
+        for (int pair = 0; pair < feature_pairs(tool); ++pair) {
+            const auto found = proximity(triangle_at(x, corners), tool, pair);
+            if (!found || norm(found->reach) >= nearest) continue;
+            nearest = norm(found->reach);
+            gives_way = std::none_of(corners.begin(), corners.end(), is_fixed);
+        }
+    }
+    return gives_way ? tool.radius - nearest : 0;
+}
+
+/// One membrane under two tools, a load and a pin, each of which may be left out, and which leave or end.
+struct Run {
+    explicit Run(std::uint64_t seed)
+        : random(seed),
+          scene(random),
+          options(random_options(random)),
+          stroke(scene.mesh, random),
+          second(scene.mesh, random),
+          has_second(random.chance(0.3)),
+          solver(scene.network, options) {
+        const Index f = random.index(scene.mesh.triangle_count());
+        for (std::size_t k = 0; k < 3; ++k) corners[k] = scene.mesh.triangles()(static_cast<Index>(k), f);
+        weights = random.barycentric();
+        if (random.chance(0.2)) force = 0.02 * random.vector();
+        for (int i = random.chance(0.2) ? 3 : 0; i > 0; --i) pins.push_back(random.index(scene.mesh.vertex_count()));
+        tolerance = options.negligible_force > 0 ? options.negligible_force : scene.network.negligible_force();
+    }
+
+    void tick(int i) {
+        const bool late = i >= 150;
+        if (late) {
+            force.setZero();
+            pins.clear();
+        }
+        tool = stroke.at(i);
+        contact = tracker.update(tree, x, tool);
+        grasp = grasper.update(contact, x, tool);
+        const auto tool_2 = second.at(i - 20);
+        const auto contact_2 = has_second ? tracker_2.update(tree, x, tool_2) : Contact<double>::none();
+        report = solver.step(x, dt, scene.network, scene.backing, press(tool, contact, grasp), pull(tool, grasp),
+                             press(tool_2, contact_2), load<double>(corners, weights, force), pin(pins));
+        tree.refit(x, report.moved);
+        for (const Index v : solver.queue().vertices()) has_taken_part[static_cast<std::size_t>(v)] = 1;
+    }
+
+    bool is_fixed(Index v) const { return scene.network.pinned(v) || std::ranges::count(pins, v) > 0; }
+
+    /// Beyond a threshold of layers the membrane stands still by design.
+    bool may_move(Index v) const {
+        if (is_fixed(v)) return false;
+        return options.layers == unlimited || options.layers_as_needed || has_taken_part[static_cast<std::size_t>(v)];
+    }
+
+    Vector3<double> internal_force(Index v) const {
+        const Vector3<double> here = point(x, v);
+        return scene.network.pull(v, x).force + scene.backing.pull(v, here, here, dt).force;
+    }
+
+    Random random;
+    Scene scene;
+    SolverOptions<double> options;
+    Stroke stroke, second;
+    bool has_second;
+    QuasiStaticSolver<double> solver;
+    AabbTree<double> tree{scene.mesh};
+    ContactTracker<double> tracker{scene.mesh}, tracker_2{scene.mesh};
+    Grasper<double> grasper{scene.mesh};
+    Points<double> x = scene.mesh.positions();
+    std::vector<char> has_taken_part = std::vector<char>(static_cast<std::size_t>(scene.mesh.vertex_count()), 0);
+    std::array<Index, 3> corners{};
+    Vector3<double> weights, force = Vector3<double>::Zero();
+    std::vector<Index> pins;
+    double tolerance;  // [N]
+    Tool<double> tool;
+    Contact<double> contact;
+    Grasp<double> grasp;
+    StepReport<double> report;
+};
+
+void check_converged(const Run& run) {
+    const double rounding = 1e-13, limit = run.tolerance * (1 + 1e-9) + rounding;  // [N]
+    const auto& queue = run.solver.queue();
+    const auto layer_0 = queue.layer_count() > 0 ? queue.layer(0) : std::span<const Index>();
+    Vector3<double> sum = -run.report.total_reaction();
+    for (Index v = 0; v < run.x.cols(); ++v) {
+        if (std::ranges::count(layer_0, v) > 0) {
+            sum += run.internal_force(v);
+        } else if (run.may_move(v)) {
+            CAPTURE(v);
+            REQUIRE(norm(run.internal_force(v)) <= limit);
+        }
+    }
+    // What the membrane pulls with at layer 0 is what those who act feel, but for what they do to fixed vertices.
+    const bool all_free = run.pins.empty() && border(run.scene.mesh).empty();
+    if (all_free) REQUIRE(norm(sum) <= static_cast<double>(layer_0.size()) * limit);
+    if (run.contact.touching() && !run.grasp.holding()) {
+        const double slack = run.tolerance / run.scene.foundation + 1e-9;  // what the force does to a vertex [m]
+        REQUIRE(overlap(run.scene.mesh, run.x, run.tool, [&](Index v) { return run.is_fixed(v); }) <= slack);
+    }
+}
+
+}  // namespace
+
+TEST_CASE("converged: no vertex that may move is out of balance, no tool inside", "[solver][converged]") {
+    long said = 0;
+    const int runs = cases(300, 20'000);
+    for (int seed = 1; seed <= runs; ++seed) {
+        CAPTURE(seed);
+        Run run(static_cast<std::uint64_t>(seed));
+        for (int i = 0; i < 300; ++i) {
+            CAPTURE(i);
+            run.tick(i);
+            REQUIRE(run.report.status == StepStatus::advanced);
+            if (!run.report.converged) continue;
+            ++said;
+            check_converged(run);
+        }
+    }
+    CHECK(said > 100L * runs);
+}
