@@ -44,20 +44,19 @@ fi
 # runs_here BENCHMARK: whether this processor has what the benchmark is built for.
 runs_here() { [[ $1 != *_avx2* ]] || grep -qs avx2 /proc/cpuinfo; }
 
-# build PRESET PART... [-- CMAKE ARGUMENT...]: configures build/PRESET with these parts (tests, examples, benchmarks) and
-# builds them. A part that was asked for before stays, so that nothing is built twice.
-build() {
-    local preset=$1 part parts=() options=() targets=()
+# configure PRESET PART... [-- CMAKE ARGUMENT...]: build/PRESET with these parts (tests, examples, benchmarks). A part that
+# was asked for before stays, so that nothing is built twice.
+configure() {
+    local preset=$1 options=()
     shift
-    while (($# > 0)) && [[ $1 != -- ]]; do parts+=("$1"); shift; done
-    if (($# > 0)); then shift; fi
     if [[ ! -f $root/build/$preset/CMakeCache.txt ]]; then
         options+=(-DMEMBRANE_BUILD_{TESTS,EXAMPLES,BENCHMARKS}=OFF)
     fi
-    for part in "${parts[@]}"; do
-        options+=(-D "MEMBRANE_BUILD_${part^^}=ON")
-        targets+=("membrane_$part")
+    while (($# > 0)) && [[ $1 != -- ]]; do
+        options+=(-D "MEMBRANE_BUILD_${1^^}=ON")
+        shift
     done
+    if (($# > 0)); then shift; fi
 
     local version log
     version=$(cmake --version | sed -n '1s/[^0-9]*//p')
@@ -65,14 +64,21 @@ build() {
         die "CMake 3.25 or newer is needed (Debian 12, Ubuntu 23.04), this is $version"
     say "configuring build/$preset"
     log=$(cd "$root" && cmake --preset "$preset" "${cache_options[@]}" "${options[@]}" "$@" 2>&1) || die "cmake failed"$'\n'"$log"
-    say "building ${parts[*]}"
-    cmake --build "$root/build/$preset" --parallel "$(nproc)" --target "${targets[@]}" >&2
 }
 
+# build PRESET TARGET...
+build() {
+    local preset=$1
+    shift
+    say "building ${*#membrane_}"
+    cmake --build "$root/build/$preset" --parallel "$(nproc)" --target "$@" >&2
+}
+
+# assimp's CMake package names zlib's library, which Debian's does not bring.
 test_packages=(g++ cmake ninja-build libeigen3-dev catch2 libcgal-dev libseccomp-dev libcli11-dev libassimp-dev
-    libtinyobjloader-dev)
+    libtinyobjloader-dev zlib1g-dev)
 example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json3-dev libassimp-dev
-    libtinyobjloader-dev)
+    libtinyobjloader-dev zlib1g-dev)
 bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox
     libbullet-dev libcgal-dev libembree-dev libfcl-dev)
-check_packages=(clang clang-format clang-tidy libclang-rt-dev valgrind)
+check_packages=(clang clang-format clang-tidy debootstrap git libclang-rt-dev valgrind)

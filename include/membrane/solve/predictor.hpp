@@ -58,16 +58,16 @@ Scalar Predictor<Scalar, most_leads>::expect(std::span<const Lead<Scalar>> leads
     bool led = false;
     for (std::size_t i = 0; i < most_leads; ++i) {
         const Path before = paths_[i];
-        const Lead<Scalar> lead = i < leads.size() ? leads[i] : std::nullopt;
+        const LeadPoint<Scalar>* const lead = i < leads.size() && leads[i] ? &*leads[i] : nullptr;
         Path& path = paths_[i] = {};
-        if (lead) path.at = lead->at;
-        if (lead && before.at) path.way = lead->at - *before.at;
+        if (lead != nullptr) path.at = lead->at;
+        if (lead != nullptr && before.at) path.way = lead->at - *before.at;
         const bool comes_or_goes =
-            lead.has_value() != before.at.has_value() || before.at.has_value() != before.way.has_value();
+            (lead != nullptr) != before.at.has_value() || before.at.has_value() != before.way.has_value();
         const auto jumps = [&] { return norm(*path.way) > lead->longest || norm(*before.way) > lead->longest; };
-        if (comes_or_goes || (lead && jumps())) {
+        if (comes_or_goes || (lead != nullptr && jumps())) {
             part = 0;
-        } else if (lead && squared_norm(*before.way) > 0) {
+        } else if (lead != nullptr && squared_norm(*before.way) > 0) {
             led = true;
             part = (std::min)(part, part_of(*path.way, *before.way));
         }
