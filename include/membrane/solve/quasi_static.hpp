@@ -31,6 +31,8 @@
 ///     // report.reactions[0] [N], report.moved
 namespace membrane {
 
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
 /// The quasi-static solver, [Liu07] 2.2: every step is taken to be at rest, and the vertices of the propagation queue
 /// move one after the other, nearest to the contact first, by (4) or another rule, each seeing those that have moved.
 ///
@@ -113,6 +115,8 @@ template <class Network, class Rule = BlockStep, class Threads = OneThread>
         const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {}, const Threads& = {})
 ->QuasiStaticSolver<typename Network::Scalar, Rule, Threads>;
 
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <ElasticNetwork<Scalar> Network>
 QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& network,
@@ -126,6 +130,7 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& netwo
       last_held_(network.vertex_count()),
       moved_(static_cast<std::size_t>(network.vertex_count())),
       ways_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
+    detail::define_made<QuasiStaticSolver>();
     if constexpr (requires { rule.check(); }) rule.check();
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
@@ -143,6 +148,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
                                                                      const Constraints&... constraints) noexcept {
     static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints, "a step takes 16 constraints at most");
     MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());
+    detail::require_made<QuasiStaticSolver>();
     open(sizeof...(Constraints));
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) {
         return refuse_step(StepStatus::bad_time_step, x);
