@@ -321,7 +321,7 @@ template <class Method, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Method, Scalar, Scene, Acting, Pace>::look_at(Index v, const Vector3<Scalar>& force) noexcept {
     ++report_.visits;
     region_.set_unbalanced(v, force);
-    if (!region_.held(v)) report_.residual = (std::max)(report_.residual, norm(force));
+    if (!region_.fixed(v)) report_.residual = (std::max)(report_.residual, norm(force));
     return is_finite(force);
 }
 
