@@ -3,6 +3,7 @@
 
 #include <array>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "support/catch.hpp"
@@ -185,6 +186,27 @@ TEST_CASE("touches can be forgotten, and are refused where there is no room", "[
     CHECK(region.recall(1, 0) != nullptr);
     scene.work.forget();
     CHECK(region.recall(1, 0) == nullptr);
+}
+
+TEST_CASE("the corners of nothing are none, whatever the last step had", "[region]") {
+    SixPoints scene;
+    struct Corners {
+        std::array<Index, 3> corners;
+    };
+    const std::array<Corners, 1> some{{{{1, 2, 3}}}};
+    CHECK(Region<double>(scene.x, scene.work).corners_of(std::span<const Corners>(some)).size() == 3);
+    CHECK(Region<double>(scene.x, scene.work).corners_of(std::span<const Corners>()).empty());
+}
+
+TEST_CASE("who is pinned is asked whenever it matters", "[region]") {
+    SixPoints scene;
+    Index pinned = 2;
+    scene.work.pinned = [&pinned](Index v) { return v == pinned; };
+    const Region<double> region(scene.x, scene.work);
+    CHECK(region.fixed(2));
+    pinned = 3;
+    CHECK_FALSE(region.fixed(2));
+    CHECK(region.fixed(3));
 }
 
 TEST_CASE("a workspace is copied with all it holds", "[region]") {

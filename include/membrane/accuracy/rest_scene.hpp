@@ -269,7 +269,9 @@ inline void RestScene::press(const Tool<double>& tool, const Contact<double>& co
 
 inline RestGoals RestScene::goals(double part) const {
     const auto on_the_way = [&](const auto& from, const auto& to) {  // exact for what stays, and at the end
-        return part == 1 ? to : (from + part * (to - from)).eval();
+        auto there = to;
+        if (part != 1) there = from + part * (to - from);
+        return there;
     };
     RestGoals goals{on_the_way(start_, targets_), Points<double>::Zero(3, start_.cols()), {}, {}};
     for (const auto& place : loaded_places_) {

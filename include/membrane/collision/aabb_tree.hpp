@@ -36,6 +36,8 @@ struct SurfaceHit {
     Index boxes_visited;
 };
 
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
 /// A tree of boxes over the triangles of a mesh [Bergen97], and what is asked of it.
 ///
 /// The tree owns what it needs of the mesh; positions are handed in. The splits stay as they were at the start, the
@@ -93,6 +95,8 @@ class AabbTree {
   private:
     BoxTree<Scalar> boxes_;
 };
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
 
 namespace detail {
 

@@ -31,6 +31,8 @@ struct TreeOptions {
     Index balance_threshold = 16;
 };
 
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
 /// The splits are those of `tree_shape`; folded, so that a node has as many children as the processor reckons with side
 /// by side.
 template <Real Scalar>
@@ -108,6 +110,8 @@ class BoxTree {
     TreeStatistics statistics_;
 };
 
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
 namespace detail {
 
 /// Of triangles, the key of their boxes; or the query's own.
@@ -124,6 +128,7 @@ template <class Key, Number N>
 template <Real Scalar>
 BoxTree<Scalar>::BoxTree(const TriangleMesh<Scalar>& mesh, const TreeOptions& options)
     : shape_(tree_shape(mesh, options.balance_threshold)), statistics_(membrane::statistics(shape_)) {
+    detail::define_made<BoxTree>();
     items_.reserve(shape_.triangles.size());
     for (const Index f : shape_.triangles) {
         const auto corners = mesh.triangles().col(f);
@@ -266,6 +271,7 @@ template <Real Scalar>
 template <class Key, class Examine>
 Index BoxTree<Scalar>::search(const ConstPointsRef<Scalar>& x, Key key, const Scalar& limit,
                               Examine examine) const noexcept {
+    detail::require_made<BoxTree>();
     constexpr std::size_t most_waiting = (width - 1) * TreeShape::max_depth + 1;
     std::array<Scalar, most_waiting> keys;
     std::array<Index, most_waiting> parts;

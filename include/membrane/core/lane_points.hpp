@@ -23,16 +23,7 @@ struct alignas(4 * sizeof(Scalar)) PaddedPoint {
     void set(const Vector3<Scalar>& p) noexcept { number = {p.x(), p.y(), p.z(), 0}; }
 };
 
-namespace detail {
-
-/// As many numbers of a point as a register holds.
-template <Real Scalar>
-struct PartOfPoint {
-    static constexpr std::size_t bytes = (std::min)(4 * sizeof(Scalar), register_bytes);
-    using Type __attribute__((vector_size(bytes))) = Scalar;
-};
-
-}  // namespace detail
+inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// A point in registers, reckoned with as a whole.
 template <Real Scalar>
@@ -84,10 +75,13 @@ class PaddedVector {
         return result;
     }
 
-    using Part = typename detail::PartOfPoint<Scalar>::Type;
+    // As many numbers as a register holds.
+    using Part = typename Register<Scalar, (std::min)(4 * sizeof(Scalar), register_bytes)>::Type;
     static constexpr std::size_t parts = 4 * sizeof(Scalar) / sizeof(Part);
     std::array<Part, parts> parts_{};
 };
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
 
 /// How many numbers a point takes: row r begins at number 4 r.
 inline constexpr Index numbers_in_point = 4;

@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include <membrane/core/instruction_set.hpp>
 #include <membrane/core/types.hpp>
 
 #if defined(__AVX__)
@@ -24,7 +25,7 @@
 ///     const auto part = x / select(length > 0, length, membrane::Lanes<float>(1));      // every lane for itself
 namespace membrane {
 
-namespace detail {
+inline namespace MEMBRANE_INSTRUCTION_SET {
 
 #if defined(__AVX__)
 inline constexpr std::size_t register_bytes = 32;
@@ -32,12 +33,10 @@ inline constexpr std::size_t register_bytes = 32;
 inline constexpr std::size_t register_bytes = 16;
 #endif
 
-template <class Scalar>
+template <class Scalar, std::size_t bytes = register_bytes>
 struct Register {
-    using Type __attribute__((vector_size(register_bytes))) = Scalar;
+    using Type __attribute__((vector_size(bytes))) = Scalar;
 };
-
-}  // namespace detail
 
 /// 8 floats or 4 doubles, on every processor. Each lane comes to the bits that its number would come to by itself.
 template <Real Scalar>
@@ -47,8 +46,8 @@ class Lanes {
     static constexpr std::size_t count = 32 / sizeof(Scalar);
 
     /// What the processor reckons with at a time; so many make up all lanes.
-    using Part = typename detail::Register<Scalar>::Type;
-    static constexpr std::size_t parts = 32 / detail::register_bytes;
+    using Part = typename Register<Scalar>::Type;
+    static constexpr std::size_t parts = 32 / register_bytes;
 
     Lanes() = default;
     Lanes(Scalar all) noexcept {  // NOLINT(google-explicit-constructor): one number stands for all lanes
@@ -202,6 +201,8 @@ class Lanes {
     static constexpr std::size_t width = count / parts;
     std::array<Part, parts> parts_;
 };
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
 
 /// choice ? yes : no, in every lane.
 template <Number N, class Choice>

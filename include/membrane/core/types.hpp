@@ -56,12 +56,14 @@ inline constexpr Index unlimited = (std::numeric_limits<Index>::max)();
 template <Number Scalar>
 using Vector3 = Eigen::Matrix<Scalar, 3, 1>;
 
+// How Eigen aligns, allocates and frees memory depends on the instruction set, but not for those that are not aligned.
+
 /// One point a column, 3 x V.
 template <Real Scalar>
-using Points = Eigen::Matrix<Scalar, 3, Eigen::Dynamic>;
+using Points = Eigen::Matrix<Scalar, 3, Eigen::Dynamic, Eigen::DontAlign>;
 
 /// Three vertices a column, 3 x F.
-using Triangles = Eigen::Matrix<Index, 3, Eigen::Dynamic>;
+using Triangles = Eigen::Matrix<Index, 3, Eigen::Dynamic, Eigen::DontAlign>;
 
 /// Points that a part writes in place: a matrix, a block of one, or a map of somebody's memory with any stride from
 /// one point to the next. Binding never copies.

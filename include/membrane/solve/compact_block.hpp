@@ -34,6 +34,8 @@ concept VisitsInLanes = (Network::never_stiffens ||
     { volume.spring(Index(0), start, dt) } -> std::same_as<VolumeSpring<Scalar>>;
 });
 
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
 /// Packs of vertices, and all that a step knows of them.
 template <Real Scalar>
 class CompactBlock {
@@ -80,15 +82,19 @@ class CompactBlock {
     }
 
     /// What they answered at their last visit, at least [m/N].
-    [[nodiscard]] const Several& compliance(std::size_t p) const noexcept { return answers_[p]; }
+    [[nodiscard]] const Several& compliance(std::size_t p) const noexcept { return answers_[p].compliance; }
 
   private:
-    struct Ties {
+    // They lie in memory alike for every instruction set.
+    struct alignas(32) Ties {
         VolumeSpring<Several> spring;
         Several mass = 1;
         Several free = 0;  // 1 where it may move
         Index free_count = 0;
         bool damps = false;
+    };
+    struct alignas(32) Answer {
+        Several compliance;
     };
 
     template <class Sum, class Scene>
@@ -97,9 +103,11 @@ class CompactBlock {
 
     SpringPacks<Scalar> packs_;
     std::vector<Ties> ties_;
-    std::vector<Several> answers_;
+    std::vector<Answer> answers_;
     std::vector<Visit> outcomes_;
 };
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
 
 template <Real Scalar>
 template <class Scene, class IsFixed>
@@ -109,7 +117,7 @@ void CompactBlock<Scalar>::open(const Scene& scene, IsFixed is_fixed) noexcept {
         const auto vertices = packs_.vertices(p);
         for (std::size_t i = 0; i < vertices.size(); ++i) {
             const Index v = vertices[i];
-            answers_[p].set(i, scene.work.compliance[static_cast<std::size_t>(v)]);
+            answers_[p].compliance.set(i, scene.work.compliance[static_cast<std::size_t>(v)]);
             if (!is_fixed(v)) {
                 ties.free.set(i, 1);
                 ++ties.free_count;
@@ -168,10 +176,10 @@ auto CompactBlock<Scalar>::visit(std::size_t p, const Scene& scene, const Rule& 
                 if (any((compliance * bound >= 2) & may_move)) return Visit::too_far;
             }
         }
-        answers_[p] = compliance;
+        answers_[p].compliance = compliance;
     } else {
         const auto resists = state.stiffness > 0;
-        answers_[p] = select(resists, 1 / select(resists, state.stiffness, Several(1)), Several(0));
+        answers_[p].compliance = select(resists, 1 / select(resists, state.stiffness, Several(1)), Several(0));
     }
     const auto moves = (norm(state.force) > Several(scene.work.negligible_force)) & may_move;
     if (!any(moves)) return Visit::still;

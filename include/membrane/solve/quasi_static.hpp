@@ -31,6 +31,8 @@
 ///     // report.reactions[0] [N], report.moved
 namespace membrane {
 
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
 /// The quasi-static solver, [Liu07] 2.2: every step is taken to be at rest, and the vertices of the propagation queue
 /// move one after the other, nearest to the contact first, by (4) or another rule, each seeing those that have moved.
 ///
@@ -99,6 +101,7 @@ class QuasiStaticSolver {
     CompactBlock<Scalar> block_;
     Workspace<Scalar> work_;
     IndexSet last_held_;
+    IndexSet woken_;            // since the last step
     BoundedList<Index> moved_;  // in the last step that advanced, and how far [m]
     Points<Scalar> ways_;
     Predictor<Scalar, Workspace<Scalar>::most_constraints> predictor_;
@@ -114,6 +117,8 @@ template <class Network, class Rule = BlockStep, class Threads = OneThread>
         const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {}, const Threads& = {})
 ->QuasiStaticSolver<typename Network::Scalar, Rule, Threads>;
 
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <ElasticNetwork<Scalar> Network>
 QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& network,
@@ -122,11 +127,12 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& netwo
     : method_{rule, (options.check(), options), executor},
       active_(network.vertex_count()),
       block_(network, detail::most_in_lanes<Scalar, Rule, Network>(options)),
-      work_(
-          network.vertex_count(), [&](Index v) { return network.pinned(v); }, options.most_touches),
+      work_(network.vertex_count(), {}, options.most_touches),
       last_held_(network.vertex_count()),
+      woken_(network.vertex_count()),
       moved_(static_cast<std::size_t>(network.vertex_count())),
       ways_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
+    detail::define_made<QuasiStaticSolver>();
     if constexpr (requires { rule.check(); }) rule.check();
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
@@ -144,7 +150,9 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
                                                                      const Constraints&... constraints) noexcept {
     static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints, "a step takes 16 constraints at most");
     MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());
+    detail::require_made<QuasiStaticSolver>();
     open(sizeof...(Constraints));
+    work_.pinned = [&network](Index v) { return network.pinned(v); };
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) {
         return refuse_step(StepStatus::bad_time_step, x);
     }
@@ -195,6 +203,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const Acting& acting, Reg
     const Scalar part = predictor_.expect(leads);
     if (part == 0 || !complete_) return;
     for (const Index v : moved_.items()) {
+        if (region.fixed(v)) continue;
         region.shift(v, part * point(ways_, v));
         active_.wake(v);
     }
@@ -207,6 +216,10 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::line_up(const Network& network, R
     for (const Index v : last_held_.items()) {
         if (!region.fixed(v)) active_.wake(v);
     }
+    for (const Index v : woken_.items()) {
+        if (!network.pinned(v)) active_.wake(v);
+    }
+    woken_.clear();
     active_.arrange(network, work_.seeds.items(), method_.options);
     for (const auto vertices : {active_.vertices(), active_.frontier()}) {
         for (const Index v : vertices) region.save(v);
@@ -218,8 +231,10 @@ template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 template <class Handed>
 void QuasiStaticSolver<Scalar, Rule, Threads>::settle(const Handed& scene, bool mended) noexcept {
     moved_.clear();
-    active_.settle(
-        [&](Index v) { return work_.held.contains(v) || norm(lasting_force(scene, v)) <= work_.negligible_force; });
+    active_.settle([&](Index v) {
+        return work_.held.contains(v) || scene.network.pinned(v) ||
+               norm(lasting_force(scene, v)) <= work_.negligible_force;
+    });
     for (const Index v : work_.saved.items()) {
         const Vector3<Scalar> way = point(scene.x, v) - point(work_.start, v);
         if (way.isZero(0)) continue;
@@ -246,7 +261,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepSta
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::wake(std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
-        if (v >= 0 && v < work_.vertex_count() && work_.pinned[static_cast<std::size_t>(v)] == 0) active_.wake(v);
+        if (v >= 0 && v < work_.vertex_count()) woken_.insert(v);
     }
 }
 
@@ -262,6 +277,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
     predictor_.forget();
     complete_ = false;
     last_held_.clear();
+    woken_.clear();
     resume_ = 0;
     costs_ = {};
 }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -33,11 +34,10 @@ struct Workspace {
     /// The largest number of constraints of one step.
     static constexpr std::size_t most_constraints = 16;
 
-    /// `is_pinned(v)` says which vertices never move.
-    template <class IsPinned>
-    Workspace(Index vertex_count, IsPinned is_pinned, Index most_touches);
+    /// `pinned(v)` says which vertices never move.
+    Workspace(Index vertex_count, std::function<bool(Index)> pinned, Index most_touches);
 
-    [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(pinned.size()); }
+    [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(compliance.size()); }
 
     void open() noexcept;           ///< Begins a step.
     void close() noexcept;          ///< Keeps the touches of the step that ends for the next one.
@@ -48,7 +48,7 @@ struct Workspace {
     struct Range {
         std::size_t begin = 0, end = 0;
     };
-    std::vector<unsigned char> pinned;
+    std::function<bool(Index)> pinned;  // asked whenever it matters; must not throw
     IndexSet seeds, held, saved, pushed, patch;
     Points<Scalar> start;           // of saved vertices, where they were when the step began
     Points<Scalar> external;        // of pushed vertices, the constraints' force on them
@@ -86,9 +86,7 @@ class Region {
     }
 
     /// Whether nothing moves `v` in this step but `hold`.
-    [[nodiscard]] bool fixed(Index v) const noexcept {
-        return work_.pinned[static_cast<std::size_t>(v)] != 0 || held(v);
-    }
+    [[nodiscard]] bool fixed(Index v) const noexcept { return held(v) || work_.pinned(v); }
     [[nodiscard]] bool held(Index v) const noexcept { return work_.held.contains(v); }
 
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept { return point(x_, v); }
@@ -97,9 +95,8 @@ class Region {
     /// what a step is handed does not change within it.
     template <class TouchedTriangle>
     [[nodiscard]] std::span<const Index> corners_of(std::span<const TouchedTriangle> triangles) noexcept {
-        if (const void* first = triangles.data(); first == patch_of_ && triangles.size() == patch_size_) {
-            return work_.patch.items();
-        }
+        if (has_patch_ && triangles.data() == patch_of_ && triangles.size() == patch_size_) return work_.patch.items();
+        has_patch_ = true;
         patch_of_ = triangles.data();
         patch_size_ = triangles.size();
         work_.patch.clear();
@@ -224,14 +221,14 @@ class Region {
     Workspace<Scalar>& work_;
     std::size_t constraint_ = 0;
     std::size_t last_recalled_ = 0;
+    bool has_patch_ = false;
     const void* patch_of_ = nullptr;  // the triangles whose corners are the workspace's patch
     std::size_t patch_size_ = 0;
 };
 
 template <Real Scalar>
-template <class IsPinned>
-Workspace<Scalar>::Workspace(Index vertices, IsPinned is_pinned, Index most_touches)
-    : pinned(static_cast<std::size_t>(vertices)),
+Workspace<Scalar>::Workspace(Index vertices, std::function<bool(Index)> is_pinned, Index most_touches)
+    : pinned(std::move(is_pinned)),
       seeds(vertices),
       held(vertices),
       saved(vertices),
@@ -241,14 +238,12 @@ Workspace<Scalar>::Workspace(Index vertices, IsPinned is_pinned, Index most_touc
       external(start),
       unbalanced(start),
       kept(start),
-      stiffness(pinned.size(), Scalar(0)),
-      compliance(pinned.size(), Scalar(0)),
+      stiffness(static_cast<std::size_t>(vertices), Scalar(0)),
+      compliance(stiffness),
       resistance(compliance),
       firmness(compliance),
       touches(static_cast<std::size_t>(most_touches)),
-      touches_before(touches) {
-    for (Index v = 0; v < vertices; ++v) pinned[static_cast<std::size_t>(v)] = is_pinned(v) ? 1 : 0;
-}
+      touches_before(touches) {}
 
 template <Real Scalar>
 void Workspace<Scalar>::open() noexcept {
@@ -299,7 +294,7 @@ bool Region<Scalar>::check(Index v) noexcept {
 template <Real Scalar>
 void Region<Scalar>::hold(Index v, const Vector3<Scalar>& target) noexcept {
     work_.held.insert(v);
-    if (work_.pinned[static_cast<std::size_t>(v)] == 0) place(v, target);
+    if (!work_.pinned(v)) place(v, target);
 }
 
 template <Real Scalar>

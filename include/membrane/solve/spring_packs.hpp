@@ -21,6 +21,8 @@
 ///     packs.store(x);
 namespace membrane {
 
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
 /// The groups of a queue, and of what else is visited, cut up in packs of as many vertices as there are lanes. As many
 /// groups as there is room for, from the first on.
 template <Real Scalar>
@@ -94,8 +96,8 @@ class SpringPacks {
         std::size_t slot, slot_count;
         Begins own;
     };
-    /// One spring of each vertex of a pack.
-    struct Slot {
+    /// One spring of each vertex of a pack. It lies in memory alike for every instruction set.
+    struct alignas(32) Slot {
         Several stiffness, rest_length;
         Begins other;
     };
@@ -126,6 +128,8 @@ class SpringPacks {
     BoundedList<Index> with_row_;            // who has the rows after it
     std::vector<Index> row_;                 // of every vertex that has one
 };
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
 
 template <Real Scalar>
 template <ElasticNetwork<Scalar> Network>

@@ -32,6 +32,8 @@ template <class Scalar, class Rule, class Network>
 
 }  // namespace detail
 
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
 /// The visits of one step: layer 0 and what the constraints then mend, in rounds, and all the vertices beyond; again until
 /// nothing changes, the sweeps are done, or time is up. In the end a look at the forces on all of them.
 template <class Method, class Scalar, class Scene, class Acting, class Pace>
@@ -90,6 +92,8 @@ class Sweeps {
     bool mended_ = false;
     bool in_lanes_ = false;  // the groups of the block are visited all at once
 };
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
 
 template <class Method, class Scalar, class Scene, class Acting, class Pace>
 StepStatus Sweeps<Method, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) noexcept {
@@ -330,7 +334,7 @@ template <class Method, class Scalar, class Scene, class Acting, class Pace>
 bool Sweeps<Method, Scalar, Scene, Acting, Pace>::look_at(Index v, const Vector3<Scalar>& force) noexcept {
     ++report_.visits;
     region_.set_unbalanced(v, force);
-    if (!region_.held(v)) report_.residual = (std::max)(report_.residual, norm(force));
+    if (!region_.fixed(v)) report_.residual = (std::max)(report_.residual, norm(force));
     return is_finite(force);
 }
 
