@@ -11,7 +11,7 @@
 /// Whether a loop can buzz: before it runs, and while it does.
 ///
 ///     const membrane::SampledLoop loop{.stiffness = 40 * 12.0, .damping = 0.5, .tick = 1e-3,    // after the scale
-///                                      .negative_stiffness = 100, .off_potential = 0.05};
+///                                      .negative_stiffness = 100, .off_potential = 0.06};
 ///     const auto device = membrane::devices::touch;
 ///     membrane::require_passive(loop, device, {.hand_damping = 2});     // throws, and says what would do
 ///     const auto most = membrane::passivity(loop, device, {.hand_damping = 2}).most_stiffness;  // [N/m]
