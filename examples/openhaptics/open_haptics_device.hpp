@@ -96,7 +96,7 @@ class OpenHapticsDevice {
     void need(bool well, const char* step);
     void narrow(double peak, double continuous);
     [[nodiscard]] Tool read(double now) noexcept;
-    [[nodiscard]] Force answer(const Tool& tool, double now) noexcept;
+    [[nodiscard]] Force answer(const Tool& tool) noexcept;
     void write(const Force& force) noexcept;
     bool look_for_errors() noexcept;
     static void forget_errors() noexcept;
@@ -234,7 +234,7 @@ bool OpenHapticsDevice<Hd>::servo() noexcept {
     const Tool tool = read(now - first_);
     look_for_errors();
     Force force = Force::Zero();
-    if (!failed_ && !stopping_) force = answer(tool, now);
+    if (!failed_ && !stopping_) force = answer(tool);
     const bool over = failed_ || stopping_;
     write(over ? Force::Zero() : force);
     Hd::end_frame(device_);
@@ -256,7 +256,7 @@ membrane::Tool<double> OpenHapticsDevice<Hd>::read(double now) noexcept {
 }
 
 template <class Hd>
-typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::answer(const Tool& tool, double now) noexcept {
+typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::answer(const Tool& tool) noexcept {
     constexpr double none = std::numeric_limits<double>::quiet_NaN();  // the limiter starts softly after one
     Force force(none, none, none);
     if (is_sound(tool)) {
@@ -272,7 +272,7 @@ typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::answer(const Tool& 
     const bool held = std::exchange(held_, false);
     if (held) force.setConstant(none);
     if (!held) warning_ = nullptr;
-    force = limiter_(force, now, solves_);
+    force = limiter_(force, tool.time, solves_);
     report_.count(limiter_.acted(), held);
     return force;
 }

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <iostream>
 #include <sstream>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -25,6 +26,10 @@
 // [smooth]
 #include <membrane/haptics/smooth_contact.hpp>
 // [/smooth]
+
+// [rest]
+#include <membrane/haptics/rest_contact.hpp>
+// [/rest]
 
 // [handover]
 #include <membrane/haptics/handover.hpp>
@@ -148,14 +153,23 @@ TEST_CASE_METHOD(Touched, "the README's hand") {
     const auto report = solver.step(x, dt, network, backing, press(tool, contact));
     // [hand]
     const auto profile = membrane::devices::touch;
-    membrane::require_passive({.stiffness = 100, .damping = 0.5, .tick = 1e-3}, profile, {.hand_damping = 2});
+    const auto loop = membrane::SampledLoop{.stiffness = 100,  // [N/m]
+                                            .damping = 0.5,    // [N s/m]
+                                            .tick = 1e-3,
+                                            .negative_stiffness = 100,  // 1 mm deep, a tool of 2 mm radius
+                                            .off_potential = 0.06};     // [N]: 1 mm deep, normals up to 35 degrees off
+    membrane::require_passive(loop, profile, {.hand_damping = 2});
     auto limit = membrane::ForceLimiter(profile);  // each limit can be taken off
-    device.write(limit(feel({tool, contact, report}), now(), steps));
+    device.write(limit(feel({tool, contact, report}), tool.time, steps));
     // [/hand]
     // [smooth]
     const auto smooth = membrane::SmoothContact(mesh);
-    device.write(limit(feel({tool, smooth(contact), report}), now(), steps));
+    device.write(limit(feel({tool, smooth(contact), report}), tool.time, steps));
     // [/smooth]
+    // [rest]
+    const auto rest = membrane::RestContact(mesh);
+    device.write(limit(feel({tool, rest(contact, tool), report}), tool.time, steps));
+    // [/rest]
     CHECK(limit.acted().faded);  // it has only begun
 
     const auto force = device.force();
@@ -167,6 +181,43 @@ TEST_CASE_METHOD(Touched, "the README's hand") {
     membrane::ReplayDevice<double> again(membrane::read_recording<double>(file));  // in place of the device
     // [/recording]
     CHECK(again.read().position == tool.position);
+}
+
+// The lines of the loop and those of the hand, together, as a user has them.
+TEST_CASE_METHOD(AtRest, "the README's loop with limits and recorder replays to the bit, however late it runs") {
+    const auto feel = membrane::SpringDamperForce{.stiffness = 400, .damping = 0.5};
+    const auto smooth = membrane::SmoothContact(mesh);
+    const auto play = [&](auto& device, membrane::Recorder<double>* recorder) {
+        auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
+        auto tree = membrane::AabbTree(mesh);
+        auto tracker = membrane::ContactTracker(mesh);
+        auto limit = membrane::ForceLimiter(membrane::devices::touch);
+        auto x = mesh.positions();
+        std::uint64_t steps = 0;
+        int limited = 0;
+        while (device.running()) {
+            if (recorder != nullptr && steps % 40 == 0) std::this_thread::sleep_for(2ms);
+            const auto tool = device.read();
+            const auto contact = tracker.update(tree, x, tool);
+            const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+            tree.refit(x, report.moved);
+            const auto force = limit(feel({tool, smooth(contact), report}), tool.time, ++steps);
+            device.write(force);
+            if (recorder != nullptr) recorder->add(tool, force);
+            limited += limit.acted().any();
+        }
+        return limited;
+    };
+    membrane::NullDevice<double> device({{0, {0, 0, 0.012}}, {0.03, {0, 0, 0.009}}, {0.3, {0, 2e-3, 0.009}}},
+                                        {.radius = 1e-3});
+    membrane::Recorder<double> recorder(1000, mesh.vertex_count());
+    CHECK(play(device, &recorder) > 50);  // a soft start, at least
+    std::stringstream file;
+    membrane::write_recording(file, recorder.recording());
+    membrane::ReplayDevice<double> again(membrane::read_recording<double>(file));
+    CHECK(play(again, nullptr) > 50);
+    CHECK(again.differing() == 0);
+    CHECK(recorder.size() == 301);
 }
 
 TEST_CASE("the README's device in millimetres") {
@@ -188,8 +239,8 @@ TEST_CASE_METHOD(Touched, "the README's two loops") {
     const auto report = solver.step(x, dt, network, backing, press(tool, contact));
     // [handover]
     membrane::MovedPoints<double> moved(mesh.vertex_count());
-    moved.publish(report.moved, x, now());  // haptic loop, each tick
-    const auto news = moved.read();         // drawing loop, each frame
+    moved.publish(report.moved, x, now());  // haptic loop, each tick; a steady clock [s]
+    const auto news = moved.read();         // drawing loop, each frame; news.age(now())
     for (const auto v : news.moved) shown.col(v) = news.x.col(v);
     // [/handover]
     CHECK_FALSE(news.moved.empty());

@@ -29,6 +29,17 @@ double size_of(const Vector3<S>& force) {
     return norm<double>(force.template cast<double>());
 }
 
+/// Whether a change from `before` to `after` is no larger than `most`, or straight towards zero. What a float is off by its
+/// own rounding is no change.
+template <class S>
+bool within_slew(const Vector3<S>& before, const Vector3<S>& after, double most) {
+    const Vector3<double> p = before.template cast<double>(), f = after.template cast<double>();
+    if (norm<double>(f - p) <= most * (1 + 1e-12)) return true;
+    const double kept = std::clamp(dot(f, p) / squared_norm(p), 0.0, 1.0);
+    const double rounding = 16 * static_cast<double>(std::numeric_limits<S>::epsilon()) * norm(p);
+    return norm<double>(f - kept * p) <= rounding;
+}
+
 /// Nothing but the device's peak.
 constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .fresh_for = infinity, .heating = false};
 
@@ -95,7 +106,8 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
     const double slew = device.peak_force / options.rise_time;
     ForceLimiter limit(device, options);
     Mishaps<S> scene(7);
-    double before = 0, clean_since = 0, last_solve = 0, last = 0, warmth = 0;
+    Vector3<S> before = Vector3<S>::Zero();
+    double clean_since = 0, last_solve = 0, last = 0, warmth = 0;
     std::uint64_t state = 0;
     long whole = 0, frozen = 0;
     const int ticks = cases(500'000);  // of each scalar
@@ -106,15 +118,14 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
         if (scene.state != state || scene.dt < 0) last_solve = scene.now;
         state = scene.state;
         if (scene.faulty() || scene.now - last_solve > options.fresh_for) clean_since = scene.now;
-        warmth += scene.dt > 0 ? (before * before / (device.continuous_force * device.continuous_force) - warmth) *
-                                     (1 - std::exp(-scene.dt / device.thermal_time))
-                               : 0;
+        const double relative = size_of(before) / device.continuous_force;
+        warmth += scene.dt > 0 ? (relative * relative - warmth) * (1 - std::exp(-scene.dt / device.thermal_time)) : 0;
 
-        const double may_grow = slew * std::clamp(scene.now - last, 0.0, options.longest_tick);
+        const double may_change = slew * std::clamp(scene.now - last, 0.0, options.longest_tick);
         last = scene.now;
-        const bool within = is_finite(felt) && size <= device.peak_force && size <= before + may_grow;
+        const bool within = is_finite(felt) && size <= device.peak_force && within_slew(before, felt, may_change);
         if (!within) {
-            CAPTURE(i, size, before);
+            CAPTURE(i, size, before, felt);
             REQUIRE(within);
         }
         if (scene.now - last_solve > 0.1) {
@@ -125,7 +136,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
             ++whole;
             if (felt != scene.force || limit.acted().any()) FAIL("not the policy's force at tick " << i);
         }
-        before = size;
+        before = felt;
     }
     CHECK(frozen > ticks / 200);  // the cases that the test is about did occur
     CHECK(whole > ticks / 20);
@@ -141,7 +152,8 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
     test::Mishaps mishaps(5);
     const auto device = loop.limit.device();
     const double slew = device.peak_force / options.rise_time;
-    double before = 0, asked_before = 0, last = 0, clean_since = 0, last_solve = 0;
+    Vector3<S> before = Vector3<S>::Zero(), asked_before = before;
+    double last = 0, clean_since = 0, last_solve = 0;
     std::uint64_t solves = 0;
     long frozen = 0, whole = 0, pushed = 0;
     const int ticks = cases(8'000, 500'000);  // of each scalar
@@ -149,9 +161,9 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
         const auto mishap = mishaps.next();
         loop.tick(mishap);
         const double size = size_of(loop.felt), asked = size_of(loop.asked);
-        const double grows = slew * std::clamp(loop.now - last, 0.0, options.longest_tick);
-        if (!(is_finite(loop.felt) && size <= device.peak_force && size <= before + grows)) {
-            FAIL("tick " << i << ": " << size << " N after " << before << " N");
+        const double may_change = slew * std::clamp(loop.now - last, 0.0, options.longest_tick);
+        if (!(is_finite(loop.felt) && size <= device.peak_force && within_slew(before, loop.felt, may_change))) {
+            FAIL("tick " << i << ": " << loop.felt.transpose() << " N after " << before.transpose() << " N");
         }
         if (loop.solves != solves) last_solve = loop.now;
         if (loop.now - last_solve > 0.1) {
@@ -159,15 +171,16 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
             if (size != 0) FAIL("frozen, and " << size << " N at tick " << i);
         }
         // A policy that asks for more than the device bears, or for it too suddenly, is no fault, but is limited.
-        const bool bearable = asked <= device.continuous_force && asked - asked_before <= slew * loop.dt;
+        const bool bearable =
+            asked <= device.continuous_force && within_slew(asked_before, loop.asked, slew * loop.dt * (1 - 1e-5));
         if (mishap.any() || loop.solves == solves || !bearable) clean_since = loop.now;
         if (loop.now - clean_since > 0.2) {
             ++whole;
             pushed += asked > 0;
             if (loop.felt != loop.asked || loop.limit.acted().any()) FAIL("not the policy's force at tick " << i);
         }
-        before = size;
-        asked_before = asked;
+        before = loop.felt;
+        asked_before = loop.asked;
         last = loop.now;
         solves = loop.solves;
     }
@@ -190,9 +203,10 @@ TEMPLATE_TEST_CASE("inside the limits a force passes with the same bits", "[limi
         for (int i = 0; i < 110; ++i) (void)loop.tick(force);
         for (int i = 0; i < 200; ++i) {
             Vector3<S> next = force + random.vector<S>(S(-0.1), S(0.1));
-            if (random.chance(0.02)) next *= S(0.1);  // falls at once
-            if (random.chance(0.02)) next = -next;    // and turns
-            if (size_of(next) > 1.7) next *= S(0.5);
+            if (random.chance(0.02)) next = S(0.1) * force;  // falls at once
+            if (random.chance(0.02)) next = Vector3<S>::Zero();
+            if (size_of(force) < 0.19) next = -force;  // across zero, by less than the 0.395 N of a tick
+            if (size_of(next) > 1.7) next = S(0.5) * force;
             force = next;
             REQUIRE(loop.tick(force) == force);
             REQUIRE_FALSE(loop.limit.acted().any());
@@ -221,7 +235,23 @@ TEST_CASE("a force is shortened along itself, never beyond the limit", "[limits]
     CHECK(detail::shortened<double>({3, 0, 4}, 0) == Vector3<double>(0, 0, 0));
 }
 
-TEST_CASE("a solver that stops is felt no longer than 91 ms", "[limits]") {
+TEST_CASE("a solver that stops is felt for 90 ms and at most a tick, at any rate", "[limits]") {
+    for (const double rate : {300.0, 500.0, 700.0, 1000.0, 3000.0}) {
+        CAPTURE(rate);
+        Loop<double> loop{ForceLimiter(devices::touch)};
+        const double tick = 1 / rate;
+        for (int i = 0; i < rate; ++i) (void)loop.tick({0, 0, 0.5}, tick);
+        int ticks = 0;
+        do {
+            ++ticks;
+            loop.now += tick;
+        } while (loop.limit(Vector3<double>(0, 0, 0.5), loop.now, loop.solves).z() > 0);
+        CHECK(ticks * tick >= 0.09 - 1e-9);
+        CHECK(ticks * tick < 0.09 + tick + 1e-9);
+    }
+}
+
+TEST_CASE("a solver that stops at 1 kHz is felt no longer than 91 ms", "[limits]") {
     Loop<double> loop{ForceLimiter(devices::touch)};
     const Vector3<double> force(0, 0, 0.5);
     for (int i = 0; i < 150; ++i) (void)loop.tick(force);
@@ -262,7 +292,7 @@ TEST_CASE("after a fault the force is zero at once, and comes back slowly", "[li
     }
 }
 
-TEST_CASE("only growth is slowed, also in a gap", "[limits]") {
+TEST_CASE("a fall straight to zero is not slowed, all else is, also in a gap", "[limits]") {
     const LimitOptions options{.soft_start = 0};
     Loop<double> loop{ForceLimiter(devices::touch, options)};
     CHECK(loop.tick({3, 0, 0}) == Vector3<double>(0, 0, 0));  // no time has passed
@@ -273,10 +303,89 @@ TEST_CASE("only growth is slowed, also in a gap", "[limits]") {
     CHECK(loop.tick({3, 0, 0}).x() == 3);
     CHECK(loop.tick({0.1, 0, 0}).x() == 0.1);
     CHECK(loop.tick({0, -0.1, 0}).y() == -0.1);
-    CHECK(loop.tick({3, 0, 0}, 0.05).x() == Approx(0.1 + 2 * 0.165));  // 50 ms count for 2
-    CHECK(loop.tick({3, 0, 0}, 0).x() == Approx(0.1 + 2 * 0.165));     // a clock that stands still
-    CHECK(loop.tick({3, 0, 0}, -5).x() == Approx(0.1 + 2 * 0.165));    // or jumps back
+    const double across = std::sqrt(0.33 * 0.33 - 0.1 * 0.1);  // what is left beside the fall to zero
+    CHECK(loop.tick({3, 0, 0}, 0.05).x() == Approx(across));   // 50 ms count for 2
+    CHECK(loop.tick({3, 0, 0}, 0).x() == Approx(across));      // a clock that stands still
+    CHECK(loop.tick({2, 2, 0}, 0).y() == 0);                   // holds what there is
+    CHECK(loop.tick({3, 0, 0}, -5).x() == Approx(across));     // or jumps back
+    CHECK(loop.tick({0.2, 0.2, 0}, 0).x() == Approx(0.2));     // and lets it fall
     CHECK(loop.tick({0, 0, 0}).x() == 0);
+}
+
+TEST_CASE("a force that turns about goes through zero", "[limits]") {
+    Loop<double> loop{ForceLimiter(devices::touch)};
+    for (int i = 0; i < 200; ++i) (void)loop.tick({0, 0, 1});
+    for (int turn = 0; turn < 3; ++turn) {
+        const double sign = turn % 2 == 0 ? -1 : 1;
+        CHECK(loop.tick({0, 0, sign}) == Vector3<double>(0, 0, 0));
+        CHECK(loop.limit.acted().slew);
+        for (int i = 1; i <= 6; ++i) REQUIRE(loop.tick({0, 0, sign}).z() == Approx(sign * 0.165 * i));
+        REQUIRE(loop.tick({0, 0, sign}).z() == sign);
+    }
+    // One that turns about in each tick is hardly felt.
+    for (int i = 0; i < 100; ++i) REQUIRE(size_of(loop.tick({0, 0, i % 2 == 0 ? 1.0 : -1.0})) <= 0.165);
+}
+
+TEMPLATE_TEST_CASE("however a force jumps and turns, its change is bounded but for a fall to zero", "[limits]", double,
+                   float) {
+    using S = TestType;
+    const double slew = devices::touch.peak_force / LimitOptions{}.rise_time;
+    constexpr double rounding = 8 * static_cast<double>(std::numeric_limits<S>::epsilon());
+    for (int seed = 1; seed <= cases(300); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Loop<S> loop{ForceLimiter(devices::touch, {.soft_start = 0, .heating = false})};
+        Vector3<S> before = loop.tick(Vector3<S>::Zero());
+        Vector3<S> asked = Vector3<S>::Zero();
+        Vector3<S> axis = random.unit_vector<S>();
+        const auto rate = static_cast<S>(std::pow(10, random.number(-3.0, 0.5)));  // [rad] in a tick
+        for (int i = 0; i < 300; ++i) {
+            const Vector3<S> turned = std::cos(rate) * asked + std::sin(rate) * cross(axis, asked);
+            switch (random.index(30)) {
+                case 0: asked = static_cast<S>(random.number(0.0, 3.3)) * random.unit_vector<S>(); break;
+                case 1: asked = -asked; break;
+                case 2: asked *= static_cast<S>(random.number(0.0, 1.0)); break;
+                case 3: asked = S(0.3) * asked + S(0.02) * random.unit_vector<S>(); break;
+                case 4: asked.setZero(); break;
+                case 5: axis = random.unit_vector<S>(); break;
+                default: asked = turned;
+            }
+            const double dt = random.chance(0.05) ? 0 : 1e-3 * random.number(0.2, 3.0);
+            const double time = loop.now;
+            const Vector3<S> felt = loop.tick(asked, dt);
+            const double change = slew * std::clamp(loop.now - time, 0.0, 2e-3);
+            const Vector3<double> f = asked.template cast<double>(), g = felt.template cast<double>();
+            CAPTURE(i, before, asked, felt, change);
+            if (!within_slew(before, felt, change)) FAIL("changed by too much");
+            if (!(norm(g) <= norm(f) * (1 + rounding))) FAIL("larger than asked for");
+            if (!(dot(g, f) >= squared_norm(g) - rounding * norm(g) * norm(f))) FAIL("against what is asked for");
+            if (within_slew(before, asked, change * (1 - 1e-5) - 1e-5) && size_of(asked) < 3.3 &&
+                (felt - asked).norm() > S(rounding) * before.norm()) {
+                FAIL("not passed");
+            }
+            before = felt;
+        }
+        // It comes to a steady force, straight, in no more ticks than that takes.
+        asked = static_cast<S>(random.number(0.0, 3.2)) * random.unit_vector<S>();
+        const double far = norm<double>((asked - before).template cast<double>());
+        for (int i = 0; i <= static_cast<int>(far / (slew * 1e-3)) + 1; ++i) before = loop.tick(asked);
+        REQUIRE(before == asked);
+    }
+}
+
+TEST_CASE("a solver that stops while the force turns fades all the same", "[limits]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Loop<double> loop{ForceLimiter(devices::touch)};
+        for (int i = 0; i < 200; ++i) (void)loop.tick(3 * random.unit_vector());
+        for (int i = 1; i <= 200; ++i) {
+            loop.now += 1e-3;
+            const double most = i <= 40 ? 3 : std::max(3 * (90 - i) / 50.0, 0.0) + 1e-9;
+            REQUIRE(norm(loop.limit(Vector3<double>(3 * random.unit_vector()), loop.now, loop.solves)) <= most);
+            if (i >= 91) REQUIRE(loop.limit.share() == 0);
+        }
+    }
 }
 
 TEST_CASE("a clock that stands still does not blind the watchdog", "[limits]") {
@@ -338,6 +447,54 @@ TEST_CASE("motors warm up as a first-order model does, and are not asked for mor
         CHECK(least == Approx(strong.continuous_force).epsilon(0.02));
         CHECK(loop.limit.acted().heat);
         CHECK(at_once < 0.03 * strong.peak_force);  // down in small steps
+    }
+}
+
+TEST_CASE("a wild reading of the clock is got over", "[limits]") {
+    const test::FloatingPointTraps traps;
+    constexpr double most = std::numeric_limits<double>::max();
+    for (const double wild : {most, 1.7e308, -1.7e308, 1e30, -1e30, 1e6, -1e6}) {
+        for (const double thermal_time : {10.0, 0.5, 1e-300}) {
+            for (const double rise_time : {0.02, 0.0}) {
+                CAPTURE(wild, thermal_time, rise_time);
+                auto device = devices::touch;
+                device.thermal_time = thermal_time;
+                Loop<double> loop{ForceLimiter(device, {.rise_time = rise_time})};
+                for (int i = 0; i < 300; ++i) (void)loop.tick({0, 0, 3.3});
+                (void)loop.limit(Vector3<double>(0, 0, 3.3), wild, ++loop.solves);
+                for (int i = 0; i < 40'000; ++i) {
+                    const double felt = loop.tick({0, 0, 0.5}).z();
+                    REQUIRE((felt >= 0 && felt <= 0.5));
+                }
+                CHECK(loop.limit.warmth() >= 0);
+                if (thermal_time < 0.1) continue;  // warm at once, whatever the clock
+                CHECK(loop.limit.warmth() < 0.75);
+                double felt = 0;
+                for (int i = 0; i < 25; ++i) felt = std::max(felt, loop.tick({0, 0, 3.3}).z());
+                CHECK(felt > 3.2);  // the peak is there again
+            }
+        }
+    }
+}
+
+TEST_CASE("in a gap motors warm up as the force that is held has them do", "[limits]") {
+    for (const auto& device : {devices::touch, devices::phantom_desktop, devices::premium_1_5, devices::premium_3_0}) {
+        const double hottest = std::pow(device.peak_force / device.continuous_force, 2);
+        for (const double gap : {0.04, 0.1, 0.2, 0.5, 2.0, 1e3}) {
+            CAPTURE(device.name, gap);
+            for (int lead = 110; lead < 6000; lead += 65) {
+                Loop<double> loop{ForceLimiter(device)};
+                for (int i = 0; i < lead; ++i) (void)loop.tick({0, 0, device.peak_force});
+                const double before = loop.limit.warmth();
+                const double held = loop.tick({0, 0, device.peak_force}).z() / device.continuous_force;
+                (void)loop.tick({0, 0, device.peak_force}, gap);
+                const double share = -std::expm1(-gap / device.thermal_time);
+                const double exact = before + share * (held * held - before);
+                REQUIRE(loop.limit.warmth() ==
+                        Approx(exact).epsilon(0.005).margin(0.03 * hottest * share * share + 0.01));
+                REQUIRE(loop.limit.warmth() <= (gap > 0.04 ? hottest : 1));
+            }
+        }
     }
 }
 

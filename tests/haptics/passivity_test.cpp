@@ -126,8 +126,12 @@ Energies play(const Scene& scene, Policy policy, double tissue, const SampledLoo
 
 SampledLoop random_loop(Random& random, double damping) {
     const double tick = 1e-3 * random.number(0.25, 2.0);
-    return {
-        .stiffness = 0, .damping = random.number(0.0, 0.8) * damping, .tick = tick, .delay = tick * random.index(4)};
+    return {.stiffness = 0,
+            .damping = random.number(0.0, 0.8) * damping,
+            .tick = tick,
+            .delay = tick * random.index(4),
+            .negative_stiffness = 0,
+            .off_potential = 0};
 }
 
 }  // namespace
@@ -231,11 +235,12 @@ TEST_CASE("a quiver as fast as the ticks is the worst for spring and damper toge
 }
 
 TEST_CASE("the bound is that of Colgate and Schenkel, with delay, friction and resolution", "[passivity]") {
-    const SampledLoop wall{.stiffness = 1000, .damping = 0.3, .tick = 1e-3};
+    const SampledLoop wall{
+        .stiffness = 1000, .damping = 0.3, .tick = 1e-3, .negative_stiffness = 0, .off_potential = 0};
     CHECK(passivity(wall, bare(0.5), {.hand_damping = 0.4}).damping_needed == Approx(0.8));
     CHECK(passivity(wall, bare(0.5), {.hand_damping = 0.4}).damping_there == Approx(0.9));
     CHECK(passivity(wall, bare(0.5), {.hand_damping = 0.4}).most_stiffness == Approx(1200));
-    const SampledLoop late{.stiffness = 1000, .tick = 1e-3, .delay = 2e-3};
+    const SampledLoop late{.stiffness = 1000, .tick = 1e-3, .delay = 2e-3, .negative_stiffness = 0, .off_potential = 0};
     CHECK(passivity(late, bare(0.5), {.hand_damping = 0}).damping_needed == Approx(2.5));
     CHECK(passivity(late, bare(0.5), {.hand_damping = 0}).most_stiffness == Approx(200));
     // Friction of 0.2 N is a damper of 2 N s/m up to 0.1 m/s, of nothing if the speed is not known.
@@ -254,6 +259,161 @@ TEST_CASE("the bound is that of Colgate and Schenkel, with delay, friction and r
     CHECK_FALSE(passivity(wall, device, {.hand_damping = 0}).passive);
     CHECK(passivity(wall, device, {.hand_damping = 0}).most_stiffness == 900);
     CHECK(passivity({.stiffness = 0}, device, {.hand_damping = 0}).passive);
+}
+
+TEST_CASE("what a check presumes of a force has to be said", "[passivity]") {
+    const auto refused = [](const SampledLoop& loop, const DeviceProfile& device) {
+        return test::refusal([&] { require_passive(loop, device, {.hand_damping = 5}); });
+    };
+    CHECK(refused({.stiffness = 100}, bare(0)) ==
+          "passivity: off_potential must be known, 0 for a force that has a potential [N], got inf");
+    CHECK(refused({.stiffness = 100, .off_potential = 0}, bare(0)) == "");  // nothing comes too late or is coarse
+    CHECK(
+        refused({.stiffness = 100, .delay = 1e-3, .off_potential = 0}, bare(0)) ==
+        "passivity: with a delay of 0.001 s and a resolution of 0 m negative_stiffness must be known and finite [N/m], "
+        "got inf");
+    CHECK(refused({.stiffness = 100, .off_potential = 0}, devices::touch) ==
+          "passivity: with a delay of 0 s and a resolution of 5.5e-05 m negative_stiffness must be known and finite "
+          "[N/m], "
+          "got inf");
+    CHECK(refused({.stiffness = 100, .negative_stiffness = 100, .off_potential = 0}, devices::touch) == "");
+    // What has no potential gives in slow loops, and only friction takes that.
+    CHECK(
+        refused({.stiffness = 100, .off_potential = 0.1}, bare(0)) ==
+        "passivity: with damping 0 N s/m, negative_stiffness inf N/m and off_potential 0.1 N friction of bare must be "
+        "at least 0.1 [N], got 0");
+    CHECK(refused({.stiffness = 100, .negative_stiffness = 0, .off_potential = 0.1}, devices::touch) == "");
+    CHECK(refused({.stiffness = 100, .negative_stiffness = 0, .off_potential = 0.3}, devices::touch) != "");
+}
+
+TEST_CASE("the most stiffness is that with which a loop is just passive, whatever the rest", "[passivity]") {
+    for (int seed = 1; seed <= cases(5000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        auto device = bare(random.number(0.0, 2.0));
+        device.friction = random.chance(0.3) ? 0 : random.number(0.0, 0.3);
+        device.resolution = random.chance(0.5) ? 0 : random.number(0.0, 1e-4);
+        auto loop = random_loop(random, 0.2);
+        loop.negative_stiffness = random.chance(0.2) ? infinity : std::pow(10, random.number(-1.0, 5.0));
+        loop.off_potential = random.chance(0.5) ? 0 : random.number(0.0, 0.2);
+        const Dissipation there{.hand_damping = random.number(0.0, 3.0),
+                                .fastest = random.chance(0.5) ? infinity : random.number(0.05, 1.0)};
+        const auto passive_at = [&](double stiffness) {
+            loop.stiffness = stiffness;
+            return passivity(loop, device, there).passive;
+        };
+        const double most = passivity(loop, device, there).most_stiffness;
+        REQUIRE(is_finite(most));
+        if (most > 0) REQUIRE(passive_at(0.999 * most));
+        if (most < device.stiffness) REQUIRE_FALSE(passive_at(1.001 * most + 1e-9));
+    }
+}
+
+namespace {
+
+/// A force law over a row of places, linear between them, and the search for a walk along them that gains energy.
+class Walks {
+  public:
+    static constexpr std::size_t places = 7;
+    using Law = std::array<double, places>;
+
+    explicit Walks(const Law& force) : force_(force) {
+        for (std::size_t i = 1; i < places; ++i) potential_[i] = potential_[i - 1] + (force[i - 1] + force[i]) / 2;
+    }
+
+    /// Energy of the hand at the end of the worst walk there is, above that of the law's potential: in places apart and
+    /// ticks of 1, the force `delay` ticks late, beside a damper. By dynamic programming over the last places.
+    [[nodiscard]] double worst(std::size_t delay, double damping, int ticks) const {
+        std::size_t states = places;
+        for (std::size_t i = 0; i < delay; ++i) states *= places;
+        std::vector<double> best(states, 0.0), next(states);
+        for (int tick = 0; tick < ticks; ++tick) {
+            for (std::size_t state = 0; state < states; ++state) {  // places from the last to the earliest
+                const std::size_t here = state % places, seen = state / (states / places);
+                double least = infinity;
+                for (std::size_t to = 0; to < places; ++to) {
+                    const double way = static_cast<double>(to) - static_cast<double>(here);
+                    const double more = force_[seen] * way + damping * way * way - (potential_[to] - potential_[here]);
+                    least = std::min(least, more + best[state % (states / places) * places + to]);
+                }
+                next[state] = least;
+            }
+            best.swap(next);
+        }
+        double least = infinity;
+        for (std::size_t place = 0; place < places; ++place) {
+            std::size_t resting = 0;
+            for (std::size_t i = 0; i <= delay; ++i) resting = resting * places + place;
+            least = std::min(least, best[resting]);
+        }
+        return least;
+    }
+
+  private:
+    Law force_, potential_{};
+};
+
+}  // namespace
+
+TEST_CASE("no walk over a force law within its slopes gains energy, whatever the delay", "[passivity]") {
+    constexpr int ticks = 40;
+    std::array<int, 4> gained{};
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        Random random(static_cast<std::uint64_t>(seed));
+        const double up = random.chance(0.2) ? 0.01 : 1, down = random.chance(0.2) ? 0 : random.number(0.0, 20.0);
+        const double steep = random.number();  // how often a slope is one of the two
+        Walks::Law force{random.number(-3.0, 3.0)};
+        for (std::size_t i = 1; i < Walks::places; ++i) {
+            const double slope = random.chance(steep) ? (random.chance(0.5) ? up : -down) : random.number(-down, up);
+            force[i] = force[i - 1] + slope;
+        }
+        const Walks walks(force);
+        for (std::size_t delay = 0; delay < 4; ++delay) {
+            CAPTURE(seed, delay, up, down, force);
+            const SampledLoop loop{.stiffness = up,
+                                   .tick = 1,
+                                   .delay = static_cast<double>(delay),
+                                   .negative_stiffness = down,
+                                   .off_potential = 0};
+            const double damping = passivity(loop, bare(0), {.hand_damping = 0}).damping_needed;
+            REQUIRE(walks.worst(delay, damping, ticks) >= -1e-12);
+            // As much as a wall needs that has no slope downward.
+            auto wall = loop;
+            wall.negative_stiffness = 0;
+            const double less = passivity(wall, bare(0), {.hand_damping = 0}).damping_needed;
+            gained[delay] += walks.worst(delay, less, ticks) < -1e-3;
+        }
+    }
+    CHECK(gained[0] == 0);  // without a delay a wall may end
+    for (std::size_t delay = 1; delay < 4; ++delay) CHECK(gained[delay] > 0);
+}
+
+TEST_CASE("with less damping than the bound there is a walk that gains energy", "[passivity]") {
+    const Walks spring({0, 1, 2, 3, 4, 5, 6});
+    CHECK(spring.worst(0, 0.499, 40) < -1e-3);
+    CHECK(spring.worst(1, 1.2, 60) < -1e-3);
+    CHECK(spring.worst(2, 1.8, 60) < -1e-3);
+}
+
+TEST_CASE("a wall that ends is refused where it is answered late", "[passivity]") {
+    const double stiffness = 100, end = 0.01, tick = 1e-3, off = 0.5e-3;
+    for (int delay = 0; delay < 4; ++delay) {
+        const SampledLoop wall{.stiffness = stiffness, .tick = tick, .delay = delay * tick, .off_potential = 0};
+        const Dissipation hand{.hand_damping = 1.01 * stiffness * (tick / 2 + delay * tick)};
+        CHECK(passivity(wall, bare(0), hand).passive == (delay == 0));
+        EnergyObserver observer(hand.hand_damping);
+        std::vector<double> way;
+        for (int i = 0; i <= 100; ++i) way.push_back((end - off) * i / 100);
+        for (int i = 0; i < 2000; ++i) way.push_back(i / std::max(delay, 1) % 2 == 1 ? end - off : end + off);
+        for (std::size_t i = 0; i < way.size(); ++i) {
+            const auto late = static_cast<std::size_t>(delay);
+            const double seen = i >= late ? way[i - late] : 0;
+            const double force = seen > 0 && seen < end ? -stiffness * seen : 0;
+            observer.update(Vector3<double>(way[i], 0, 0), Vector3<double>(force, 0, 0), tick);
+        }
+        if (delay == 0) CHECK(observer.least() == 0);
+        if (delay == 1) CHECK(observer.energy() < -0.5);
+    }
 }
 
 TEST_CASE("accepted at 0.9 of the bound, refused at 1.1, on every device", "[passivity]") {
@@ -283,7 +443,12 @@ TEST_CASE("friction and a coarse position are counted rightly, whatever the way"
         auto device = bare(random.number(0.0, 1.0));
         device.friction = random.number(0.05, 0.3);
         device.resolution = random.chance(0.5) ? 0 : 5e-5;
-        SampledLoop loop{.stiffness = 0, .damping = 0.02, .tick = 1e-3, .delay = 1e-3 * random.index(3)};
+        SampledLoop loop{.stiffness = 0,
+                         .damping = 0.02,
+                         .tick = 1e-3,
+                         .delay = 1e-3 * random.index(3),
+                         .negative_stiffness = 0,
+                         .off_potential = 0};
         const double fastest = random.number(0.02, 0.5);
         const Dissipation there{.hand_damping = random.number(0.0, 1.0), .fastest = fastest};
         loop.stiffness = passivity(loop, device, there).most_stiffness;
@@ -334,7 +499,8 @@ TEMPLATE_TEST_CASE("the observer counts what a held force does", "[passivity]", 
 }
 
 TEST_CASE("what is not passive is refused, and the message says what would be", "[passivity][bad]") {
-    const SampledLoop loop{.stiffness = 1000, .damping = 0.25, .tick = 1e-3};
+    const SampledLoop loop{
+        .stiffness = 1000, .damping = 0.25, .tick = 1e-3, .negative_stiffness = 0, .off_potential = 0};
     CHECK(test::refusal([&] { require_passive(loop, bare(0.25), {.hand_damping = 0.25}); }) ==
           "passivity: with damping 0.25 N s/m and a tick of 0.001 s on bare stiffness must be at most 500 [N/m], got "
           "1000; damping needed 0.75 [N s/m], there is 0.5");
@@ -349,6 +515,10 @@ TEST_CASE("what is not passive is refused, and the message says what would be", 
           "SampledLoop: tick must be finite and positive [s], got 0");
     CHECK(refused({.stiffness = 1, .delay = infinity}, {.hand_damping = 0}) ==
           "SampledLoop: delay must be finite and not negative [s], got inf");
+    CHECK(refused({.stiffness = 1, .negative_stiffness = -2}, {.hand_damping = 0}) ==
+          "SampledLoop: negative_stiffness must not be negative [N/m], got -2");
+    CHECK(refused({.stiffness = 1, .off_potential = -3}, {.hand_damping = 0}) ==
+          "SampledLoop: off_potential must not be negative [N], got -3");
     CHECK(refused({.stiffness = 1}, {.hand_damping = -1}) ==
           "Dissipation: hand_damping must be finite and not negative [N s/m], got -1");
     CHECK(refused({.stiffness = 1}, {.hand_damping = 1, .fastest = 0}) ==

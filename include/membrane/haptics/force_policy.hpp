@@ -47,6 +47,10 @@ template <Real Scalar>
 /// The force of the paper, F = -k x - mu v, [Liu07] 2.4. Touching: x is the depth and v the velocity along the contact
 /// normal, and so is the force; it never pulls the tool in. Pulling: x is how far the held point is from where it was
 /// at first, v its velocity along that, and the force runs against it. The held point moves with the tool.
+///
+/// Touching, it has no potential as it stands: the depth is of the surface at rest, the normal of the deformed one. A hand
+/// that goes round slowly is given some microjoules on each turn, which only friction takes (see `SampledLoop`). With the
+/// contact of a `RestContact` it is that of a spring.
 struct SpringDamperForce {
     double stiffness;    ///< k [N/m]
     double damping = 0;  ///< mu [N s/m]
@@ -67,7 +71,8 @@ struct SpringDamperForce {
 };
 
 /// The membrane's own reaction, what the solver found: the sum over all constraints of the step, scaled from the tissue
-/// to what a hand can feel. Where a step has loads, pins or a second hand's tool, a policy of one's own takes the
+/// to what a hand can feel. As far as steps converge its potential is the energy of the membrane, so that a hand that goes
+/// round slowly is given nothing. Where a step has loads, pins or a second hand's tool, a policy of one's own takes the
 /// `report.reactions` that are this hand's.
 struct ReactionForce {
     double scale = 1;

@@ -10,18 +10,32 @@
 
 /// Whether a loop can buzz: before it runs, and while it does.
 ///
-///     const membrane::SampledLoop loop{.stiffness = 40 * 12.0, .damping = 0.5, .tick = 1e-3};   // after the scale
+///     const membrane::SampledLoop loop{.stiffness = 40 * 12.0, .damping = 0.5, .tick = 1e-3,    // after the scale
+///                                      .negative_stiffness = 100, .off_potential = 0.06};
 ///     const auto device = membrane::devices::touch;
 ///     membrane::require_passive(loop, device, {.hand_damping = 2});     // throws, and says what would do
 ///     const auto most = membrane::passivity(loop, device, {.hand_damping = 2}).most_stiffness;  // [N/m]
 namespace membrane {
 
-/// What is shown to the hand.
+/// What is shown to the hand: a force that has a potential, but for its damping and for what `off_potential` says. Its
+/// stiffness is that of the potential, the eigenvalues of its Hessian: in every direction, not along a normal alone.
+///
+/// | force | negative_stiffness | off_potential |
+/// |---|---|---|
+/// | `ReactionForce` | reaction / distance to the centre of curvature of a convex membrane; more where it buckles | scale * residual |
+/// | `SpringDamperForce` on a `RestContact` | stiffness * depth / distance, see there | 0 |
+/// | the same on a contact itself, or a `SmoothContact` | the same | stiffness * depth * sine of the angle between its normal and that of the `RestContact` |
 struct SampledLoop {
     double stiffness;    ///< K, the largest tangent stiffness at the device, tissue-to-device scale included [N/m]
     double damping = 0;  ///< B, the largest damping of the policy, by differences of the position [N s/m]
     double tick = 1e-3;  ///< T, from one force to the next [s]
     double delay = 0;    ///< from a position to the tick in which it is answered, a multiple of the tick [s]
+    /// N, how far the tangent stiffness goes below zero, at most [N/m]: 0 where it never does, infinity for a wall that
+    /// ends, or if it is not known. It matters with a delay, or on a device with a resolution.
+    double negative_stiffness = std::numeric_limits<double>::infinity();
+    /// How far the force without its damping is from that of any potential, at most [N]: 0 where it has one, infinity if
+    /// it is not known. What it gives in a slow loop no damping takes, friction must. A jump of the force counts in full.
+    double off_potential = std::numeric_limits<double>::infinity();
 
     /// @throws InvalidInput for a number that is not finite or out of its range
     void check() const;
@@ -41,23 +55,26 @@ struct Dissipation {
 /// What a check comes to.
 struct PassivityReport {
     bool passive = false;
-    double most_stiffness = 0;  ///< of the loop, the rest as it is; 0: none [N/m]
-    double damping_needed = 0;  ///< by the loop as it is [N s/m]
-    double damping_there = 0;   ///< of device and hand, and of friction as far as it is counted [N s/m]
+    double most_stiffness = 0;   ///< of the loop, the rest as it is; 0: none [N/m]
+    double damping_needed = 0;   ///< by the loop as it is [N s/m]
+    double damping_there = 0;    ///< of device and hand, and of friction as far as it is counted [N s/m]
+    double friction_needed = 0;  ///< of the device, for a coarse resolution and what has no potential [N]
 };
 
 /// Whether a held, sampled force gives the hand no energy that the hand has not brought.
 ///
 /// The force of a tick is held until the next, so a spring that is let go pushes as it did where it was pressed deeper:
-/// that makes at most K / 2 d^2 for a tick in which the tool goes by d, a delay by n ticks n K d^2 more in the mean, a
-/// damper by differences B d^2 / T. A damper b takes b d^2 / T. So the loop is passive if
+/// that makes at most K / 2 d^2 for a tick in which the tool goes by d. A delay of n ticks answers a position that is off
+/// by the last n d: where no slope is steeper than L = max(K, N), up or down, that makes n L d^2 more in the mean. A
+/// damper by differences makes B d^2 / T. A damper b takes b d^2 / T. So the loop is passive if
 ///
-///     b >= K (T / 2 + delay) + B,                                                                [Colgate97]
+///     b >= K T / 2 + max(K, N) delay + B,                                                        [Colgate97]
 ///
-/// for any force with a potential whose slope is nowhere above K: springs that harden, walls that end. A position
-/// coarse by r makes the force wrong by (K / 2 + B / T) r, against which friction has to stand [Abbott05]; what is left of
-/// friction, c, takes c d, no less than c / v d^2 / T at speeds up to v [Diolaiti06]. Sufficient; necessary where the hand
-/// may be anything passive.
+/// for any force with a potential: springs that harden, and, where there is no delay, walls that end, of which N is
+/// infinite. A position coarse by r makes the force wrong by (L / 2 + B / T) r, against which friction has to stand
+/// [Abbott05], as it has against the part of the force that has no potential: that gives in a slow loop what no damper takes.
+/// What is left of friction, c, takes c d, no less than c / v d^2 / T at speeds up to v [Diolaiti06]. Sufficient; for
+/// N <= K necessary where the hand may be anything passive.
 ///
 /// @throws InvalidInput for a number out of its range
 [[nodiscard]] inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device,
@@ -104,6 +121,10 @@ inline void SampledLoop::check() const {
     detail::check_option(component, damping, "damping", "N s/m");
     detail::check_option(component, tick, "tick", "s", false);
     detail::check_option(component, delay, "delay", "s");
+    if (!(negative_stiffness >= 0)) {
+        refuse(component, "negative_stiffness must not be negative [N/m], got ", negative_stiffness);
+    }
+    if (!(off_potential >= 0)) refuse(component, "off_potential must not be negative [N], got ", off_potential);
 }
 
 inline void Dissipation::check() const {
@@ -115,20 +136,29 @@ inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& d
     loop.check();
     device.check();
     dissipation.check();
-    const double lag = loop.tick / 2 + loop.delay, coarse = device.resolution;
-    const double viscous = device.damping + dissipation.hand_damping;
+    const double lag = loop.tick / 2, coarse = device.resolution, negative = loop.negative_stiffness;
     const double per_speed = 1 / dissipation.fastest;
-    const auto friction_left = [&](double stiffness) {
-        return device.friction - (stiffness / 2 + loop.damping / loop.tick) * coarse;
-    };
+    const double viscous = device.damping + dissipation.hand_damping;
+    // For slopes: without a lag even an infinite one does nothing.
+    const double friction = device.friction - loop.off_potential - loop.damping / loop.tick * coarse;
+    const auto over = [](double slope, double way) { return way > 0 ? slope * way : 0.0; };
+
     PassivityReport report;
-    const double left = friction_left(loop.stiffness);
-    report.damping_needed = loop.stiffness * lag + loop.damping;
+    const double steepest = (std::max)(loop.stiffness, negative);
+    const double left = friction - over(steepest, coarse / 2);
+    report.friction_needed = device.friction - left;
+    report.damping_needed = loop.stiffness * lag + over(steepest, loop.delay) + loop.damping;
     report.damping_there = viscous + (std::max)(left, 0.0) * per_speed;
-    // Both grow less with the stiffness: damping, and what friction leaves of the resolution.
-    const double by_damping = (viscous + friction_left(0) * per_speed - loop.damping) / (lag + coarse / 2 * per_speed);
-    const double by_resolution = coarse > 0 ? 2 * friction_left(0) / coarse : std::numeric_limits<double>::infinity();
-    report.most_stiffness = (std::max)((std::min)({by_damping, by_resolution, device.stiffness}), 0.0);
+
+    // The most where the stiffness is the steepest slope; if that is less than the negative one, where that is.
+    const double late = loop.delay + coarse / 2 * per_speed;
+    const double room = viscous + friction * per_speed - loop.damping;
+    double most = room / (lag + late);
+    if (late > 0 && !(most >= negative)) most = (room - negative * late) / lag;
+    const double most_slope = coarse > 0 ? 2 * friction / coarse : std::numeric_limits<double>::infinity();
+    const bool borne = friction >= 0 && (coarse == 0 || negative <= most_slope);
+    report.most_stiffness = borne ? (std::max)((std::min)({most, most_slope, device.stiffness}), 0.0) : 0;
+
     // A wall of no stiffness and no damping is no wall.
     const bool shows_nothing = loop.stiffness == 0 && loop.damping == 0;
     const bool enough = left >= 0 && report.damping_there >= report.damping_needed;
@@ -139,6 +169,19 @@ inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& d
 inline void require_passive(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation) {
     const auto report = passivity(loop, device, dissipation);
     if (report.passive) return;
+    if (!is_finite(loop.off_potential)) {
+        refuse("passivity", "off_potential must be known, 0 for a force that has a potential [N], got ",
+               loop.off_potential);
+    }
+    if (!is_finite(loop.negative_stiffness) && (loop.delay > 0 || device.resolution > 0)) {
+        refuse("passivity", "with a delay of ", loop.delay, " s and a resolution of ", device.resolution,
+               " m negative_stiffness must be known and finite [N/m], got ", loop.negative_stiffness);
+    }
+    if (report.friction_needed > device.friction) {
+        refuse("passivity", "with damping ", loop.damping, " N s/m, negative_stiffness ", loop.negative_stiffness,
+               " N/m and off_potential ", loop.off_potential, " N friction of ", device.name, " must be at least ",
+               report.friction_needed, " [N], got ", device.friction);
+    }
     refuse("passivity", "with damping ", loop.damping, " N s/m and a tick of ", loop.tick, " s on ", device.name,
            " stiffness must be at most ", report.most_stiffness, " [N/m], got ", loop.stiffness, "; damping needed ",
            report.damping_needed, " [N s/m], there is ", report.damping_there);

@@ -20,8 +20,10 @@
 ///     while (again.running()) { ...; again.write(force); }                         // then again.differing() == 0
 ///
 /// A replay gives the same forces to the bit if it is the same binary, and begins as the recorded run began: same mesh,
-/// network and options, same positions, parts and force policies that are new or `reset()`, the tree refitted. Steps that end
-/// at a deadline of a real clock do not repeat themselves.
+/// network and options, same positions, parts and force policies that are new or `reset()`, the tree refitted, a limiter that
+/// is new (a restarted one is as warm as it was). Nothing is recorded but what the device said, so all that needs a time takes
+/// the tool's: a `ForceLimiter` with `tool.time` limits a replay as it did the run, and the loop is the same in both. One
+/// on a clock of its own, or steps that end at a deadline of a real clock, do not repeat themselves.
 namespace membrane {
 
 /// One turn of the loop: what the device said, and what it was told.
