@@ -30,7 +30,7 @@ struct SolverOptions {
     Index sweeps = 2;               ///< passes over the queue in each step
     Index contact_visits = 4;       ///< visits of layer 0 in each sweep: what touches the tool settles last
     VisitOrder order = VisitOrder::groups;
-    bool predict = true;  ///< a step begins with the ways of the last one, as far as what leads goes on
+    bool predict = true;  ///< a step starts from the last displacements again, if the last step was not cut short
     Index most_visits =
         unlimited;  ///< visits of vertices in a step; layer 0, what is held and one vertex get theirs anyway
     Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
