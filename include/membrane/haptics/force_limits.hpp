@@ -109,8 +109,8 @@ class MotorHeat {
 /// a time is good to a tenth of a millisecond for a quarter of an hour; count from the start of the run.
 ///
 /// A time that stands still or goes back counts as a tick of the longest length for watchdog and motors, and lets no
-/// force change but towards zero: a device that gives no time gets no force. One that leaps ahead counts as a gap throughout which the last force was held: after a
-/// wild reading motors are taken for as hot as that, until they have cooled down.
+/// force change but towards zero: a device that gives no time gets no force. One that leaps ahead counts as a gap in which
+/// the last force was held: after a wild reading motors are taken for as hot as that, until they have cooled down.
 class ForceLimiter {
   public:
     /// @throws InvalidInput for a profile or an option out of its range
