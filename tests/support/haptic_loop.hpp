@@ -14,6 +14,7 @@
 #include <membrane/haptics/handover.hpp>
 #include <membrane/haptics/passivity.hpp>
 #include <membrane/haptics/recording.hpp>
+#include <membrane/haptics/rest_contact.hpp>
 #include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/haptics/units.hpp>
@@ -80,6 +81,7 @@ struct HapticLoop {
     membrane::Grasper<S> grasper{mesh};
     membrane::VertexNormals<S> normals{mesh};
     membrane::SmoothContact<S> smooth{mesh};
+    membrane::RestContact<S> rest{mesh};
     membrane::Points<S> x = mesh.positions();
     V reaction = V::Zero();
 
@@ -89,6 +91,7 @@ struct HapticLoop {
     membrane::ReactionForce react{.scale = 5};
     membrane::ExtrapolatedReaction<S> extrapolate{{.scale = 5}};
     membrane::VirtualCoupling<S> coupling{{.stiffness = 200, .damping = 0.2, .scale = 5}};
+    membrane::SpringDamperForce spring{.stiffness = 100, .damping = 0.5};
     membrane::ForceLimiter limit{membrane::devices::touch};
     membrane::EnergyObserver observer;
     membrane::Recorder<S> recorder{1000, mesh.vertex_count()};
@@ -109,7 +112,7 @@ struct HapticLoop {
     std::uint64_t solves = 0;
     double now = 0;
     int ticks = 0, policy = 0, touching = 0, holding = 0, refused = 0;
-    std::array<int, 4> pushed{};  // ticks with a force, by policy
+    std::array<int, 5> pushed{};  // ticks with a force, by policy
     bool drawn_right = true;
 
   private:
@@ -146,10 +149,12 @@ struct HapticLoop {
         }
         if (ticks % 5 == 0) extrapolate.solved(reaction, membrane::diagonal3(S(20)), tool.position);
         const membrane::HapticState<S> state{tool, smooth(contact), report, grasp};
-        const std::array<V, 4> ways{paper(state), react(state), extrapolate(state), coupling(state)};
+        const membrane::HapticState<S> undeformed{tool, rest(contact, tool), report, grasp};
+        const std::array<V, 5> ways{paper(state), react(state), extrapolate(state), coupling(state),
+                                    spring(undeformed)};
         asked = ways[static_cast<std::size_t>(policy)];
         pushed[static_cast<std::size_t>(policy)] += asked.isZero(0) ? 0 : 1;
-        if (!contact.touching() && !grasp.holding() && ticks % 500 < 250) policy = ticks / 500 % 4;
+        if (!contact.touching() && !grasp.holding() && ticks % 500 < 250) policy = ticks / 500 % 5;
         touching += contact.touching();
         holding += grasp.holding();
     }

@@ -97,6 +97,10 @@ class MotorHeat {
 /// after one that turns too fast, but never against it: with f for what is asked for and g for what comes out,
 /// g . f >= |g|^2. A force that all of them let pass comes out with the same bits.
 ///
+/// What `passivity` says of a force holds while no limit acts. The slew limit keeps back what comes in too fast, so that a
+/// hand that jabs gets more back than it brought: above a speed of peak force / rise time / stiffness, 1.65 m/s for a
+/// Touch that shows 100 N/m.
+///
 /// With the options as they are a force is at zero 90 ms and at most a tick after the solver has stopped, and whole again
 /// 0.1 s after a fault is over (as far as motors are not hot).
 ///
@@ -105,8 +109,8 @@ class MotorHeat {
 /// a time is good to a tenth of a millisecond for a quarter of an hour; count from the start of the run.
 ///
 /// A time that stands still or goes back counts as a tick of the longest length for watchdog and motors, and lets no
-/// force change but towards zero. One that leaps ahead counts as a gap throughout which the last force was held: after a
-/// wild reading motors are taken for as hot as that, until they have cooled down.
+/// force change but towards zero: a device that gives no time gets no force. One that leaps ahead counts as a gap in which
+/// the last force was held: after a wild reading motors are taken for as hot as that, until they have cooled down.
 class ForceLimiter {
   public:
     /// @throws InvalidInput for a profile or an option out of its range

@@ -20,7 +20,8 @@ namespace membrane {
 /// The contact with the normal of a smooth surface: that without the tool, as the depth has it, under normals that are
 /// interpolated between its vertices. A proxy on it has the tool straight above itself or below, along its normal. It
 /// moves as continuously as the tool, over concave edges too, and nothing is remembered: no delay is added. The depth,
-/// continuous already, stays as it is.
+/// continuous already, stays as it is. Its gradient is another normal, that of a `RestContact`: a force of this one has no
+/// potential, and gives a hand a little on each slow turn (see `SampledLoop`).
 ///
 /// Where the tool's radius is larger than that of a fold which it lies in there is more than one proxy, and going from
 /// one to the other is a jump; so is going from one end of a shaft to the other, which the contact does. Beyond a border
