@@ -12,6 +12,7 @@
 
 #include <membrane/collision/contact_tracker.hpp>
 #include <membrane/mesh/shapes.hpp>
+#include <membrane/network/moved_volume.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
 #include "support/bits.hpp"
@@ -231,6 +232,13 @@ void check_solver(const Sphere& sphere, const Points<double>& start, const Const
     }
 }
 
+/// Pulls vertex 7 with a force that is not a number.
+struct BrokenBacking {
+    [[nodiscard]] Pull<double> pull(Index v, const Point& position, const Point&, double) const noexcept {
+        return {(v == 7 ? std::numeric_limits<double>::quiet_NaN() : 0.0) * position, 1.0};
+    }
+};
+
 /// A constraint of one's own: two vertices as one would with forceps of two tips.
 struct Clamp {
     Index first, second;
@@ -266,7 +274,10 @@ TEST_CASE("equilibrium of mixed springs, two held vertices, moved anchors: every
         if (row.integer("anchors") == 1) way(0, 1) = 1;
         if (row.integer("anchors") == 2) way.diagonal() << 1, -0.5, -0.5;
         const Points<double> anchors = initial + row.number("amount") * way * initial;
-        const auto volume = membrane.backing.at(anchors, initial);  // at rest it is all the same where they were
+        MovingBody body(membrane.mesh);
+        Points<double> start = initial;
+        REQUIRE(body.move_to(anchors, 1, start));
+        const auto volume = on(body, membrane.backing);
         const auto hold = [&](const std::string& n) {
             const Point place(row.number("x" + n), row.number("y" + n), row.number("z" + n));
             return membrane.hold(membrane.vertex_at(place), row.number("delta" + n));
@@ -611,7 +622,7 @@ TEST_CASE("equilibrium refuses what does not fit together", "[equilibrium]") {
     x(1, 7) = std::numeric_limits<double>::quiet_NaN();
     CHECK(refused(x, sphere.mesh, sphere.network, sphere.backing) ==
           "equilibrium: y of vertex 7 must be finite [m], got nan");
-    CHECK(refused(sphere.x(), sphere.mesh, sphere.network, sphere.backing.at(x, x)) ==
+    CHECK(refused(sphere.x(), sphere.mesh, sphere.network, BrokenBacking{}) ==
           "equilibrium: the backing of vertex 7 must pull with a finite force [N], got one that is not");
     CHECK(refusal([&] { std::ignore = sphere.rest({.increments = 0}); }) ==
           "equilibrium: increments must be at least 1, got 0");
