@@ -270,9 +270,9 @@ TEST_CASE("a contact begins, goes on and ends once, with the depth against the s
 TEST_CASE("anchors that moved carry the depth with them") {
     const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
     const Vector shift(0.3, -0.1, 0.2);
-    MovingBody body(mesh);
+    membrane::MovingBody body(mesh);
     Points<double> moved = mesh.positions();
-    REQUIRE(body.move_to(RigidFrame<double>{.origin = shift}, moved));
+    REQUIRE(body.move_to(membrane::RigidFrame<double>{.origin = shift}, moved));
     AabbTree<double> tree(mesh);
     tree.refit(moved);
     ContactTracker<double> still(mesh), carried(mesh);

@@ -93,7 +93,7 @@ TEST_CASE("the pose is the best fit to the anchors, and normals are theirs", "[b
         const auto& rest = mesh.positions();
         MovingBody body(mesh);
         Points<double> x = rest;
-        const Points<double> anchors = test::jittered(carried(rest, random_pose<double>(random)), 1.5e-3, random);
+        const Points<double> anchors = test::jittered(carried(rest, random_pose<double>(random)), 5e-4, random);
         REQUIRE(body.move_to(anchors, 1e-3, x));
         CHECK(body.deformations() == 1);
         const auto& pose = body.pose();
