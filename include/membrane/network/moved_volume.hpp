@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <type_traits>
+
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/mesh/moving_body.hpp>
 #include <membrane/network/volume_springs.hpp>
@@ -9,6 +11,24 @@
 ///
 ///     solver.step(x, dt, network, on(body, backing), press(tool, contact));
 namespace membrane {
+
+namespace detail {
+
+/// A rotation in another number type, orthonormal to its rounding.
+template <Real Number, Real Scalar>
+[[nodiscard]] Eigen::Matrix<Number, 3, 3> rotation_in(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept {
+    Eigen::Matrix<Number, 3, 3> r = rotation.template cast<Number>();
+    if constexpr (!std::is_same_v<Number, Scalar>) {
+        const Vector3<Number> x = r.col(0) / norm<Number>(r.col(0));
+        const Vector3<Number> z = cross<Number>(x, r.col(1));
+        r.col(0) = x;
+        r.col(2) = z / norm(z);
+        r.col(1) = cross<Number>(r.col(2), x);
+    }
+    return r;
+}
+
+}  // namespace detail
 
 /// Any `VolumeModel` on a body that has moved: at each vertex it is shifted with the anchor, and turned as the body is there.
 /// What it is asked is brought to where the body is at rest, and its answer back. A view of both for the length of a call or
@@ -52,7 +72,7 @@ class MovedVolume {
         volume.curvature(v);
     }
     {
-        const Eigen::Matrix<Number, 3, 3> rotation = body_->rotation_at(v).template cast<Number>();
+        const auto rotation = detail::rotation_in<Number>(body_->rotation_at(v));
         if constexpr (requires { volume_->template curvature<Number>(v); }) {
             return rotated(volume_->template curvature<Number>(v), rotation);
         } else {
