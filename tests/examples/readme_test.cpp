@@ -26,6 +26,10 @@
 #include <membrane/haptics/smooth_contact.hpp>
 // [/smooth]
 
+// [moving]
+#include <membrane/network/moved_volume.hpp>
+// [/moving]
+
 // [handover]
 #include <membrane/haptics/handover.hpp>
 // [/handover]
@@ -102,6 +106,23 @@ std::vector<membrane::Tool<double>> stroke_of_ticks() {
 }
 
 }  // namespace
+
+TEST_CASE_METHOD(Touched, "the README's moving body") {
+    const membrane::SmoothContact smooth(mesh);
+    const membrane::Points<double> anchors = 1.001 * mesh.positions();
+    // [moving]
+    auto body = membrane::MovingBody(mesh);
+    if (!body.move_to(anchors, dt, x)) return;  // each tick: 3 x V [m], or a pose; false: not finite, nothing has moved
+    tree.refit(x);
+    const auto contact = tracker.update(tree, x, tool, body);
+    const auto grasp = grasper.update(contact, x, tool, body);
+    const auto report = solver.step(x, dt, network, on(body, backing), press(tool, contact, grasp), pull(tool, grasp));
+    const auto force = feel({tool, smooth(contact, body), report, grasp});
+    // [/moving]
+    CHECK(contact.touching());
+    CHECK(report.status == membrane::StepStatus::advanced);
+    CHECK(force.z() > 0);
+}
 
 TEST_CASE_METHOD(Touched, "the README's constraints") {
     tool.grasping = true;
