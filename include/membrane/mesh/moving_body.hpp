@@ -35,7 +35,8 @@ namespace membrane {
 ///
 /// A body that only moves rigidly, as an eye in its orbit, needs none of this where positions need not be in the world:
 /// with `carried_in(tool, frame)` the membrane stays in the body's frame, at no cost. Loads of a network that keep their
-/// direction in the world (`DeadLoad`) do not turn with a body; with `carried_in` they do.
+/// direction in the world (`DeadLoad`) do not turn with a body, and force policies that remember a position there
+/// (`ContactFriction`) do not go along; with `carried_in` they do.
 template <Real Scalar>
 class MovingBody {
   public:
@@ -104,7 +105,8 @@ namespace detail {
                 if (!(std::abs(a[p][q]) > 1e-30 * (std::abs(a[p][p]) + std::abs(a[q][q])))) continue;
                 done = false;
                 const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-                const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + std::hypot(theta, 1.0));
+                const double root = std::abs(theta) < 1e9 ? std::sqrt(theta * theta + 1) : std::abs(theta);
+                const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + root);
                 const double c = 1 / std::sqrt(t * t + 1), s = t * c;
                 for (std::size_t i = 0; i < 4; ++i) {
                     const double ip = a[i][p], iq = a[i][q];
