@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
 // The body under the membrane moves. An eye that turns is handled in its own frame, at no cost per vertex; a vessel
-// that beats takes new anchors in every tick.
+// that beats takes new anchors in every tick, told to all parts by one `MovingBody`.
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -9,6 +9,7 @@
 #include <Eigen/Geometry>
 
 #include <membrane/membrane.hpp>
+#include <membrane/network/moved_volume.hpp>
 
 #include "support/specimen.hpp"
 
@@ -61,16 +62,17 @@ void beating_vessel(const examples::Specimen& specimen) {
     const auto mesh = membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles);
     Membrane vessel(mesh);
     const membrane::Tool<double> tool{.position = specimen.above(0.2), .radius = specimen.tool_radius()};
-    membrane::Points<double> anchors = mesh.positions(), previous;
+    membrane::MovingBody body(mesh);
     std::printf("a vessel beats under a tool\n  time [s]   swollen by [mm]   depth [mm]   force [mN]\n");
     for (int tick = 0; tick <= 500; ++tick) {
         const double swollen = 0.05 * std::sin(2 * std::numbers::pi * dt * tick);  // of the radius, once a second
-        previous = anchors;
-        anchors = ((1 + swollen) * mesh.positions()).colwise() - swollen * specimen.centre;
-        vessel.solver.wake_all();
-        const auto contact = vessel.tracker.update(vessel.tree, vessel.x, tool, anchors);
-        const auto report = vessel.solver.step(vessel.x, dt, vessel.network, vessel.backing.at(anchors, previous),
-                                               press(tool, contact));
+        const membrane::Points<double> anchors =
+            ((1 + swollen) * mesh.positions()).colwise() - swollen * specimen.centre;
+        if (!body.move_to(anchors, dt, vessel.x)) return;  // the membrane goes along
+        vessel.tree.refit(vessel.x);
+        const auto contact = vessel.tracker.update(vessel.tree, vessel.x, tool, body);
+        const auto report =
+            vessel.solver.step(vessel.x, dt, vessel.network, on(body, vessel.backing), press(tool, contact));
         vessel.tree.refit(vessel.x, report.moved);
         if (tick % 50 != 0) continue;
         std::printf("%10.2f %17.2f %12.2f %12.1f\n", dt * tick, 1e3 * swollen * specimen.size, 1e3 * contact.depth,

@@ -7,6 +7,7 @@
 
 #include <membrane/mesh/shapes.hpp>
 #include <membrane/network/foundation_springs.hpp>
+#include <membrane/network/moved_volume.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -102,21 +103,60 @@ TEST_CASE("forces are those of network and backing without damping", "[elasticit
     const VirtualVolumeSprings damped(mesh, {.stiffness = 8.0, .damping = 0.5});
     const VirtualVolumeSprings undamped(mesh, {.stiffness = 8.0});
     const Points<double> x = test::jittered<double>(mesh.positions(), 1e-3, random);
-    const Points<double> anchors = test::jittered<double>(mesh.positions(), 1e-3, random), previous = 2 * anchors;
-    const auto moved = damped.at(anchors, previous), expected = undamped.at(anchors, anchors);
+    const Points<double> anchors = test::jittered<double>(mesh.positions(), 1e-3, random);
+    MovingBody body(mesh);
+    Points<double> along = mesh.positions();
+    REQUIRE(body.move_to(anchors, 1, along));
+    const auto moved = on(body, damped);
     const auto state = Elasticity(network, damped).at(x), state_moved = Elasticity(network, moved).at(x);
     double largest = 0;
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         const auto here = point(x, v);
         CHECK((state.springs.col(v) - network.pull(v, x).force).norm() < 1e-15);
         CHECK((state.backing.col(v) - undamped.pull(v, here, here, 1.0).force).norm() == 0);
-        CHECK((state_moved.backing.col(v) - expected.pull(v, here, here, 1.0).force).norm() == 0);
+        CHECK((state_moved.backing.col(v) - 8 * (anchors.col(v) - here)).norm() < 1e-15);
         largest = std::max(largest, state.backing.col(v).norm());
     }
     for (Index s = 0; s < static_cast<Index>(network.springs().size()); ++s) {
         largest = std::max(largest, std::abs(network.tension(s, x)));
     }
     CHECK(state.largest_force == Approx(largest).epsilon(1e-14));
+}
+
+TEST_CASE("network and backing of floats are evaluated in double", "[elasticity]") {
+    for (int seed = 1; seed <= 20; ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere<float>({.radius = 0.01F, .subdivisions = 1});
+        const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0F});
+        const VirtualVolumeSprings volume(mesh, {.stiffness = 7.3F, .damping = 0.02F});
+        const FoundationSprings foundation(mesh, {.normal = 7.3F, .tangential = 2.1F, .recovery_time = 0.1F});
+        MovingBody body(mesh);
+        Points<float> along = mesh.positions();
+        REQUIRE(body.move_to(test::jittered<float>(along, 1e-4F, random), 1e-3F, along));
+        const Points<double> x = test::jittered<double>(mesh.positions().cast<double>(), 1e-3, random);
+        const auto check = [&](const auto& backing, const Points<float>& anchors, auto stiffness) {
+            const auto state = Elasticity(network, backing).at(x);
+            for (Index v = 0; v < mesh.vertex_count(); ++v) {
+                const Eigen::Vector3d way = anchors.col(v).cast<double>() - x.col(v);
+                const Eigen::Vector3d exact = stiffness(v) * way;
+                CHECK((state.backing.col(v) - exact).norm() <= 2e-15 * exact.norm());
+            }
+        };
+        const auto springs = [](Index) -> Eigen::Matrix3d { return double(7.3F) * Eigen::Matrix3d::Identity(); };
+        check(volume, mesh.positions(), springs);
+        check(foundation, mesh.positions(), [&](Index v) -> Eigen::Matrix3d {
+            const Eigen::Vector3d n = foundation.normals().col(v).cast<double>();
+            const double normal = double(7.3F), tangential = double(2.1F);
+            return tangential * Eigen::Matrix3d::Identity() + (normal - tangential) * n * n.transpose();
+        });
+        const auto moved = on(body, volume);
+        const auto state = Elasticity(network, moved).at(x);
+        for (Index v = 0; v < mesh.vertex_count(); ++v) {
+            const Eigen::Vector3d exact = double(7.3F) * (body.anchors().col(v).cast<double>() - x.col(v));
+            CHECK((state.backing.col(v) - exact).norm() <= 2e-15 * exact.norm());
+        }
+    }
 }
 
 TEST_CASE("a network of floats has smooth forces in double", "[elasticity]") {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/collision/contact_tracker.hpp>
+#include <membrane/mesh/moving_body.hpp>
 
 #include <cmath>
 #include <limits>
@@ -269,7 +270,9 @@ TEST_CASE("a contact begins, goes on and ends once, with the depth against the s
 TEST_CASE("anchors that moved carry the depth with them") {
     const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
     const Vector shift(0.3, -0.1, 0.2);
-    const Points<double> moved = mesh.positions().colwise() + shift;
+    membrane::MovingBody body(mesh);
+    Points<double> moved = mesh.positions();
+    REQUIRE(body.move_to(membrane::RigidFrame<double>{.origin = shift}, moved));
     AabbTree<double> tree(mesh);
     tree.refit(moved);
     ContactTracker<double> still(mesh), carried(mesh);
@@ -278,7 +281,7 @@ TEST_CASE("anchors that moved carry the depth with them") {
     Tool<double> moved_tool = tool;
     moved_tool.position += shift;
     const auto a = still.update(still_tree, mesh.positions(), tool);
-    const auto b = carried.update(tree, moved, moved_tool, moved);
+    const auto b = carried.update(tree, moved, moved_tool, body);
     REQUIRE(a.touching());
     REQUIRE(b.touching());
     CHECK(std::abs(a.depth - b.depth) < 1e-12);

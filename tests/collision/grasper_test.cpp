@@ -7,6 +7,7 @@
 #include <memory>
 #include <utility>
 
+#include <membrane/mesh/moving_body.hpp>
 #include <membrane/mesh/shapes.hpp>
 
 #include "support/cases.hpp"
@@ -149,4 +150,35 @@ TEST_CASE("forceps are copied and moved with what they hold", "[grasp]") {
     CHECK_FALSE(copy.update(contact, x, Tool<double>{}).holding());
     CHECK(copy.update(contact, x, tool).origin == grasp.origin);
     STATIC_REQUIRE(noexcept(copy.update(contact, std::declval<const ConstPointsRef<double>&>(), tool)));
+}
+
+TEST_CASE("on a body that moves they turn with it, and the way is that on it", "[grasp]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
+        MovingBody body(mesh);
+        Points<double> x = mesh.positions(), still = x;
+        Grasper<double> grasper(mesh), at_rest(mesh);
+        const auto contact = contact_at<double>(mesh, random.index(80), random.barycentric());
+        Tool<double> tool{.position = random.vector(), .grasping = true};
+        for (int move = 0; move < 10; ++move) {
+            RigidFrame<double> pose{.rotation = random.rotation(), .origin = random.vector()};
+            pose.velocity = random.vector();
+            pose.angular_velocity = random.vector();
+            REQUIRE(body.move_to(pose, x));
+            Tool<double> seen = tool;
+            seen.position = pose.point_out(tool.position);
+            const auto grasp = grasper.update(contact, x, seen, body);
+            const auto expected = at_rest.update(contact, still, tool);
+            REQUIRE(grasp.holding());
+            REQUIRE(norm<double>(grasp.offset - pose.direction_out(expected.offset)) < 1e-14);
+            REQUIRE(norm<double>(grasp.displacement(seen) - pose.direction_out(expected.displacement(tool))) < 1e-14);
+            REQUIRE(norm<double>(grasp.body_velocity - pose.velocity_at(seen.position)) < 1e-14);
+            tool.position += 0.1 * random.vector();
+        }
+        grasper.reset();  // as a new one, to the bit
+        Grasper<double> fresh(mesh);
+        REQUIRE(same(grasper.update(contact, x, tool, body), fresh.update(contact, x, tool, body)));
+    }
 }

@@ -66,6 +66,25 @@ TEMPLATE_TEST_CASE("into a frame and out of it again", "[core]", double, float) 
     }
 }
 
+TEMPLATE_TEST_CASE("the motion from one pose to another takes along what is on the body", "[core]", double, float) {
+    using S = TestType;
+    const S tolerance = 32 * std::numeric_limits<S>::epsilon();
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto from = random_frame<S>(random), to = random_frame<S>(random);
+        const auto motion = motion_between(from, to);
+        const Vector3<S> p = random.vector<S>();
+        REQUIRE(norm<S>(motion.point_out(from.point_out(p)) - to.point_out(p)) < tolerance);
+        REQUIRE(norm<S>(motion.direction_out(from.direction_out(p)) - to.direction_out(p)) < tolerance);
+        REQUIRE(motion.velocity == Vector3<S>(0, 0, 0));
+        REQUIRE(from.same_pose(from));
+        REQUIRE_FALSE(from.same_pose(to));
+        // What moves with the body stands still on it.
+        REQUIRE(norm<S>(to.velocity_in(to.velocity_at(p), p)) < tolerance);
+    }
+}
+
 TEST_CASE("a velocity seen from a frame is how fast the point moves in it", "[core]") {
     const double h = 1e-5;
     for (int seed = 1; seed <= cases(200); ++seed) {

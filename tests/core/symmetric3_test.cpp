@@ -109,3 +109,15 @@ TEMPLATE_TEST_CASE("largest eigenvalue of symmetric matrices", "[symmetric3]", d
     CHECK(largest_eigenvalue(Symmetric3<S>{1, 5, 2, 0, 0, 0}) == Approx(5));
     CHECK(largest_eigenvalue(Symmetric3<S>{-1, -5, -2, 0, 0, 0}) == Approx(-1));
 }
+
+TEMPLATE_TEST_CASE("a symmetric matrix that is turned with everything", "[symmetric3]", double, float) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Dense<S> a = random_symmetric<S>(random), r = random.rotation<S>();
+        const Dense<S> expected = r * a * r.transpose();
+        REQUIRE((dense(rotated(packed<S>(a), r)) - expected).cwiseAbs().maxCoeff() <=
+                32 * std::numeric_limits<S>::epsilon());
+    }
+}

@@ -31,6 +31,10 @@
 #include <membrane/haptics/rest_contact.hpp>
 // [/rest]
 
+// [moving]
+#include <membrane/network/moved_volume.hpp>
+// [/moving]
+
 // [handover]
 #include <membrane/haptics/handover.hpp>
 // [/handover]
@@ -107,6 +111,23 @@ std::vector<membrane::Tool<double>> stroke_of_ticks() {
 }
 
 }  // namespace
+
+TEST_CASE_METHOD(Touched, "the README's moving body") {
+    const membrane::SmoothContact smooth(mesh);
+    const membrane::Points<double> anchors = 1.001 * mesh.positions();
+    // [moving]
+    auto body = membrane::MovingBody(mesh);
+    if (!body.move_to(anchors, dt, x)) return;  // each tick: 3 x V [m], or a pose; false: not finite, nothing has moved
+    tree.refit(x);
+    const auto contact = tracker.update(tree, x, tool, body);
+    const auto grasp = grasper.update(contact, x, tool, body);
+    const auto report = solver.step(x, dt, network, on(body, backing), press(tool, contact, grasp), pull(tool, grasp));
+    const auto force = feel({tool, smooth(contact, body), report, grasp});
+    // [/moving]
+    CHECK(contact.touching());
+    CHECK(report.status == membrane::StepStatus::advanced);
+    CHECK(force.z() > 0);
+}
 
 TEST_CASE_METHOD(Touched, "the README's constraints") {
     tool.grasping = true;
@@ -269,16 +290,20 @@ TEST_CASE("the README's mesh from elsewhere") {
     membrane::Points<double> points(3, good.vertex_count() + 1);  // triangle 7 has a corner of its own, as in an STL
     points << good.positions(), good.positions().col(triangles(0, 7));
     triangles(0, 7) = good.vertex_count();
-    std::swap(triangles(0, 9), triangles(1, 9));
+    for (membrane::Index f = 0; f < triangles.cols(); ++f) {  // most of them inside out
+        if (f % 5 < 3) std::swap(triangles(0, f), triangles(1, f));
+    }
     // [validate]
     const auto report = membrane::validate(points, triangles);  // any numbers, 3 x V [m] and 3 x F
     std::cout << to_string(report);                             // each defect with its indices and what to do
     if (report.facts.likely_unit == membrane::LengthUnit::millimetre) points /= 1000;  // facts: what the mesh is
-    const auto mended = membrane::repair(points, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true});
+    const auto mended =
+        membrane::repair(points, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true, .flip_inward = true});
     const auto mesh = membrane::TriangleMesh(mended.positions, mended.triangles);  // throws where more is wrong
     // [/validate]
     CHECK_FALSE(report.sound());
     CHECK(membrane::validate(mesh).empty());
+    CHECK(membrane::validate(mesh).facts.facing == membrane::Facing::outward);
     CHECK(mesh.vertex_count() == good.vertex_count());
     CHECK(mesh.positions().colwise().norm().maxCoeff() == Approx(0.01));
 }

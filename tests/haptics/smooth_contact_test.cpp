@@ -7,6 +7,7 @@
 
 #include <membrane/collision/aabb_tree.hpp>
 #include <membrane/collision/contact_tracker.hpp>
+#include <membrane/mesh/moving_body.hpp>
 #include <membrane/mesh/shapes.hpp>
 
 #include "support/bits.hpp"
@@ -117,19 +118,29 @@ TEMPLATE_TEST_CASE("at a vertex its normal, on an edge both, beyond a border the
     using S = TestType;
     const auto mesh = sheet<S>({.width = 2, .height = 2, .columns = 1, .rows = 1});  // two triangles
     const auto smooth = SmoothContact(mesh);
-    Points<S> normals(3, 4);
-    normals << 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1;
+    Points<S> x = mesh.positions();
+    MovingBody<S> body(mesh);
+    Points<S> warped = x;
+    warped.row(2) << S(0.2), S(-0.1), S(0), S(0.3);
+    REQUIRE(body.move_to(warped, S(1), x));
     const auto corners = mesh.triangles().col(0);
-    const auto at = [&](const Vector3<S>& place) {
-        return smooth(touching<S>(0, place), mesh.positions(), normals).normal;
-    };
+    CHECK((body.normals().col(corners[0]) - body.normals().col(corners[1])).norm() +
+              (body.normals().col(corners[1]) - body.normals().col(corners[2])).norm() >
+          S(0.05));
+    const auto at = [&](const Vector3<S>& place) { return smooth(touching<S>(0, place), body).normal; };
     for (int k = 0; k < 3; ++k) {
-        const Vector3<S> corner = point(mesh.positions(), corners[k]),
-                         next = point(mesh.positions(), corners[(k + 1) % 3]);
-        const Vector3<S> here = point(normals, corners[k]), there = point(normals, corners[(k + 1) % 3]);
+        const Vector3<S> corner = point(warped, corners[k]), next = point(warped, corners[(k + 1) % 3]);
+        const Vector3<S> here = point(body.normals(), corners[k]), there = point(body.normals(), corners[(k + 1) % 3]);
         CHECK(norm<S>(at(corner) - here) < S(1e-6));
         CHECK(norm<S>(at((corner + next) / 2) - direction<S>(here + there, here)) < S(1e-6));
-        CHECK(norm<S>(at(2 * corner) - here) < S(1e-6));  // outside
+        // Outside, in the planes of all its triangles: those of the diagonal are of both.
+        const Vector3<S> last = point(warped, corners[(k + 2) % 3]);
+        const auto other = mesh.triangles().col(1);
+        const auto shared = [&](int i) { return (other.array() == corners[i % 3]).any(); };
+        const Vector3<S> outside = !shared(k)      ? Vector3<S>(3 * corner - next - last)
+                                   : shared(k + 1) ? Vector3<S>(2 * corner - next)
+                                                   : Vector3<S>(2 * corner - last);
+        CHECK(norm<S>(at(outside) - here) < S(1e-6));
     }
 }
 
@@ -139,12 +150,12 @@ TEST_CASE("what is no contact, or not finite, or has no normal, stays as it is",
     Contact<double> contact;
     CHECK(smooth(contact).normal == contact.normal);
     contact = touching<double>(AabbTree(mesh).closest_point(mesh.positions(), {0, 0, 1}).triangle, {0, 0, 0.0105});
-    const Points<double> none = Points<double>::Zero(3, mesh.vertex_count());
-    CHECK(smooth(contact, mesh.positions(), none).normal == contact.normal);
-    CHECK(smooth(contact, none, none).normal == contact.normal);
-    const Points<double> wild =
-        Points<double>::Constant(3, mesh.vertex_count(), std::numeric_limits<double>::quiet_NaN());
-    CHECK(smooth(contact, wild, wild).normal == contact.normal);
+    MovingBody body(mesh);
+    Points<double> x = mesh.positions();
+    const Points<double> one_place = Points<double>::Zero(3, mesh.vertex_count());
+    REQUIRE(body.move_to(one_place, 1, x));
+    const auto collapsed = smooth(contact, body).normal;
+    CHECK((collapsed == contact.normal || std::abs(norm(collapsed) - 1) < 1e-12));
     for (const double far : {0.0, 1e300, -1e300}) {
         contact.on_axis = {0, far, 0};
         const auto found = smooth(contact).normal;
@@ -164,12 +175,14 @@ TEST_CASE("a body that moves takes its normals along", "[smooth]") {
         const auto smooth = SmoothContact(mesh);
         const auto turn = random.rotation();
         const Vector3<double> way = 0.01 * random.unit_vector();
-        const Points<double> anchors = (turn * mesh.positions()).colwise() + way;
-        const Points<double> normals = turn * VertexNormals(mesh).values();
+        MovingBody body(mesh);
+        Points<double> x = mesh.positions();
+        const Points<double> anchors = (turn * x).colwise() + way;
+        REQUIRE((seed % 2 == 0 ? body.move_to(RigidFrame<double>{turn, way}, x) : body.move_to(anchors, 1, x)));
         const Vector3<double> tool = 0.0105 * random.unit_vector();
         const auto contact = touching(AabbTree(mesh).closest_point(mesh.positions(), tool).triangle, tool);
         auto seen = contact;
         seen.on_axis = turn * contact.on_axis + way;
-        CHECK(norm<double>(smooth(seen, anchors, normals).normal - turn * smooth(contact).normal) < 1e-9);
+        CHECK(norm<double>(smooth(seen, body).normal - turn * smooth(contact).normal) < 1e-9);
     }
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/mesh/repair.hpp>
+#include <membrane/mesh/shapes.hpp>
 #include <membrane/mesh/validate.hpp>
 
 #include <array>
@@ -30,6 +31,19 @@ RepairedMesh<S> mended(const Surface<S>& surface, const RepairOptions& options) 
 template <class S>
 bool same(const RepairedMesh<S>& mesh, const Surface<S>& surface) {
     return test::same_bits(mesh.positions, surface.x) && mesh.triangles == surface.triangles;
+}
+
+template <class S>
+Surface<S> unit_ball() {
+    return test::surface_of(icosphere<S>({.radius = 1, .subdivisions = 1}));
+}
+
+/// Whether two triangles have the same vertices in the same order, whichever comes first.
+bool same_turn(const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+        if (a[0] == b[k]) return a[1] == b[(k + 1) % 3] && a[2] == b[(k + 2) % 3];
+    }
+    return false;
 }
 
 /// As random as its bits, or a mesh with all that can be wrong with one.
@@ -193,6 +207,61 @@ TEMPLATE_TEST_CASE("whole components are turned outward, and fans parted", "[mes
 
         Surface<S> strip = test::moebius_strip<S>(3 + random.index(9));  // which no turning helps
         CHECK(same(mended(strip, {.orient = true}), strip));
+    }
+}
+
+TEMPLATE_TEST_CASE("triangles of a closed component are turned to face outward, however many are wrong", "[mesh][bad]",
+                   double, float) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(60) + 8; ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        // Some closed surfaces side by side, one inside the last of them, and an open one.
+        Surface<S> good;
+        const Index count = 1 + random.index(3);
+        std::vector<bool> closed;
+        std::vector<std::size_t> part_of;
+        const auto add = [&](Surface<S> part, S size, S at, bool is_closed) {
+            for (Eigen::Index v = 0; v < part.x.cols(); ++v) {
+                part.x.col(v) = size * part.x.col(v) + Vector3<S>(at, 0, 0);
+            }
+            part_of.insert(part_of.end(), static_cast<std::size_t>(part.triangle_count()), closed.size());
+            closed.push_back(is_closed);
+            good.add(part);
+        };
+        for (Index i = 0; i < count; ++i) add(unit_ball<S>(), 1, static_cast<S>(4 * i), true);
+        add(unit_ball<S>(), S(0.3), static_cast<S>(4 * count - 4), true);
+        Surface<S> open = unit_ball<S>();
+        open.remove_triangle(3);
+        add(open, 1, -4, false);
+        REQUIRE(validate(good.x, good.triangles).facts.facing == Facing::outward);
+
+        Surface<S> bad = good;
+        Index turned = 0;
+        std::vector<Index> turned_of(closed.size(), 0), size_of(closed.size(), 0);
+        std::vector<double> chance;
+        for (std::size_t i = 0; i < closed.size(); ++i) chance.push_back(closed[i] ? random.number(0.0, 1.1) : 0.3);
+        for (Index f = 0; f < good.triangle_count(); ++f) {
+            const auto part = part_of[static_cast<std::size_t>(f)];
+            ++size_of[part];
+            if (!random.chance(chance[part])) continue;
+            bad.turn(f);
+            ++turned_of[part];
+        }
+        const auto result = mended(bad, {.orient = true});
+        for (Index f = 0; f < good.triangle_count(); ++f) {
+            const auto part = part_of[static_cast<std::size_t>(f)];
+            // Those that agree as given, though inward, are another option's.
+            const bool agrees = turned_of[part] == size_of[part];
+            const auto& expected = agrees ? bad.triangles : good.triangles;
+            REQUIRE(same_turn(result.triangles.col(f), expected.col(f)));
+        }
+        for (std::size_t i = 0; i < closed.size(); ++i) turned += turned_of[i] == size_of[i] ? 0 : turned_of[i];
+        CHECK(result.done.turned == turned);
+        const auto outward = mended(bad, {.orient = true, .flip_inward = true});
+        CHECK(validate(outward.positions, outward.triangles).facts.facing == Facing::outward);
+        CHECK(validate(outward.positions, outward.triangles).count(MeshDefect::inward) == 0);
+        CHECK(validate(outward.positions, outward.triangles).count(MeshDefect::nested_components) == 1);
     }
 }
 

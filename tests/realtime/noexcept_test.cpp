@@ -14,6 +14,7 @@
 #include <membrane/haptics/units.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
+#include <membrane/network/moved_volume.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 
 #include "support/catch.hpp"
@@ -85,12 +86,14 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
     using S = TestType;
     using Network = MassSpringNetwork<S, LinearSpring>;
     using Volume = VirtualVolumeSprings<S>;
-    static_cast<void>([](const Network& network, const Volume& volume, const ConstPointsRef<S>& x, const Vector3<S>& p,
-                         S s, std::span<const Index> vertices, PropagationQueue& queue) {
+    static_cast<void>([](const Network& network, const Volume& volume, MovingBody<S>& body, const ConstPointsRef<S>& x,
+                         PointsRef<S> y, const Vector3<S>& p, S s, std::span<const Index> vertices,
+                         PropagationQueue& queue) {
         static_assert(noexcept(network.pull(0, x))&& noexcept(network.tension(0, x))&& noexcept(network.energy(x)));
         static_assert(noexcept(network.springs_of(0))&& noexcept(network.pinned(0))&& noexcept(network.mass(0)));
-        static_assert(noexcept(volume.pull(0, p, p, s))&& noexcept(volume.energy(0, p))&& noexcept(volume.at(x, x)));
-        static_assert(noexcept(volume.at(x, x).pull(0, p, p, s))&& noexcept(largest_curvature(network, 0, x)));
+        static_assert(noexcept(volume.pull(0, p, p, s))&& noexcept(volume.energy(0, p))&& noexcept(on(body, volume)));
+        static_assert(noexcept(on(body, volume).pull(0, p, p, s))&& noexcept(largest_curvature(network, 0, x)));
+        static_assert(noexcept(body.move_to(RigidFrame<S>(), y))&& noexcept(body.move_to(x, s, y)));
         static_assert(
             noexcept(queue.build(network, vertices, 4))&& noexcept(queue.vertices())&& noexcept(queue.layer(0)));
         static_assert(noexcept(queue.contains(0))&& noexcept(queue.clear())&& noexcept(queue.grow(network)));

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <membrane/mesh/shapes.hpp>
+#include <membrane/network/moved_volume.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -185,11 +186,13 @@ TEST_CASE("anchors that move take the membrane along", "[euler]") {
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 5.0, .mass = 0.1, .viscosity = 0.5});
     const VirtualVolumeSprings backing(mesh, {.stiffness = 2.0, .damping = 0.2});
     ExplicitEuler euler(network);
-    Points<double> x = mesh.positions(), velocity = zeros<double>(42), anchors = x;
+    MovingBody body(mesh);
+    Random random(1);
+    Points<double> anchors = mesh.positions(), x = test::jittered(anchors, 0.05, random), velocity = zeros<double>(42);
     for (int i = 0; i < 4000; ++i) {
-        const Points<double> previous = anchors;
         if (i < 100) anchors.row(0).array() += 0.003;
-        REQUIRE(euler.step(x, velocity, 0.01, network, backing.at(anchors, previous)));
+        REQUIRE(body.move_to(anchors, 0.01, x));
+        REQUIRE(euler.step(x, velocity, 0.01, network, on(body, backing)));
     }
     CHECK((x - anchors).cwiseAbs().maxCoeff() < 1e-9);
 }

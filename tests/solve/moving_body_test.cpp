@@ -3,129 +3,311 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include <Eigen/Geometry>
 #include <membrane/collision/aabb_tree.hpp>
 #include <membrane/collision/contact_tracker.hpp>
-#include <membrane/core/rigid_frame.hpp>
+#include <membrane/collision/grasper.hpp>
+#include <membrane/haptics/force_policy.hpp>
+#include <membrane/haptics/smooth_contact.hpp>
+#include <membrane/mesh/moving_body.hpp>
 #include <membrane/mesh/shapes.hpp>
+#include <membrane/network/moved_volume.hpp>
 #include <membrane/solve/press.hpp>
 
+#include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/random.hpp"
 
 using namespace membrane;
 
 namespace {
 
 constexpr double radius = 0.01, dt = 1e-3;
-constexpr int ticks_of_motion = 300, ticks = 3000;
 
-/// A body that turns and shifts for a while, and then stands still.
-RigidFrame<double> body_at(int tick) {
-    const double part = std::min(tick, ticks_of_motion) / static_cast<double>(ticks_of_motion);
-    const bool moves = tick < ticks_of_motion;
-    const Vector3<double> axis = Vector3<double>(1, 2, -1).normalized(), way(0.004, -0.002, 0.003);
-    RigidFrame<double> body;
-    body.rotation = Eigen::AngleAxisd(0.7 * part, axis).matrix();
-    body.origin = part * way;
-    if (moves) body.velocity = way / (ticks_of_motion * dt);
-    if (moves) body.angular_velocity = 0.7 / (ticks_of_motion * dt) * axis;
-    return body;
-}
+enum class Told { pose, anchors };
 
-/// A membrane on the body, seen from the body or from the world.
+/// A membrane in the frame of its body, or in the world on a body that moves, and what one tick of it comes to.
 struct Membrane {
-    TriangleMesh<double> mesh = icosphere({.radius = radius, .subdivisions = 2});
-    MassSpringNetwork<double, LinearSpring> network{mesh, LinearSpring{}, NetworkOptions<double>{.stiffness = 40}};
+    Membrane(const TriangleMesh<double>& shape, bool pins, Index layers = unlimited)
+        : mesh(shape),
+          network(mesh, LinearSpring{}, {.stiffness = 40.0, .pinned = pins ? border(mesh) : std::vector<Index>{}}),
+          solver(network, {.layers = layers, .sweeps = 4, .negligible_force = 1e-13}) {}
+
+    void tick(const Tool<double>& tool) {
+        contact = tracker.update(tree, x, tool);
+        grasp = grasper.update(contact, x, tool);
+        report = solver.step(x, dt, network, backing, press(tool, contact, grasp), membrane::pull(tool, grasp));
+        end(tool, smooth(contact));
+    }
+    void tick_on_body(const Tool<double>& tool, const RigidFrame<double>& pose, Told told) {
+        if (told == Told::pose) {
+            REQUIRE(body.move_to(pose, x));
+        } else {
+            Points<double> anchors = mesh.positions();
+            for (Index v = 0; v < anchors.cols(); ++v) anchors.col(v) = pose.point_out(point(mesh.positions(), v));
+            REQUIRE(body.move_to(anchors, dt, x));
+        }
+        tree.refit(x);
+        contact = tracker.update(tree, x, tool, body);
+        grasp = grasper.update(contact, x, tool, body);
+        report =
+            solver.step(x, dt, network, on(body, backing), press(tool, contact, grasp), membrane::pull(tool, grasp));
+        end(tool, smooth(contact, body));
+    }
+    void end(const Tool<double>& tool, const Contact<double>& smooth_contact) {
+        REQUIRE(report.status == StepStatus::advanced);
+        tree.refit(x, report.moved);
+        force = report.total_reaction();
+        felt = SpringDamperForce{.stiffness = 100, .damping = 0.5}({tool, smooth_contact, report, grasp});
+    }
+
+    TriangleMesh<double> mesh;
+    MassSpringNetwork<double, LinearSpring> network;
     VirtualVolumeSprings<double> backing{mesh, VolumeOptions<double>{.stiffness = 8, .damping = 0.02}};
-    QuasiStaticSolver<double> solver{
-        network, SolverOptions<double>{.layers = unlimited, .sweeps = 10, .negligible_force = 1e-14}};
+    QuasiStaticSolver<double> solver;
     AabbTree<double> tree{mesh};
     ContactTracker<double> tracker{mesh};
+    Grasper<double> grasper{mesh};
+    SmoothContact<double> smooth{mesh};
+    MovingBody<double> body{mesh};
     Points<double> x = mesh.positions();
-
-    Points<double> anchors_on(const RigidFrame<double>& body) const {
-        return (body.rotation * mesh.positions()).colwise() + body.origin;
-    }
+    Contact<double> contact;
+    Grasp<double> grasp;
+    StepReport<double> report;
+    Vector3<double> force = Vector3<double>::Zero(), felt = force;
 };
+
+Tool<double> in_world(Tool<double> tool, const RigidFrame<double>& pose) {
+    tool.position = pose.point_out(tool.position);
+    tool.velocity = pose.direction_out(tool.velocity) + pose.velocity_at(tool.position);
+    return tool;
+}
+
+constexpr int phase_ticks = 150, active_ticks = 50;  // the rest of a phase is still
+
+/// Comes down, slides, closes the forceps, goes up with what they hold, each followed by a rest; as seen from the body.
+Tool<double> stroke_at(int tick) {
+    const auto part = [](int phase, int now) {
+        return std::clamp(static_cast<double>(now - phase * phase_ticks) / active_ticks, 0.0, 1.0);
+    };
+    const auto position = [&](int now) {
+        const double down = part(0, now), along = part(1, now), up = part(3, now);
+        return Vector3<double>(0.3e-3 + 1.1e-3 * along, 0.17e-3 + 0.4e-3 * along,
+                               0.01117 - 0.8e-3 * down + 1.3e-3 * up);
+    };
+    Tool<double> tool{.position = position(tick), .radius = 1e-3, .time = tick * dt};
+    tool.velocity = (position(tick) - position(tick - 1)) / dt;
+    tool.grasping = tick >= 2 * phase_ticks;
+    return tool;
+}
+const char* const phases[] = {"press", "slide", "grasp", "pull"};
+
+/// How far a membrane on a body is from the same one in the body's frame; forces in parts of the latter's.
+struct Difference {
+    Difference(const Membrane& rest, const Membrane& moved, const RigidFrame<double>& pose) {
+        const auto off = [&](const Vector3<double>& at_rest, const Vector3<double>& now) {
+            return norm<double>(pose.direction_out(at_rest) - now) / (std::max)(norm(at_rest), 5e-3);
+        };
+        force = off(rest.force, moved.force);
+        felt = off(rest.felt, moved.felt);
+        depth = std::abs(rest.contact.depth - moved.contact.depth) / radius;
+        for (Index v = 0; v < rest.x.cols(); ++v) {
+            const double here = norm<double>(pose.point_out(point(rest.x, v)) - point(moved.x, v));
+            positions = std::max(positions, here / radius);
+        }
+    }
+    double force, felt, depth, positions = 0;
+};
+
+struct Scene {
+    std::string name;
+    TriangleMesh<double> mesh;
+    bool pins;
+};
+
+const Scene scenes[] = {
+    {"sphere", icosphere({.radius = radius, .subdivisions = 2}), false},
+    {"cap, its border free", spherical_cap({.radius = radius, .diameter = 0.016, .rings = 8}), false},
+    {"cap, its border pinned", spherical_cap({.radius = radius, .diameter = 0.016, .rings = 8}), true},
+};
+
+/// Turns by 20 degrees and shifts by some millimetres in half a second, smoothly.
+RigidFrame<double> smooth_motion(double time) {
+    const double s = std::min(time / 0.5, 1.0), u = s * s * (3 - 2 * s), rate = 6 * s * (1 - s) / 0.5;
+    const Vector3<double> axis = Vector3<double>(1, 1, 0.3).normalized(), way(2e-3, 1e-3, -1e-3);
+    const double angle = 20 * 3.14159265358979 / 180;
+    return {Eigen::AngleAxisd(angle * u, axis).toRotationMatrix(), u * way, rate * way, rate * angle * axis};
+}
 
 }  // namespace
 
-TEST_CASE("what is held feels the same, seen from the body or from the world", "[moving]") {
-    Membrane inside, outside;
-    StepReport<double> inner, outer;
-    const Index v = 7;
-    // A place in the world, fixed beside the vertex as it will be in the end.
-    const Vector3<double> place = 1.15 * body_at(ticks).point_out(point(inside.mesh.positions(), v));
-    for (int tick = 1; tick <= ticks; ++tick) {
-        const auto body = body_at(tick);
-        inner = inside.solver.step(inside.x, dt, inside.network, inside.backing, pull(v, body.point_in(place)));
-        const Points<double> anchors = outside.anchors_on(body), previous = outside.anchors_on(body_at(tick - 1));
-        if (tick <= ticks_of_motion + 1) outside.solver.wake_all();
-        outer =
-            outside.solver.step(outside.x, dt, outside.network, outside.backing.at(anchors, previous), pull(v, place));
+// What touches a vertex or an edge touches several triangles alike, and rounding decides which of them a solver begins with:
+// on its way to the equilibrium a step may differ by what it leaves undone, about 1e-6; at rest it may not.
+TEST_CASE("a body that jumps with the tool on it: all forces as at rest", "[moving]") {
+    for (const auto& scene : scenes) {
+        for (const Told told : {Told::pose, Told::anchors}) {
+            INFO(scene.name << ", told by " << (told == Told::pose ? "pose" : "anchors"));
+            test::Random random(7);
+            Membrane rest(scene.mesh, scene.pins), moved(scene.mesh, scene.pins);
+            RigidFrame<double> pose;
+            for (int tick = 0; tick < 4 * phase_ticks; ++tick) {
+                if (tick % 12 == 0) {  // more than ten poses in each phase
+                    pose.rotation = random.rotation();
+                    pose.origin = 5 * radius * random.vector();
+                }
+                const auto tool = stroke_at(tick);
+                rest.tick(tool);
+                moved.tick_on_body(in_world(tool, pose), pose, told);
+                INFO(phases[tick / phase_ticks] << ", tick " << tick);
+                const Difference difference(rest, moved, pose);
+                const bool still = tick % phase_ticks == phase_ticks - 1;
+                const double bound = still ? 1e-9 : 1e-4;
+                REQUIRE(difference.force <= bound);
+                REQUIRE(difference.depth <= 1e-9);
+                REQUIRE(difference.positions <= bound);
+                // A jump has no velocity, but for a body that is told by anchors.
+                if (still || told == Told::pose) REQUIRE(difference.felt <= bound);
+                REQUIRE(rest.contact.touching() == moved.contact.touching());
+                REQUIRE(rest.grasp.holding() == moved.grasp.holding());
+                if (still) REQUIRE(norm(rest.force) > 5e-3);
+                if (still) REQUIRE(rest.grasp.holding() == (tick >= 2 * phase_ticks));
+            }
+            CHECK(moved.body.deformations() == 0);
+        }
     }
-    REQUIRE(inner.residual < 1e-13);
-    REQUIRE(outer.residual < 1e-13);
-    const auto body = body_at(ticks);
-    const Vector3<double> force = body.direction_out(inner.reactions[0]);
-    CHECK(norm(force) > 1e-3);
-    CHECK(norm<double>(force - outer.reactions[0]) <= 1e-9 * norm(force));
-    const Points<double> carried_out = (body.rotation * inside.x).colwise() + body.origin;
-    CHECK((carried_out - outside.x).cwiseAbs().maxCoeff() <= 1e-9 * radius);
 }
 
-TEST_CASE("a tool that presses feels the same, seen from the body or from the world", "[moving]") {
-    Membrane inside, outside;
-    StepReport<double> inner, outer;
-    Contact<double> inner_contact, outer_contact;
-    const Vector3<double> top = body_at(ticks).point_out({0, 0, 0});
-    for (int tick = 1; tick <= ticks; ++tick) {
-        const auto body = body_at(tick);
-        // Down onto the sphere in the world, at the velocity that takes.
-        const bool moves = tick < 2 * ticks_of_motion;
-        const double height = radius + 0.003 - 0.003 * std::min(1.0, tick / (2.0 * ticks_of_motion));
-        const Vector3<double> direction = Vector3<double>(0.2, 0.3, 1).normalized();
-        const Tool<double> tool{.position = top + height * direction,
-                                .radius = 0.0015,
-                                .velocity = moves ? Vector3<double>(-0.003 / (2 * ticks_of_motion * dt) * direction)
-                                                  : Vector3<double>(0, 0, 0)};
-        const auto seen = carried_in(tool, body);
-        inner_contact = inside.tracker.update(inside.tree, inside.x, seen);
-        inner = inside.solver.step(inside.x, dt, inside.network, inside.backing, press(seen, inner_contact));
-        inside.tree.refit(inside.x, inner.moved);
-
-        const Points<double> anchors = outside.anchors_on(body), previous = outside.anchors_on(body_at(tick - 1));
-        outer_contact = outside.tracker.update(outside.tree, outside.x, tool, anchors);
-        if (tick <= ticks_of_motion + 1) outside.solver.wake_all();
-        outer = outside.solver.step(outside.x, dt, outside.network, outside.backing.at(anchors, previous),
-                                    press(tool, outer_contact));
-        outside.tree.refit(outside.x, outer.moved);
+TEST_CASE("a body that turns and shifts under forceps: all forces as at rest", "[moving]") {
+    for (const auto& scene : scenes) {
+        for (const Told told : {Told::pose, Told::anchors}) {
+            INFO(scene.name << ", told by " << (told == Told::pose ? "pose" : "anchors"));
+            Membrane rest(scene.mesh, scene.pins), moved(scene.mesh, scene.pins);
+            for (int tick = 0; tick < 4 * phase_ticks; ++tick) {
+                const auto pose = smooth_motion(tick * dt);
+                const auto tool = stroke_at(tick);
+                rest.tick(tool);
+                moved.tick_on_body(in_world(tool, pose), pose, told);
+                INFO(phases[tick / phase_ticks] << ", tick " << tick);
+                const Difference difference(rest, moved, pose);
+                const bool still = tick % phase_ticks == phase_ticks - 1;
+                const double bound = still ? 1e-9 : 1e-4;
+                REQUIRE(difference.force <= bound);
+                REQUIRE(difference.positions <= bound);
+                // Of anchors the velocity is the mean over the tick: half a tick times the acceleration off.
+                REQUIRE(difference.felt <= (told == Told::pose ? bound : 1e-2));
+            }
+        }
     }
-    REQUIRE(inner_contact.touching());
-    REQUIRE(outer_contact.touching());
-    REQUIRE(inner.residual < 1e-12);
-    REQUIRE(outer.residual < 1e-12);
-    const auto body = body_at(ticks);
-    const Vector3<double> force = body.direction_out(inner.reactions[0]);
-    CHECK(norm(force) > 1e-3);
-    CHECK(norm<double>(force - outer.reactions[0]) <= 1e-9 * norm(force));
-    CHECK(std::abs(inner_contact.depth - outer_contact.depth) <= 1e-9 * radius);
-    CHECK(norm<double>(body.direction_out(inner_contact.normal) - outer_contact.normal) <= 1e-7);
-    const Points<double> carried_out = (body.rotation * inside.x).colwise() + body.origin;
-    CHECK((carried_out - outside.x).cwiseAbs().maxCoeff() <= 1e-9 * radius);
 }
 
-TEST_CASE("a membrane follows the body it lies on, and its own frame costs nothing", "[moving]") {
-    Membrane inside, outside;
-    for (int tick = 1; tick <= ticks; ++tick) {
-        const Points<double> anchors = outside.anchors_on(body_at(tick)),
-                             previous = outside.anchors_on(body_at(tick - 1));
-        if (tick <= ticks_of_motion + 1) outside.solver.wake_all();
-        const auto report = outside.solver.step(outside.x, dt, outside.network, outside.backing.at(anchors, previous));
-        REQUIRE(report.status == StepStatus::advanced);
-        REQUIRE(inside.solver.step(inside.x, dt, inside.network, inside.backing).visits == 0);
+TEST_CASE("a still tool on a body that moves feels the same, seen from the body or from the world", "[moving]") {
+    const auto& scene = scenes[0];
+    Membrane inside(scene.mesh, false), outside(scene.mesh, false);
+    for (int tick = 0; tick <= 600; ++tick) {
+        const auto pose = smooth_motion(tick * dt);
+        const Tool<double> tool{.position = {0.3e-3, 0.5e-3, 0.0094}, .radius = 1e-3};
+        inside.tick(carried_in(tool, pose));
+        outside.tick_on_body(tool, pose, Told::pose);
+        CAPTURE(tick);
+        const Difference difference(inside, outside, pose);
+        const double bound = tick == 600 ? 1e-9 : 1e-4;
+        REQUIRE(difference.force <= bound);
+        REQUIRE(difference.felt <= bound);
+        REQUIRE(difference.positions <= bound);
     }
-    CHECK((outside.x - outside.anchors_on(body_at(ticks))).cwiseAbs().maxCoeff() <= 1e-9 * radius);
-    CHECK(outside.network.energy(outside.x) < 1e-20);
+    CHECK(norm(outside.force) > 5e-3);
+}
+
+TEST_CASE("a membrane goes with its body, pinned or not, at no visit where it is rigid", "[moving]") {
+    for (const auto& scene : scenes) {
+        INFO(scene.name);
+        Membrane moved(scene.mesh, scene.pins, 6);
+        const Tool<double> far{.position = {1, 1, 1}, .radius = 1e-3};
+        for (int tick = 0; tick <= 100; ++tick) {
+            moved.tick_on_body(far, smooth_motion(5 * tick * dt), tick % 2 == 0 ? Told::pose : Told::anchors);
+            REQUIRE(moved.report.visits == 0);
+            REQUIRE(moved.x == moved.body.anchors());
+        }
+    }
+}
+
+TEST_CASE("a body that swells: the membrane comes to the rest that it has on it", "[moving]") {
+    for (const auto& scene : scenes) {
+        INFO(scene.name);
+        Membrane moved(scene.mesh, scene.pins);
+        const auto move_to = [&](double swollen) {
+            const Points<double> anchors = (1 + swollen) * scene.mesh.positions();
+            REQUIRE(moved.body.move_to(anchors, dt, moved.x));
+            moved.report = moved.solver.step(moved.x, dt, moved.network, on(moved.body, moved.backing));
+            REQUIRE(moved.report.status == StepStatus::advanced);
+        };
+        for (int tick = 0; tick <= 100; ++tick) move_to(1e-3 * tick);
+        CHECK(moved.body.deformations() == 100);  // and not when nothing moved at first
+        for (int tick = 0; tick < 1500 && !moved.report.converged; ++tick) move_to(0.1);
+        REQUIRE(moved.report.converged);
+        CHECK(moved.body.deformations() == 100);
+        for (Index v = 0; v < moved.x.cols(); ++v) {
+            const auto springs = moved.network.pull(v, moved.x).force;
+            const Vector3<double> backing = -8 * (point(moved.x, v) - 1.1 * point(scene.mesh.positions(), v));
+            if (moved.network.pinned(v)) {
+                REQUIRE(norm<double>(point(moved.x, v) - 1.1 * point(scene.mesh.positions(), v)) <= 1e-15);
+            } else {
+                REQUIRE(norm<double>(springs + backing) <= 1e-12);
+            }
+        }
+        // What pins hold at the border pushes back with the sum of all other forces.
+        if (!scene.pins) continue;
+        const auto rim = border(scene.mesh);
+        const auto report = moved.solver.step(moved.x, dt, moved.network, on(moved.body, moved.backing), pin(rim));
+        Vector3<double> sum = Vector3<double>::Zero();
+        for (const Index v : rim) sum += moved.network.pull(v, moved.x).force;
+        CHECK(norm<double>(report.reactions[0] - sum) <= 1e-12);
+        CHECK(norm(sum) > 1e-3);
+    }
+}
+
+TEST_CASE("a refused step leaves the membrane where its body took it", "[moving]") {
+    const auto& scene = scenes[2];
+    Membrane rest(scene.mesh, true, 6), moved(scene.mesh, true, 6);
+    test::Random random(3);
+    for (int tick = 0; tick < phase_ticks; ++tick) {
+        RigidFrame<double> pose{.rotation = random.rotation(), .origin = radius * random.vector()};
+        rest.tick(stroke_at(tick));
+        if (tick % 7 == 3) {
+            REQUIRE(moved.body.move_to(pose, moved.x));
+            const Points<double> before = moved.x;
+            CHECK(moved.solver.step(moved.x, 0, moved.network, on(moved.body, moved.backing)).status ==
+                  StepStatus::bad_time_step);
+            CHECK(moved.x == before);
+        }
+        pose.rotation = random.rotation();
+        moved.tick_on_body(in_world(stroke_at(tick), pose), pose, Told::pose);
+        if (tick < phase_ticks - 1) continue;  // what was refused has no prediction after it
+        CHECK(Difference(rest, moved, pose).force <= 1e-9);
+    }
+}
+
+TEST_CASE("after reset on a moved body a solver is as new", "[moving]") {
+    const auto& scene = scenes[0];
+    Membrane used(scene.mesh, false, 6);
+    const Points<double> anchors = 1.02 * scene.mesh.positions();
+    for (int tick = 0; tick < 30; ++tick) {
+        const auto pose = smooth_motion(tick * dt);
+        used.tick_on_body(in_world(stroke_at(tick), pose), pose, Told::pose);
+    }
+    REQUIRE(used.body.move_to(anchors, dt, used.x));
+    QuasiStaticSolver<double> fresh(used.network, {.layers = 6, .sweeps = 4, .negligible_force = 1e-13});
+    used.solver.reset();
+    Points<double> x = used.x;
+    for (int tick = 0; tick < 5; ++tick) {
+        const auto volume = on(used.body, used.backing);
+        const auto a =
+            used.solver.step(used.x, dt, used.network, volume, membrane::pull(3, Vector3<double>(0, 0, 0.012)));
+        const auto b = fresh.step(x, dt, used.network, volume, membrane::pull(3, Vector3<double>(0, 0, 0.012)));
+        REQUIRE(used.x == x);
+        REQUIRE(a.visits == b.visits);
+        REQUIRE(a.reactions[0] == b.reactions[0]);
+    }
 }

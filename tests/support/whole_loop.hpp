@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <membrane/membrane.hpp>
+#include <membrane/network/moved_volume.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 
 #include "support/random.hpp"
@@ -105,16 +106,16 @@ struct OddLoop {
         other.axis.setZero();
         if (now % 1000 < 3) tool.position.x() = std::numeric_limits<S>::quiet_NaN();
 
-        const std::array<membrane::Contact<S>, 2> contacts{trackers[0].update(tree, x, tool, anchors),
-                                                           trackers[1].update(tree, x, other, anchors)};
-        const auto grasp = grasper.update(contacts[1], x, other);
+        const std::array<membrane::Contact<S>, 2> contacts{trackers[0].update(tree, x, tool, body),
+                                                           trackers[1].update(tree, x, other, body)};
+        const auto grasp = grasper.update(contacts[1], x, other, body);
         int reads = 0;
         const membrane::Deadline deadline([&reads] { return ++reads; }, now % 10);
-        const auto report = solver.step_until(
-            deadline, x, now % 1000 == 500 ? S(0) : S(1e-3), network, backing.at(anchors, anchors_before),
-            press(tool, contacts[0]), press(other, contacts[1], grasp), pull(other, grasp),
-            membrane::load<S>({0, 1, 2}, {S(0.5), S(0.25), S(0.25)}, {0, 0, S(-1e-3)}),
-            membrane::pull(3, membrane::point(anchors, 3)), membrane::pin(pins));
+        const auto report =
+            solver.step_until(deadline, x, now % 1000 == 500 ? S(0) : S(1e-3), network, on(body, backing),
+                              press(tool, contacts[0]), press(other, contacts[1], grasp), pull(other, grasp),
+                              membrane::load<S>({0, 1, 2}, {S(0.5), S(0.25), S(0.25)}, {0, 0, S(-1e-3)}),
+                              membrane::pull(3, membrane::point(anchors, 3)), membrane::pin(pins));
         tree.refit(x, report.moved);
         normals.update(x, report.moved);
         refused += report.status != membrane::StepStatus::advanced;
@@ -126,10 +127,11 @@ struct OddLoop {
     void move_body(int now) noexcept {
         const S sway = S(1e-5) * static_cast<S>(now % 200 < 100 ? now % 100 : 100 - now % 100);
         eye.origin.x() = sway;
-        anchors_before = anchors;
         anchors = mesh.positions();
         anchors.row(2) *= 1 + sway;
-        solver.wake_all();
+        refused += !(now % 10 == 5 ? body.move_to(eye, x) : body.move_to(anchors, S(1e-3), x));
+        tree.refit(x);
+        normals.update(x);
     }
 
     void start_afresh(int now) noexcept {
@@ -164,7 +166,8 @@ struct OddLoop {
     membrane::NullDevice<S> device;
     membrane::RigidFrame<S> eye;
     std::vector<membrane::Index> pins{20, 30, 20};
-    membrane::Points<S> anchors = mesh.positions(), anchors_before = anchors, x = anchors;
+    membrane::MovingBody<S> body{mesh};
+    membrane::Points<S> anchors = mesh.positions(), x = anchors;
     membrane::Points<S> velocity = membrane::Points<S>::Zero(3, x.cols()), external = velocity;
     int ticks = 0, refused = 0;
 };

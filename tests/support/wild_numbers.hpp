@@ -9,6 +9,7 @@
 #include <limits>
 
 #include <membrane/membrane.hpp>
+#include <membrane/network/moved_volume.hpp>
 
 #include "support/bits.hpp"
 #include "support/catch.hpp"
@@ -44,7 +45,8 @@ template <membrane::Real S>
 struct Tick {
     S dt = S(1e-3);
     membrane::Tool<S> tool;
-    membrane::Points<S> x, anchors, previous;
+    membrane::Points<S> x, anchors;
+    membrane::RigidFrame<S> pose;
     membrane::Vector3<S> target, force;
     std::array<Eigen::Matrix<S, 3, 1>, 2> weights;
     membrane::HeldPoint<S> held;
@@ -65,13 +67,14 @@ void hand_in_wild_number(int seed) {
     ContactTracker<S> tracker(mesh);
     Grasper<S> grasper(mesh);
     VertexNormals<S> normals(mesh);
+    MovingBody<S> body(mesh);
 
     const Index v = random.index(42), f = random.index(80), g = random.index(80);
     const auto corners = [&](Index i) {
         return std::array<Index, 3>{mesh.triangles()(0, i), mesh.triangles()(1, i), mesh.triangles()(2, i)};
     };
     Tick<S> usual;
-    usual.x = usual.anchors = usual.previous = mesh.positions();
+    usual.x = usual.anchors = mesh.positions();
     const Vector3<S> from = random.unit_vector<S>();
     usual.tool.radius = S(0.2);
     if (random.chance(0.3)) usual.tool.axis = random.vector<S>();
@@ -106,19 +109,24 @@ void hand_in_wild_number(int seed) {
             case 10: now.weights[1][k] = wild; break;
             case 11: now.x(k, u) = wild; break;
             case 12: now.anchors(k, u) = wild; break;
-            case 13: now.previous(k, u) = wild; break;
+            case 13: now.pose.origin[k] = wild; break;
             default: break;
         }
-        const Points<S> before = now.x;
+        Points<S> before = now.x;
         StepReport<S> report;
-        bool touching = false;
+        bool touching = false, moved = false;
         {
 #ifndef __FAST_MATH__
             // What is no number is looked at before it is refused, and squares of what is too large overflow.
             const FloatingPointTraps traps(FloatingPointTraps::only_division);
 #endif
             if (which == 11 && seed % 2 == 0) tree.refit(now.x);
-            auto contact = tracker.update(tree, now.x, now.tool, now.anchors);
+            if (which == 12) moved = body.move_to(now.anchors, S(1e-3), now.x);
+            if (which == 13) moved = body.move_to(now.pose, now.x);
+            if (moved) tree.refit(now.x);
+            if (!moved) REQUIRE(same_bits(now.x, before));
+            before = now.x;
+            auto contact = tracker.update(tree, now.x, now.tool, body);
             touching = contact.touching();
             switch (which) {
                 case 14: contact.gap = wild; break;
@@ -127,10 +135,10 @@ void hand_in_wild_number(int seed) {
                 case 17: contact.before[k] = wild; break;
                 default: break;
             }
-            const auto grasp = grasper.update(contact, now.x, now.tool);
-            report = solver.step(now.x, now.dt, network, backing.at(now.anchors, now.previous),
-                                 press(now.tool, contact, grasp), membrane::pull(now.tool, grasp),
-                                 membrane::pull(v, now.target), now.held, load(corners(g), now.weights[1], now.force));
+            const auto grasp = grasper.update(contact, now.x, now.tool, body);
+            report = solver.step(now.x, now.dt, network, on(body, backing), press(now.tool, contact, grasp),
+                                 membrane::pull(now.tool, grasp), membrane::pull(v, now.target), now.held,
+                                 load(corners(g), now.weights[1], now.force));
             tree.refit(now.x, report.moved);
             normals.update(now.x, report.moved);
         }
@@ -150,7 +158,7 @@ void hand_in_wild_number(int seed) {
             if (report.status == StepStatus::advanced) solver.reset();
             tree.refit(x);
             normals.update(x);
-        } else if (report.status == StepStatus::advanced) {
+        } else if (report.status == StepStatus::advanced || moved) {
             x = now.x;
             tame = tame && which < 0;  // what is wild and yet a number may be far out of the way by now
         }

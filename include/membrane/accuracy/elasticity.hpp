@@ -24,7 +24,8 @@ struct ElasticState {
 };
 
 /// A membrane without time, in double whatever its scalar: its springs by their law, its elements, if it is a `Tissue`, its
-/// backing as it pulls in a tick without end, in which no damping is left.
+/// backing as it pulls in a tick without end, in which no damping is left. A linear backing that says its anchors and, in
+/// double, its `curvature` is evaluated by these; any other one in its own scalar.
 ///
 ///     Elasticity elasticity(network, volume);
 ///     const auto state = elasticity.at(x);                    // state.springs + state.backing [N]
@@ -53,6 +54,10 @@ class Elasticity {
     [[nodiscard]] double largest_stiffness(const ElasticState& state) const;
 
   private:
+    static constexpr bool is_linear = requires(const Volume& volume, Index v) {
+        volume.anchors();
+        volume.template curvature<double>(v);
+    };
     static constexpr bool has_elements = requires(const Network& network) {
         network.for_each_kind([](const auto&) {});
     };
@@ -84,6 +89,7 @@ class Elasticity {
     }
     void add_elements(ElasticState& state) const;
     void add_elements(const ElasticState& state, NewtonSystem& system) const;
+    void pull_back(ElasticState& state);
     void ask_backing(const Points<double>& x);
     [[nodiscard]] Symmetric3<double> curvature(Index v, Scalar most) const noexcept;
     [[nodiscard]] const Symmetric3<double>& backing_stiffness(Index v) const noexcept {
@@ -112,13 +118,31 @@ ElasticState Elasticity<Network, Volume>::at(const Points<double>& x) {
         state.largest_force = (std::max)(state.largest_force, std::abs(answer.tension));
     }
     add_elements(state);
-    ask_backing(x);
+    pull_back(state);
+    return state;
+}
+
+template <class Network, class Volume>
+void Elasticity<Network, Volume>::pull_back(ElasticState& state) {
+    const auto& x = state.x;
+    if constexpr (is_linear) {
+        if (backing_stiffness_.empty()) {
+            for (Index v = 0; v < x.cols(); ++v) backing_stiffness_.push_back(volume_.template curvature<double>(v));
+        }
+        for (Index v = 0; v < x.cols(); ++v) {
+            const Vector3<double> anchor = point(volume_.anchors(), v).template cast<double>();
+            state.backing.col(v) = backing_stiffness(v) * Vector3<double>(anchor - point(x, v));
+        }
+    } else {
+        ask_backing(x);
+        for (Index v = 0; v < x.cols(); ++v) {
+            const Vector3<double> since = point(x, v) - point(asked_, v).template cast<double>();
+            state.backing.col(v) = point(answered_, v) - backing_stiffness(v) * since;
+        }
+    }
     for (Index v = 0; v < x.cols(); ++v) {
-        const Vector3<double> since = point(x, v) - point(asked_, v).template cast<double>();
-        state.backing.col(v) = point(answered_, v) - backing_stiffness(v) * since;
         state.largest_force = (std::max)(state.largest_force, norm(point(state.backing, v)));
     }
-    return state;
 }
 
 template <class Network, class Volume>

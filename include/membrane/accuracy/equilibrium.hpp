@@ -24,7 +24,8 @@
 namespace membrane {
 
 /// The equilibrium near `x` (3 x V [m]) under the constraints of a step, to the last digits of a double, whatever the
-/// network's scalar; reactions are as in `StepReport`. Not `converged` if none was found: then `x` is how far it came.
+/// scalar of network and backing (a backing of one's own that is not linear, see `VolumeModel`, is evaluated in its own);
+/// reactions are as in `StepReport`. Not `converged` if none was found: then `x` is how far it came.
 ///
 /// All vertices at once by Newton's method, with exact second derivatives and sparse factors; what is near a tool is
 /// an inequality with a curvature of its own, sequential quadratic programming [Nocedal06] 18. A line search on the

@@ -25,8 +25,9 @@ namespace membrane {
 /// A backing that pulls in proportion to the distance from an anchor, or not at all.
 template <class Volume>
 concept LinearBacking = std::same_as<Volume, NoVolumeSprings> || std::same_as<Volume, VirtualVolumeSprings<float>> ||
-    std::same_as<Volume, VirtualVolumeSprings<double>> || std::same_as<Volume, MovedVolumeSprings<float>> ||
-    std::same_as<Volume, MovedVolumeSprings<double>>;
+                        std::same_as<Volume, VirtualVolumeSprings<double>> || std::same_as < Volume,
+        MovedVolume < VirtualVolumeSprings<float>,
+float >> || std::same_as<Volume, MovedVolume<VirtualVolumeSprings<double>, double>>;
 
 enum class ProblemStatus {
     sound,

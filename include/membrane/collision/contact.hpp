@@ -39,7 +39,8 @@ struct Contact {
     Scalar depth = 0;   ///< how far the tool is inside the surface as it would be without the tool [m], >= 0
     Scalar reach = 0;   ///< triangles up to this far from the tool count as touched [m]
     Scalar radius = 0;  ///< of the tool [m]; a point counts as a small sphere, see `TrackerOptions::margin`
-    Vector3<Scalar> before = Vector3<Scalar>::Zero();  ///< where `on_axis` was a tick ago, off the surface [m]
+    Vector3<Scalar> before = Vector3<Scalar>::Zero();         ///< where `on_axis` was a tick ago, off the surface [m]
+    Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();  ///< of the body there, where it moves [m/s]
     bool crossed = false;  ///< the tool's way since the last tick led through the surface at `point`
 
     // Valid until the tracker's next update.

@@ -20,6 +20,9 @@
 ///     const auto contact = tracker.update(tree, x, tool);                    // once a tick, before the solver's step
 namespace membrane {
 
+template <Real Scalar>
+class MovingBody;  // of moving_body.hpp
+
 struct TrackerOptions {
     double margin = 0.01;  ///< what is this near counts as touched, and a point as a sphere of this radius [mean edges]
     Index check_every = 128;  ///< ticks in contact after which the tree is asked whether something else is touched too
@@ -34,7 +37,7 @@ struct TrackerOptions {
 /// tool in contact is found after `check_every` ticks at the latest.
 ///
 /// The tool stays on the outer side of a closed surface. On an open one it stays on the side of first contact. The
-/// depth is measured against the surface as it would be without the tool: the mesh, or the anchors handed in.
+/// depth is measured against the surface as it would be without the tool: the mesh, or the anchors of a body that moves.
 template <Real Scalar>
 class ContactTracker {
   public:
@@ -45,12 +48,12 @@ class ContactTracker {
     /// changes nothing. Online. Cost: O(log F), and in contact the triangles within the tool's reach and their neighbours.
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool) noexcept {
-        return update(tree, x, tool, origins_);
+        return track(tree, x, tool, origins_);
     }
 
-    /// The same on a body that moves: `anchors` is where the membrane would be without the tool (3 x V [m]).
+    /// The same on a body that moves: what is remembered of tool and contact goes along with it.
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
-                                         const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) noexcept;
+                                         const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
 
     /// How often the tree has been asked for what the tool touches during contact, since the beginning.
     [[nodiscard]] Index tree_checks() const noexcept { return tree_checks_; }
@@ -70,6 +73,9 @@ class ContactTracker {
         Scalar reach;   // from the tool's axis to what may touch it in this tick [m]
     };
 
+    void go_along(const RigidFrame<Scalar>& pose) noexcept;
+    [[nodiscard]] Contact<Scalar> track(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                        const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) noexcept;
     [[nodiscard]] Scene scene_of(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                  const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) const noexcept;
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
@@ -99,6 +105,7 @@ class ContactTracker {
     BoundedList<TouchedTriangle> listed_;
     Contact<Scalar> last_;
     std::optional<Tool<Scalar>> last_tool_;
+    RigidFrame<Scalar> pose_;  // of the body then
     // Where on the surface without the tool its two ends and its contact point are nearest to.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
     Index ticks_ = 0, tree_checks_ = 0;
@@ -126,6 +133,7 @@ void ContactTracker<Scalar>::reset() noexcept {
     near_.clear();
     last_ = {};
     last_tool_.reset();
+    pose_ = {};
     origin_triangles_.fill(no_index);
     ticks_ = 0;
     lively_ticks_ = 0;
@@ -133,8 +141,33 @@ void ContactTracker<Scalar>::reset() noexcept {
 
 template <Real Scalar>
 Contact<Scalar> ContactTracker<Scalar>::update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
-                                               const Tool<Scalar>& tool,
-                                               const ConstPointsRef<Scalar>& anchors) noexcept {
+                                               const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept {
+    go_along(body.pose());
+    auto contact = track(tree, x, tool, body.anchors());
+    if (contact.touching()) {
+        contact.body_velocity = body.velocity_at(tool.position, contact.corners, contact.barycentric);
+    }
+    return contact;
+}
+
+// The body is at `pose` now, and what was seen in the last tick is on it.
+template <Real Scalar>
+void ContactTracker<Scalar>::go_along(const RigidFrame<Scalar>& pose) noexcept {
+    if (pose.same_pose(pose_)) return;
+    const auto motion = motion_between(pose_, pose);
+    pose_ = pose;
+    if (last_tool_) {
+        last_tool_->position = motion.point_out(last_tool_->position);
+        last_tool_->axis = motion.direction_out(last_tool_->axis);
+    }
+    for (auto* place : {&last_.point, &last_.on_axis, &last_.before}) *place = motion.point_out(*place);
+    last_.normal = motion.direction_out(last_.normal);
+}
+
+template <Real Scalar>
+Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                              const Tool<Scalar>& tool,
+                                              const ConstPointsRef<Scalar>& anchors) noexcept {
     MEMBRANE_ASSERT(x.cols() == origins_.cols() && anchors.cols() == origins_.cols());
     if (!is_sound(tool)) return Contact<Scalar>::none();
     const Scene scene = scene_of(tree, x, tool, anchors);

@@ -15,6 +15,9 @@
 ///     const auto report = solver.step(x, dt, network, backing, press(tool, contact, grasp), pull(tool, grasp));
 namespace membrane {
 
+template <Real Scalar>
+class MovingBody;  // of moving_body.hpp
+
 /// A point of the membrane that moves with the tool.
 template <Real Scalar>
 struct Grasp {
@@ -22,11 +25,12 @@ struct Grasp {
     std::array<Index, 3> corners{no_index, no_index, no_index};  ///< its vertices
     Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the held point
     Vector3<Scalar> offset = Vector3<Scalar>::Zero();            ///< from the tool to the held point [m]
-    Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< where the held point was at first [m]
+    Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< where the held point would be without the tool [m]
+    Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();     ///< of the body there, where it moves [m/s]
 
     [[nodiscard]] bool holding() const noexcept { return triangle != no_index; }
 
-    /// How far the tool has taken the held point from where it was at first [m]. @pre holding()
+    /// How far the tool has taken the held point from where it would be without it [m]. @pre holding()
     [[nodiscard]] Vector3<Scalar> displacement(const Tool<Scalar>& tool) const noexcept {
         return tool.position + offset - origin;
     }
@@ -48,9 +52,14 @@ class Grasper {
     [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                        const Tool<Scalar>& tool) noexcept;
 
+    /// The same on a body that moves: the held point goes along with it, and turns with it about the tool.
+    [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
+                                       const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
+
     /// Lets go and forgets whether it was closed: from here on it does what a new one does, to the bit.
     void reset() noexcept {
         grasp_ = {};
+        pose_ = {};
         closed_ = false;
     }
 
@@ -58,6 +67,7 @@ class Grasper {
     Points<Scalar> origins_;
     GraspOptions options_;
     Grasp<Scalar> grasp_;
+    RigidFrame<Scalar> pose_;  // of the body at the last update
     bool closed_ = false;
 };
 
@@ -79,6 +89,20 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
     }
     grasp_.offset = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
     grasp_.origin = point_at(triangle_at(origins_, grasp_.corners), grasp_.barycentric);
+    return grasp_;
+}
+
+template <Real Scalar>
+Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
+                                      const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept {
+    if (!body.pose().same_pose(pose_)) {
+        grasp_.offset = motion_between(pose_, body.pose()).direction_out(grasp_.offset);
+        pose_ = body.pose();
+    }
+    (void)update(contact, x, tool);
+    if (!grasp_.holding()) return grasp_;
+    grasp_.origin = point_at(triangle_at(body.anchors(), grasp_.corners), grasp_.barycentric);
+    grasp_.body_velocity = body.velocity_at(tool.position, grasp_.corners, grasp_.barycentric);
     return grasp_;
 }
 

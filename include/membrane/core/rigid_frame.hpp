@@ -34,11 +34,33 @@ struct RigidFrame {
         return rotation.col(0) * body.x() + rotation.col(1) * body.y() + rotation.col(2) * body.z();
     }
 
+    /// Velocity in the world of what moves with the body and is at `place` [m/s], [m].
+    [[nodiscard]] Vector3<Scalar> velocity_at(const Vector3<Scalar>& place) const noexcept {
+        return velocity + cross<Scalar>(angular_velocity, place - origin);
+    }
+
     /// Velocity as seen from the body of what moves with `velocity_of` at `place`, both in the world [m/s], [m].
     [[nodiscard]] Vector3<Scalar> velocity_in(const Vector3<Scalar>& velocity_of,
                                               const Vector3<Scalar>& place) const noexcept {
         return direction_in(velocity_of - velocity - cross<Scalar>(angular_velocity, place - origin));
     }
+
+    /// The same place and attitude, to the bit.
+    [[nodiscard]] bool same_pose(const RigidFrame& other) const noexcept {
+        return rotation == other.rotation && origin == other.origin;
+    }
 };
+
+/// The motion that takes a body from pose `from` to pose `to`: `point_out` of where something on the body was is where it
+/// is, in the world. Without velocities.
+template <Real Scalar>
+[[nodiscard]] RigidFrame<Scalar> motion_between(const RigidFrame<Scalar>& from, const RigidFrame<Scalar>& to) noexcept {
+    RigidFrame<Scalar> motion;
+    for (Eigen::Index k = 0; k < 3; ++k) {  // the rotation takes each of the world's axes into the body and out again
+        motion.rotation.col(k) = to.direction_out(from.rotation.row(k).transpose());
+    }
+    motion.origin = to.origin - motion.direction_out(from.origin);
+    return motion;
+}
 
 }  // namespace membrane

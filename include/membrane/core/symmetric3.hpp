@@ -44,6 +44,16 @@ template <Number Scalar>
     return {x * u[0], y * u[1], z * u[2], x * u[1], x * u[2], y * u[2]};
 }
 
+/// `a` as it is once everything is turned by `rotation`: R a R^T.
+template <Real Scalar>
+[[nodiscard]] Symmetric3<Scalar> rotated(const Symmetric3<Scalar>& a,
+                                         const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept {
+    const Vector3<Scalar> x = rotation.row(0).transpose(), y = rotation.row(1).transpose(),
+                          z = rotation.row(2).transpose();
+    const Vector3<Scalar> ax = a * x, ay = a * y, az = a * z;
+    return {dot(x, ax), dot(y, ay), dot(z, az), dot(x, ay), dot(x, az), dot(y, az)};
+}
+
 /// @pre positive definite. Cost: one division; half the digits are left where the largest eigenvalue is a cube root of
 /// epsilon's inverse times the smallest.
 template <Number Scalar>

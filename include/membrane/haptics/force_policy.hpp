@@ -45,8 +45,9 @@ template <Real Scalar>
 }  // namespace detail
 
 /// The force of the paper, F = -k x - mu v, [Liu07] 2.4. Touching: x is the depth and v the velocity along the contact
-/// normal, and so is the force; it never pulls the tool in. Pulling: x is how far the held point is from where it was
-/// at first, v its velocity along that, and the force runs against it. The held point moves with the tool.
+/// normal, and so is the force; it never pulls the tool in. Pulling: x is how far the held point is from where it would be
+/// without the tool, v its velocity along that, and the force runs against it. The held point moves with the tool. On a
+/// body that moves velocities are relative to it.
 ///
 /// Touching, it has no potential as it stands: the depth is of the surface at rest, the normal of the deformed one. A hand
 /// that goes round slowly is given some microjoules on each turn, which only friction takes (see `SampledLoop`). With the
@@ -102,10 +103,11 @@ Vector3<Scalar> SpringDamperForce::force(const HapticState<Scalar>& state) const
         const Scalar length = norm(way);
         if (!(length > 0)) return Vector3<Scalar>::Zero();
         const Vector3<Scalar> along = way / length;
-        return detail::finite_or_zero<Scalar>(-(k * length + mu * dot(tool.velocity, along)) * along);
+        return detail::finite_or_zero<Scalar>(
+            -(k * length + mu * dot<Scalar>(tool.velocity - grasp.body_velocity, along)) * along);
     }
     if (!contact.touching()) return Vector3<Scalar>::Zero();
-    const Scalar push = k * contact.depth - mu * dot(tool.velocity, contact.normal);
+    const Scalar push = k * contact.depth - mu * dot<Scalar>(tool.velocity - contact.body_velocity, contact.normal);
     return detail::finite_or_zero<Scalar>((std::max)(push, Scalar(0)) * contact.normal);
 }
 

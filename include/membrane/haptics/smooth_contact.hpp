@@ -17,6 +17,9 @@
 ///     device.write(feel({tool, smooth(contact), report}));          // for the force; the solver takes the contact itself
 namespace membrane {
 
+template <Real Scalar>
+class MovingBody;  // of moving_body.hpp
+
 /// The contact with the normal of a smooth surface: that without the tool, as the depth has it, under normals that are
 /// interpolated between its vertices. A proxy on it has the tool straight above itself or below, along its normal. It
 /// moves as continuously as the tool, over concave edges too, and nothing is remembered: no delay is added. The depth,
@@ -39,15 +42,18 @@ class SmoothContact {
     /// Online. Cost: a few triangles, from the contact's to the proxy's.
     /// @pre the contact is with this mesh (asserted)
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact) const noexcept {
-        return (*this)(contact, at_rest_, normals_);
+        return over(contact, at_rest_, normals_);
     }
 
-    /// The same on a body that moves: `anchors` is where the membrane would be without the tool (3 x V [m]), `normals`
-    /// are of length 1, such as `VertexNormals` has for the anchors.
-    [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
-                                             const ConstPointsRef<Scalar>& normals) const noexcept;
+    /// The same on a body that moves.
+    [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact,
+                                             const MovingBody<Scalar>& body) const noexcept {
+        return over(contact, body.anchors(), body.normals());
+    }
 
   private:
+    [[nodiscard]] Contact<Scalar> over(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
+                                       const ConstPointsRef<Scalar>& normals) const noexcept;
     [[nodiscard]] Vector3<Scalar> normal_at(Index f, const Vector3<Scalar>& q, const ConstPointsRef<Scalar>& anchors,
                                             const ConstPointsRef<Scalar>& normals) const noexcept;
     [[nodiscard]] Index across(Index f, const Vector3<Scalar>& weights) const noexcept;
@@ -90,8 +96,8 @@ template <Real Scalar>
 }  // namespace detail
 
 template <Real Scalar>
-Contact<Scalar> SmoothContact<Scalar>::operator()(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
-                                                  const ConstPointsRef<Scalar>& normals) const noexcept {
+Contact<Scalar> SmoothContact<Scalar>::over(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
+                                            const ConstPointsRef<Scalar>& normals) const noexcept {
     MEMBRANE_ASSERT(anchors.cols() == at_rest_.cols() && normals.cols() == at_rest_.cols());
     MEMBRANE_ASSERT(!contact.touching() || contact.triangle < static_cast<Index>(triangles_.cols()));
     if (!contact.touching() || !is_sound(contact)) return contact;

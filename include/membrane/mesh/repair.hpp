@@ -37,7 +37,10 @@ struct RepairOptions {
     bool drop_repeated = false;    ///< Triangles that name a vertex twice.
     bool drop_zero_area = false;   ///< Triangles with corners on one line; may leave a T-junction.
     bool drop_duplicates = false;  ///< Of triangles with the same vertices, however turned, all but the first.
-    bool orient = false;  ///< Turns as few triangles of a component as possible to agree; not if it is one-sided.
+    /// Turns triangles of a component to agree, not if it is one-sided: a closed component so that it faces outward, any other
+    /// as few triangles as possible. One whose triangles agree as given stays as it is, see `flip_inward`. Each component by
+    /// itself: one inside another comes to face outward too, though it may be meant as the wall of a cavity.
+    bool orient = false;
     bool split_vertices = false;  ///< Gives each fan of triangles at a vertex, but for the first, a vertex of its own.
     bool flip_inward = false;     ///< Turns closed components that face inward.
     bool drop_isolated = false;   ///< Vertices that no triangle names.
@@ -110,7 +113,7 @@ class Repair {
     inline void drop_repeated();
     inline void drop_zero_area(const std::vector<bool>& usable);
     inline void drop_duplicates();
-    inline void orient();
+    inline void orient(const std::vector<bool>& usable);
     inline void split_vertices();
     inline void flip_inward(const std::vector<bool>& usable);
     inline void drop_isolated();
@@ -136,6 +139,9 @@ class Repair {
         const auto [a, b, c] = corners(f);
         return a == b || b == c || c == a;
     }
+    /// As triangles are turned now; a part with a point that cannot be computed with is not closed.
+    [[nodiscard]] inline SurfaceParts parts(const std::vector<bool>& usable) const;
+
     Points<double> x_;
     Triangles triangles_;
     std::vector<bool> kept_vertices_;
@@ -188,7 +194,7 @@ inline void Repair::drop_duplicates() {
         static_cast<Index>(std::erase_if(kept_, [&](Index f) { return is_duplicate[static_cast<std::size_t>(f)]; }));
 }
 
-inline void Repair::orient() {
+inline void Repair::orient(const std::vector<bool>& usable) {
     const auto count = static_cast<std::size_t>(triangles_.cols());
     const std::vector<HalfEdge> all = sides();
     DisjointSets sets = turns(all, count);
@@ -203,13 +209,29 @@ inline void Repair::orient() {
         const auto [lowest, side] = side_of(f);
         ++votes[lowest][side];
     }
+    std::vector<bool> turned(count, false);
+    const auto turn_over = [&](Index f) {
+        turn(f);
+        turned[static_cast<std::size_t>(f)].flip();
+    };
     for (const Index f : kept_) {
         const auto [lowest, side] = side_of(f);
         const std::size_t fewer = votes[lowest][1] <= votes[lowest][0] ? 1 : 0;
-        if (side != fewer) continue;  // on a one-sided surface none is
-        turn(f);
-        ++done_.turned;
+        if (side == fewer) turn_over(f);  // on a one-sided surface none is
     }
+    const SurfaceParts now = parts(usable);
+    std::vector<bool> agreed(now.parts.size(), true);  // as given
+    for (const Index f : kept_) {
+        const Index p = now.part_of[static_cast<std::size_t>(f)];
+        if (p != no_index && turned[static_cast<std::size_t>(f)]) agreed[static_cast<std::size_t>(p)] = false;
+    }
+    for (const Index f : kept_) {
+        const Index p = now.part_of[static_cast<std::size_t>(f)];
+        if (p == no_index || agreed[static_cast<std::size_t>(p)]) continue;
+        const SurfacePart& part = now.parts[static_cast<std::size_t>(p)];
+        if (part.closed && part.volume < 0) turn_over(f);
+    }
+    done_.turned = static_cast<Index>(std::count(turned.begin(), turned.end(), true));
 }
 
 inline void Repair::split_vertices() {
@@ -242,7 +264,7 @@ inline void Repair::split_vertices() {
     kept_vertices_.resize(origin_.size(), true);
 }
 
-inline void Repair::flip_inward(const std::vector<bool>& usable) {
+inline SurfaceParts Repair::parts(const std::vector<bool>& usable) const {
     std::vector<bool> measured(static_cast<std::size_t>(triangles_.cols()), true);
     for (const Index f : kept_) {
         for (const Index v : corners(f)) {
@@ -250,11 +272,15 @@ inline void Repair::flip_inward(const std::vector<bool>& usable) {
             if (!usable[given]) measured[static_cast<std::size_t>(f)] = false;
         }
     }
-    const SurfaceParts parts = surface_parts(x_, triangles_, sides(), measured);
+    return surface_parts(x_, triangles_, sides(), measured);
+}
+
+inline void Repair::flip_inward(const std::vector<bool>& usable) {
+    const SurfaceParts now = parts(usable);
     for (const Index f : kept_) {
-        const Index p = parts.part_of[static_cast<std::size_t>(f)];
+        const Index p = now.part_of[static_cast<std::size_t>(f)];
         if (p == no_index) continue;
-        const SurfacePart& part = parts.parts[static_cast<std::size_t>(p)];
+        const SurfacePart& part = now.parts[static_cast<std::size_t>(p)];
         if (!part.closed || part.volume >= 0) continue;
         turn(f);
         ++done_.flipped;
@@ -318,7 +344,7 @@ RepairedMesh<typename P::Scalar> repair(const Eigen::MatrixBase<P>& positions, c
     if (options.drop_repeated) work.drop_repeated();
     if (options.drop_zero_area) work.drop_zero_area(stored.usable);
     if (options.drop_duplicates) work.drop_duplicates();
-    if (options.orient) work.orient();
+    if (options.orient) work.orient(stored.usable);
     if (options.split_vertices) work.split_vertices();
     if (options.flip_inward) work.flip_inward(stored.usable);
     if (options.drop_isolated) work.drop_isolated();

@@ -37,7 +37,7 @@ static_assert(std::is_default_constructible_v<FoundationOptions<double>>);
 /// start of the tick, T the recovery time: damping is T K (Kelvin and Voigt).
 ///
 /// A tick leaves 1 / (1 + dt / T) of what the foundation brings back, so that in ticks of T / 10 the recovery takes 5 % more
-/// than T. The body stands still; on one that moves rigidly, work in its own frame, see `RigidFrame`.
+/// than T.
 template <Real Scalar>
 class FoundationSprings {
   public:
@@ -59,10 +59,13 @@ class FoundationSprings {
         return {-answer(v, way), (std::max)(k.normal, k.tangential) * (1 + rate)};
     }
 
-    /// K, the second derivative of the energy.
-    [[nodiscard]] Symmetric3<Scalar> curvature(Index v) const noexcept {
-        auto sum = diagonal3(constants(v).tangential);
-        sum += outer<Scalar>(constants(v).normal - constants(v).tangential, point(normals_, v));
+    /// K, the second derivative of the energy, from constants and normals as they are.
+    template <Real Number = Scalar>
+    [[nodiscard]] Symmetric3<Number> curvature(Index v) const noexcept {
+        const auto normal = static_cast<Number>(constants(v).normal),
+                   tangential = static_cast<Number>(constants(v).tangential);
+        auto sum = diagonal3(tangential);
+        sum += outer<Number>(normal - tangential, point(normals_, v).template cast<Number>());
         return sum;
     }
 

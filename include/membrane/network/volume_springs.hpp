@@ -10,14 +10,15 @@
 
 #include <membrane/core/field.hpp>
 #include <membrane/core/lanes.hpp>
+#include <membrane/core/symmetric3.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 #include <membrane/network/elastic_network.hpp>
 
 /// What holds the membrane to the body under it.
 ///
 ///     const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
-///     solver.step(x, dt, network, backing, press(tool, contact));                        // the body stands still
-///     solver.step(x, dt, network, backing.at(anchors, previous), press(tool, contact));  // the body moves
+///     solver.step(x, dt, network, backing, press(tool, contact));               // the body stands still
+///     solver.step(x, dt, network, on(body, backing), press(tool, contact));     // it moves, see `moved_volume.hpp`
 namespace membrane {
 
 /// Constants of the volume springs, the same for all vertices or one for each.
@@ -32,9 +33,11 @@ static_assert(std::is_default_constructible_v<VolumeOptions<double>>);
 
 /// A model of the body under the membrane: the pull on vertex `v` at `position`, which was at `start` when the tick of
 /// length `dt` began. What the compiler cannot see: the pull does no work on the membrane over a closed path. One that
-/// hands out its springs, `spring(v, start, dt)`, lets a solver visit several vertices at once. One that is not alike in
-/// all directions may say its stiffness without damping as a `Symmetric3`, `curvature(v)`, for the parts that look for
-/// an equilibrium.
+/// hands out its springs, `spring(v, start, dt)`, lets a solver visit several vertices at once. For the parts that look for an
+/// equilibrium, one that is not alike in all directions may say its stiffness without damping as a `Symmetric3`,
+/// `curvature(v)`; one that is linear may say it in either number type, `curvature<Number>(v)`, and where it does not pull,
+/// `anchors()`: it is then evaluated in double even if it is of floats. A body that moves is no concern of a model's: `on(body,
+/// volume)` brings it there.
 template <class Volume, class Scalar>
 concept VolumeModel = Real<Scalar> &&
     requires(const Volume& volume, Index v, const Vector3<Scalar>& position, Scalar dt) {
@@ -82,8 +85,8 @@ struct VolumeSpring {
     }
 };
 
-template <Real Scalar>
-class MovedVolumeSprings;
+template <class Volume, Real Scalar>
+class MovedVolume;  // of moved_volume.hpp
 
 /// Virtual volume springs, [Liu07] (5): one for each vertex, of rest length zero, from the anchor to the vertex.
 template <Real Scalar>
@@ -99,21 +102,22 @@ class VirtualVolumeSprings {
         return damping_.empty() ? Scalar(0) : damping_[static_cast<std::size_t>(v)];
     }
 
-    /// The same springs with their anchors moved by the body under them: they were at `previous` when the tick began
-    /// and are at `anchors` now (3 x V [m]). Both are the caller's and must outlive what is returned.
-    /// Let the solver know with `wake_all()` that vertices have lost their balance, and the tracker where the anchors are.
-    /// @pre as many points as vertices (asserted)
-    [[nodiscard]] MovedVolumeSprings<Scalar> at(const ConstPointsRef<Scalar>& anchors,
-                                                const ConstPointsRef<Scalar>& previous) const noexcept;
-
     /// The spring of vertex `v`, which was at `start` when the tick of length `dt` [s] began.
     [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept {
         const Vector3<Scalar> anchor = point(anchors_, v);
-        return spring_from(v, anchor, start - anchor, dt);
+        const Scalar d = damping(v);
+        if (d == 0) return {anchor, stiffness(v), 0, 0};
+        return {anchor, stiffness(v), d / dt, norm<Scalar>(start - anchor)};
     }
     [[nodiscard]] Pull<Scalar> pull(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                     Scalar dt) const noexcept {
         return spring(v, start, dt).pull(position);
+    }
+
+    /// The second derivative of the energy, from the constants as they are.
+    template <Real Number = Scalar>
+    [[nodiscard]] Symmetric3<Number> curvature(Index v) const noexcept {
+        return diagonal3(static_cast<Number>(stiffness(v)));
     }
 
     /// Energy stored in the spring of vertex `v` at `position` [J].
@@ -122,46 +126,8 @@ class VirtualVolumeSprings {
     }
 
   private:
-    friend class MovedVolumeSprings<Scalar>;
-
-    [[nodiscard]] VolumeSpring<Scalar> spring_from(Index v, const Vector3<Scalar>& anchor,
-                                                   const Vector3<Scalar>& before, Scalar dt) const noexcept {
-        const Scalar d = damping(v);
-        if (d == 0) return {anchor, stiffness(v), 0, 0};
-        return {anchor, stiffness(v), d / dt, norm(before)};
-    }
-
     Points<Scalar> anchors_;
     std::vector<Scalar> stiffness_, damping_;
-};
-
-/// Volume springs whose anchors have moved: a view for the length of a call or two, see `VirtualVolumeSprings::at`.
-template <Real Scalar>
-class MovedVolumeSprings {
-  public:
-    MovedVolumeSprings(const VirtualVolumeSprings<Scalar>& springs, const ConstPointsRef<Scalar>& anchors,
-                       const ConstPointsRef<Scalar>& previous) noexcept
-        : springs_(&springs), anchors_(anchors), previous_(previous) {
-        MEMBRANE_ASSERT(anchors.cols() == springs.anchors().cols() && previous.cols() == anchors.cols());
-    }
-
-    [[nodiscard]] const ConstPointsRef<Scalar>& anchors() const noexcept { return anchors_; }
-
-    [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept {
-        return springs_->spring_from(v, point(anchors_, v), start - point(previous_, v), dt);
-    }
-    [[nodiscard]] Pull<Scalar> pull(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
-                                    Scalar dt) const noexcept {
-        return spring(v, start, dt).pull(position);
-    }
-
-    [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept {
-        return springs_->stiffness(v) * squared_norm<Scalar>(position - point(anchors_, v)) / 2;
-    }
-
-  private:
-    const VirtualVolumeSprings<Scalar>* springs_;
-    ConstPointsRef<Scalar> anchors_, previous_;
 };
 
 template <Real Scalar>
@@ -174,12 +140,6 @@ VirtualVolumeSprings<Scalar>::VirtualVolumeSprings(const TriangleMesh<Scalar>& m
     if (options.damping.given()) {
         damping_ = options.damping.expand(mesh.vertex_count(), component, "damping", "vertex", "N s/m");
     }
-}
-
-template <Real Scalar>
-MovedVolumeSprings<Scalar> VirtualVolumeSprings<Scalar>::at(const ConstPointsRef<Scalar>& anchors,
-                                                            const ConstPointsRef<Scalar>& previous) const noexcept {
-    return {*this, anchors, previous};
 }
 
 }  // namespace membrane

@@ -141,7 +141,7 @@ struct Load {
     Vector3<Scalar> force;  ///< [N]
 
     [[nodiscard]] bool sound() const noexcept;
-    [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{force}; }
+    [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{.at = force, .is_force = true}; }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>&) const noexcept { return -force; }

@@ -21,6 +21,7 @@ template <Real Scalar>
 struct LeadPoint {
     Vector3<Scalar> at;                                        ///< a position [m], or a force [N]
     Scalar longest = std::numeric_limits<Scalar>::infinity();  ///< of the ways in a tick that let one expect the next
+    bool is_force = false;
 };
 
 /// Nothing where the constraint does not act.

@@ -5,12 +5,14 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <utility>
 #include <vector>
 
 #include <membrane/core/executor.hpp>
+#include <membrane/core/rigid_frame.hpp>
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
@@ -72,7 +74,7 @@ class QuasiStaticSolver {
     }
 
     /// Has a look at these vertices in the next steps: what moved them, or their anchors, was not a step of this solver.
-    /// An index that is no vertex is passed over.
+    /// An index that is no vertex is passed over. A `MovingBody` says by itself what it moves.
     void wake(std::span<const Index> vertices) noexcept;
     void wake_all() noexcept;
 
@@ -84,11 +86,19 @@ class QuasiStaticSolver {
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return active_.queue(); }
 
   private:
+    // What the membrane is on may have moved: `on(body, volume)`.
+    template <class Volume>
+    static constexpr bool moves = requires(const Volume& volume) {
+        volume.body();
+    };
+
     template <class Pace, class Network, class Volume, class... Constraints>
     [[nodiscard]] StepReport<Scalar> step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt, const Network& network,
                                              const Volume& volume, const Constraints&... constraints) noexcept;
     void open(std::size_t constraint_count) noexcept;
-    template <class Acting>
+    template <class Volume>
+    void go_along(const Volume& volume) noexcept;
+    template <class Volume, class Acting>
     void predict(const Acting& acting, Region<Scalar>& region) noexcept;
     template <class Network>
     void line_up(const Network& network, Region<Scalar>& region) noexcept;
@@ -107,7 +117,9 @@ class QuasiStaticSolver {
     Predictor<Scalar, Workspace<Scalar>::most_constraints> predictor_;
     std::array<Vector3<Scalar>, Workspace<Scalar>::most_constraints> reactions_{};
     StepReport<Scalar> report_;
-    bool complete_ = false;   // the last step visited all that were at work, as often as it should
+    bool complete_ = false;    // the last step visited all that were at work, as often as it should
+    RigidFrame<Scalar> pose_;  // of the body, and how often it was deformed, at the last step
+    std::uint64_t deformations_ = 0;
     std::size_t resume_ = 0;  // the vertex beyond layer 0 at which the last sweep ran out of time
     StepCosts costs_;
 };
@@ -153,6 +165,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
     detail::require_made<QuasiStaticSolver>();
     open(sizeof...(Constraints));
     work_.pinned = [&network](Index v) { return network.pinned(v); };
+    go_along(volume);
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) {
         return refuse_step(StepStatus::bad_time_step, x);
     }
@@ -160,7 +173,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
     Region<Scalar> region(x, work_);
     const ConstraintSet<Scalar, Constraints...> acting(region, constraints...);
     if (!acting.sound()) return refuse_step(StepStatus::bad_input, x);
-    predict(acting, region);
+    predict<Volume>(acting, region);
     acting.begin();
     if (work_.invalid) return refuse_step(StepStatus::bad_input, x);
     if (work_.full) return refuse_step(StepStatus::too_many_touches, x);
@@ -191,15 +204,35 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::open(std::size_t constraint_count
     report_.reactions = {reactions_.data(), constraint_count};
 }
 
+// The body has moved since the last step, and the membrane with it: what is remembered goes along.
+template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <class Volume>
+void QuasiStaticSolver<Scalar, Rule, Threads>::go_along([[maybe_unused]] const Volume& volume) noexcept {
+    if constexpr (moves<Volume>) {
+        const auto& body = volume.body();
+        if (std::exchange(deformations_, body.deformations()) != body.deformations()) wake_all();
+        if (body.pose().same_pose(pose_)) return;
+        const auto motion = motion_between(std::exchange(pose_, body.pose()), body.pose());
+        work_.turn(motion.rotation);
+        if (!method_.options.predict) return;
+        for (const Index v : moved_.items()) ways_.col(v) = motion.direction_out(point(ways_, v));
+    }
+}
+
 // Those that moved go on, as far as what leads them does. They are to be visited, wherever they are now. A step that was
 // cut short is not expected again: where vertices were not visited, what was predicted for them would be predicted anew,
 // and grow from step to step.
 template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
-template <class Acting>
+template <class Volume, class Acting>
 void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const Acting& acting, Region<Scalar>& region) noexcept {
     if (!method_.options.predict) return;
     std::array<Lead<Scalar>, Workspace<Scalar>::most_constraints> leads{};
     acting.tell(leads);
+    if constexpr (moves<Volume>) {  // as they go on the body
+        for (auto& lead : leads) {
+            if (lead) lead->at = lead->is_force ? pose_.direction_in(lead->at) : pose_.point_in(lead->at);
+        }
+    }
     const Scalar part = predictor_.expect(leads);
     if (part == 0 || !complete_) return;
     for (const Index v : moved_.items()) {
@@ -278,6 +311,8 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
     complete_ = false;
     last_held_.clear();
     woken_.clear();
+    pose_ = {};
+    deformations_ = 0;
     resume_ = 0;
     costs_ = {};
 }

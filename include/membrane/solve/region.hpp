@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <membrane/core/index_set.hpp>
+#include <membrane/core/rigid_frame.hpp>
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/core/types.hpp>
 
@@ -39,11 +40,12 @@ struct Workspace {
 
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(compliance.size()); }
 
-    void open() noexcept;           ///< Begins a step.
-    void close() noexcept;          ///< Keeps the touches of the step that ends for the next one.
-    void forget() noexcept;         ///< Keeps no touches.
-    void clear() noexcept;          ///< Nor what vertices answered at their last visit: as new.
-    void drop_external() noexcept;  ///< Takes all pushes back.
+    void open() noexcept;    ///< Begins a step.
+    void close() noexcept;   ///< Keeps the touches of the step that ends for the next one.
+    void forget() noexcept;  ///< Keeps no touches.
+    void clear() noexcept;   ///< Nor what vertices answered at their last visit: as new.
+    void turn(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< What is kept, with the membrane.
+    void drop_external() noexcept;                                    ///< Takes all pushes back.
 
     struct Range {
         std::size_t begin = 0, end = 0;
@@ -273,6 +275,18 @@ void Workspace<Scalar>::clear() noexcept {
     forget();
     for (auto* answers : {&compliance, &resistance, &firmness}) std::fill(answers->begin(), answers->end(), Scalar(0));
     std::fill(block_compliance.begin(), block_compliance.end(), Symmetric3<Scalar>{});
+}
+
+template <Real Scalar>
+void Workspace<Scalar>::turn(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept {
+    const RigidFrame<Scalar> turned{.rotation = rotation};
+    for (auto& touch : touches_before.items()) {
+        touch.normal = turned.direction_out(touch.normal);
+        touch.force = turned.direction_out(touch.force);
+    }
+    for (auto& compliance_of_vertex : block_compliance) {
+        compliance_of_vertex = rotated(compliance_of_vertex, rotation);
+    }
 }
 
 template <Real Scalar>
