@@ -11,6 +11,7 @@
 #include <membrane/collision/contact_geometry.hpp>
 #include <membrane/collision/neighbourhood.hpp>
 #include <membrane/collision/tool.hpp>
+#include <membrane/collision/winding_number.hpp>
 #include <membrane/core/index_set.hpp>
 
 /// Does the tool touch, where, how deep, and since when?
@@ -82,6 +83,7 @@ class ContactTracker {
     void gather(const Scene& scene, Index f) noexcept;
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
 
     // What a tool has gone through springs back, and may fold over it: for some ticks it is looked at from farther off.
     static constexpr int rings_watched = 2, rings_after_crossing = 6, ticks_after_crossing = 16;
@@ -210,6 +212,7 @@ template <Real Scalar>
 bool ContactTracker<Scalar>::touches(const Scene& scene, Contact<Scalar>& contact) noexcept {
     if (!last_.touching() && contact.gap > 0) return false;
     measure_depth(scene, contact);
+    if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
     const Scalar slack = margin_ / 1000;
     return contact.gap <= slack || (contact.depth > 0 && contact.gap <= contact.depth + scene.travel);
@@ -250,7 +253,8 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     };
     bool behind = seen_from(contact.side);
     if (behind && !last_.touching() && !surface_.closed()) behind = seen_from(-1);  // it is first seen from there
-    contact.crossed = behind && (!last_.touching() || !has_given_way(surface_, scene.x, last_));
+    contact.crossed = behind && (surface_.closed() ? winding_number(surface_, scene.tree, scene.x, contact.on_axis) != 0
+                                                   : !last_.touching() || !has_given_way(surface_, scene.x, last_));
     if (behind && !contact.crossed) {
         contact.gap = -contact.gap - 2 * scene.radius;
         contact.normal = -contact.normal;
@@ -324,6 +328,16 @@ void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& 
         const Scalar height = contact.side * surface_.height(scene.anchors, f, probes[i]);
         contact.depth = (std::max)(contact.depth, scene.radius - height);
     }
+}
+
+// A tool that is outside the surface as it would be without it has nothing to press; what lies beyond it, farther out, would
+// be pulled.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+    if (contact.depth > 0) return false;
+    const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
+    const auto nearest = closest_point(surface_.triangle(scene.anchors, f), contact.on_axis);
+    return dot<Scalar>(contact.normal, contact.on_axis - nearest.point) < 0;
 }
 
 }  // namespace membrane
