@@ -279,6 +279,17 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     }
     contact.crossed = behind && has_passed(scene, contact.triangle, contact.side, contact.on_axis);
     if (behind && !contact.crossed) turn();
+    // Of a shaft across a border what is nearest may be outside, and an end behind.
+    for (const Vector3<Scalar>& end : {scene.tool.position, Vector3<Scalar>(scene.tool.position + scene.tool.axis)}) {
+        if (contact.crossed || side_ == 0 || surface_.closed() || feature_pairs(scene.tool) == 1) break;
+        if (!has_passed(scene, f, side_, end)) continue;
+        const Index g = surface_.descend(scene.x, f, end);
+        contact = contact_in(surface_, scene.x, g, Tool<Scalar>{.position = end}, scene.radius, side_);
+        contact.crossed = true;
+        if (contact.side == side_ && contact.gap < -scene.radius) continue;
+        contact.side = side_;
+        turn();
+    }
     contact.before = (contact.crossed ? contact.point : contact.on_axis) + margin_ * contact.normal;
 }
 
