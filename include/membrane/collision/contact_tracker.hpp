@@ -76,7 +76,7 @@ class ContactTracker {
     [[nodiscard]] Scalar expected_side() const noexcept {
         return side_ != 0 ? side_ : last_.touching() ? last_.side : Scalar(1);
     }
-    [[nodiscard]] Scalar clearance() const noexcept { return 2 * surface_.mean_edge(); }  // [m]
+    [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool touches(const Scene& scene, Contact<Scalar>& contact) noexcept;
@@ -159,7 +159,7 @@ Contact<Scalar> ContactTracker<Scalar>::update(const AabbTree<Scalar>& tree, con
         contact.phase = before ? ContactPhase::ongoing : ContactPhase::began;
         settle_side(scene, contact);
     } else {
-        if (contact.gap > clearance() || leaves_border(scene, contact)) side_ = 0;
+        if (side_ != 0 && !tool.grasping && (is_clear(scene) || leaves_border(scene, contact))) side_ = 0;
         near_.clear();
         origin_triangles_.fill(no_index);
         contact = {};
@@ -375,6 +375,16 @@ void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& 
         if (below_border) height = std::abs(height);
         contact.depth = (std::max)(contact.depth, scene.radius - height);
     }
+}
+
+// Whether nothing is within two edges of the tool.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_clear(const Scene& scene) const noexcept {
+    bool clear = true;
+    const auto& tool = scene.tool;
+    const Scalar radius = scene.radius + 2 * surface_.mean_edge();
+    scene.tree.touching_capsule(scene.x, tool.position, tool.position + tool.axis, radius, [&](Index) { clear = false; });
+    return clear;
 }
 
 // Beside a border a tool may be on either side. Once it has been above or below, it stays there until it is clear of the
