@@ -11,6 +11,7 @@
 #include <membrane/collision/contact_geometry.hpp>
 #include <membrane/collision/neighbourhood.hpp>
 #include <membrane/collision/tool.hpp>
+#include <membrane/collision/winding_number.hpp>
 #include <membrane/core/index_set.hpp>
 
 /// Does the tool touch, where, how deep, and since when?
@@ -78,16 +79,25 @@ class ContactTracker {
                                         const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) noexcept;
     [[nodiscard]] Scene scene_of(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                  const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) const noexcept;
+    [[nodiscard]] Scalar expected_side() const noexcept {
+        return side_ != 0 ? side_ : last_.touching() ? last_.side : Scalar(1);
+    }
+    [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool touches(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept;
     void describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept;
+    [[nodiscard]] bool has_passed(const Scene& scene, Index near, Scalar side, const Vector3<Scalar>& q) const noexcept;
     void gather_from_tree(const Scene& scene) noexcept;
     void flood(const Scene& scene) noexcept;
     void gather(const Scene& scene, Index f) noexcept;
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
+    [[nodiscard]] bool leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
+    void settle_side(const Scene& scene, const Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
 
     // What a tool has gone through springs back, and may fold over it: for some ticks it is looked at from farther off.
     static constexpr int rings_watched = 2, rings_after_crossing = 6, ticks_after_crossing = 16;
@@ -106,6 +116,7 @@ class ContactTracker {
     Contact<Scalar> last_;
     std::optional<Tool<Scalar>> last_tool_;
     RigidFrame<Scalar> pose_;  // of the body then
+    Scalar side_ = 0;  // that the tool is known to be on; 0: not yet
     // Where on the surface without the tool its two ends and its contact point are nearest to.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
     Index ticks_ = 0, tree_checks_ = 0;
@@ -134,6 +145,7 @@ void ContactTracker<Scalar>::reset() noexcept {
     last_ = {};
     last_tool_.reset();
     pose_ = {};
+    side_ = 0;
     origin_triangles_.fill(no_index);
     ticks_ = 0;
     lively_ticks_ = 0;
@@ -178,7 +190,9 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
     if ((followed || find(scene, contact)) && touches(scene, contact)) {
         complete(scene, contact);
         contact.phase = before ? ContactPhase::ongoing : ContactPhase::began;
+        settle_side(scene, contact);
     } else {
+        if (side_ != 0 && !tool.grasping && (is_clear(scene) || leaves_border(scene, contact))) side_ = 0;
         near_.clear();
         origin_triangles_.fill(no_index);
         contact = {};
@@ -217,7 +231,7 @@ bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact
     flood(scene);
     if (near_.empty()) return false;
 
-    contact.side = last_.side;
+    contact.side = expected_side();
     if (!crossing(scene, contact)) describe(scene, nearest_, contact);
     return true;
 }
@@ -232,7 +246,7 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
     if (!crossing(scene, contact)) {
         const Index f = near_.empty() ? scene.tree.closest_point(scene.x, scene.tool.position).triangle : nearest_;
         if (f == no_index) return false;
-        contact.side = last_.touching() ? last_.side : Scalar(1);
+        contact.side = expected_side();
         describe(scene, f, contact);
     }
     return true;
@@ -242,7 +256,9 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
 template <Real Scalar>
 bool ContactTracker<Scalar>::touches(const Scene& scene, Contact<Scalar>& contact) noexcept {
     if (!last_.touching() && contact.gap > 0) return false;
+    if (contact.gap > 0 && is_below_border(scene, contact)) return false;
     measure_depth(scene, contact);
+    if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
     const Scalar slack = margin_ / 1000;
     return contact.gap <= slack || (contact.depth > 0 && contact.gap <= contact.depth + scene.travel);
@@ -252,7 +268,7 @@ bool ContactTracker<Scalar>::touches(const Scene& scene, Contact<Scalar>& contac
 template <Real Scalar>
 bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept {
     if (!last_tool_) return false;
-    const Scalar side = last_.touching() ? last_.side : Scalar(1);
+    const Scalar side = expected_side();
     const auto through = [&](const Vector3<Scalar>& from, const Vector3<Scalar>& now) {
         const auto hit = scene.tree.first_hit(scene.x, from, now);
         if (hit.triangle == no_index) return false;
@@ -260,9 +276,10 @@ bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& conta
         if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it has only come to it
         if (passed.gap > 0) {
             if (hit.along < negligible_way) return false;  // it leaves what it rests on
+            if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from)) return false;  // or comes out
             passed.normal = -passed.normal;                // of a crease, or an open surface from its other side
             passed.gap = -passed.gap;
-            if (!surface_.closed() && !last_.touching()) passed.side = -side;
+            if (!surface_.closed() && !last_.touching() && side_ == 0) passed.side = -side;
         }
         contact = passed;
         contact.gap -= scene.radius;
@@ -281,14 +298,46 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
         contact = contact_in(surface_, scene.x, f, scene.tool, scene.radius, side);
         return contact.gap < -scene.radius;
     };
-    bool behind = seen_from(contact.side);
-    if (behind && !last_.touching() && !surface_.closed()) behind = seen_from(-1);  // it is first seen from there
-    contact.crossed = behind && (!last_.touching() || !has_given_way(surface_, scene.x, last_));
-    if (behind && !contact.crossed) {
+    const Scalar side = contact.side;
+    const auto turn = [&] {
         contact.gap = -contact.gap - 2 * scene.radius;
         contact.normal = -contact.normal;
+    };
+    bool behind = seen_from(side);
+    if (behind && !last_.touching() && side_ == 0 && !surface_.closed()) behind = seen_from(-1);  // it is first seen from there
+    if (side_ != 0 && contact.side != side_) {  // beside a border
+        contact.side = side_;
+        behind = true;
+        turn();
+    }
+    contact.crossed = behind && has_passed(scene, contact.triangle, contact.side, contact.on_axis);
+    if (behind && !contact.crossed) turn();
+    // Of a shaft across a border what is nearest may be outside, and an end behind.
+    for (const Vector3<Scalar>& end : {scene.tool.position, Vector3<Scalar>(scene.tool.position + scene.tool.axis)}) {
+        if (contact.crossed || side_ == 0 || surface_.closed() || feature_pairs(scene.tool) == 1) break;
+        if (!has_passed(scene, f, side_, end)) continue;
+        const Index g = surface_.descend(scene.x, f, end);
+        contact = contact_in(surface_, scene.x, g, Tool<Scalar>{.position = end}, scene.radius, side_);
+        contact.crossed = true;
+        if (contact.side == side_ && contact.gap < -scene.radius) continue;
+        contact.side = side_;
+        turn();
     }
     contact.before = (contact.crossed ? contact.point : contact.on_axis) + margin_ * contact.normal;
+}
+
+// Whether `q` is behind the surface and not outside, in a crease. An open surface has no inside: there it is behind what
+// lies between it and where it would be outside, had the surface not moved.
+template <Real Scalar>
+bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar side,
+                                        const Vector3<Scalar>& q) const noexcept {
+    if (surface_.closed()) return winding_number(surface_, scene.tree, scene.x, q) != 0;
+    const Index f = surface_.descend(scene.anchors, near, q);
+    const auto nearest = closest_point(surface_.triangle(scene.anchors, f), q);
+    const Vector3<Scalar> outward = side * surface_.outward(scene.anchors, f, nearest.barycentric);
+    const auto hit = scene.tree.first_hit(scene.x, q, q + 2 * reach(scene.tree.box(0), q) * outward);
+    if (hit.triangle == no_index) return false;
+    return side * dot<Scalar>(area_vector(surface_.triangle(scene.x, hit.triangle)), outward) > 0;
 }
 
 template <Real Scalar>
@@ -350,13 +399,60 @@ void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& 
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
                                                 contact.on_axis};
     const std::size_t count = feature_pairs(scene.tool) == 1 ? 1 : 3;
+    const bool below_border = is_below_border(scene, contact);
     contact.depth = 0;
     for (std::size_t i = 0; i < count; ++i) {
         Index& f = origin_triangles_[i];
         f = surface_.descend(scene.anchors, f == no_index ? contact.triangle : f, probes[i]);
-        const Scalar height = contact.side * surface_.height(scene.anchors, f, probes[i]);
+        Scalar height = contact.side * surface_.height(scene.anchors, f, probes[i]);
+        if (below_border) height = std::abs(height);
         contact.depth = (std::max)(contact.depth, scene.radius - height);
     }
+}
+
+// Whether nothing is within two edges of the tool.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_clear(const Scene& scene) const noexcept {
+    bool clear = true;
+    const auto& tool = scene.tool;
+    const Scalar radius = scene.radius + 2 * surface_.mean_edge();
+    scene.tree.touching_capsule(scene.x, tool.position, tool.position + tool.axis, radius, [&](Index) { clear = false; });
+    return clear;
+}
+
+// Beside a border a tool may be on either side. Once it has been above or below, it stays there until it is clear of the
+// surface, or has slid off a border that gave way: past one that does not, it can only have been forced.
+template <Real Scalar>
+void ContactTracker<Scalar>::settle_side(const Scene& scene, const Contact<Scalar>& contact) noexcept {
+    if (side_ != 0) return;
+    const auto outward = surface_.outward(scene.x, contact.triangle, contact.barycentric);
+    const bool above = contact.side * dot<Scalar>(contact.normal, outward) > Scalar(0.5);
+    if (above || !surface_.on_border(contact.triangle, contact.barycentric)) side_ = contact.side;
+}
+
+// Whether the tool is beside a border, and lower.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+    if (contact.crossed || !surface_.on_border(contact.triangle, contact.barycentric)) return false;
+    const auto outward = surface_.outward(scene.x, contact.triangle, contact.barycentric);
+    return contact.side * dot<Scalar>(contact.normal, outward) < 0;
+}
+
+template <Real Scalar>
+bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+    if (contact.triangle == no_index || !is_below_border(scene, contact)) return false;
+    const Vector3<Scalar> origin = point_at(surface_.triangle(scene.anchors, contact.triangle), contact.barycentric);
+    return norm<Scalar>(contact.point - origin) > margin_;
+}
+
+// A tool that is outside the surface as it would be without it has nothing to press; what lies beyond it, farther out, would
+// be pulled.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+    if (contact.depth > 0) return false;
+    const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
+    const auto nearest = closest_point(surface_.triangle(scene.anchors, f), contact.on_axis);
+    return dot<Scalar>(contact.normal, contact.on_axis - nearest.point) < 0;
 }
 
 }  // namespace membrane

@@ -7,6 +7,7 @@
 #include <membrane/collision/contact.hpp>
 #include <membrane/collision/neighbourhood.hpp>
 #include <membrane/collision/tool.hpp>
+#include <membrane/mesh/moving_body.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 
 /// A depth and a normal that belong together, so that a force made of them has a potential.
@@ -41,16 +42,19 @@ class RestContact {
 
     /// Not for the solver. Online. Cost: O(log F) for a sphere, 17 times that for a shaft.
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact, const Tool<Scalar>& tool) const noexcept {
-        return (*this)(contact, tool, tree_, at_rest_);
+        return contact_with(at_rest_, tree_, contact, tool);
     }
 
-    /// The same on a body that moves other than rigidly (a rigid one: `carried_in`): `anchors` is where the membrane would
-    /// be without the tool (3 x V [m]), `tree` is fitted to them.
+    /// The same on a body that moves; `tree` is fitted to its anchors.
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact, const Tool<Scalar>& tool,
                                              const AabbTree<Scalar>& tree,
-                                             const ConstPointsRef<Scalar>& anchors) const noexcept;
+                                             const MovingBody<Scalar>& body) const noexcept {
+        return contact_with(body.anchors(), tree, contact, tool);
+    }
 
   private:
+    [[nodiscard]] Contact<Scalar> contact_with(const ConstPointsRef<Scalar>& anchors, const AabbTree<Scalar>& tree,
+                                               const Contact<Scalar>& contact, const Tool<Scalar>& tool) const noexcept;
     [[nodiscard]] Contact<Scalar> contact_of(const Vector3<Scalar>& q, Scalar side, const AabbTree<Scalar>& tree,
                                              const ConstPointsRef<Scalar>& anchors) const noexcept;
 
@@ -62,9 +66,9 @@ class RestContact {
 };
 
 template <Real Scalar>
-Contact<Scalar> RestContact<Scalar>::operator()(const Contact<Scalar>& contact, const Tool<Scalar>& tool,
-                                                const AabbTree<Scalar>& tree,
-                                                const ConstPointsRef<Scalar>& anchors) const noexcept {
+Contact<Scalar> RestContact<Scalar>::contact_with(const ConstPointsRef<Scalar>& anchors, const AabbTree<Scalar>& tree,
+                                                  const Contact<Scalar>& contact,
+                                                  const Tool<Scalar>& tool) const noexcept {
     MEMBRANE_ASSERT(anchors.cols() == at_rest_.cols());
     Contact<Scalar> lowest;
     if (!is_sound(tool) || (!surface_.closed() && !contact.touching())) return lowest;
