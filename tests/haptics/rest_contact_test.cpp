@@ -239,3 +239,26 @@ TEST_CASE("in slow turns over a membrane some forces give energy, and those with
         if (deepest == 1e-3) CHECK(plain.energy() / turns == Approx(-13.4e-6).epsilon(0.1));
     }
 }
+
+TEST_CASE("on a body that moves the contact with the surface at rest goes along", "[rest]") {
+    const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 2});
+    const auto rest = RestContact(mesh);
+    MovingBody<double> body(mesh);
+    auto tree = AabbTree(mesh);
+    Points<double> x = mesh.positions();
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        RigidFrame<double> pose;
+        pose.rotation = random.rotation();
+        pose.origin = 0.1 * random.vector();
+        REQUIRE(body.move_to(pose, x));
+        tree.refit(body.anchors());
+        const Vector3<double> p = random.number(0.009, 0.0112) * random.unit_vector();
+        const auto still = rest({}, ball_at(p));
+        const auto moved = rest({}, ball_at(pose.point_out(p)), tree, body);
+        CHECK(moved.touching() == still.touching());
+        CHECK(std::abs(moved.depth - still.depth) <= 1e-15);
+        if (still.touching()) CHECK(norm<double>(moved.normal - pose.direction_out(still.normal)) <= 1e-9);
+    }
+}

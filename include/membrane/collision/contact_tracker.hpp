@@ -116,7 +116,7 @@ class ContactTracker {
     Contact<Scalar> last_;
     std::optional<Tool<Scalar>> last_tool_;
     RigidFrame<Scalar> pose_;  // of the body then
-    Scalar side_ = 0;  // that the tool is known to be on; 0: not yet
+    Scalar side_ = 0;          // that the tool is known to be on; 0: not yet
     // Where on the surface without the tool its two ends and its contact point are nearest to.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
     Index ticks_ = 0, tree_checks_ = 0;
@@ -276,8 +276,9 @@ bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& conta
         if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it has only come to it
         if (passed.gap > 0) {
             if (hit.along < negligible_way) return false;  // it leaves what it rests on
-            if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from)) return false;  // or comes out
-            passed.normal = -passed.normal;                // of a crease, or an open surface from its other side
+            if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from))
+                return false;                // or comes out
+            passed.normal = -passed.normal;  // of a crease, or an open surface from its other side
             passed.gap = -passed.gap;
             if (!surface_.closed() && !last_.touching() && side_ == 0) passed.side = -side;
         }
@@ -296,7 +297,7 @@ template <Real Scalar>
 void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept {
     const auto seen_from = [&](Scalar side) {
         contact = contact_in(surface_, scene.x, f, scene.tool, scene.radius, side);
-        return contact.gap < -scene.radius;
+        return contact.gap < -scene.radius - detail::rounding_at(contact.on_axis);  // not on the surface itself
     };
     const Scalar side = contact.side;
     const auto turn = [&] {
@@ -304,7 +305,8 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
         contact.normal = -contact.normal;
     };
     bool behind = seen_from(side);
-    if (behind && !last_.touching() && side_ == 0 && !surface_.closed()) behind = seen_from(-1);  // it is first seen from there
+    if (behind && !last_.touching() && side_ == 0 && !surface_.closed())
+        behind = seen_from(-1);                 // it is first seen from there
     if (side_ != 0 && contact.side != side_) {  // beside a border
         contact.side = side_;
         behind = true;
@@ -416,7 +418,8 @@ bool ContactTracker<Scalar>::is_clear(const Scene& scene) const noexcept {
     bool clear = true;
     const auto& tool = scene.tool;
     const Scalar radius = scene.radius + 2 * surface_.mean_edge();
-    scene.tree.touching_capsule(scene.x, tool.position, tool.position + tool.axis, radius, [&](Index) { clear = false; });
+    scene.tree.touching_capsule(scene.x, tool.position, tool.position + tool.axis, radius,
+                                [&](Index) { clear = false; });
     return clear;
 }
 
