@@ -370,3 +370,20 @@ TEST_CASE("tracker options out of range are refused") {
     CHECK(test::refusal([&] { ContactTracker<double>(mesh, {.check_every = 0}); }) ==
           "ContactTracker: check_every must be at least 1, got 0");
 }
+
+TEST_CASE("a tool first seen with its centre on the surface is on its outer side") {
+    const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 2});
+    const AabbTree<double> tree(mesh);
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto triangle =
+            membrane::triangle_at(mesh.positions(), mesh.triangles().col(random.index(mesh.triangle_count())));
+        const Vector place = membrane::point_at(triangle, Vector(random.barycentric()));
+        ContactTracker<double> tracker(mesh);
+        const auto contact = tracker.update(tree, mesh.positions(), Tool<double>{.position = place, .radius = 1e-3});
+        REQUIRE(contact.touching());
+        REQUIRE(contact.normal.dot(place) > 0);
+        REQUIRE(std::abs(contact.gap + 1e-3) <= 1e-15);
+    }
+}
