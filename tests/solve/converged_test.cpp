@@ -163,7 +163,8 @@ struct Run {
     bool has_second;
     QuasiStaticSolver<double> solver;
     AabbTree<double> tree{scene.mesh};
-    ContactTracker<double> tracker{scene.mesh}, tracker_2{scene.mesh};
+    // A second fold that comes to the tool is known at once.
+    ContactTracker<double> tracker{scene.mesh, {.check_every = 1}}, tracker_2{scene.mesh, {.check_every = 1}};
     Grasper<double> grasper{scene.mesh};
     Points<double> x = scene.mesh.positions();
     std::vector<char> has_taken_part = std::vector<char>(static_cast<std::size_t>(scene.mesh.vertex_count()), 0);
