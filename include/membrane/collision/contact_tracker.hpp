@@ -312,7 +312,9 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
         behind = true;
         turn();
     }
-    contact.crossed = behind && has_passed(scene, contact.triangle, contact.side, contact.on_axis);
+    const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1;  // stuck through, perhaps
+    contact.crossed =
+        behind && (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.on_axis));
     if (behind && !contact.crossed) turn();
     // Of a shaft across a border what is nearest may be outside, and an end behind.
     for (const Vector3<Scalar>& end : {scene.tool.position, Vector3<Scalar>(scene.tool.position + scene.tool.axis)}) {

@@ -59,7 +59,7 @@ int winding_number(const Neighbourhood<Scalar>& surface, const AabbTree<Scalar>&
                                      t.c.template cast<double>()};
         const int winding = detail::winding_in_plane(exact, from, static_cast<int>(axis));
         if (winding == 0) return;
-        const bool is_above = winding * sign_of_volume(exact.a, exact.b, exact.c, from) < 0;
+        const bool is_above = winding * sign_of_volume(exact.a, exact.b, exact.c, from) > 0;
         if (is_above == upward) sum += upward ? winding : -winding;
     });
     return sum;
