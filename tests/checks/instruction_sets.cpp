@@ -9,14 +9,14 @@
 #include <membrane/membrane.hpp>
 
 struct Scene {
-    membrane::TriangleMesh<double> mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});
-    membrane::MassSpringNetwork<double, membrane::LinearSpring> network{mesh, {}, {.stiffness = 40.0}};
-    membrane::VirtualVolumeSprings<double> backing{mesh, {.stiffness = 8.0, .damping = 0.02}};
-    membrane::QuasiStaticSolver<double> solver{network, {.layers = 6}};
-    membrane::AabbTree<double> tree{mesh};
-    membrane::ContactTracker<double> tracker{mesh};
-    membrane::VertexNormals<double> normals{mesh};
-    membrane::Points<double> x = mesh.positions();
+    membrane::TriangleMesh<double> mesh;
+    membrane::MassSpringNetwork<double, membrane::LinearSpring> network;
+    membrane::VirtualVolumeSprings<double> backing;
+    membrane::QuasiStaticSolver<double> solver;
+    membrane::AabbTree<double> tree;
+    membrane::ContactTracker<double> tracker;
+    membrane::VertexNormals<double> normals;
+    membrane::Points<double> x;
 };
 #elif defined(GIVE) || defined(TAKE_MAIN)
 #include <membrane/collision/aabb_tree.hpp>
@@ -37,7 +37,18 @@ double step(Scene* scene);
 }  // namespace avx2
 
 #if defined(MAKE)
-Scene* UNIT::make() { return new Scene; }
+Scene* UNIT::make() {
+    const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});
+    const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
+    return new Scene{mesh,
+                     network,
+                     membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02}),
+                     membrane::QuasiStaticSolver(network, {.layers = 6}),
+                     membrane::AabbTree(mesh),
+                     membrane::ContactTracker(mesh),
+                     membrane::VertexNormals(mesh),
+                     mesh.positions()};
+}
 #elif defined(STEP)
 // The force on a tool that presses. Frees the scene.
 double UNIT::step(Scene* scene) {
