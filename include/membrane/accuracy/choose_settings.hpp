@@ -63,7 +63,7 @@ struct Choice : Outcome {
 /// @throws InvalidInput for a wanted error or time that is not positive, none or both of them, an option out of its range,
 /// a history in which no force is felt or that has no equilibrium, and for what `trial` and `equilibria` refuse. Offline.
 /// Cost: an `equilibrium` for each tick that is judged, and some 30 to 300 times the history.
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History,
           StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] Choice<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const Network& network,
                                              const Volume& volume, const History& history, const Wanted& wanted,
@@ -212,7 +212,7 @@ Choice<Scalar> choose_settings(const ExperimentOptions<Scalar>& experiment, cons
     return search.best();
 }
 
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History,
           StepRule<Scalar> Rule, class Clock>
 Choice<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
                                const History& history, const Wanted& wanted,

@@ -28,6 +28,24 @@ concept ConvexityModel = std::copyable<Model> && std::constructible_from<Model, 
     noexcept->std::same_as<double>;
 };
 
+namespace detail {
+
+template <class Model>
+consteval bool check_convexity_model() noexcept {
+    static_assert(std::copyable<Model>, "ConvexityModel: must be copyable");
+    static_assert(std::constructible_from<Model, const RestProblem&>,
+                  "ConvexityModel: must have a constructor from const RestProblem&");
+    static_assert(ConvexityModel<Model>,
+                  "ConvexityModel: around(const RestProblem&, double radius) noexcept must return double");
+    return ConvexityModel<Model>;
+}
+
+}  // namespace detail
+
+/// A `ConvexityModel`; where it is none, the error says what is missing.
+template <class Model>
+concept CheckedConvexityModel = detail::check_convexity_model<Model>();
+
 /// A lower bound of a spring's stiffness, the second derivative of its energy by the reach from one end to the other:
 /// `along` u u^T + `across` (I - u u^T) [N/m].
 struct SpringBound {

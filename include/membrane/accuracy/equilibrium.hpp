@@ -39,7 +39,7 @@ namespace membrane {
 /// @throws InvalidInput for points that are not one finite for each vertex, a mesh, network and backing that do not
 /// belong together, an option out of its range, a constraint that is not sound. Offline.
 /// Cost: some 5 to 20 sparse factorisations for each increment.
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, RestConstraint... Constraints>
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedRestConstraint... Constraints>
 [[nodiscard]] Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
                                       const EquilibriumOptions& options, const Constraints&... constraints);
@@ -88,7 +88,7 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
 
 }  // namespace detail
 
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, RestConstraint... Constraints>
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedRestConstraint... Constraints>
 Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, const TriangleMesh<Scalar>& mesh,
                         const Network& network, const Volume& volume, const EquilibriumOptions& options,
                         const Constraints&... constraints) {

@@ -70,7 +70,7 @@ struct ErrorBoundOptions {
 /// bounded all the same. A press that touches nothing, or holds nothing, counts as none.
 ///
 /// Remembers nothing from call to call. One thread at a time for each.
-template <ConvexityModel Convexity = BlockConvexity>
+template <CheckedConvexityModel Convexity = BlockConvexity>
 class ErrorBound {
   public:
     /// @throws InvalidInput for an option out of its range. Cost: O(V + springs) memory.
@@ -129,7 +129,7 @@ inline void ErrorBoundOptions::check() const {
     if (refinements < 1) refuse("ErrorBound", "refinements must be at least 1, got ", refinements);
 }
 
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 template <Real Scalar, class Law>
 ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network, const ErrorBoundOptions& options)
     : options_((options.check(), options)),
@@ -145,7 +145,7 @@ ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network,
       weights_(magnitude_),
       slopes_(magnitude_) {}
 
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar>... Constraints>
 ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
@@ -160,7 +160,7 @@ ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<
     return report(constraints...);
 }
 
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 template <Real Scalar, class Law, LinearBacking Volume, RestConstraint... Constraints>
 ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
@@ -186,7 +186,7 @@ ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_i
     return report(constraints...);
 }
 
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::open(std::size_t constraint_count) noexcept {
     error_ = {};
     reactions_.fill({});
@@ -195,7 +195,7 @@ void ErrorBound<Convexity>::open(std::size_t constraint_count) noexcept {
     radius_ = -1;
 }
 
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 template <class... Constraints>
 ErrorReport ErrorBound<Convexity>::report(const Constraints&... constraints) noexcept {
     static_assert(sizeof...(Constraints) <= most_constraints, "16 constraints at most, as in a step");
@@ -206,7 +206,7 @@ ErrorReport ErrorBound<Convexity>::report(const Constraints&... constraints) noe
 
 // The equilibrium, by Newton's method, until what is left is small beside the way there; then a radius for C that the
 // bound it gives is not above.
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::locate() noexcept {
     y_ = problem_.centre();
     problem_.places().settle(y_);
@@ -229,7 +229,7 @@ void ErrorBound<Convexity>::locate() noexcept {
 }
 
 // A radius for C that the bound it gives is not above.
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::enclose() noexcept {
     error_.status = BoundStatus::did_not_refine;
     if (radius_ < 0 && !convex_within(1.05 * distance_ + pressed_.overlap())) {
@@ -244,7 +244,7 @@ void ErrorBound<Convexity>::enclose() noexcept {
 }
 
 // A step of Newton's method; false where the energy is not convex.
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 bool ErrorBound<Convexity>::refine() noexcept {
     stiffness_.at(problem_, y_);
     way_.setZero();
@@ -257,7 +257,7 @@ bool ErrorBound<Convexity>::refine() noexcept {
 }
 
 // The unbalanced forces at y, and its distance from x, both rounded up.
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::look() noexcept {
     problem_.forces(y_, force_, magnitude_);
     rest_ = force_;
@@ -274,7 +274,7 @@ void ErrorBound<Convexity>::look() noexcept {
 }
 
 // Takes the states within `radius` for C.
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
     radius_ = radius;
     error_.convexity = -std::numeric_limits<double>::infinity();
@@ -286,7 +286,7 @@ bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
 
 // The radius e of the ball around y; or, as a held point may be off its place by rounding, around the nearest state in
 // which none is.
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 double ErrorBound<Convexity>::enclosure() const noexcept {
     const double slip = problem_.places().slip(y_);
     const double mu = error_.convexity;
@@ -296,7 +296,7 @@ double ErrorBound<Convexity>::enclosure() const noexcept {
 }
 
 // A spring between vertices of shares a and b adds (a - b) times its change of force.
-template <ConvexityModel Convexity>
+template <CheckedConvexityModel Convexity>
 template <class C>
 EnclosedForce ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::size_t& tool) noexcept {
     if constexpr (requires { constraint.force; }) return {-constraint.force.template cast<double>(), 0};

@@ -31,6 +31,22 @@ concept ForceModel = requires(const Model& model, std::span<const double> number
     { model(numbers, numbers) } -> std::convertible_to<std::vector<double>>;
 };
 
+namespace detail {
+
+template <class Model>
+consteval bool check_force_model() noexcept {
+    static_assert(ForceModel<Model>,
+                  "ForceModel: model(std::span<const double> constants, std::span<const double> depths) const must "
+                  "give a std::vector<double> of forces [N]");
+    return ForceModel<Model>;
+}
+
+}  // namespace detail
+
+/// A `ForceModel`; where it is none, the error says what is missing.
+template <class Model>
+concept CheckedForceModel = detail::check_force_model<Model>();
+
 /// What was measured. The rows' own deviations say how much each counts against the others; how large the noise is, the
 /// scatter of the rows tells.
 struct ForceTable {
@@ -88,7 +104,7 @@ struct Fit {
 /// @throws InvalidInput for a table, options or start that is not sound, no more rows than constants, a model that gives
 /// another number of forces than depths, or at the start none that are finite (and, without deviations, positive); what
 /// the model throws. Offline. Cost: some 5 to 15 iterations of 2 constants + 1 evaluations.
-template <ForceModel Model>
+template <CheckedForceModel Model>
 [[nodiscard]] Fit fit(const ForceTable& table, const std::vector<double>& start, const Model& model,
                       const FitOptions& options = {});
 
@@ -170,7 +186,7 @@ inline void FitOptions::check() const {
     if (most_iterations < 1) refuse("FitOptions", "most_iterations must be at least 1, got ", most_iterations);
 }
 
-template <ForceModel Model>
+template <CheckedForceModel Model>
 Fit fit(const ForceTable& table, const std::vector<double>& start, const Model& model, const FitOptions& options) {
     table.check();
     options.check();

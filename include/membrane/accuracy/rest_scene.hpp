@@ -171,6 +171,21 @@ template <class C>
 concept RestConstraint = requires(const C& constraint, RestScene& scene) {
     describe(constraint, scene);
 };
+
+namespace detail {
+
+template <class C>
+consteval bool check_rest_constraint() noexcept {
+    static_assert(RestConstraint<C>,
+                  "RestConstraint: there must be describe(const C&, RestScene&) in the namespace of the constraint");
+    return RestConstraint<C>;
+}
+
+}  // namespace detail
+
+/// A `RestConstraint`; where it is none, the error says what is missing.
+template <class C>
+concept CheckedRestConstraint = detail::check_rest_constraint<C>();
 static_assert(RestConstraint<HeldVertex<float>> && RestConstraint<HeldPoint<double>> && RestConstraint<Pinned>);
 static_assert(RestConstraint<Load<float>> && RestConstraint<Press<double>>);
 

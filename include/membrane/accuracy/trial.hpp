@@ -54,6 +54,33 @@ concept LoadHistory = Real<Scalar> && std::copyable<History> &&
     requires detail::are_constraints<std::remove_cvref_t<decltype(history(tick, x, moved))>, Scalar>;
 };
 
+namespace detail {
+
+template <class History, class Scalar>
+consteval bool check_load_history() noexcept {
+    static_assert(std::copyable<History>, "LoadHistory: must be copyable");
+    static_assert(
+        requires(const History& idle) {
+            { idle.ticks() } -> std::same_as<Index>;
+        },
+        "LoadHistory: ticks() const must return Index");
+    static_assert(
+        requires(const History& idle) {
+            { idle.dt() } -> std::same_as<Scalar>;
+        },
+        "LoadHistory: dt() const must return Scalar [s]");
+    static_assert(LoadHistory<History, Scalar>,
+                  "LoadHistory: history(Index tick, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) "
+                  "must return a std::tuple of what is a Constraint and a RestConstraint");
+    return LoadHistory<History, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `LoadHistory`; where it is none, the error says what is missing.
+template <class History, class Scalar>
+concept CheckedLoadHistory = detail::check_load_history<History, Scalar>();
+
 /// A tool that presses, slides, grasps and pulls as it was recorded.
 template <Real Scalar>
 class Stroke {
@@ -92,7 +119,7 @@ struct TickAtRest {
 /// is off by what a damped backing lags behind.
 /// @throws InvalidInput for what `equilibrium` refuses, a history without ticks, or an `every` below 1. Offline.
 /// Cost: an `equilibrium` for each tick of the result.
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History>
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History>
 [[nodiscard]] std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network,
                                                  const Volume& volume, History history, Index every = 1);
 
@@ -116,7 +143,7 @@ struct SteadySeconds {
 /// Plays `history` with a solver of these options, from the mesh at rest, each tick from where the one before ended, and
 /// sets it against `rests`. `clock()` gives the time [s].
 /// @throws InvalidInput for options that the solver refuses, and `rests` of another scene. Offline.
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History,
           StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
                             History history, std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options,
@@ -140,7 +167,7 @@ template <class... Each, class Square>
     return sum;
 }
 
-template <Real Scalar, LoadHistory<Scalar> History>
+template <Real Scalar, CheckedLoadHistory<Scalar> History>
 void check_history(std::string_view component, const History& history) {
     if (history.ticks() < 1) refuse(component, "the history must have a tick, got ", history.ticks());
     if (!is_finite(history.dt()) || !(history.dt() > 0)) {
@@ -205,7 +232,7 @@ std::tuple<Press<Scalar>, HeldPoint<Scalar>> Stroke<Scalar>::operator()(Index ti
     return {press(tool, contact, grasp), pull(tool, grasp)};
 }
 
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History>
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History>
 std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
                                    History history, Index every) {
     detail::check_history<Scalar>("equilibria", history);
@@ -234,7 +261,7 @@ std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const Netwo
     return rests;
 }
 
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, LoadHistory<Scalar> History,
+template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History,
           StepRule<Scalar> Rule, class Clock>
 Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume, History history,
               std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options, const Rule& rule,

@@ -28,6 +28,23 @@ concept Executor = std::copy_constructible<E> &&
     executor(count, task);
 };
 
+namespace detail {
+
+template <class E>
+consteval bool check_executor() noexcept {
+    static_assert(std::copy_constructible<E>, "Executor: must have a copy constructor");
+    static_assert(
+        Executor<E>,
+        "Executor: executor(Index count, const Task& task) const must take any task that is called with an Index");
+    return Executor<E>;
+}
+
+}  // namespace detail
+
+/// A `Executor`; where it is none, the error says what is missing.
+template <class E>
+concept CheckedExecutor = detail::check_executor<E>();
+
 /// The thread that asks.
 struct OneThread {
     template <class Task>

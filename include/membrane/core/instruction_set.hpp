@@ -26,8 +26,9 @@ inline namespace MEMBRANE_INSTRUCTION_SET __attribute__((abi_tag)) {}
 
 namespace detail {
 
-// A part may also come from another unit inside a type that names no instruction set. So a unit that makes parts defines a
-// symbol, which a unit that uses them refers to: if all are made by units for another instruction set, it is undefined.
+// A part may also come from another unit inside a type that names no instruction set. So a unit that can make such parts
+// defines a symbol, which a unit that uses them refers to: if only units for other sets can, it is undefined. Where one for
+// each set can, nothing tells, but then nothing breaks: parts lie in memory alike for all.
 #if defined(__ELF__)
 template <class Part>
 struct MadeHere {

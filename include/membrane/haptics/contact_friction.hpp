@@ -29,7 +29,7 @@ struct FrictionOptions {
 /// energy and never gives any but what the spring has stored; the largest stiffness that passivity has to reckon with is
 /// the larger of the policy's and `stiffness`.
 template <class Policy, Real Scalar = double>
-    requires ForcePolicy<Policy, Scalar>
+    requires CheckedForcePolicy<Policy, Scalar>
 class ContactFriction {
   public:
     /// @throws InvalidInput for an option out of its range
@@ -57,7 +57,7 @@ inline void FrictionOptions::check() const {
 }
 
 template <class Policy, Real Scalar>
-requires ForcePolicy<Policy, Scalar> Vector3<Scalar> ContactFriction<Policy, Scalar>::operator()(
+requires CheckedForcePolicy<Policy, Scalar> Vector3<Scalar> ContactFriction<Policy, Scalar>::operator()(
     const HapticState<Scalar>& state) noexcept {
     const Vector3<Scalar> force = policy_(state);
     const auto& [tool, contact, report, grasp] = state;

@@ -29,6 +29,37 @@ concept Device = Real<Scalar> && requires(D& device, const D& idle, const Vector
     noexcept->std::same_as<void>;
 };
 
+namespace detail {
+
+template <class D, class Scalar>
+consteval bool check_device() noexcept {
+    static_assert(
+        requires(const D& idle) {
+            { idle.running() }
+            noexcept->std::same_as<bool>;
+        },
+        "Device: running() const noexcept must return bool");
+    static_assert(
+        requires(D & device) {
+            { device.read() }
+            noexcept->std::same_as<Tool<Scalar>>;
+        },
+        "Device: read() noexcept must return Tool<Scalar>");
+    static_assert(
+        requires(D & device, const Vector3<Scalar>& force) {
+            { device.write(force) }
+            noexcept->std::same_as<void>;
+        },
+        "Device: write(const Vector3<Scalar>& force) noexcept must return void");
+    return Device<D, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `Device`; where it is none, the error says what is missing.
+template <class D, class Scalar>
+concept CheckedDevice = detail::check_device<D, Scalar>();
+
 /// Where the tool of a script is at a time.
 template <Real Scalar>
 struct Waypoint {
@@ -62,6 +93,50 @@ concept Hand = Real<Scalar> && std::copyable<H> &&
     noexcept->std::convertible_to<Vector3<Scalar>>;
 };
 
+namespace detail {
+
+template <class H, class Scalar>
+consteval bool check_hand() noexcept {
+    static_assert(std::copyable<H>, "Hand: must be copyable");
+    static_assert(
+        requires(H & hand, const Vector3<Scalar>& vector) {
+            { hand.place(vector) }
+            noexcept;
+        },
+        "Hand: there must be place(const Vector3<Scalar>& position) noexcept");
+    static_assert(
+        requires(H & hand, const Vector3<Scalar>& vector) {
+            { hand.aim(vector, vector) }
+            noexcept;
+        },
+        "Hand: there must be aim(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept");
+    static_assert(
+        requires(H & hand, const Vector3<Scalar>& vector, Scalar dt) {
+            { hand.move(vector, dt) }
+            noexcept;
+        },
+        "Hand: there must be move(const Vector3<Scalar>& force, Scalar dt) noexcept");
+    static_assert(
+        requires(const H& idle) {
+            { idle.position() }
+            noexcept->std::convertible_to<Vector3<Scalar>>;
+        },
+        "Hand: position() const noexcept must give a Vector3<Scalar>");
+    static_assert(
+        requires(const H& idle) {
+            { idle.velocity() }
+            noexcept->std::convertible_to<Vector3<Scalar>>;
+        },
+        "Hand: velocity() const noexcept must give a Vector3<Scalar>");
+    return Hand<H, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `Hand`; where it is none, the error says what is missing.
+template <class H, class Scalar>
+concept CheckedHand = detail::check_hand<H, Scalar>();
+
 /// Is where it should be, whatever the force. One that gives way: `SimulatedHand`.
 template <Real Scalar>
 class FirmHand {
@@ -85,7 +160,7 @@ static_assert(Hand<FirmHand<float>, float> && Hand<FirmHand<double>, double>);
 /// A device without a device: its tool follows a script in straight lines from waypoint to waypoint, at the velocity
 /// that takes, whatever force is written. Held by another hand, it follows as far as that hand lets it: from rest at the
 /// first waypoint, under the force that was written last before each tick.
-template <Real Scalar, Hand<Scalar> Holder = FirmHand<Scalar>>
+template <Real Scalar, CheckedHand<Scalar> Holder = FirmHand<Scalar>>
 class NullDevice {
   public:
     /// @throws InvalidInput for a script that is empty or not finite or does not go forward in time, or bad options
@@ -125,7 +200,7 @@ class NullDevice {
     Holder hand_;
 };
 
-template <Real Scalar, Hand<Scalar> Holder>
+template <Real Scalar, CheckedHand<Scalar> Holder>
 NullDevice<Scalar, Holder>::NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options,
                                        const Holder& hand)
     : script_(std::move(script)),
@@ -149,7 +224,7 @@ NullDevice<Scalar, Holder>::NullDevice(std::vector<Waypoint<Scalar>> script, con
     hand_.place(script_.front().position);
 }
 
-template <Real Scalar, Hand<Scalar> Holder>
+template <Real Scalar, CheckedHand<Scalar> Holder>
 Tool<Scalar> NullDevice<Scalar, Holder>::read() noexcept {
     Tool<Scalar> tool = scripted(time());
     if (ticks_ > 0) hand_.move(force_, tick_);
@@ -160,7 +235,7 @@ Tool<Scalar> NullDevice<Scalar, Holder>::read() noexcept {
     return tool;
 }
 
-template <Real Scalar, Hand<Scalar> Holder>
+template <Real Scalar, CheckedHand<Scalar> Holder>
 Tool<Scalar> NullDevice<Scalar, Holder>::scripted(Scalar now) noexcept {
     while (next_ < script_.size() && script_[next_].time <= now) ++next_;
     Tool<Scalar> tool{.radius = radius_, .time = now};

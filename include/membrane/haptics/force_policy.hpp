@@ -36,6 +36,21 @@ concept ForcePolicy = Real<Scalar> && requires(Policy& policy, const HapticState
 
 namespace detail {
 
+template <class Policy, class Scalar>
+consteval bool check_force_policy() noexcept {
+    static_assert(ForcePolicy<Policy, Scalar>,
+                  "ForcePolicy: policy(const HapticState<Scalar>&) noexcept must return Vector3<Scalar>");
+    return ForcePolicy<Policy, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `ForcePolicy`; where it is none, the error says what is missing.
+template <class Policy, class Scalar>
+concept CheckedForcePolicy = detail::check_force_policy<Policy, Scalar>();
+
+namespace detail {
+
 /// A device never gets what is not a number.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> finite_or_zero(const Vector3<Scalar>& force) noexcept {

@@ -23,7 +23,7 @@ struct TransitionOptions {
 /// law differs by comes in evenly over `duration`. At all other times it is the policy's, bit for bit. Meanwhile it is
 /// no force of a potential: it may give the hand up to that difference times the way in `duration`.
 template <class Policy, Real Scalar = double>
-    requires ForcePolicy<Policy, Scalar>
+    requires CheckedForcePolicy<Policy, Scalar>
 class GraspTransition {
   public:
     /// @throws InvalidInput for an option out of its range
@@ -45,7 +45,7 @@ class GraspTransition {
 };
 
 template <class Policy, Real Scalar>
-requires ForcePolicy<Policy, Scalar> Vector3<Scalar> GraspTransition<Policy, Scalar>::operator()(
+requires CheckedForcePolicy<Policy, Scalar> Vector3<Scalar> GraspTransition<Policy, Scalar>::operator()(
     const HapticState<Scalar>& state) noexcept {
     const Vector3<Scalar> force = policy_(state);
     const bool holds = state.grasp.holding();

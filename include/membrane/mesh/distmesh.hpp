@@ -51,11 +51,11 @@ struct DistMeshOptions {
 /// iterations below 0, a spacing or edge length that is not finite and positive, and for what `isosurface` refuses
 /// Cost: O(grid) + O(vertices) for each iteration: 0.3 s for 1,500 vertices and 200 iterations. A body much thinner than
 /// the edges are long is found in many more vertices than are left, some 20 us each: give a wider `spacing`.
-template <Real Scalar = double, SignedDistance Body>
+template <Real Scalar = double, CheckedSignedDistance Body>
 [[nodiscard]] TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options);
 
 /// The same with a border.
-template <Real Scalar = double, SignedDistance Body, SignedDistance Within>
+template <Real Scalar = double, CheckedSignedDistance Body, SignedDistance Within>
 [[nodiscard]] TriangleMesh<Scalar> distmesh(const Trimmed<Body, Within>& surface, const DistMeshOptions& options);
 
 namespace detail {
@@ -113,12 +113,12 @@ template <Real Scalar, class Surface>
 
 }  // namespace detail
 
-template <Real Scalar, SignedDistance Body>
+template <Real Scalar, CheckedSignedDistance Body>
 TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options) {
     return detail::distmesh<Scalar>(body, options);
 }
 
-template <Real Scalar, SignedDistance Body, SignedDistance Within>
+template <Real Scalar, CheckedSignedDistance Body, SignedDistance Within>
 TriangleMesh<Scalar> distmesh(const Trimmed<Body, Within>& surface, const DistMeshOptions& options) {
     return detail::distmesh<Scalar>(surface, options);
 }

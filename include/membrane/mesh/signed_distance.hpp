@@ -28,6 +28,20 @@ concept SignedDistance = requires(const D& distance, const Vector3<double>& p) {
     { distance(p) } -> std::convertible_to<double>;
 };
 
+namespace detail {
+
+template <class D>
+consteval bool check_signed_distance() noexcept {
+    static_assert(SignedDistance<D>, "SignedDistance: distance(const Vector3<double>&) const must give a double [m]");
+    return SignedDistance<D>;
+}
+
+}  // namespace detail
+
+/// A `SignedDistance`; where it is none, the error says what is missing.
+template <class D>
+concept CheckedSignedDistance = detail::check_signed_distance<D>();
+
 /// A signed distance that knows its own gradient: a vector out of the body, of length one for a true distance.
 template <class D>
 concept GivesGradient = SignedDistance<D> && requires(const D& distance, const Vector3<double>& p) {

@@ -74,4 +74,93 @@ concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, 
     noexcept->std::same_as<Scalar>;
 };
 
+namespace detail {
+
+template <class Network, class Scalar>
+consteval bool check_elastic_network() noexcept {
+    static_assert(
+        requires { requires std::same_as<typename Network::Scalar, Scalar>; },
+        "ElasticNetwork: must have Scalar, the scalar of the solver");
+    static_assert(
+        requires {
+            { Network::never_stiffens } -> std::convertible_to<bool>;
+        },
+        "ElasticNetwork: must have static constexpr bool never_stiffens");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.vertex_count() }
+            noexcept->std::same_as<Index>;
+        },
+        "ElasticNetwork: vertex_count() const noexcept must return Index");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.pinned(v) }
+            noexcept->std::same_as<bool>;
+        },
+        "ElasticNetwork: pinned(Index) const noexcept must return bool");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.has_masses() }
+            noexcept->std::same_as<bool>;
+        },
+        "ElasticNetwork: has_masses() const noexcept must return bool");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.mass(v) }
+            noexcept->std::same_as<Scalar>;
+        },
+        "ElasticNetwork: mass(Index) const noexcept must return Scalar");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.viscosity(v) }
+            noexcept->std::same_as<Scalar>;
+        },
+        "ElasticNetwork: viscosity(Index) const noexcept must return Scalar");
+    static_assert(
+        requires(const Network& network, Index v) {
+            { network.neighbours(v)[0].other } -> std::convertible_to<Index>;
+        },
+        "ElasticNetwork: neighbours(Index) const must give a range of something with .other, an Index");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.pull(v, x) }
+            noexcept->std::same_as<Pull<Scalar>>;
+        },
+        "ElasticNetwork: pull(Index, const ConstPointsRef<Scalar>&) const noexcept must return Pull<Scalar>");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.curved_pull(v, x) }
+            noexcept->std::same_as<CurvedPull<Scalar>>;
+        },
+        "ElasticNetwork: curved_pull(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
+        "CurvedPull<Scalar>");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.curvature(v, x) }
+            noexcept->std::same_as<Symmetric3<Scalar>>;
+        },
+        "ElasticNetwork: curvature(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
+        "Symmetric3<Scalar>");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.energy_change(v, way, x) }
+            noexcept->std::same_as<EnergyChange<Scalar>>;
+        },
+        "ElasticNetwork: energy_change(Index, const Vector3<Scalar>&, const ConstPointsRef<Scalar>&) const noexcept "
+        "must return EnergyChange<Scalar>");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& way) {
+            { network.negligible_force() }
+            noexcept->std::same_as<Scalar>;
+        },
+        "ElasticNetwork: negligible_force() const noexcept must return Scalar");
+    return ElasticNetwork<Network, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `ElasticNetwork`; where it is none, the error says what is missing.
+template <class Network, class Scalar>
+concept CheckedElasticNetwork = detail::check_elastic_network<Network, Scalar>();
+
 }  // namespace membrane

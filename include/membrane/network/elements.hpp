@@ -50,8 +50,67 @@ concept Element = std::copyable<E> && requires(const E& element, const Corners<d
     { element.second_derivative(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
 };
 
+namespace detail {
+
+template <class E>
+consteval bool check_element() noexcept {
+    static_assert(std::copyable<E>, "Element: must be copyable");
+    static_assert(
+        requires {
+            requires E::corner_count >
+            0;
+        },
+        "Element: must have static constexpr corner_count, the number of its corners");
+    static_assert(
+        requires(const E& element, const Corners<double, E::corner_count>& x, std::size_t i) {
+            { element.pull(x, i) }
+            noexcept->std::same_as<CornerPull<double>>;
+        },
+        "Element: pull(const Corners<double, corner_count>&, std::size_t) const noexcept must return "
+        "CornerPull<double>");
+    static_assert(
+        requires(const E& element, const Corners<float, E::corner_count>& x, std::size_t i) {
+            { element.pull(x, i) }
+            noexcept->std::same_as<CornerPull<float>>;
+        },
+        "Element: pull(const Corners<float, corner_count>&, std::size_t) const noexcept must return CornerPull<float>");
+    static_assert(
+        requires(const E& element, const Corners<double, E::corner_count>& x, std::size_t i) {
+            { element.energy(x) }
+            noexcept->std::same_as<double>;
+        },
+        "Element: energy(const Corners<double, corner_count>&) const noexcept must return double");
+    static_assert(
+        requires(const E& element, const Corners<double, E::corner_count>& x, std::size_t i) {
+            { element.energy_change(x, i, x[i]) }
+            noexcept->std::same_as<EnergyChange<double>>;
+        },
+        "Element: energy_change(const Corners<double, corner_count>&, std::size_t, const Vector3<double>&) const "
+        "noexcept must return EnergyChange<double>");
+    static_assert(
+        requires(const E& element, const Corners<float, E::corner_count>& x, std::size_t i) {
+            { element.energy_change(x, i, x[i]) }
+            noexcept->std::same_as<EnergyChange<float>>;
+        },
+        "Element: energy_change(const Corners<float, corner_count>&, std::size_t, const Vector3<float>&) const "
+        "noexcept must return EnergyChange<float>");
+    static_assert(
+        requires(const E& element, const Corners<double, E::corner_count>& x, std::size_t i) {
+            { element.second_derivative(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
+        },
+        "Element: second_derivative(const Corners<double, corner_count>&, std::size_t, std::size_t) const must return "
+        "Eigen::Matrix3d");
+    return Element<E>;
+}
+
+}  // namespace detail
+
+/// A `Element`; where it is none, the error says what is missing.
+template <class E>
+concept CheckedElement = detail::check_element<E>();
+
 /// Elements of one kind, each at its vertices. Constant once built, no positions in it.
-template <Real Scalar_, Element Each>
+template <Real Scalar_, CheckedElement Each>
 class Elements {
   public:
     using Scalar = Scalar_;
@@ -99,7 +158,7 @@ class Elements {
     Scalar negligible_force_ = 0;
 };
 
-template <Real Scalar, Element Each>
+template <Real Scalar, CheckedElement Each>
 Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all) : all_(std::move(all)) {
     for (std::size_t i = 0; i < all_.size(); ++i) {
         for (const Index v : all_[i].corners) {
@@ -123,7 +182,7 @@ Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<P
     });
 }
 
-template <Real Scalar, Element Each>
+template <Real Scalar, CheckedElement Each>
 Scalar Elements<Scalar, Each>::negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept {
     const auto corners = where(placed, x);
     Scalar largest = 0, stiffness = 0, size = 0;

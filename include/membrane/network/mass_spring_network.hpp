@@ -107,7 +107,7 @@ template <Number Scalar>
 }
 
 /// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1): constant once built, no positions in it.
-template <Real Scalar_, SpringLaw<Scalar_> Law>
+template <Real Scalar_, CheckedSpringLaw<Scalar_> Law>
 class MassSpringNetwork {
   public:
     using Scalar = Scalar_;
@@ -193,7 +193,7 @@ namespace detail {
 inline constexpr std::string_view network_name = "MassSpringNetwork";
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law>
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 MassSpringNetwork<Scalar, Law>::MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law,
                                                   const NetworkOptions<Scalar>& options)
     : law_(law) {
@@ -221,7 +221,7 @@ MassSpringNetwork<Scalar, Law>::MassSpringNetwork(const TriangleMesh<Scalar>& me
     });
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law>
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, const Points<Scalar>& x,
                                                    const NetworkOptions<Scalar>& options) {
     const auto edges = adjacency.edges();
@@ -247,7 +247,7 @@ void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, c
     }
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law>
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 template <class Act>
 void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
     const Vector3<Scalar> here = point(x, v);
@@ -257,14 +257,14 @@ void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef
     }
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law>
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 Pull<Scalar> MassSpringNetwork<Scalar, Law>::pull(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
     Pull<Scalar> sum;
     for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) { add(sum, spring); });
     return sum;
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law>
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 CurvedPull<Scalar> MassSpringNetwork<Scalar, Law>::curved_pull(Index v,
                                                                const ConstPointsRef<Scalar>& x) const noexcept {
     CurvedPull<Scalar> sum;
@@ -272,7 +272,7 @@ CurvedPull<Scalar> MassSpringNetwork<Scalar, Law>::curved_pull(Index v,
     return sum;
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law>
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
     Symmetric3<Scalar> block;
     for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) {
@@ -282,7 +282,7 @@ Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::curvature(Index v, const Cons
     return block;
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law>
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 EnergyChange<Scalar> MassSpringNetwork<Scalar, Law>::energy_change(Index v, const Vector3<Scalar>& way,
                                                                    const ConstPointsRef<Scalar>& x) const noexcept {
     const Vector3<Scalar> here = point(x, v);
@@ -300,7 +300,7 @@ EnergyChange<Scalar> MassSpringNetwork<Scalar, Law>::energy_change(Index v, cons
     return sum;
 }
 
-template <Real Scalar, SpringLaw<Scalar> Law>
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 Scalar MassSpringNetwork<Scalar, Law>::energy(const ConstPointsRef<Scalar>& x) const noexcept {
     Scalar sum = 0;
     for (const auto& s : springs_) sum += response(s, x).energy;

@@ -45,6 +45,22 @@ concept SpringLaw = Real<Scalar> && std::copyable<Law> && requires(const Law& la
     noexcept->std::same_as<SpringResponse<Scalar>>;
 };
 
+namespace detail {
+
+template <class Law, class Scalar>
+consteval bool check_spring_law() noexcept {
+    static_assert(std::copyable<Law>, "SpringLaw: must be copyable");
+    static_assert(SpringLaw<Law, Scalar>,
+                  "SpringLaw: law(const SpringState<Scalar>&) const noexcept must return SpringResponse<Scalar>");
+    return SpringLaw<Law, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `SpringLaw`; where it is none, the error says what is missing.
+template <class Law, class Scalar>
+concept CheckedSpringLaw = detail::check_spring_law<Law, Scalar>();
+
 /// A law that sets `never_stiffens` says that no spring is stiffer at another length than it is at this one, or than its
 /// tension over its length if that is more. Then steps are known to be safe; with other laws, a solver has to look.
 template <class Law>

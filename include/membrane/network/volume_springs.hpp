@@ -45,6 +45,22 @@ concept VolumeModel = Real<Scalar> &&
     noexcept->std::same_as<Pull<Scalar>>;
 };
 
+namespace detail {
+
+template <class Volume, class Scalar>
+consteval bool check_volume_model() noexcept {
+    static_assert(VolumeModel<Volume, Scalar>,
+                  "VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) "
+                  "const noexcept must return Pull<Scalar>");
+    return VolumeModel<Volume, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `VolumeModel`; where it is none, the error says what is missing.
+template <class Volume, class Scalar>
+concept CheckedVolumeModel = detail::check_volume_model<Volume, Scalar>();
+
 /// No body under the membrane: nothing holds it, at no cost.
 struct NoVolumeSprings {
     template <Real Scalar>

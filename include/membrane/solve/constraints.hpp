@@ -38,6 +38,43 @@ concept Constraint = Real<Scalar> && requires(const C& constraint, Region<Scalar
     noexcept->std::same_as<Vector3<Scalar>>;
 };
 
+namespace detail {
+
+template <class C, class Scalar>
+consteval bool check_constraint() noexcept {
+    static_assert(
+        requires(const C& constraint) {
+            { constraint.sound() }
+            noexcept->std::same_as<bool>;
+        },
+        "Constraint: sound() const noexcept must return bool");
+    static_assert(
+        requires(const C& constraint, Region<Scalar>& region) {
+            { constraint.begin(region) }
+            noexcept;
+        },
+        "Constraint: there must be begin(Region<Scalar>&) const noexcept");
+    static_assert(
+        requires(const C& constraint, Region<Scalar>& region) {
+            { constraint.enforce(region) }
+            noexcept->std::same_as<bool>;
+        },
+        "Constraint: enforce(Region<Scalar>&) const noexcept must return bool");
+    static_assert(
+        requires(const C& constraint, const Region<Scalar>& done) {
+            { constraint.reaction(done) }
+            noexcept->std::same_as<Vector3<Scalar>>;
+        },
+        "Constraint: reaction(const Region<Scalar>&) const noexcept must return Vector3<Scalar>");
+    return Constraint<C, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `Constraint`; where it is none, the error says what is missing.
+template <class C, class Scalar>
+concept CheckedConstraint = detail::check_constraint<C, Scalar>();
+
 /// All constraints of one step, in the order they were handed in.
 template <Real Scalar, Constraint<Scalar>... Constraints>
 class ConstraintSet {

@@ -45,19 +45,20 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 ///
 /// Positions, network and backing are handed in at each step, always those of one membrane; what is remembered (queue,
 /// restless vertices, contact forces) is a cache. One thread at a time for each solver.
-template <Real Scalar, StepRule<Scalar> Rule = BlockStep, Executor Threads = OneThread>
+template <Real Scalar, CheckedStepRule<Scalar> Rule = BlockStep, CheckedExecutor Threads = OneThread>
 class QuasiStaticSolver {
   public:
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
     /// Cost: O(V) memory.
-    template <ElasticNetwork<Scalar> Network>
+    template <CheckedElasticNetwork<Scalar> Network>
     explicit QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options = {}, const Rule& rule = {},
                                const Threads& executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, in layer 0 `contact_visits` in each
     /// sweep; a visit costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
-    template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
+    template <CheckedElasticNetwork<Scalar> Network, CheckedVolumeModel<Scalar> Volume,
+              CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                           const Constraints&... constraints) noexcept {
         return step_in(NoHurry{}, x, dt, network, volume, constraints...);
@@ -66,7 +67,8 @@ class QuasiStaticSolver {
     /// The same, over at `deadline`, or later by what it misjudged its end by; or by what comes in any case, one round
     /// over layer 0, 32 vertices beyond, and a look at all that are at work. One thread visits. The next step goes on
     /// where time ran out, so that a membrane comes to rest however little time its steps have.
-    template <class Now, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, Constraint<Scalar>... Constraints>
+    template <class Now, CheckedElasticNetwork<Scalar> Network, CheckedVolumeModel<Scalar> Volume,
+              CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
                                                 const Network& network, const Volume& volume,
                                                 const Constraints&... constraints) noexcept {
@@ -124,15 +126,16 @@ class QuasiStaticSolver {
     StepCosts costs_;
 };
 
-template <class Network, class Rule = BlockStep, class Threads = OneThread>
-    requires ElasticNetwork<Network, typename Network::Scalar> QuasiStaticSolver(
-        const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {}, const Threads& = {})
-->QuasiStaticSolver<typename Network::Scalar, Rule, Threads>;
+template <class Network, class Rule = BlockStep, class Threads = OneThread,
+          bool = CheckedElasticNetwork<Network, typename Network::Scalar>&&
+              CheckedStepRule<Rule, typename Network::Scalar>&& CheckedExecutor<Threads>>
+QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {},
+                  const Threads& = {}) -> QuasiStaticSolver<typename Network::Scalar, Rule, Threads>;
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
-template <ElasticNetwork<Scalar> Network>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <CheckedElasticNetwork<Scalar> Network>
 QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& network,
                                                             const SolverOptions<Scalar>& options, const Rule& rule,
                                                             const Threads& executor)
@@ -155,7 +158,7 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& netwo
     work_.negligible_force = options.negligible_force > 0 ? options.negligible_force : network.negligible_force();
 }
 
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <class Pace, class Network, class Volume, class... Constraints>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
                                                                      const Network& network, const Volume& volume,
@@ -196,7 +199,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
     return report_;
 }
 
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::open(std::size_t constraint_count) noexcept {
     work_.open();
     reactions_.fill(Vector3<Scalar>::Zero());
@@ -205,7 +208,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::open(std::size_t constraint_count
 }
 
 // The body has moved since the last step, and the membrane with it: what is remembered goes along.
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <class Volume>
 void QuasiStaticSolver<Scalar, Rule, Threads>::go_along([[maybe_unused]] const Volume& volume) noexcept {
     if constexpr (moves<Volume>) {
@@ -222,7 +225,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::go_along([[maybe_unused]] const V
 // Those that moved go on, as far as what leads them does. They are to be visited, wherever they are now. A step that was
 // cut short is not expected again: where vertices were not visited, what was predicted for them would be predicted anew,
 // and grow from step to step.
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <class Volume, class Acting>
 void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const Acting& acting, Region<Scalar>& region) noexcept {
     if (!method_.options.predict) return;
@@ -243,7 +246,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const Acting& acting, Reg
 }
 
 // Who is at work in this step, what has been let go of as well.
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule, Threads>::line_up(const Network& network, Region<Scalar>& region) noexcept {
     for (const Index v : last_held_.items()) {
@@ -260,7 +263,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::line_up(const Network& network, R
 }
 
 // Who has moved, and who has to be looked at again.
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <class Handed>
 void QuasiStaticSolver<Scalar, Rule, Threads>::settle(const Handed& scene, bool mended) noexcept {
     moved_.clear();
@@ -280,7 +283,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::settle(const Handed& scene, bool 
     std::swap(last_held_, work_.held);
 }
 
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepStatus status,
                                                                          PointsRef<Scalar>& x) noexcept {
     Region<Scalar>(x, work_).put_back([](Index) { return true; });
@@ -291,19 +294,19 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepSta
     return report_;
 }
 
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::wake(std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
         if (v >= 0 && v < work_.vertex_count()) woken_.insert(v);
     }
 }
 
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::wake_all() noexcept {
     for (Index v = 0; v < work_.vertex_count(); ++v) wake({&v, 1});
 }
 
-template <Real Scalar, StepRule<Scalar> Rule, Executor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
     active_.clear();
     work_.clear();

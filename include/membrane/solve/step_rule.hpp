@@ -43,6 +43,23 @@ concept StepRule = Real<Scalar> && std::copyable<Rule> &&
     noexcept->Compliance<Scalar>;
 };
 
+namespace detail {
+
+template <class Rule, class Scalar>
+consteval bool check_step_rule() noexcept {
+    static_assert(std::copyable<Rule>, "StepRule: must be copyable");
+    static_assert(
+        StepRule<Rule, Scalar>,
+        "StepRule: compliance(const VertexState<Scalar>&) const noexcept must return Scalar or Symmetric3<Scalar>");
+    return StepRule<Rule, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `StepRule`; where it is none, the error says what is missing.
+template <class Rule, class Scalar>
+concept CheckedStepRule = detail::check_step_rule<Rule, Scalar>();
+
 /// Whether the compliances of `Rule` are numbers, so that it moves a vertex along the force on it.
 template <class Rule, class Scalar>
 inline constexpr bool moves_along_force =
