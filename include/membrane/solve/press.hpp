@@ -23,7 +23,11 @@
 namespace membrane {
 
 /// Keeps the surface outside the tool, without friction: every touched triangle in its point nearest to the tool, by a
-/// force along the normal that pushes and never pulls, shared out to the corners by barycentric weights.
+/// force along the normal that pushes and never pulls, shared out to the corners by barycentric weights. Corners that are
+/// pinned or held stay in their place, and push with their stiffness times how deep the tool is in, see
+/// `SolverOptions::rigid_stiffness`: there, and beside them, the tool stays inside by force over stiffness. If its axis is
+/// behind such a corner, it touches in its nearest point alone; where that passes a border, or another part of a surface
+/// that is folded around a pin more sharply than its triangles, the force may jump.
 template <Real Scalar>
 struct Press {
     Tool<Scalar> tool;

@@ -57,8 +57,7 @@ struct Workspace {
     Points<Scalar> kept;            // of saved vertices, where they were when a constraint kept them, or at the start
     Points<Scalar> borne;           // of bearing vertices, the force of tools on them
     std::vector<Scalar> stiffness;  // of pushed vertices, what touches add to it
-    std::vector<Scalar>
-        support;  // of fixed vertices, how stiff they are to a tool, as of the last step they were seeds
+    std::vector<Scalar> support;    // of fixed vertices, how stiff they are to a tool; zero where none has come near
     std::vector<Scalar> compliance;
     std::vector<Scalar> resistance,
         firmness;  // of vertices in layer 0: what pulls on them, and how stiff, without touches
