@@ -29,6 +29,8 @@ TEST_CASE("solver options out of range are refused by name") {
          {-1e-9, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
         CHECK_THAT(refused({.negligible_force = bad}),
                    ContainsSubstring("QuasiStaticSolver: negligible_force must be finite and not negative [N], got "));
+        CHECK_THAT(refused({.rigid_stiffness = bad}),
+                   ContainsSubstring("QuasiStaticSolver: rigid_stiffness must be finite and not negative [N/m], got "));
     }
 }
 

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -111,4 +112,33 @@ TEST_CASE("corners become seeds unless one is no vertex") {
     CHECK_FALSE(m.work.invalid);
     CHECK_FALSE(membrane::seed_corners<double>(m.region, {0, 3, 1}));
     CHECK(m.work.invalid);
+}
+
+TEST_CASE("what a tool presses on yields where it is fixed by its share of the force, and stays in its place") {
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane m(random, seed % 2 == 0);
+        const double stiffness = random.number(1.0, 1000.0);
+        m.region.set_support(2, stiffness);
+        const Vector3<double> none = Vector3<double>::Zero(), force = random.vector();
+        const Touch<double> touch{0, 0, corners, random.barycentric(), random.unit_vector(), force, none};
+        const Points<double> before = m.x;
+        membrane::attach(m.region, touch);
+        const double weight = seed % 2 == 0 ? touch.barycentric[2] : 0;  // on what is fixed
+        const Vector3<double> yields = (weight / stiffness) * force;
+        CHECK((m.region.yielding(2) - yields).norm() < 1e-12);
+        CHECK((membrane::yielding_of(m.region, touch) - weight * yields).norm() < 1e-12);
+        CHECK(std::abs(membrane::support_compliance_of(m.region, touch) - weight * weight / stiffness) < 1e-12);
+        CHECK((membrane::surface_triangle(m.region, corners).c - before.col(2) - yields).norm() < 1e-12);
+        CHECK(m.x == before);
+        membrane::detach(m.region, touch);
+        CHECK(m.region.yielding(2).norm() < 1e-14);
+        // And as much as a free corner would where a tool presses the surface in.
+        const Vector3<double> way = random.vector();
+        membrane::press_in<double>(m.region, corners, touch.barycentric, way);
+        const double part = 1 - weight * weight / touch.barycentric.squaredNorm();
+        CHECK((at(m.x, touch.barycentric) - at(before, touch.barycentric) - part * way).norm() < 1e-12);
+        if (seed % 2 == 0) CHECK(m.x.col(2) == before.col(2));
+    }
 }

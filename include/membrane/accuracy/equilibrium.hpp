@@ -32,7 +32,8 @@ namespace membrane {
 /// energy, and on the deepest overlap with a weight that makes the penalty exact, leads there from afar. Tools press the
 /// whole surface, not only `contact.touched`; of a contact it uses where it is, its normal and its radius. A tool that
 /// is far in comes from outside, in as many increments as it is half radii deep. Where nothing can move, a tool may
-/// overlap and a point need not be held, as in a step.
+/// overlap and a point need not be held. What is fixed does not yield to a tool: beside it this is the limit of a step's
+/// forces for an ever larger `SolverOptions::rigid_stiffness`; where all corners are fixed, no tool presses here.
 ///
 /// Where a membrane can rest in several ways, the start decides, and increments may.
 ///

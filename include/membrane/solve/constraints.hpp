@@ -25,7 +25,8 @@ namespace membrane {
 /// Something that acts on the membrane during one step. `begin` names all vertices where its force enters, and puts in
 /// place what it holds; `enforce` is called in every sweep once layer 0 has moved, and once more at the end; it mends
 /// what they broke and says whether there was anything to mend; `reaction` is the force of the membrane on whoever acts
-/// [N]. One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it.
+/// [N]. One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it. One
+/// that holds vertices may do so in `hold(region)`, which is called before any `begin`.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> && requires(const C& constraint, Region<Scalar>& region, const Region<Scalar>& done) {
     { constraint.sound() }
@@ -91,7 +92,11 @@ class ConstraintSet {
             if constexpr (requires { constraint.lead(); }) leads[i] = constraint.lead();
         });
     }
+    /// Vertices that a constraint holds are fixed for all of them, in whatever order they were handed in.
     void begin() const noexcept {
+        for_each([this]([[maybe_unused]] const auto& constraint, std::size_t) {
+            if constexpr (requires { constraint.hold(region_); }) constraint.hold(region_);
+        });
         for_each([this](const auto& constraint, std::size_t) {
             region_.open();
             constraint.begin(region_);
@@ -148,6 +153,9 @@ struct HeldVertex {
 
     [[nodiscard]] bool sound() const noexcept { return is_finite(target); }
     [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{target}; }
+    void hold(Region<Scalar>& region) const noexcept {
+        if (region.check(vertex)) region.hold(vertex, target);
+    }
     void begin(Region<Scalar>& region) const noexcept;
     bool enforce(Region<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept {
@@ -161,7 +169,11 @@ struct Pinned {
 
     [[nodiscard]] bool sound() const noexcept { return true; }
     template <Real Scalar>
-    void begin(Region<Scalar>& region) const noexcept;
+    void hold(Region<Scalar>& region) const noexcept;
+    template <Real Scalar>
+    void begin(Region<Scalar>& region) const noexcept {
+        hold(region);
+    }
     template <Real Scalar>
     bool enforce(Region<Scalar>&) const noexcept {
         return false;
@@ -260,7 +272,7 @@ void HeldVertex<Scalar>::begin(Region<Scalar>& region) const noexcept {
 }
 
 template <Real Scalar>
-void Pinned::begin(Region<Scalar>& region) const noexcept {
+void Pinned::hold(Region<Scalar>& region) const noexcept {
     for (const Index v : vertices) {
         if (!region.check(v)) return;
         region.hold(v);

@@ -21,6 +21,7 @@
 #include <membrane/solve/deadline.hpp>
 #include <membrane/solve/predictor.hpp>
 #include <membrane/solve/region.hpp>
+#include <membrane/solve/rigid_support.hpp>
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/sweeps.hpp>
@@ -181,6 +182,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
     if (work_.invalid) return refuse_step(StepStatus::bad_input, x);
     if (work_.full) return refuse_step(StepStatus::too_many_touches, x);
 
+    set_supports(network, volume, method_.options.rigid_stiffness, region, work_.seeds.items());
     line_up(network, region);
     const StepInput<Scalar, Network, Volume> scene{x, dt, network, volume, work_};
     std::size_t resume = resume_;

@@ -52,11 +52,14 @@ struct Workspace {
     };
     std::function<bool(Index)> pinned;  // asked whenever it matters; must not throw
     IndexSet seeds, held, saved, pushed, patch;
+    IndexSet bearing;               // fixed vertices that a tool presses on
     Points<Scalar> start;           // of saved vertices, where they were when the step began
     Points<Scalar> external;        // of pushed vertices, the constraints' force on them
     Points<Scalar> unbalanced;      // of visited vertices, the force on them at the end of the step
     Points<Scalar> kept;            // of saved vertices, where they were when a constraint kept them, or at the start
+    Points<Scalar> borne;           // of bearing vertices, the force of tools on them
     std::vector<Scalar> stiffness;  // of pushed vertices, what touches add to it
+    std::vector<Scalar> support;    // of fixed vertices, how stiff they are to a tool; zero where none has come near
     std::vector<Scalar> compliance;
     std::vector<Scalar> resistance,
         firmness;  // of vertices in layer 0: what pulls on them, and how stiff, without touches
@@ -92,6 +95,34 @@ class Region {
     [[nodiscard]] bool held(Index v) const noexcept { return work_.held.contains(v); }
 
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept { return point(x_, v); }
+    [[nodiscard]] const PointsRef<Scalar>& positions() const noexcept { return x_; }
+
+    /// Where a tool finds `v`: at its position; if `v` is fixed, as far from it as the force of the tools on `v` stretches
+    /// a spring of its support stiffness.
+    [[nodiscard]] Vector3<Scalar> surface_position(Index v) const noexcept {
+        const Vector3<Scalar> here = position(v);
+        return work_.bearing.contains(v) ? Vector3<Scalar>(here + yielding(v)) : here;
+    }
+
+    /// How far that is from its position [m].
+    [[nodiscard]] Vector3<Scalar> yielding(Index v) const noexcept {
+        const Scalar stiffness = work_.support[static_cast<std::size_t>(v)];
+        if (!work_.bearing.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
+        return point(work_.borne, v) / stiffness;
+    }
+
+    /// How far a fixed vertex yields to a tool for each newton [m/N]; zero for others.
+    [[nodiscard]] Scalar support_compliance(Index v) const noexcept {
+        const Scalar stiffness = work_.support[static_cast<std::size_t>(v)];
+        return fixed(v) && stiffness > 0 ? 1 / stiffness : Scalar(0);
+    }
+
+    /// Adds to the force of the tools on `v` [N], if it is fixed.
+    void bear(Index v, const Vector3<Scalar>& force) noexcept {
+        if (!fixed(v)) return;
+        work_.bearing.insert(v);
+        work_.borne.col(v) += force;
+    }
 
     /// The vertices of these triangles, each once; valid until the next call. Of the same span as last time, at no cost:
     /// what a step is handed does not change within it.
@@ -149,11 +180,16 @@ class Region {
         return fixed(v) ? Scalar(0) : work_.compliance[static_cast<std::size_t>(v)];
     }
 
-    /// What springs and backing of `v` pulled with at its last visit in layer 0 [N].
-    [[nodiscard]] Scalar resistance(Index v) const noexcept { return work_.resistance[static_cast<std::size_t>(v)]; }
+    /// What springs and backing of `v` pulled with at its last visit in layer 0, or what it bears if it is fixed [N].
+    [[nodiscard]] Scalar resistance(Index v) const noexcept {
+        if (fixed(v)) return work_.bearing.contains(v) ? norm<Scalar>(point(work_.borne, v)) : Scalar(0);
+        return work_.resistance[static_cast<std::size_t>(v)];
+    }
 
     /// And how stiff they were [N/m].
-    [[nodiscard]] Scalar firmness(Index v) const noexcept { return work_.firmness[static_cast<std::size_t>(v)]; }
+    [[nodiscard]] Scalar firmness(Index v) const noexcept {
+        return fixed(v) ? work_.support[static_cast<std::size_t>(v)] : work_.firmness[static_cast<std::size_t>(v)];
+    }
 
     /// At the end of the step: springs, backing and external forces on `v` [N].
     [[nodiscard]] Vector3<Scalar> unbalanced(Index v) const noexcept { return point(work_.unbalanced, v); }
@@ -163,6 +199,13 @@ class Region {
 
     /// The touch that this constraint had here in the step before, or null.
     [[nodiscard]] const Touch<Scalar>* recall(Index triangle, int pair) noexcept;
+
+    /// The touches of this constraint in the step before.
+    [[nodiscard]] std::span<const Touch<Scalar>> touches_before() const noexcept {
+        const auto range = work_.ranges_before[constraint_];
+        return std::span<const Touch<Scalar>>(work_.touches_before.items())
+            .subspan(range.begin, range.end - range.begin);
+    }
 
     /// Remembers a touch of this constraint; refuses the step where there is no room for more.
     void remember(const Touch<Scalar>& touch) noexcept;
@@ -192,6 +235,7 @@ class Region {
         work_.resistance[static_cast<std::size_t>(v)] = force;
         work_.firmness[static_cast<std::size_t>(v)] = stiffness;
     }
+    void set_support(Index v, Scalar stiffness) noexcept { work_.support[static_cast<std::size_t>(v)] = stiffness; }
     void set_compliance(Index v, Scalar compliance) noexcept {
         work_.compliance[static_cast<std::size_t>(v)] = compliance;
     }
@@ -236,11 +280,14 @@ Workspace<Scalar>::Workspace(Index vertices, std::function<bool(Index)> is_pinne
       saved(vertices),
       pushed(vertices),
       patch(vertices),
+      bearing(vertices),
       start(Points<Scalar>::Zero(3, vertices)),
       external(start),
       unbalanced(start),
       kept(start),
+      borne(start),
       stiffness(static_cast<std::size_t>(vertices), Scalar(0)),
+      support(stiffness),
       compliance(stiffness),
       resistance(compliance),
       firmness(compliance),
@@ -273,7 +320,8 @@ void Workspace<Scalar>::forget() noexcept {
 template <Real Scalar>
 void Workspace<Scalar>::clear() noexcept {
     forget();
-    for (auto* answers : {&compliance, &resistance, &firmness}) std::fill(answers->begin(), answers->end(), Scalar(0));
+    for (auto* answers : {&compliance, &resistance, &firmness, &support})
+        std::fill(answers->begin(), answers->end(), Scalar(0));
     std::fill(block_compliance.begin(), block_compliance.end(), Symmetric3<Scalar>{});
 }
 
@@ -296,6 +344,8 @@ void Workspace<Scalar>::drop_external() noexcept {
         stiffness[static_cast<std::size_t>(v)] = 0;
     }
     pushed.clear();
+    for (const Index v : bearing.items()) borne.col(v).setZero();
+    bearing.clear();
 }
 
 template <Real Scalar>

@@ -34,6 +34,7 @@ struct SolverOptions {
     Index most_visits =
         unlimited;  ///< visits of vertices in a step; layer 0, what is held and one vertex get theirs anyway
     Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
+    Scalar rigid_stiffness = 0;     ///< a tool's of a pinned or held vertex [N/m]; 0: 4 times the stiffest beside it
     Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time
     Index most_in_groups = 32'768;  ///< room for vertices moved several at once: each 260 bytes, 460 in double
 
@@ -89,6 +90,7 @@ void SolverOptions<Scalar>::check() const {
     at_least(most_touches, 0, "most_touches");
     at_least(most_in_groups, 0, "most_in_groups");
     detail::check_option(component, negligible_force, "negligible_force", "N");
+    detail::check_option(component, rigid_stiffness, "rigid_stiffness", "N/m");
 }
 
 }  // namespace membrane

@@ -17,6 +17,22 @@ template <Real Scalar>
     return {region.position(corners[0]), region.position(corners[1]), region.position(corners[2])};
 }
 
+/// The same as a tool finds it.
+template <Real Scalar>
+[[nodiscard]] Triangle<Scalar> surface_triangle(const Region<Scalar>& region,
+                                                const std::array<Index, 3>& corners) noexcept {
+    return {region.surface_position(corners[0]), region.surface_position(corners[1]),
+            region.surface_position(corners[2])};
+}
+
+/// And as it found it where its vertices were kept.
+template <Real Scalar>
+[[nodiscard]] Triangle<Scalar> kept_surface_triangle(const Region<Scalar>& region,
+                                                     const std::array<Index, 3>& corners) noexcept {
+    const auto kept = [&](Index v) { return Vector3<Scalar>(region.kept(v) + region.yielding(v)); };
+    return {kept(corners[0]), kept(corners[1]), kept(corners[2])};
+}
+
 /// Whether the corners are vertices; if they are, they become seeds, else the step is refused.
 template <Real Scalar>
 bool seed_corners(Region<Scalar>& region, const std::array<Index, 3>& corners) noexcept {
@@ -64,6 +80,18 @@ void shift_point(Region<Scalar>& region, const std::array<Index, 3>& corners, co
     }
 }
 
+/// Moves the free corners as they move where the point goes by `way` [m] and fixed corners yield as much as free ones: a
+/// point on fixed corners stays, and nothing jumps on the way there.
+template <Real Scalar>
+void press_in(Region<Scalar>& region, const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
+              const Vector3<Scalar>& way) noexcept {
+    const Vector3<Scalar> weights = free_weights(region, corners, barycentric);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Scalar part = weights[static_cast<Eigen::Index>(k)] / squared_norm(barycentric);
+        if (part > 0) region.shift(corners[k], part * way);
+    }
+}
+
 /// How far the touched point moves for `force` on it [m].
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> answer_of(const Region<Scalar>& region, const Touch<Scalar>& touch,
@@ -93,6 +121,28 @@ template <Real Scalar>
     return dot(touch.normal, answer_of(region, touch, touch.normal));
 }
 
+/// How far a tool gets into it for each newton where fixed corners bear it [m/N]: they yield as springs of their support
+/// stiffness do, though they stay in their place.
+template <Real Scalar>
+[[nodiscard]] Scalar support_compliance_of(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
+    Scalar sum = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Scalar weight = touch.barycentric[static_cast<Eigen::Index>(k)];
+        sum += weight * weight * region.support_compliance(touch.corners[k]);
+    }
+    return sum;
+}
+
+/// How far the fixed corners of the touched point yield to tools [m].
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> yielding_of(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+        sum += touch.barycentric[static_cast<Eigen::Index>(k)] * region.yielding(touch.corners[k]);
+    }
+    return sum;
+}
+
 /// The force that would move it by `way` [N]; none where nothing can.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> force_for(const Region<Scalar>& region, const Touch<Scalar>& touch,
@@ -105,10 +155,19 @@ template <Real Scalar>
     return inverse(stiffness * Symmetric3<Scalar>{x[0], y[1], z[2], x[1], x[2], y[2]}) * (stiffness * way);
 }
 
+/// Adds `force` [N] to what the touched point's fixed corners bear.
+template <Real Scalar>
+void bear(Region<Scalar>& region, const Touch<Scalar>& touch, const Vector3<Scalar>& force) noexcept {
+    for (std::size_t k = 0; k < 3; ++k) {
+        region.bear(touch.corners[k], touch.barycentric[static_cast<Eigen::Index>(k)] * force);
+    }
+}
+
 /// Brings what the touch does to its corners into the region, and takes it out again.
 template <Real Scalar>
 void attach(Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
     push_point(region, touch.corners, touch.barycentric, touch.force);
+    bear(region, touch, touch.force);
     for (std::size_t k = 0; k < 3; ++k) {
         region.stiffen(touch.corners[k], touch.stiffness[static_cast<Eigen::Index>(k)]);
     }
@@ -116,6 +175,7 @@ void attach(Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
 template <Real Scalar>
 void detach(Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
     push_point<Scalar>(region, touch.corners, touch.barycentric, -touch.force);
+    bear<Scalar>(region, touch, -touch.force);
     for (std::size_t k = 0; k < 3; ++k) {
         region.stiffen(touch.corners[k], -touch.stiffness[static_cast<Eigen::Index>(k)]);
     }
