@@ -1,48 +1,21 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <cmath>
 #include <cstddef>
-#include <limits>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
 #include <membrane/core/types.hpp>
+#include <membrane/network/spring_law.hpp>
 
 /// The equilibrium of a small membrane found in another way than the solver's: all free vertices at once, by Newton's
 /// method with a dense Jacobian from differences. Forces are summed here, from energies that the network does not see.
 namespace test {
 
 /// Where `residual` (as many numbers as unknowns) vanishes, from `x` on; steps are halved until they help.
-template <class Residual>
-Eigen::VectorXd newton(Residual residual, Eigen::VectorXd x) {
-    const Eigen::Index count = x.size();
-    Eigen::VectorXd here = residual(x);
-    const double size = x.cwiseAbs().maxCoeff();
-    for (int iteration = 0; iteration < 100; ++iteration) {
-        Eigen::MatrixXd jacobian(count, count);
-        const double h = 1e-6 * (size > 0 ? size : 1.0);
-        for (Eigen::Index i = 0; i < count; ++i) {
-            Eigen::VectorXd after = x, before = x;
-            after[i] += h;
-            before[i] -= h;
-            jacobian.col(i) = (residual(after) - residual(before)) / (2 * h);
-        }
-        const Eigen::VectorXd way = -jacobian.partialPivLu().solve(here);
-        double step = 1;
-        Eigen::VectorXd there = residual(x + way);
-        while (!(there.norm() < here.norm()) && step > 1e-10) {
-            step /= 2;
-            there = residual(x + step * way);
-        }
-        if (!(there.norm() < here.norm())) return x;  // no nearer than rounding lets it
-        x += step * way;
-        here = there;
-    }
-    return x;
-}
+Eigen::VectorXd newton(const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& residual, Eigen::VectorXd x);
 
 /// A point of the membrane, as weights of its vertices, and where it is held or what pulls on it.
 struct HeldPlace {

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+#include "support/newton.hpp"
+
+#include <Eigen/LU>
+
+namespace test {
+
+Eigen::VectorXd newton(const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& residual, Eigen::VectorXd x) {
+    const Eigen::Index count = x.size();
+    Eigen::VectorXd here = residual(x);
+    const double size = x.cwiseAbs().maxCoeff();
+    for (int iteration = 0; iteration < 100; ++iteration) {
+        Eigen::MatrixXd jacobian(count, count);
+        const double h = 1e-6 * (size > 0 ? size : 1.0);
+        for (Eigen::Index i = 0; i < count; ++i) {
+            Eigen::VectorXd after = x, before = x;
+            after[i] += h;
+            before[i] -= h;
+            jacobian.col(i) = (residual(after) - residual(before)) / (2 * h);
+        }
+        const Eigen::VectorXd way = -jacobian.partialPivLu().solve(here);
+        double step = 1;
+        Eigen::VectorXd there = residual(x + way);
+        while (!(there.norm() < here.norm()) && step > 1e-10) {
+            step /= 2;
+            there = residual(x + step * way);
+        }
+        if (!(there.norm() < here.norm())) return x;  // no nearer than rounding lets it
+        x += step * way;
+        here = there;
+    }
+    return x;
+}
+
+}  // namespace test
