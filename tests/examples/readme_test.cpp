@@ -112,9 +112,16 @@ std::vector<membrane::Tool<double>> stroke_of_ticks() {
 
 }  // namespace
 
-TEST_CASE_METHOD(Touched, "the README's moving body") {
+TEST_CASE_METHOD(AtRest, "the README's moving body") {
+    membrane::QuasiStaticSolver<double> solver(network);
+    membrane::AabbTree<double> tree(mesh);
+    membrane::ContactTracker<double> tracker(mesh);
+    membrane::Grasper<double> grasper(mesh);
     const membrane::SmoothContact smooth(mesh);
+    const membrane::SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
+    const membrane::Tool<double> tool{.position = {0, 0, 0.0108}, .radius = 1e-3};
     const membrane::Points<double> anchors = 1.001 * mesh.positions();
+    membrane::Points<double> x = mesh.positions();
     // [moving]
     auto body = membrane::MovingBody(mesh);
     if (!body.move_to(anchors, dt, x)) return;  // each tick: 3 x V [m], or a pose; false: not finite, nothing has moved

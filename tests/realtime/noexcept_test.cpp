@@ -70,8 +70,10 @@ TEMPLATE_TEST_CASE("contact is found without exceptions", "[noexcept]", double, 
     });
     static_cast<void>([](ContactTracker<S>& tracker, Grasper<S>& grasper, const AabbTree<S>& tree,
                          const ConstPointsRef<S>& x, const Tool<S>& tool, const Contact<S>& contact,
-                         const Grasp<S>& grasp, const RigidFrame<S>& frame, const Vector3<S>& p) {
-        static_assert(noexcept(tracker.update(tree, x, tool))&& noexcept(tracker.update(tree, x, tool, x)));
+                         const Grasp<S>& grasp, const RigidFrame<S>& frame, const MovingBody<S>& body,
+                         const Vector3<S>& p) {
+        static_assert(noexcept(tracker.update(tree, x, tool))&& noexcept(tracker.update(tree, x, tool, body)));
+        static_assert(noexcept(grasper.update(contact, x, tool, body))&& noexcept(body.velocity_at(p, {}, p)));
         static_assert(noexcept(tracker.reset())&& noexcept(tracker.tree_checks()));
         static_assert(noexcept(grasper.update(contact, x, tool))&& noexcept(grasper.reset()));
         static_assert(noexcept(contact.touching())&& noexcept(Contact<S>::none())&& noexcept(grasp.holding()));
@@ -86,14 +88,14 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
     using S = TestType;
     using Network = MassSpringNetwork<S, LinearSpring>;
     using Volume = VirtualVolumeSprings<S>;
-    static_cast<void>([](const Network& network, const Volume& volume, MovingBody<S>& body, const ConstPointsRef<S>& x,
-                         PointsRef<S> y, const Vector3<S>& p, S s, std::span<const Index> vertices,
+    static_cast<void>([](const Network& network, const Volume& volume, const MovingBody<S>& body,
+                         const ConstPointsRef<S>& x, const Vector3<S>& p, S s, std::span<const Index> vertices,
                          PropagationQueue& queue) {
         static_assert(noexcept(network.pull(0, x))&& noexcept(network.tension(0, x))&& noexcept(network.energy(x)));
         static_assert(noexcept(network.springs_of(0))&& noexcept(network.pinned(0))&& noexcept(network.mass(0)));
         static_assert(noexcept(volume.pull(0, p, p, s))&& noexcept(volume.energy(0, p))&& noexcept(on(body, volume)));
         static_assert(noexcept(on(body, volume).pull(0, p, p, s))&& noexcept(largest_curvature(network, 0, x)));
-        static_assert(noexcept(body.move_to(RigidFrame<S>(), y))&& noexcept(body.move_to(x, s, y)));
+        static_assert(noexcept(body.anchors())&& noexcept(body.rotation_at(0)));
         static_assert(
             noexcept(queue.build(network, vertices, 4))&& noexcept(queue.vertices())&& noexcept(queue.layer(0)));
         static_assert(noexcept(queue.contains(0))&& noexcept(queue.clear())&& noexcept(queue.grow(network)));
@@ -161,14 +163,14 @@ TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept
     using S = TestType;
     static_cast<void>([](ContactFriction<SpringDamperForce, S>& friction, ExtrapolatedReaction<S>& extrapolated,
                          GraspTransition<SpringDamperForce, S>& transition, VirtualCoupling<S>& coupling,
-                         const SmoothContact<S>& smooth, const HapticState<S>& state, const ConstPointsRef<S>& x,
+                         const SmoothContact<S>& smooth, const HapticState<S>& state, const MovingBody<S>& body,
                          const Vector3<S>& p, const Symmetric3<S>& stiffness) {
         static_assert(noexcept(friction(state))&& noexcept(friction.slips()));
         static_assert(noexcept(extrapolated(state))&& noexcept(extrapolated.solved(p, stiffness, p)));
         static_assert(noexcept(transition(state))&& noexcept(transition.under_way()));
         static_assert(noexcept(coupling.follow(state.tool, p, S(1)))&& noexcept(coupling(state)));
         static_assert(noexcept(coupling.force())&& noexcept(coupling.restart()));
-        static_assert(noexcept(smooth(state.contact))&& noexcept(smooth(state.contact, x, x)));
+        static_assert(noexcept(smooth(state.contact))&& noexcept(smooth(state.contact, body)));
     });
     static_cast<void>([](ForceLimiter& limit, EnergyObserver& observer, Watchdog& watchdog, SoftStart& start,
                          MotorHeat& heat, const Vector3<S>& force) {

@@ -10,6 +10,7 @@
 #include <membrane/collision/contact_tracker.hpp>
 #include <membrane/collision/grasper.hpp>
 #include <membrane/haptics/force_policy.hpp>
+#include <membrane/haptics/rest_contact.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/mesh/moving_body.hpp>
 #include <membrane/mesh/shapes.hpp>
@@ -218,6 +219,27 @@ TEST_CASE("a still tool on a body that moves feels the same, seen from the body 
         REQUIRE(difference.positions <= bound);
     }
     CHECK(norm(outside.force) > 5e-3);
+}
+
+TEST_CASE("the contact with the surface at rest goes with its body", "[moving]") {
+    const auto& mesh = scenes[0].mesh;
+    const RestContact rest(mesh);
+    const SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        AabbTree<double> tree(mesh);
+        MovingBody body(mesh);
+        Points<double> x = mesh.positions();
+        const RigidFrame<double> pose{random.rotation(), radius * random.vector(), random.vector(), random.vector()};
+        REQUIRE(body.move_to(pose, x));
+        tree.refit(body.anchors());
+        const Tool<double> tool{.position = radius * random.unit_vector(), .radius = 1e-3, .velocity = random.vector()};
+        const auto there = rest({}, in_world(tool, pose), tree, body), here = rest({}, tool);
+        const Vector3<double> felt = feel({in_world(tool, pose), there, {}});
+        REQUIRE(std::abs(there.depth - here.depth) <= 1e-15);
+        REQUIRE(norm<double>(felt - pose.direction_out(feel({tool, here, {}}))) <= 1e-12);
+    }
 }
 
 TEST_CASE("a membrane goes with its body, pinned or not, at no visit where it is rigid", "[moving]") {

@@ -49,7 +49,11 @@ class RestContact {
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact, const Tool<Scalar>& tool,
                                              const AabbTree<Scalar>& tree,
                                              const MovingBody<Scalar>& body) const noexcept {
-        return contact_with(body.anchors(), tree, contact, tool);
+        auto found = contact_with(body.anchors(), tree, contact, tool);
+        if (found.touching()) {
+            found.body_velocity = body.velocity_at(tool.position, found.corners, found.barycentric);
+        }
+        return found;
     }
 
   private:

@@ -28,10 +28,10 @@ namespace membrane {
 /// Where the body is and how it came there: the anchors, which are where the membrane would be without any tool, and the
 /// pose, which carries the mesh to them as nearly as a rigid motion can.
 ///
-/// A move takes the membrane along, pinned vertices too: each vertex goes with its anchor, and how far it is from that is turned
-/// as the pose is. What parts remember (contact, grasp, forces, displacements) they turn and shift with the pose at their next call. So
-/// a membrane and a tool that move rigidly with the body feel nothing of it: all is as at rest, to rounding. Vertices are
-/// woken only where anchors move other than rigidly.
+/// A move takes the membrane along, pinned vertices too: each vertex goes with its anchor, and its distance from that is
+/// turned as the pose is. What parts remember (contact, grasp, forces, displacements) they turn and shift with the pose at
+/// their next call. So a membrane and a tool that move rigidly with the body feel nothing of it: all is as at rest, to
+/// rounding. Vertices are woken only when anchors move other than rigidly.
 ///
 /// A body that only moves rigidly, as an eye in its orbit, needs none of this where positions need not be in the world:
 /// with `carried_in(tool, frame)` the membrane stays in the body's frame, at no cost. Loads of a network that keep their
@@ -43,8 +43,8 @@ class MovingBody {
     /// At rest, its anchors the positions of `mesh`. Cost: O(F log F).
     explicit MovingBody(const TriangleMesh<Scalar>& mesh);
 
-    /// The body is at `pose`, which carries it from where the mesh is; `x` (3 x V [m]), on the body, goes along. To be called in every tick,
-    /// for velocities too are those of the last call. Then refit the tree, all of it.
+    /// The body is at `pose`, which carries it from where the mesh is; `x` (3 x V [m]), on the body, goes along. To be
+    /// called in every tick: velocities are those of the last call. Then refit the tree, all of it.
     ///
     /// False, and nothing has changed, for a number that is not finite in `pose` or `x`, or that would come out so. Online.
     /// Cost: O(V). @pre `x` has a column for each vertex, and the pose's rotation is one (asserted)
@@ -66,7 +66,8 @@ class MovingBody {
     /// How often anchors have moved other than rigidly: a membrane at rest is then out of balance.
     [[nodiscard]] std::uint64_t deformations() const noexcept { return deformations_; }
 
-    /// Velocity at `place` of what is fixed to the body at the point `barycentric` of the triangle of vertices `corners` [m/s].
+    /// Velocity at `place` of what is fixed to the body at the point `barycentric` of the triangle of vertices `corners`
+    /// [m/s].
     [[nodiscard]] Vector3<Scalar> velocity_at(const Vector3<Scalar>& place, const std::array<Index, 3>& corners,
                                               const Vector3<Scalar>& barycentric) const noexcept;
 

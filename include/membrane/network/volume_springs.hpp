@@ -36,8 +36,8 @@ static_assert(std::is_default_constructible_v<VolumeOptions<double>>);
 /// hands out its springs, `spring(v, start, dt)`, lets a solver visit several vertices at once. For the parts that look for an
 /// equilibrium, one that is not alike in all directions may say its stiffness without damping as a `Symmetric3`,
 /// `curvature(v)`; one that is linear may say it in either number type, `curvature<Number>(v)`, and where it does not pull,
-/// `anchors()`: it is then evaluated in double even if it is of floats. A body that moves is no concern of a model's: `on(body,
-/// volume)` brings it there.
+/// `anchors()`: it is then evaluated in double even if it is of floats. A body that moves is no concern of a model's:
+/// `on(body, volume)` brings it there.
 template <class Volume, class Scalar>
 concept VolumeModel = Real<Scalar> &&
     requires(const Volume& volume, Index v, const Vector3<Scalar>& position, Scalar dt) {
