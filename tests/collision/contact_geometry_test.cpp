@@ -70,19 +70,3 @@ TEST_CASE("where a point passed, the contact is what it passed") {
     CHECK((contact.point - membrane::point_at(surface.triangle(mesh.positions(), 1), barycentric)).norm() < 1e-15);
     CHECK(contact.normal.z() == 1);
 }
-
-TEST_CASE("a surface has given way once it has come a quarter of the way to where the tool was") {
-    const Tool<double> tool{.position = {0.1, 0.05, -0.2}, .radius = 0.05};
-    const Index f = surface.descend(mesh.positions(), 0, tool.position);
-    auto contact = membrane::contact_in(surface, mesh.positions(), f, tool, 0.05, 1.0);
-    contact.radius = 0.05;
-    REQUIRE(contact.gap < -0.05);
-    for (const double way : {0.0, 0.04, 0.06, 0.2}) {
-        membrane::Points<double> x = mesh.positions();
-        x.row(2).array() -= way;
-        CAPTURE(way);
-        CHECK(membrane::has_given_way(surface, x, contact) == (way > 0.05));
-    }
-    contact.gap = -0.04;  // it was not behind
-    CHECK(membrane::has_given_way(surface, mesh.positions(), contact));
-}

@@ -26,17 +26,6 @@ template <Real Scalar>
                                                    const Vector3<Scalar>& barycentric, const Vector3<Scalar>& from,
                                                    const Vector3<Scalar>& to, Scalar side) noexcept;
 
-/// Whether the surface has moved to where the tool was a tick ago, or the tool was not behind it then: false where it was,
-/// and the surface has not come a quarter of the way.
-template <Real Scalar>
-[[nodiscard]] bool has_given_way(const Neighbourhood<Scalar>& surface,
-                                 const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                 const Contact<Scalar>& last) noexcept {
-    const Scalar then = last.gap + last.radius;
-    const Vector3<Scalar> now = last.on_axis - point_at(surface.triangle(x, last.triangle), last.barycentric);
-    return !(then < 0 && dot<Scalar>(last.normal, now) < Scalar(0.75) * then);
-}
-
 template <Real Scalar>
 Contact<Scalar> contact_in(const Neighbourhood<Scalar>& surface, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                            Index f, const Tool<Scalar>& tool, Scalar radius, Scalar side) noexcept {

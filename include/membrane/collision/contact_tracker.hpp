@@ -37,8 +37,10 @@ struct TrackerOptions {
 /// however far it has come: the tree is asked about its way in every tick. A second fold of the surface that comes near a
 /// tool in contact is found after `check_every` ticks at the latest.
 ///
-/// The tool stays on the outer side of a closed surface. On an open one it stays on the side of first contact. The
-/// depth is measured against the surface as it would be without the tool: the mesh, or the anchors of a body that moves.
+/// The tool stays on the outer side of a closed surface: behind it is where the winding number is not 0. On an open one it
+/// stays on the side of first contact until it is clear of the surface, or has slid off a border that gave way. A tool that
+/// is outside the surface as it would be without it touches nothing that it would pull farther out. The depth is measured
+/// against the surface as it would be without the tool: the mesh, or the anchors of a body that moves.
 template <Real Scalar>
 class ContactTracker {
   public:
@@ -291,8 +293,7 @@ bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& conta
             through(last_tool_->position + last_tool_->axis, scene.tool.position + scene.tool.axis));
 }
 
-// Behind a closed surface is a tool that was not in contact, or that the surface has not given way to. No way has led
-// any other in: it is outside, whatever the surface looks like where it is creased.
+// What looks as if the tool were behind is a crease, or the tool has passed the surface.
 template <Real Scalar>
 void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept {
     const auto seen_from = [&](Scalar side) {
@@ -454,7 +455,8 @@ bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Sca
 // be pulled.
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
-    if (contact.depth > 0) return false;
+    const auto before = surface_.nearest(scene.anchors, contact.triangle, scene.tool).on_triangle;
+    if (contact.depth > 0 || before.squared_distance < scene.radius * scene.radius) return false;
     const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
     const auto nearest = closest_point(surface_.triangle(scene.anchors, f), contact.on_axis);
     return dot<Scalar>(contact.normal, contact.on_axis - nearest.point) < 0;

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/quasi_static.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include <Eigen/Geometry>
+#include <membrane/collision/aabb_tree.hpp>
+#include <membrane/collision/contact_tracker.hpp>
+#include <membrane/collision/grasper.hpp>
+#include <membrane/mesh/shapes.hpp>
+#include <membrane/solve/press.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+// A tool that is out leaves nothing behind: the membrane comes back to rest.
+
+using namespace membrane;
+
+namespace {
+
+using Point = Vector3<double>;
+
+constexpr double size = 0.01, dt = 1e-3;  // [m], [s]
+
+/// A membrane with the constants of README's example, before anything has touched it.
+struct Scene {
+    TriangleMesh<double> mesh;
+    std::vector<Index> rim;  // its border
+    MassSpringNetwork<double, LinearSpring> network;
+    VirtualVolumeSprings<double> backing;
+    QuasiStaticSolver<double> solver;
+    AabbTree<double> tree;
+    ContactTracker<double> tracker;
+    Grasper<double> grasper;
+    Points<double> x;
+    double edge;
+
+    explicit Scene(const TriangleMesh<double>& surface, bool pinned = true)
+        : mesh(surface),
+          rim(border(mesh)),
+          network(mesh, LinearSpring{}, {.stiffness = 40, .pinned = pinned ? rim : std::vector<Index>{}}),
+          backing(mesh, {.stiffness = 8, .damping = 0.02}),
+          solver(network, {.layers = 6, .sweeps = 2}),
+          tree(mesh),
+          tracker(mesh),
+          grasper(mesh),
+          x(mesh.positions()),
+          edge(Neighbourhood<double>(mesh).mean_edge()) {}
+
+    void tick(const Tool<double>& tool) {
+        const auto contact = tracker.update(tree, x, tool);
+        const auto grasp = grasper.update(contact, x, tool);
+        const auto report = solver.step(x, dt, network, backing, press(tool, contact, grasp), pull(tool, grasp));
+        REQUIRE(report.status == StepStatus::advanced);
+        tree.refit(x, report.moved);
+    }
+
+    double off_rest() const { return (x - mesh.positions()).colwise().norm().maxCoeff(); }
+
+    /// Ticks with the tool held still until the membrane is at rest, or `most`.
+    bool comes_back(const Tool<double>& tool, int most) {
+        for (int i = 0; i < most && off_rest() > 1e-3 * size; ++i) tick(tool);
+        return off_rest() <= 1e-3 * size;
+    }
+};
+
+/// From 0 to 1 between two ticks.
+double ramp(int tick, int from, int to) {
+    return std::clamp(static_cast<double>(tick - from) / std::max(1, to - from), 0.0, 1.0);
+}
+
+TriangleMesh<double> square() { return sheet<double>({.width = 0.02, .height = 0.02, .columns = 10, .rows = 10}); }
+
+TriangleMesh<double> folded_square(double slope) {
+    const auto flat = square();
+    Points<double> x = flat.positions();
+    x.row(2) = slope * x.row(0).cwiseAbs();
+    return {x, flat.triangles()};
+}
+
+TriangleMesh<double> cube() {
+    const auto ball = icosphere<double>({.radius = size, .subdivisions = 2});
+    Points<double> x = ball.positions();
+    for (auto corner : x.colwise()) corner *= 0.8 * size / corner.cwiseAbs().maxCoeff();
+    return {x, ball.triangles()};
+}
+
+/// Where a tool goes: to `start`, `in` from there, `slide` along, back out by `out`.
+struct Stroke {
+    Tool<double> tool;
+    Point start, in = Point::Zero(), slide = Point::Zero(), out = Point::Zero();
+    bool turns_back = false;  // withdrawn by the way it came
+    bool grasps = false;
+    int pressed = 0, slides = 0, slid = 0, leaves = 0, gone = 0;  // ticks
+
+    Tool<double> at(int tick) const {
+        Tool<double> moved = tool;
+        const double withdrawn = ramp(tick, leaves, gone);
+        moved.position = start + ramp(tick, 0, pressed) * in + ramp(tick, slides, slid) * slide;
+        if (turns_back) moved.position += std::min(1.0, 4 * withdrawn) * -in;
+        moved.position += (turns_back ? std::max(0.0, (4 * withdrawn - 1) / 3) : withdrawn) * out;
+        moved.grasping = grasps && tick >= pressed + 10 && tick < slid + 10;
+        return moved;
+    }
+};
+
+int ticks_for(const Point& way, double speed) { return std::max(1, static_cast<int>(way.norm() / speed / dt)); }
+
+bool overlaps(const Scene& scene, const Tool<double>& tool) {
+    bool any = false;
+    scene.tree.touching_capsule(scene.mesh.positions(), tool.position, tool.position + tool.axis, tool.radius + 1e-5,
+                                [&](Index) { any = true; });
+    return any;
+}
+
+/// Up to two edges deep, at 10 mm/s to 1 m/s, withdrawn by 20 mm at 10 mm/s or up to all in one tick.
+Stroke random_stroke(const Scene& scene, test::Random& random) {
+    const auto& x = scene.mesh.positions();
+    Stroke stroke;
+    // Over a corner, an edge or a face; often over the border.
+    Index f = random.index(scene.mesh.triangle_count());
+    const bool over_rim = !scene.rim.empty() && random.chance(0.4);
+    const Index v = over_rim ? scene.rim[static_cast<std::size_t>(random.index(static_cast<Index>(scene.rim.size())))]
+                             : scene.mesh.triangles()(0, f);
+    while ((scene.mesh.triangles().col(f).array() != v).all()) f = (f + 1) % scene.mesh.triangle_count();
+    const auto triangle = triangle_at(x, scene.mesh.triangles().col(f));
+    Point target = point(x, v);
+    if (!over_rim && random.chance(0.75)) target = point_at<double>(triangle, random.barycentric());
+    Point outward = area_vector(triangle).normalized();
+    if (!scene.rim.empty() && random.chance(0.3)) outward = -outward;
+    const Point inward = (0.5 * random.vector() - outward).normalized();
+
+    const Index shape = random.index(3);  // a point, a sphere, a capsule
+    if (shape > 0) stroke.tool.radius = scene.edge * 0.05 * std::pow(40, random.number());
+    if (shape > 1) {
+        const Point axis = random.unit_vector() + random.number() * outward;
+        stroke.tool.axis = random.number(0.5, 4.0) * scene.edge * (axis.dot(outward) < 0 ? -axis : axis);
+    }
+    stroke.tool.position = target - stroke.tool.radius * inward;
+    while (overlaps(scene, stroke.tool)) stroke.tool.position -= 2e-4 * inward;
+    stroke.start = stroke.tool.position;
+    stroke.in = std::min(random.number(0.2, 2.0) * scene.edge, size / 2) * inward;
+    if (!over_rim && random.chance(0.5)) {
+        stroke.slide = 0.5 * size * random.number() * inward.cross(random.unit_vector()).normalized();
+    }
+    // What has gone round a rim would come up from below, and lift the membrane as it should.
+    stroke.turns_back = over_rim;
+    stroke.out = (2 * size + stroke.in.norm() + stroke.tool.radius) * outward;
+    Tool<double> away = stroke.tool;
+    const Point last = stroke.start + (over_rim ? Point(Point::Zero()) : Point(stroke.in + stroke.slide));
+    for (away.position = last + stroke.out; overlaps(scene, away); away.position += 1e-3 * outward) {
+        stroke.out += 1e-3 * outward;
+    }
+    stroke.grasps = random.chance(0.3);
+    stroke.pressed = ticks_for(stroke.in, 0.01 * std::pow(100, random.number()));
+    stroke.slides = stroke.pressed + 20;
+    stroke.slid = stroke.slides + ticks_for(stroke.slide, 0.01 * std::pow(20, random.number()));
+    stroke.leaves = stroke.slid + 20;
+    stroke.gone = stroke.leaves + ticks_for(stroke.out, 0.01 * std::pow(3000, random.number()));
+    return stroke;
+}
+
+}  // namespace
+
+TEST_CASE("after any stroke of any tool over creases, rims and coarse meshes the membrane comes back", "[withdrawal]") {
+    const std::vector<Scene> scenes{Scene(icosphere<double>({.radius = size, .subdivisions = 1})),
+                                    Scene(icosphere<double>({.radius = size, .subdivisions = 2})),
+                                    Scene(cube()),
+                                    Scene(square()),
+                                    Scene(folded_square(-0.7)),
+                                    Scene(folded_square(0.7)),
+                                    Scene(spherical_cap<double>({.rings = 8}))};
+    for (int seed = 1; seed <= cases(300, 20'000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Scene scene = scenes[static_cast<std::size_t>(seed) % scenes.size()];
+        const Stroke stroke = random_stroke(scene, random);
+        for (int tick = 0; tick <= stroke.gone; ++tick) scene.tick(stroke.at(tick));
+        CHECK(scene.comes_back(stroke.at(stroke.gone), 2100));
+    }
+}
+
+TEST_CASE("forceps that open below the surface and are drawn out slowly let go of it", "[withdrawal]") {
+    const Scene fresh(icosphere<double>({.radius = size, .subdivisions = 2}));
+    int strokes = 0;
+    for (const double radius : {1e-3, 2e-3}) {
+        for (const double depth : {1e-3, 2e-3}) {
+            for (const double drawn : {0.0, 2e-3}) {
+                for (const double along : {3e-3, 6e-3}) {
+                    const Index place = strokes++ % 3;
+                    CAPTURE(radius, depth, drawn, along, place);
+                    const Point foot = point(fresh.mesh.positions(), 41 * place + 20), out = foot.normalized();
+                    const Point side = out.cross(Point(0.3, 0.5, 0.81)).normalized();
+                    Stroke stroke{.tool = {.radius = radius}, .start = foot + radius * out, .in = -depth * out};
+                    stroke.slide = drawn * out + along * side;
+                    stroke.out = 0.02 * out;
+                    stroke.grasps = true;
+                    stroke.pressed = 100, stroke.slides = 150, stroke.slid = 300, stroke.leaves = 350;
+                    stroke.gone = 850;
+                    Scene scene = fresh;
+                    for (int tick = 0; tick <= stroke.gone; ++tick) scene.tick(stroke.at(tick));
+                    CHECK(scene.comes_back(stroke.at(stroke.gone), 500));
+                }
+            }
+        }
+    }
+}
+
+TEST_CASE("a shaft over a pinned rim is withdrawn as it was pressed", "[withdrawal]") {
+    const Scene fresh(sheet<double>({.width = 0.02, .height = 0.02, .columns = 14, .rows = 14}));
+    for (int i = 0; i <= 16; i += 2) {
+        for (const double rise : {0.0, 0.001, 0.002}) {
+            CAPTURE(i, rise);
+            Stroke stroke{.tool = {.axis = {0.01, 0, rise}, .radius = 5e-4}, .start = {5e-4 * i, 0.0003, 0.0005}};
+            stroke.in = {0, 0, -0.002};
+            stroke.out = {0, 0, 0.02};
+            stroke.pressed = 100, stroke.leaves = 200, stroke.gone = 1200;
+            Scene scene = fresh;
+            for (int tick = 0; tick <= stroke.gone; ++tick) scene.tick(stroke.at(tick));
+            CHECK(scene.comes_back(stroke.at(stroke.gone), 500));
+        }
+    }
+}
