@@ -22,8 +22,7 @@ struct Field {
         : mesh(sphere_of<Scalar>(vertices)),
           network(mesh, {}, {.stiffness = Scalar(stiffness), .mass = Scalar(4e-4)}),
           volume(mesh, {.stiffness = Scalar(backing)}),
-          work(
-              mesh.vertex_count(), [](Index) { return false; }, 0) {
+          work(mesh.vertex_count(), 0) {
         std::mt19937_64 random(1);
         for (Index v = 0; v < x.cols(); ++v) {
             for (int k = 0; k < 3; ++k)

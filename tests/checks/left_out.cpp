@@ -159,8 +159,7 @@ int main(int argc, char** argv) {
     const membrane::NoVolumeSprings none;
     const std::vector<S> stiffnesses(static_cast<std::size_t>(mesh.vertex_count()), backing);
     const NoDamping undamped{&springs.anchors(), &stiffnesses};
-    membrane::Workspace<S> work(
-        mesh.vertex_count(), [](Index) { return false; }, 0);
+    membrane::Workspace<S> work(mesh.vertex_count(), 0);
 
     Points start = mesh.positions();
     std::mt19937_64 random(1);

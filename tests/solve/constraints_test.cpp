@@ -427,12 +427,14 @@ struct Told {
 }  // namespace
 
 TEST_CASE("a set of constraints is sound if all are, mends if any does, finite if all forces are") {
-    Workspace<double> work(
-        1, [](Index) { return false; }, 8);
+    Workspace<double> work(1, 8);
     Points<double> positions = Points<double>::Zero(3, 1);
     PointsRef<double> x = positions;
     work.open();
-    Region<double> region(x, work);
+    const struct {
+        bool pinned(Index) const { return false; }
+    } none_pinned;
+    Region<double> region(x, work, none_pinned);
     Index begun = 0;
     std::array<Vector3<double>, 2> reactions{};
     const double nan = std::numeric_limits<double>::quiet_NaN();

@@ -16,9 +16,12 @@ const Vector3<double> none(0, 0, 0);
 
 /// Six points of which number 5 is pinned, and room for three touches.
 struct SixPoints {
+    bool pinned(Index v) const { return v == pinned_vertex; }
+
+    Index pinned_vertex = 5;
     Points<double> points = Points<double>::Random(3, 6);
     PointsRef<double> x{points};
-    Workspace<double> work{6, [](Index v) { return v == 5; }, 3};
+    Workspace<double> work{6, 3};
 
     SixPoints() { work.open(); }
 };
@@ -33,7 +36,7 @@ std::vector<Index> as_vector(std::span<const Index> items) { return {items.begin
 
 TEST_CASE("a region knows its vertices", "[region]") {
     SixPoints scene;
-    Region<double> region(scene.x, scene.work);
+    Region<double> region(scene.x, scene.work, scene);
     for (Index v = 0; v < 6; ++v) {
         CHECK(region.check(v));
         CHECK(region.position(v) == point(scene.points, v));
@@ -48,7 +51,7 @@ TEST_CASE("a region knows its vertices", "[region]") {
 
 TEST_CASE("what is moved is kept as it was when the step began", "[region]") {
     SixPoints scene;
-    Region<double> region(scene.x, scene.work);
+    Region<double> region(scene.x, scene.work, scene);
     const Points<double> before = scene.points;
     region.shift(2, {1, 0, 0});
     region.shift(2, {0, 1, 0});
@@ -68,7 +71,7 @@ TEST_CASE("what is moved is kept as it was when the step began", "[region]") {
 
 TEST_CASE("held and pinned vertices are fixed until the step ends, and a pinned one stays", "[region]") {
     SixPoints scene;
-    Region<double> region(scene.x, scene.work);
+    Region<double> region(scene.x, scene.work, scene);
     const Points<double> before = scene.points;
     CHECK(region.fixed(5));
     CHECK_FALSE(region.fixed(1));
@@ -92,7 +95,7 @@ TEST_CASE("held and pinned vertices are fixed until the step ends, and a pinned 
 
 TEST_CASE("pushes add up, and are taken back with the step", "[region]") {
     SixPoints scene;
-    Region<double> region(scene.x, scene.work);
+    Region<double> region(scene.x, scene.work, scene);
     region.push(3, {1, 2, 3});
     region.push(3, {1, 0, 0});
     region.push(0, {0, 0, 5});
@@ -111,7 +114,7 @@ TEST_CASE("pushes add up, and are taken back with the step", "[region]") {
 
 TEST_CASE("seeds keep their order, and each comes once", "[region]") {
     SixPoints scene;
-    Region<double> region(scene.x, scene.work);
+    Region<double> region(scene.x, scene.work, scene);
     for (const Index v : {4, 0, 4, 2, 0}) region.seed(v);
     CHECK(as_vector(scene.work.seeds.items()) == std::vector<Index>{4, 0, 2});
     const std::array<Touch<double>, 2> triangles{touch_of(0, 0), touch_of(1, 0)};
@@ -124,7 +127,7 @@ TEST_CASE("seeds keep their order, and each comes once", "[region]") {
 
 TEST_CASE("each constraint finds the touches it had in the step before, and no others", "[region]") {
     SixPoints scene;
-    Region<double> region(scene.x, scene.work);
+    Region<double> region(scene.x, scene.work, scene);
     const auto begin = [&](std::size_t constraint) {
         region.turn_to(constraint);
         region.open();
@@ -171,7 +174,7 @@ TEST_CASE("each constraint finds the touches it had in the step before, and no o
 
 TEST_CASE("touches can be forgotten, and are refused where there is no room", "[region]") {
     SixPoints scene;
-    Region<double> region(scene.x, scene.work);
+    Region<double> region(scene.x, scene.work, scene);
     region.turn_to(0);
     region.open();
     for (Index f = 0; f < 3; ++f) region.remember(touch_of(f, 0));
@@ -194,17 +197,16 @@ TEST_CASE("the corners of nothing are none, whatever the last step had", "[regio
         std::array<Index, 3> corners;
     };
     const std::array<Corners, 1> some{{{{1, 2, 3}}}};
-    CHECK(Region<double>(scene.x, scene.work).corners_of(std::span<const Corners>(some)).size() == 3);
-    CHECK(Region<double>(scene.x, scene.work).corners_of(std::span<const Corners>()).empty());
+    CHECK(Region<double>(scene.x, scene.work, scene).corners_of(std::span<const Corners>(some)).size() == 3);
+    CHECK(Region<double>(scene.x, scene.work, scene).corners_of(std::span<const Corners>()).empty());
 }
 
 TEST_CASE("who is pinned is asked whenever it matters", "[region]") {
     SixPoints scene;
-    Index pinned = 2;
-    scene.work.pinned = [&pinned](Index v) { return v == pinned; };
-    const Region<double> region(scene.x, scene.work);
+    scene.pinned_vertex = 2;
+    const Region<double> region(scene.x, scene.work, scene);
     CHECK(region.fixed(2));
-    pinned = 3;
+    scene.pinned_vertex = 3;
     CHECK_FALSE(region.fixed(2));
     CHECK(region.fixed(3));
 }
@@ -212,7 +214,7 @@ TEST_CASE("who is pinned is asked whenever it matters", "[region]") {
 TEST_CASE("a workspace is copied with all it holds", "[region]") {
     auto scene = std::make_unique<SixPoints>();
     {
-        Region<double> region(scene->x, scene->work);
+        Region<double> region(scene->x, scene->work, *scene);
         region.turn_to(0);
         region.open();
         region.remember(touch_of(7, 0, 4));
@@ -222,7 +224,8 @@ TEST_CASE("a workspace is copied with all it holds", "[region]") {
     Points<double> points = scene->points;
     scene.reset();
     PointsRef<double> x(points);
-    Region<double> region(x, copy);
+    const SixPoints pins;
+    Region<double> region(x, copy, pins);
     copy.open();
     region.turn_to(0);
     region.open();

@@ -24,11 +24,7 @@ constexpr std::array<Index, 3> corners{0, 1, 2};
 /// Three vertices, the last of them pinned if asked for.
 struct Membrane {
     explicit Membrane(test::Random& random, bool last_pinned = false, bool blocks = false)
-        : x(3, 3),
-          work(
-              3, [=](Index v) { return last_pinned && v == 2; }, 8),
-          ref(x),
-          region(ref, work) {
+        : network{last_pinned}, x(3, 3), work(3, 8), ref(x), region(ref, work, network) {
         for (Index v = 0; v < 3; ++v) x.col(v) = random.vector();
         work.open();
         region.open();
@@ -43,6 +39,10 @@ struct Membrane {
             }
         }
     }
+    struct Network {
+        bool last_pinned;
+        bool pinned(Index v) const { return last_pinned && v == 2; }
+    } network;
     Points<double> x;
     Workspace<double> work;
     PointsRef<double> ref;
@@ -122,7 +122,7 @@ TEST_CASE("what a tool presses on yields where it is fixed by its share of the f
         const double stiffness = random.number(1.0, 1000.0);
         m.region.set_support(2, stiffness);
         const Vector3<double> none = Vector3<double>::Zero(), force = random.vector();
-        const Touch<double> touch{0, 0, corners, random.barycentric(), random.unit_vector(), force, none};
+        const Touch<double> touch{0, 0, corners, random.barycentric(), random.unit_vector(), force, none, true};
         const Points<double> before = m.x;
         membrane::attach(m.region, touch);
         const double weight = seed % 2 == 0 ? touch.barycentric[2] : 0;  // on what is fixed

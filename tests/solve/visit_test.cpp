@@ -25,8 +25,7 @@ struct MidStep {
         : random(seed),
           network(mesh, law, {.stiffness = 3.0, .mass = 0.5}),
           backing(mesh, {.stiffness = 2.0, .damping = 0.3}),
-          work(
-              42, [](Index) { return false; }, 4),
+          work(42, 4),
           x(test::jittered(mesh.positions(), 0.1, random)),
           ref(x),
           v(random.index(42)) {

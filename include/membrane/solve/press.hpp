@@ -175,20 +175,20 @@ void Press<Scalar>::give_way(Region<Scalar>& region) const noexcept {
 template <Real Scalar>
 void Press<Scalar>::find_touches(Region<Scalar>& region) const noexcept {
     const int pairs = feature_pairs(tool);
-    const auto on_fixed = [&](const std::array<Index, 3>& corners) {
-        return std::any_of(corners.begin(), corners.end(), [&](Index v) { return region.fixed(v); });
-    };
     for (const auto& touched : contact.touched) {
         const auto triangle = triangle_of(region, touched.corners);
+        const bool on_fixed =
+            std::any_of(touched.corners.begin(), touched.corners.end(), [&](Index v) { return region.fixed(v); });
         for (int pair = 0; pair < pairs; ++pair) {
             const auto nearest = proximity(triangle, tool, pair);
             if (!nearest) continue;
             const bool apart = norm(nearest->reach) > contact.radius / 1000;
             const Vector3<Scalar> towards = apart ? nearest->reach : Vector3<Scalar>(contact.before - contact.on_axis);
             const Vector3<Scalar> normal = direction(towards, contact.normal), none = Vector3<Scalar>::Zero();
-            Touch<Scalar> touch{touched.triangle, pair, touched.corners, nearest->barycentric, normal, none, none};
+            Touch<Scalar> touch{touched.triangle, pair, touched.corners, nearest->barycentric, normal, none, none,
+                                on_fixed};
             // Fixed corners have not been taken along: what the tool has crossed is between it and where it was.
-            if (contact.crossed && on_fixed(touched.corners)) {
+            if (contact.crossed && on_fixed) {
                 const Vector3<Scalar> came =
                     contact.before - contact.on_axis + nearest->reach - yielding_of(region, touch);
                 if (dot(came, touch.normal) < 0) touch.normal = -touch.normal;
@@ -224,7 +224,8 @@ void Press<Scalar>::touch_support(Region<Scalar>& region, const Vector3<Scalar>&
     Scalar pressure = 0;
     for (const auto& touch : region.touches_before()) pressure -= dot(touch.force, out);
     const Vector3<Scalar> force = -(std::max)(pressure, Scalar(0)) * out, none = Vector3<Scalar>::Zero();
-    region.remember({contact.triangle, detail::on_support, contact.corners, contact.barycentric, out, force, none});
+    region.remember(
+        {contact.triangle, detail::on_support, contact.corners, contact.barycentric, out, force, none, true});
 }
 
 // Brings the touch up to date with the positions, its pressure unchanged, and returns the gap. The tool stays on the

@@ -143,7 +143,7 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& netwo
     : method_{rule, (options.check(), options), executor},
       active_(network.vertex_count()),
       block_(network, detail::most_in_lanes<Scalar, Rule, Network>(options)),
-      work_(network.vertex_count(), {}, options.most_touches),
+      work_(network.vertex_count(), options.most_touches),
       last_held_(network.vertex_count()),
       woken_(network.vertex_count()),
       moved_(static_cast<std::size_t>(network.vertex_count())),
@@ -168,13 +168,12 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, 
     MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());
     detail::require_made<QuasiStaticSolver>();
     open(sizeof...(Constraints));
-    work_.pinned = [&network](Index v) { return network.pinned(v); };
     go_along(volume);
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) {
         return refuse_step(StepStatus::bad_time_step, x);
     }
 
-    Region<Scalar> region(x, work_);
+    Region<Scalar> region(x, work_, network);
     const ConstraintSet<Scalar, Constraints...> acting(region, constraints...);
     if (!acting.sound()) return refuse_step(StepStatus::bad_input, x);
     predict<Volume>(acting, region);
@@ -288,7 +287,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::settle(const Handed& scene, bool 
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepStatus status,
                                                                          PointsRef<Scalar>& x) noexcept {
-    Region<Scalar>(x, work_).put_back([](Index) { return true; });
+    for (const Index v : work_.saved.items()) x.col(v) = work_.start.col(v);
     if (status == StepStatus::unstable) work_.forget();  // what ran away may be a force from the step before
     predictor_.forget();
     reactions_.fill(Vector3<Scalar>::Zero());

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <functional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -26,6 +25,7 @@ struct Touch {
     Vector3<Scalar> normal;     ///< from the surface to the tool
     Vector3<Scalar> force;      ///< on the membrane [N]
     Vector3<Scalar> stiffness;  ///< that the touch adds to each corner's [N/m]
+    bool on_fixed = false;      ///< whether a corner is fixed, and bears part of the force
 };
 
 /// What the solver remembers from step to step for its constraints, and what it works with within one. `external`
@@ -35,8 +35,7 @@ struct Workspace {
     /// The largest number of constraints of one step.
     static constexpr std::size_t most_constraints = 16;
 
-    /// `pinned(v)` says which vertices never move.
-    Workspace(Index vertex_count, std::function<bool(Index)> pinned, Index most_touches);
+    Workspace(Index vertex_count, Index most_touches);
 
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(compliance.size()); }
 
@@ -50,7 +49,6 @@ struct Workspace {
     struct Range {
         std::size_t begin = 0, end = 0;
     };
-    std::function<bool(Index)> pinned;  // asked whenever it matters; must not throw
     IndexSet seeds, held, saved, pushed, patch;
     IndexSet bearing;               // fixed vertices that a tool presses on
     Points<Scalar> start;           // of saved vertices, where they were when the step began
@@ -75,7 +73,12 @@ struct Workspace {
 template <Real Scalar>
 class Region {
   public:
-    Region(PointsRef<Scalar>& x, Workspace<Scalar>& work) noexcept : x_(x), work_(work) {}
+    /// `network.pinned(v)` says which vertices never move.
+    template <class Network>
+    Region(PointsRef<Scalar>& x, Workspace<Scalar>& work, const Network& network) noexcept
+        : x_(x), work_(work), network_(&network), is_pinned_([](const void* asked, Index v) noexcept {
+              return static_cast<const Network*>(asked)->pinned(v);
+          }) {}
 
     /// Whether `v` is a vertex; if not, the step is refused.
     bool check(Index v) noexcept;
@@ -91,7 +94,7 @@ class Region {
     }
 
     /// Whether nothing moves `v` in this step but `hold`.
-    [[nodiscard]] bool fixed(Index v) const noexcept { return held(v) || work_.pinned(v); }
+    [[nodiscard]] bool fixed(Index v) const noexcept { return held(v) || is_pinned_(network_, v); }
     [[nodiscard]] bool held(Index v) const noexcept { return work_.held.contains(v); }
 
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept { return point(x_, v); }
@@ -265,6 +268,8 @@ class Region {
   private:
     PointsRef<Scalar>& x_;
     Workspace<Scalar>& work_;
+    const void* network_;  // of a type that only the next knows
+    bool (*is_pinned_)(const void*, Index) noexcept;
     std::size_t constraint_ = 0;
     std::size_t last_recalled_ = 0;
     bool has_patch_ = false;
@@ -273,9 +278,8 @@ class Region {
 };
 
 template <Real Scalar>
-Workspace<Scalar>::Workspace(Index vertices, std::function<bool(Index)> is_pinned, Index most_touches)
-    : pinned(std::move(is_pinned)),
-      seeds(vertices),
+Workspace<Scalar>::Workspace(Index vertices, Index most_touches)
+    : seeds(vertices),
       held(vertices),
       saved(vertices),
       pushed(vertices),
@@ -358,7 +362,7 @@ bool Region<Scalar>::check(Index v) noexcept {
 template <Real Scalar>
 void Region<Scalar>::hold(Index v, const Vector3<Scalar>& target) noexcept {
     work_.held.insert(v);
-    if (!work_.pinned(v)) place(v, target);
+    if (!is_pinned_(network_, v)) place(v, target);
 }
 
 template <Real Scalar>

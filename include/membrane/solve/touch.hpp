@@ -126,7 +126,7 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] Scalar support_compliance_of(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
     Scalar sum = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t k = 0; k < 3 && touch.on_fixed; ++k) {
         const Scalar weight = touch.barycentric[static_cast<Eigen::Index>(k)];
         sum += weight * weight * region.support_compliance(touch.corners[k]);
     }
@@ -137,7 +137,7 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> yielding_of(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
-    for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t k = 0; k < 3 && touch.on_fixed; ++k) {
         sum += touch.barycentric[static_cast<Eigen::Index>(k)] * region.yielding(touch.corners[k]);
     }
     return sum;
@@ -158,7 +158,7 @@ template <Real Scalar>
 /// Adds `force` [N] to what the touched point's fixed corners bear.
 template <Real Scalar>
 void bear(Region<Scalar>& region, const Touch<Scalar>& touch, const Vector3<Scalar>& force) noexcept {
-    for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t k = 0; k < 3 && touch.on_fixed; ++k) {
         region.bear(touch.corners[k], touch.barycentric[static_cast<Eigen::Index>(k)] * force);
     }
 }
