@@ -213,8 +213,8 @@ std::optional<Vector3<Scalar>> Press<Scalar>::way_out_of_support(const Region<Sc
     for (const auto& touch : region.touches_before()) pressed += touch.force;
     const bool turned = dot(pressed, contact.normal) > 0;
     const Vector3<Scalar> out = turned ? Vector3<Scalar>(-contact.normal) : contact.normal;
-    const Scalar ahead =
-        (contact.radius - tool.radius) / 2;  // a point is given a radius: half of it is a direction still
+    // A point is given a radius: half of that far from the surface there is a direction still.
+    const Scalar ahead = (contact.radius - tool.radius) / 2;
     if (!(dot<Scalar>(contact.on_axis - contact.point, out) < ahead)) return std::nullopt;
     return out;
 }
