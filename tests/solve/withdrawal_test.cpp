@@ -188,25 +188,21 @@ TEST_CASE("after any stroke of any tool over creases, rims and coarse meshes the
 
 TEST_CASE("forceps that open below the surface and are drawn out slowly let go of it", "[withdrawal]") {
     const Scene fresh(icosphere<double>({.radius = size, .subdivisions = 2}));
-    int strokes = 0;
     for (const double radius : {1e-3, 2e-3}) {
-        for (const double depth : {1e-3, 2e-3}) {
-            for (const double drawn : {0.0, 2e-3}) {
-                for (const double along : {3e-3, 6e-3}) {
-                    const Index place = strokes++ % 3;
-                    CAPTURE(radius, depth, drawn, along, place);
-                    const Point foot = point(fresh.mesh.positions(), 41 * place + 20), out = foot.normalized();
-                    const Point side = out.cross(Point(0.3, 0.5, 0.81)).normalized();
-                    Stroke stroke{.tool = {.radius = radius}, .start = foot + radius * out, .in = -depth * out};
-                    stroke.slide = drawn * out + along * side;
-                    stroke.out = 0.02 * out;
-                    stroke.grasps = true;
-                    stroke.pressed = 100, stroke.slides = 150, stroke.slid = 300, stroke.leaves = 350;
-                    stroke.gone = 850;
-                    Scene scene = fresh;
-                    for (int tick = 0; tick <= stroke.gone; ++tick) scene.tick(stroke.at(tick));
-                    CHECK(scene.comes_back(stroke.at(stroke.gone), 500));
-                }
+        for (const double drawn : {0.0, 2e-3}) {
+            for (const Index place : {0, 1, 2}) {
+                CAPTURE(radius, drawn, place);
+                const Point foot = point(fresh.mesh.positions(), 41 * place + 20), out = foot.normalized();
+                const Point side = out.cross(Point(0.3, 0.5, 0.81)).normalized();
+                Stroke stroke{.tool = {.radius = radius}, .start = foot + radius * out, .in = -0.002 * out};
+                stroke.slide = drawn * out + 0.006 * side;
+                stroke.out = 0.02 * out;
+                stroke.grasps = true;
+                stroke.pressed = 100, stroke.slides = 150, stroke.slid = 300, stroke.leaves = 350;
+                stroke.gone = 550;
+                Scene scene = fresh;
+                for (int tick = 0; tick <= stroke.gone; ++tick) scene.tick(stroke.at(tick));
+                CHECK(scene.comes_back(stroke.at(stroke.gone), 500));
             }
         }
     }
@@ -214,7 +210,7 @@ TEST_CASE("forceps that open below the surface and are drawn out slowly let go o
 
 TEST_CASE("a shaft over a pinned rim is withdrawn as it was pressed", "[withdrawal]") {
     const Scene fresh(sheet<double>({.width = 0.02, .height = 0.02, .columns = 14, .rows = 14}));
-    for (int i = 0; i <= 16; i += 2) {
+    for (const int i : {1, 3, 6, 8, 14}) {
         for (const double rise : {0.0, 0.001, 0.002}) {
             CAPTURE(i, rise);
             Stroke stroke{.tool = {.axis = {0.01, 0, rise}, .radius = 5e-4}, .start = {5e-4 * i, 0.0003, 0.0005}};
