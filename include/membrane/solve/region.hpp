@@ -50,6 +50,7 @@ struct Workspace {
         std::size_t begin = 0, end = 0;
     };
     IndexSet seeds, held, saved, pushed, patch;
+    IndexSet pinned;                // of saved vertices
     IndexSet bearing;               // fixed vertices that a tool presses on
     Points<Scalar> start;           // of saved vertices, where they were when the step began
     Points<Scalar> external;        // of pushed vertices, the constraints' force on them
@@ -94,7 +95,10 @@ class Region {
     }
 
     /// Whether nothing moves `v` in this step but `hold`.
-    [[nodiscard]] bool fixed(Index v) const noexcept { return held(v) || is_pinned_(network_, v); }
+    [[nodiscard]] bool fixed(Index v) const noexcept {
+        const bool pinned = work_.saved.contains(v) ? work_.pinned.contains(v) : is_pinned_(network_, v);
+        return pinned || held(v);
+    }
     [[nodiscard]] bool held(Index v) const noexcept { return work_.held.contains(v); }
 
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept { return point(x_, v); }
@@ -254,7 +258,9 @@ class Region {
         x_.col(v) = target;
     }
     void save(Index v) noexcept {
-        if (work_.saved.insert(v)) work_.start.col(v) = work_.kept.col(v) = x_.col(v);
+        if (!work_.saved.insert(v)) return;
+        work_.start.col(v) = work_.kept.col(v) = x_.col(v);
+        if (is_pinned_(network_, v)) work_.pinned.insert(v);
     }
 
     /// Puts the saved vertices for which `which(v)` back to where they were.
@@ -284,6 +290,7 @@ Workspace<Scalar>::Workspace(Index vertices, Index most_touches)
       saved(vertices),
       pushed(vertices),
       patch(vertices),
+      pinned(vertices),
       bearing(vertices),
       start(Points<Scalar>::Zero(3, vertices)),
       external(start),
@@ -304,6 +311,7 @@ void Workspace<Scalar>::open() noexcept {
     seeds.clear();
     held.clear();
     saved.clear();
+    pinned.clear();
     touches.clear();
     ranges = {};
     invalid = full = false;
