@@ -9,6 +9,7 @@
 
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/mesh/shapes.hpp>
+#include <membrane/network/moved_volume.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
@@ -36,7 +37,8 @@ struct Opaque {
 };
 static_assert(VisitsInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, VirtualVolumeSprings<double>>);
 static_assert(VisitsInLanes<float, SafeStep, MassSpringNetwork<float, LinearSpring>, NoVolumeSprings>);
-static_assert(VisitsInLanes<float, MassStep, MassSpringNetwork<float, LinearSpring>, MovedVolumeSprings<float>>);
+static_assert(VisitsInLanes<float, MassStep, MassSpringNetwork<float, LinearSpring>,
+                            MovedVolume<VirtualVolumeSprings<float>, float>>);
 static_assert(
     !VisitsInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Opaque<VirtualVolumeSprings<double>>>);
 static_assert(!VisitsInLanes<double, BlockStep, MassSpringNetwork<double, ExponentialSpring>, NoVolumeSprings>);

@@ -51,7 +51,8 @@ struct DistMeshOptions {
 /// iterations below 0, a spacing or edge length that is not finite and positive, and for what `isosurface` refuses
 /// Cost: O(grid) + O(vertices) for each iteration: 0.3 s for 1,500 vertices and 200 iterations. A body much thinner than
 /// the edges are long is found in many more vertices than are left, some 20 us each: give a wider `spacing`.
-template <Real Scalar = double, CheckedSignedDistance Body>
+template <Real Scalar = double, class Body>
+    requires(!detail::is_trimmed<Body> && CheckedSignedDistance<Body>)
 [[nodiscard]] TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options);
 
 /// The same with a border.
@@ -113,7 +114,8 @@ template <Real Scalar, class Surface>
 
 }  // namespace detail
 
-template <Real Scalar, CheckedSignedDistance Body>
+template <Real Scalar, class Body>
+    requires(!detail::is_trimmed<Body> && CheckedSignedDistance<Body>)
 TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options) {
     return detail::distmesh<Scalar>(body, options);
 }

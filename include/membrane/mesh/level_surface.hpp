@@ -24,6 +24,15 @@ struct Trimmed {
     [[nodiscard]] Bounds bounds() const { return bounds_of(body).within(bounds_of(within)); }
 };
 
+namespace detail {
+
+template <class T>
+inline constexpr bool is_trimmed = false;
+template <class Body, class Within>
+inline constexpr bool is_trimmed<Trimmed<Body, Within>> = true;
+
+}  // namespace detail
+
 /// The surface of `body` as far as it is in `within`. They should meet at an angle that is not small.
 template <SignedDistance Body, SignedDistance Within>
 [[nodiscard]] Trimmed<Body, Within> trimmed(Body body, Within within) {
