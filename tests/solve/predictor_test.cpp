@@ -56,9 +56,10 @@ struct Witness {
     Points<double>* seen;
 
     bool sound() const noexcept { return true; }
-    void begin(Region<double>& region) const noexcept {
+    void hold(Region<double>& region) const noexcept {
         for (Index v = 0; v < seen->cols(); ++v) seen->col(v) = region.position(v);
     }
+    void begin(Region<double>&) const noexcept {}
     bool enforce(Region<double>&) const noexcept { return false; }
     Vector3<double> reaction(const Region<double>&) const noexcept { return Vector3<double>::Zero(); }
 };
