@@ -34,6 +34,17 @@
 ///     // report.reactions[0] [N], report.moved
 namespace membrane {
 
+namespace detail {
+
+// A solver that is copied is no network that lacks something.
+template <class Network, class Scalar>
+concept NetworkOfSolver = !requires(Network & solver) {
+    solver.wake_all();
+}
+&&CheckedElasticNetwork<Network, Scalar>;
+
+}  // namespace detail
+
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The quasi-static solver, [Liu07] 2.2: every step is taken to be at rest, and the vertices of the propagation queue
@@ -51,7 +62,7 @@ class QuasiStaticSolver {
   public:
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
     /// Cost: O(V) memory.
-    template <CheckedElasticNetwork<Scalar> Network>
+    template <detail::NetworkOfSolver<Scalar> Network>
     explicit QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options = {}, const Rule& rule = {},
                                const Threads& executor = {});
 
@@ -136,7 +147,7 @@ QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>&
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-template <CheckedElasticNetwork<Scalar> Network>
+template <detail::NetworkOfSolver<Scalar> Network>
 QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& network,
                                                             const SolverOptions<Scalar>& options, const Rule& rule,
                                                             const Threads& executor)
