@@ -67,7 +67,6 @@ std::vector<Tool<Scalar>> tools(Path path, Random& random) {
     const Vector3<double> along = cross<double>(out, random.unit_vector()).normalized();
     const double r = random.number(1e-3, 3e-3), depth = random.number(0.2e-3, 1.5e-3), pace = random.number(2e-5, 1e-4);
     std::vector<Tool<Scalar>> list;
-    Vector3<double> from = (radius + r + 1e-4) * out;
     double angle = 0, below = -1e-4;
     const auto add = [&] {
         const Vector3<double> at = (radius + r - below) * (std::cos(angle) * out + std::sin(angle) * along);

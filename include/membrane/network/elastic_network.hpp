@@ -77,7 +77,7 @@ concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, 
 namespace detail {
 
 template <class Network, class Scalar>
-consteval bool check_elastic_network() noexcept {
+consteval bool check_elastic_network() noexcept {  // NOLINT(readability-function-size): a sentence for each requirement
     static_assert(
         requires { requires std::same_as<typename Network::Scalar, Scalar>; },
         "ElasticNetwork: must have Scalar, the scalar of the solver");

@@ -53,7 +53,7 @@ concept Element = std::copyable<E> && requires(const E& element, const Corners<d
 namespace detail {
 
 template <class E>
-consteval bool check_element() noexcept {
+consteval bool check_element() noexcept {  // NOLINT(readability-function-size): a sentence for each requirement
     static_assert(std::copyable<E>, "Element: must be copyable");
     static_assert(
         requires {

@@ -93,6 +93,11 @@ class ActiveVertices {
     }
     template <class Network>
     void build_queue(const Network& network, std::span<const Index> seeds, Index layers) noexcept;
+    template <class Options>
+    [[nodiscard]] Index room_for(const Options& options) const noexcept;
+    [[nodiscard]] Index room_of_others() const noexcept;
+    void leave(std::span<const Index> vertices) noexcept;
+    void line_up(std::span<const Index> vertices, Index most) noexcept;
     template <class Network, class Options>
     void extend(const Network& network, const Options& options) noexcept;
 
@@ -127,55 +132,64 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
 template <class Network, class Options>
 void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
     as_needed_ = options.layers_as_needed;
-    const bool limited = options.most_visits != unlimited;
     order_ = as_needed_ ? VisitOrder::arrival : options.order;
-    if (order_ == VisitOrder::colours && limited)
+    if (order_ == VisitOrder::colours && options.most_visits != unlimited)
         order_ = VisitOrder::groups;  // what is left out is to be the farthest
     layers_before_ = order_ == VisitOrder::colours ? std::exchange(layers_, options.layers) : queue_.layer_count() - 1;
     next_seeds_.clear();
     for (const Index v : seeds) next_seeds_.insert(v);
     left_.clear();
-    // What a constraint has let go of: the force that was balanced there is another one now.
-    const auto leave = [&](std::span<const Index> vertices) {
-        for (const Index v : vertices) left_.insert(v);
-    };
     const auto before = seeds_.items(), now = next_seeds_.items();
     const bool is_new = as_needed_ || !std::equal(now.begin(), now.end(), before.begin(), before.end());
     if (is_new) {
+        // What a constraint has let go of, too: the force that was balanced there is another one now.
         leave(as_needed_ ? layer_0() : queue_.vertices());
         build_queue(network, seeds, as_needed_ ? 0 : options.layers);
     }
-    const auto touched = static_cast<Index>(layer_0().size());
-    const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_visits + 1);
-    const auto passes = (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // a look before a layer is added
-    const auto spare = (std::max)((options.most_visits - own) / passes, std::int64_t{1});
-    room_ = limited ? touched + static_cast<Index>(spare) : unlimited;
-    // The others' turn under a lasting contact. What of the queue does not fit in beside them takes turns with them.
-    const auto share = [&] {
-        return (std::min)(restless_.count() + left_.count(), std::clamp(room_ / 4, Index(1), room_ - touched));
-    };
-    const bool fits = static_cast<Index>(queue_.vertices().size()) <= room_ - share();
-    if (!fits && (is_new || queue_fits_)) leave(queue_.vertices());
+    room_ = room_for(options);
+    const bool fits = static_cast<Index>(queue_.vertices().size()) <= room_ - room_of_others();
+    if (!fits && (is_new || queue_fits_)) leave(queue_.vertices());  // what does not fit takes turns with the others
     queue_fits_ = fits;
-    const Index others = share();
+
     visited_.clear();
     truncated_ = false;
-    const auto line_up = [&](std::span<const Index> vertices, Index most) {
-        for (const Index v : vertices) {
-            if (visited_.count() >= most) {
-                truncated_ = true;
-                return;
-            }
-            visited_.insert(v);
-        }
-    };
-    line_up(queue_.vertices(), room_ - others);
+    line_up(queue_.vertices(), room_ - room_of_others());
     from_queue_ = static_cast<std::size_t>(visited_.count());
     line_up(restless_.items(), room_);
     line_up(left_.items(), room_);
     groups_.clear();
     if (order_ != VisitOrder::arrival) groups_.add(network, visited_, from_queue_, vertices().size());
     extend(network, options);
+}
+
+// How many vertices a step may visit: what layer 0 is visited more often is taken off the rest.
+template <class Options>
+Index ActiveVertices::room_for(const Options& options) const noexcept {
+    if (options.most_visits == unlimited) return unlimited;
+    const auto touched = static_cast<Index>(layer_0().size());
+    const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_visits + 1);
+    const auto passes = (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // a look before a layer is added
+    return touched + static_cast<Index>((std::max)((options.most_visits - own) / passes, std::int64_t{1}));
+}
+
+// The restless and what the queue has left behind have their turns under a lasting contact, too.
+inline Index ActiveVertices::room_of_others() const noexcept {
+    const auto touched = static_cast<Index>(layer_0().size());
+    return (std::min)(restless_.count() + left_.count(), std::clamp(room_ / 4, Index(1), room_ - touched));
+}
+
+inline void ActiveVertices::leave(std::span<const Index> vertices) noexcept {
+    for (const Index v : vertices) left_.insert(v);
+}
+
+inline void ActiveVertices::line_up(std::span<const Index> vertices, Index most) noexcept {
+    for (const Index v : vertices) {
+        if (visited_.count() >= most) {
+            truncated_ = true;
+            return;
+        }
+        visited_.insert(v);
+    }
 }
 
 template <class Network>
