@@ -61,12 +61,12 @@ void compare(const Recording& a, const Recording& b, const std::filesystem::path
 int main(int argc, char** argv) {
     std::vector<std::string> files;
     auto out = std::filesystem::path(argv[0]).parent_path() / "pictures";
-    CLI::App app("Compares two recordings, or a press and its replay.");
-    app.add_option("recordings", files, "two files")->expected(2)->check(CLI::ExistingFile);
-    app.add_option("--out", out, "folder for what is written")->capture_default_str();
+    examples::CommandLine command("Compares two recordings, or a press and its replay.");
+    command.add_two_files("recordings", files, "two files");
+    command.add("--out", out, "folder for what is written");
     examples::MeshOptions mesh;
-    mesh.add_to(app);
-    return examples::run(app, argc, argv, [&] {
+    mesh.add_to(command);
+    return command.run(argc, argv, [&] {
         std::filesystem::create_directories(out);
         if (!files.empty()) return compare(examples::read(files[0]), examples::read(files[1]), out);
         const auto body = mesh.specimen(examples::stock_sphere());

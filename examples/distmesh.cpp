@@ -58,12 +58,12 @@ void draw_panel(Svg& svg, int panel, const membrane::TriangleMesh<double>& mesh,
 int main(int argc, char** argv) {
     auto folder = std::filesystem::path(argv[0]).parent_path() / "pictures";
     membrane::Index iterations = 200;
-    CLI::App app("Makes a sphere of triangles from its signed distance, coarse and fine, and draws both.");
+    CommandLine command("Makes a sphere of triangles from its signed distance, coarse and fine, and draws both.");
     MeshOptions other;
-    other.add_to(app);
-    app.add_option("--out", folder, "folder for figure_2_distmesh.svg")->capture_default_str();
-    app.add_option("--iterations", iterations, "at most")->capture_default_str();
-    return run(app, argc, argv, [&] {
+    other.add_to(command);
+    command.add("--out", folder, "folder for figure_2_distmesh.svg");
+    command.add("--iterations", iterations, "at most");
+    return command.run(argc, argv, [&] {
         std::cout << std::setprecision(3);
         if (!other.file.empty()) {
             const Surface surface = other.specimen(stock_sphere()).surface;

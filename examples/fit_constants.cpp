@@ -73,12 +73,12 @@ void run(const std::filesystem::path& data, const examples::Specimen& body, cons
 int main(int argc, char** argv) {
     std::string data = MEMBRANE_EXAMPLE_DATA "/lens_indentation.csv";
     auto out = std::filesystem::path(argv[0]).parent_path() / "pictures";
-    CLI::App app("Fits the constants of a lens to measured forces and depths.");
+    examples::CommandLine command("Fits the constants of a lens to measured forces and depths.");
     examples::MeshOptions mesh;
-    mesh.add_to(app);
-    app.add_option("--data", data, "a CSV file: depth [m], force [N]")->capture_default_str()->check(CLI::ExistingFile);
-    app.add_option("--out", out, "folder for the picture")->capture_default_str();
-    return examples::run(app, argc, argv, [&] {
+    mesh.add_to(command);
+    command.add_file("--data", data, "a CSV file: depth [m], force [N]");
+    command.add("--out", out, "folder for the picture");
+    return command.run(argc, argv, [&] {
         const auto lens = membrane::spherical_cap<double>({.radius = 0.01, .diameter = 9e-3, .rings = 6});  // [m]
         run(data, mesh.specimen(lens), out);
     });

@@ -77,8 +77,8 @@ void press_in_place(const examples::Specimen& specimen) {
 }
 
 int main(int argc, char** argv) {
-    CLI::App app("Presses an engine's interleaved float vertices in place.");
+    examples::CommandLine command("Presses an engine's interleaved float vertices in place.");
     examples::MeshOptions options;
-    options.add_to(app);
-    return examples::run(app, argc, argv, [&] { press_in_place(options.specimen(examples::stock_sphere())); });
+    options.add_to(command);
+    return command.run(argc, argv, [&] { press_in_place(options.specimen(examples::stock_sphere())); });
 }

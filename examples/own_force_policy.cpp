@@ -56,13 +56,13 @@ void play(const examples::Specimen& specimen, std::vector<membrane::Waypoint<dou
 int main(int argc, char** argv) {
     LimitedReaction feel{.scale = 20, .limit = 3.3};
     std::string file;
-    CLI::App app("Presses a sphere; the hand feels the membrane's reaction, magnified and limited.");
-    app.add_option("--script", file, "the tool's way, a CSV file: time [s], x, y, z [m]")->check(CLI::ExistingFile);
-    app.add_option("--scale", feel.scale, "from tissue to hand")->capture_default_str();
-    app.add_option("--limit", feel.limit, "of the device [N]")->capture_default_str();
+    examples::CommandLine command("Presses a sphere; the hand feels the membrane's reaction, magnified and limited.");
+    command.add_file("--script", file, "the tool's way, a CSV file: time [s], x, y, z [m]");
+    command.add("--scale", feel.scale, "from tissue to hand");
+    command.add("--limit", feel.limit, "of the device [N]");
     examples::MeshOptions options;
-    options.add_to(app);
-    return examples::run(app, argc, argv, [&] {
+    options.add_to(command);
+    return command.run(argc, argv, [&] {
         const auto specimen = options.specimen(examples::stock_sphere());
         const Eigen::Vector3d away = specimen.above(0.3), deep = specimen.above(-0.1);
         if (file.empty()) return play(specimen, {{0, away}, {0.4, deep}, {0.8, away}}, feel);

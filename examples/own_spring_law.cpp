@@ -43,10 +43,11 @@ double holding_force(const examples::Specimen& specimen, const Law& law, double 
 }
 
 int main(int argc, char** argv) {
-    CLI::App app("Pulls a clamped membrane by its middle, with linear springs and with a law of one's own.");
+    examples::CommandLine command(
+        "Pulls a clamped membrane by its middle, with linear springs and with a law of one's own.");
     examples::MeshOptions options;
-    options.add_to(app);
-    return examples::run(app, argc, argv, [&] {
+    options.add_to(command);
+    return command.run(argc, argv, [&] {
         const auto specimen = options.specimen(membrane::disc<double>({.radius = 0.01, .rings = 8}));
         std::printf("height [mm]   linear [mN]   collagen [mN]\n");
         for (const double part : {0.1, 0.2, 0.3, 0.4}) {

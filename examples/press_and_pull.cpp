@@ -83,9 +83,9 @@ Outcome run_both(const Scene& scene, const Settings& settings) {
 int main(int argc, char** argv) {
     Settings settings;
     settings.out.pictures = std::filesystem::path(argv[0]).parent_path() / "pictures";
-    CLI::App app("Presses, grasps, pulls and lets go membranes, with virtual volume springs and without.");
-    settings.add_to(app);
-    return run(app, argc, argv, [&] {
+    CommandLine command("Presses, grasps, pulls and lets go membranes, with virtual volume springs and without.");
+    settings.add_to(command);
+    return command.run(argc, argv, [&] {
         Output output(settings.out);
         std::vector<Outcome> outcomes;
         for (const Scene& scene : scenes(settings.mesh)) outcomes.push_back(run_both(scene, settings));

@@ -76,10 +76,10 @@ Figure press(const Scene& scene) {
 int main(int argc, char** argv) {
     auto folder = std::filesystem::path(argv[0]).parent_path() / "pictures";
     MeshOptions mesh;
-    CLI::App app("Presses a lens capsule and a cornea, and draws their tension.");
-    mesh.add_to(app);
-    app.add_option("--out", folder, "folder for pictures")->capture_default_str();
-    return run(app, argc, argv, [&] {
+    CommandLine command("Presses a lens capsule and a cornea, and draws their tension.");
+    mesh.add_to(command);
+    command.add("--out", folder, "folder for pictures");
+    return command.run(argc, argv, [&] {
         std::cout << std::setprecision(3);
         using namespace membrane;
         const auto lens = distmesh(Ellipsoid{.radii = {4.5e-3, 4.5e-3, 2e-3}}, {.edge_length = 0.3e-3});

@@ -85,10 +85,10 @@ double largest_change(const std::vector<Eigen::Vector3d>& forces) {
 int main(int argc, char** argv) {
     auto folder = std::filesystem::path(argv[0]).parent_path() / "pictures";
     MeshOptions mesh;
-    CLI::App app("Slides over a membrane, and draws what the hand feels of its triangles.");
-    mesh.add_to(app);
-    app.add_option("--out", folder, "folder for pictures")->capture_default_str();
-    return run(app, argc, argv, [&] {
+    CommandLine command("Slides over a membrane, and draws what the hand feels of its triangles.");
+    mesh.add_to(command);
+    command.add("--out", folder, "folder for pictures");
+    return command.run(argc, argv, [&] {
         const auto felt = slide(mesh.specimen(stock_sphere()));
         std::filesystem::create_directories(folder);
         save(folder / "slide.svg", picture(felt));

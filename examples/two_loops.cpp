@@ -91,9 +91,10 @@ void run(const examples::Specimen& body, double seconds, double rate, double fra
 int main(int argc, char** argv) {
     double seconds = 1, rate = 1000;
     examples::MeshOptions mesh;
-    CLI::App app("Presses a membrane in one loop and draws it in another, and prints how punctual both are.");
-    mesh.add_to(app);
-    app.add_option("--seconds", seconds, "how long [s]")->check(CLI::Range(0.1, 3600.0))->capture_default_str();
-    app.add_option("--rate", rate, "of the haptic loop [Hz]")->check(CLI::Range(1.0, 1e5))->capture_default_str();
-    return examples::run(app, argc, argv, [&] { run(mesh.specimen(examples::stock_sphere()), seconds, rate); });
+    examples::CommandLine command(
+        "Presses a membrane in one loop and draws it in another, and prints how punctual both are.");
+    mesh.add_to(command);
+    command.add_within("--seconds", seconds, 0.1, 3600.0, "how long [s]");
+    command.add_within("--rate", rate, 1.0, 1e5, "of the haptic loop [Hz]");
+    return command.run(argc, argv, [&] { run(mesh.specimen(examples::stock_sphere()), seconds, rate); });
 }

@@ -59,10 +59,10 @@ void press(const examples::Specimen& body, const std::string& name, double secon
 int main(int argc, char** argv) {
     std::string name;
     double seconds = 60;
-    CLI::App app("Presses a membrane with a device of the OpenHaptics family.");
-    app.add_option("--device", name, "its name in the vendor's set-up; the default one if none");
-    app.add_option("--seconds", seconds, "how long [s]")->capture_default_str();
+    examples::CommandLine command("Presses a membrane with a device of the OpenHaptics family.");
+    command.add("--device", name, "its name in the vendor's set-up; the default one if none");
+    command.add("--seconds", seconds, "how long [s]");
     examples::MeshOptions mesh;
-    mesh.add_to(app);
-    return examples::run(app, argc, argv, [&] { press(mesh.specimen(examples::stock_sphere()), name, seconds); });
+    mesh.add_to(command);
+    return command.run(argc, argv, [&] { press(mesh.specimen(examples::stock_sphere()), name, seconds); });
 }

@@ -1,54 +1,47 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
-#include <cstdlib>
-#include <exception>
+#include <filesystem>
 #include <functional>
-#include <iostream>
+#include <memory>
 #include <string>
-
-#include <CLI/CLI.hpp>
+#include <vector>
 
 /// The command line, the same for all examples: `--help` says what the program does and takes; a wrong option, a wrong
 /// file or refused input end in one line on stderr and exit code 2.
 ///
-///     CLI::App app("Presses a sphere.");
+///     CommandLine command("Presses a sphere.");
 ///     double depth = 1e-3;
-///     app.add_option("--depth", depth, "how deep [m]");
-///     return examples::run(app, argc, argv, [&] { press(depth); });
+///     command.add("--depth", depth, "how deep [m]");
+///     return command.run(argc, argv, [&] { press(depth); });
 namespace examples {
 
-/// Reads the command line into `app`'s options and runs the program; returns the exit code.
-[[nodiscard]] inline int run(CLI::App& app, int argc, char** argv, const std::function<void()>& program) {
-    const std::string path = argv[0];
-    app.name(path.substr(path.find_last_of('/') + 1));
-    std::string wrong;
-    try {
-        app.parse(argc, argv);
-        program();
-        return 0;
-    } catch (const CLI::CallForHelp&) {
-        std::cout << app.help();
-        return 0;
-    } catch (const CLI::ParseError& error) {
-        wrong = std::string(error.what()) + " (see --help)";
-    } catch (const std::exception& error) {
-        wrong = error.what();
-    }
-    std::replace(wrong.begin(), wrong.end(), '\n', ' ');
-    std::cerr << app.get_name() << ": " << wrong << '\n';
-    return 2;
-}
+/// Each option is read into the value it was added with, which the help shows as its default.
+class CommandLine {
+  public:
+    explicit CommandLine(const std::string& purpose);
+    ~CommandLine();
 
-/// Reads the command line and runs what comes before the program itself: ends the program unless that has been done.
-inline void run_first(CLI::App& app, int argc, char** argv, const std::function<void()>& first) {
-    bool done = false;
-    const int code = run(app, argc, argv, [&] {
-        first();
-        done = true;
-    });
-    if (!done) std::exit(code);
-}
+    void add(const std::string& name, std::string& value, const std::string& what);
+    void add(const std::string& name, std::filesystem::path& value, const std::string& what);
+    void add(const std::string& name, double& value, const std::string& what);
+    void add(const std::string& name, int& value, const std::string& what);
+    void add_within(const std::string& name, double& value, double least, double most, const std::string& what);
+    void add_word(const std::string& name, std::string& value, const std::vector<std::string>& words,
+                  const std::string& what);
+    /// A file that exists.
+    void add_file(const std::string& name, std::string& file, const std::string& what);
+    void add_two_files(const std::string& name, std::vector<std::string>& files, const std::string& what);
+    void add_flag(const std::string& name, const std::function<void()>& act, const std::string& what);
+
+    /// Reads the command line into the options and runs the program; returns the exit code.
+    [[nodiscard]] int run(int argc, char** argv, const std::function<void()>& program);
+    /// Reads the command line and runs what comes before the program itself: ends the program unless that has been done.
+    void run_first(int argc, char** argv, const std::function<void()>& first);
+
+  private:
+    struct Parser;  // its header is long: it is compiled once, for all examples
+    std::unique_ptr<Parser> parser_;
+};
 
 }  // namespace examples

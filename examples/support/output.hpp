@@ -21,10 +21,10 @@ struct OutputOptions {
     std::filesystem::path pictures;
     std::string json = {}, csv = {};
 
-    void add_to(CLI::App& app) {
-        app.add_option("--out", pictures, "folder for the pictures and index.html")->capture_default_str();
-        app.add_option("--json", json, "write every figure to this file");
-        app.add_option("--csv", csv, "write time, tool, depth and force of every frame to this file");
+    void add_to(CommandLine& command) {
+        command.add("--out", pictures, "folder for the pictures and index.html");
+        command.add("--json", json, "write every figure to this file");
+        command.add("--csv", csv, "write time, tool, depth and force of every frame to this file");
     }
 };
 

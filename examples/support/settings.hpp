@@ -18,13 +18,13 @@ struct Settings {
     double pace = 1;          ///< Of the tool.
     std::string series = {};  ///< Folder, or empty.
 
-    void add_to(CLI::App& app) {
-        mesh.add_to(app);
-        out.add_to(app);
-        app.add_option("--series", series, "folder for a time series of every run, for ParaView");
-        app.add_option("--layers", solver.layers, "threshold of the propagation queue")->capture_default_str();
-        app.add_option("--sweeps", solver.sweeps, "passes over the queue in a step")->capture_default_str();
-        app.add_flag_callback(
+    void add_to(CommandLine& command) {
+        mesh.add_to(command);
+        out.add_to(command);
+        command.add("--series", series, "folder for a time series of every run, for ParaView");
+        command.add("--layers", solver.layers, "threshold of the propagation queue");
+        command.add("--sweeps", solver.sweeps, "passes over the queue in a step");
+        command.add_flag(
             "--quick", [this] { pace = 10; }, "the tool moves ten times as fast");
     }
 };
