@@ -107,7 +107,7 @@ TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangl
     using S = TestType;
     const S tolerance = sizeof(S) == 4 ? S(2e-6) : S(1e-11);
     int edges = 0, ends = 0, stuck = 0;
-    for (int seed = 1; seed <= cases(4000); ++seed) {
+    for (int seed = 1; seed <= cases(4000, 4000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const auto triangle = random_triangle<S>(random);
@@ -143,7 +143,7 @@ TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangl
         (nearest_pair < 2 ? ends : edges) += 1;
         REQUIRE(std::abs(least - expected) <= tolerance);
     }
-    if (cases(4000) == 4000) {
+    if (cases(4000, 4000) == 4000) {
         CHECK(edges > 500);
         CHECK(ends > 500);
         CHECK(stuck > 5);

@@ -441,7 +441,8 @@ TEST_CASE("a set of constraints is sound if all are, mends if any does, finite i
     for (const bool first : {false, true}) {
         for (const bool second : {false, true}) {
             const Told a{first, first, first ? 1 : nan, &begun}, b{second, second, second ? 2 : nan, &begun};
-            const ConstraintSet<double, Told, Told> both(region, a, b);
+            const std::array refs{ConstraintRef<double>(a), ConstraintRef<double>(b)};
+            const ConstraintSet<double> both(region, refs);
             CHECK(both.sound() == (first && second));
             CHECK(both.enforce() == (first || second));
             CHECK(both.react(reactions) == (first && second));
@@ -452,7 +453,7 @@ TEST_CASE("a set of constraints is sound if all are, mends if any does, finite i
     CHECK(reactions[0].x() == 1);
     CHECK(reactions[1].x() == 2);
 
-    const ConstraintSet<double> none(region);
+    const ConstraintSet<double> none(region, {});
     CHECK(none.sound());
     CHECK_FALSE(none.enforce());
     CHECK(none.react({}));

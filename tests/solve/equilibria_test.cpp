@@ -73,22 +73,24 @@ struct Reference {
 };
 
 /// The larger meshes are left to optimised builds.
-bool is_slow(const ReferenceRow& row) { return cases(20) < 20 && row.integer("level") > 2; }
+bool is_slow(const ReferenceRow& row) { return cases(20, 20) < 20 && row.integer("level") > 2; }
 
-/// Runs `check(solver)` with every rule and order of visits that is to find the same equilibria.
+/// Runs `check(solver)` with every rule and order of visits that is to find the same equilibria; on the larger meshes but
+/// in a long run, with the first.
 template <class S, class Check>
 void with_each_rule(const Reference<S>& membrane, const SolverOptions<S>& options, Check check) {
-    SECTION("the rule as published") { check(QuasiStaticSolver(membrane.network, options, MassStep{})); }
-    SECTION("safe steps") { check(QuasiStaticSolver(membrane.network, options, SafeStep{.omega = 1})); }
-    SECTION("long safe steps") { check(QuasiStaticSolver(membrane.network, options, SafeStep{.omega = 1.9})); }
     const auto ordered = [&](VisitOrder order) {
         auto other = options;
         other.order = order;
         return QuasiStaticSolver(membrane.network, other, BlockStep{});
     };
     SECTION("block steps in groups") { check(ordered(VisitOrder::groups)); }
+    if (membrane.mesh.vertex_count() > 200 && cases(1, 2) == 1) return;
     SECTION("in the order of arrival") { check(ordered(VisitOrder::arrival)); }
     SECTION("by colours") { check(ordered(VisitOrder::colours)); }
+    SECTION("the rule as published") { check(QuasiStaticSolver(membrane.network, options, MassStep{})); }
+    SECTION("safe steps") { check(QuasiStaticSolver(membrane.network, options, SafeStep{.omega = 1})); }
+    SECTION("long safe steps") { check(QuasiStaticSolver(membrane.network, options, SafeStep{.omega = 1.9})); }
 }
 
 SolverOptions<double> to_the_end(Index layers) { return {.layers = layers, .sweeps = 50, .negligible_force = 1e-14}; }

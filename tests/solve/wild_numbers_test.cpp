@@ -6,7 +6,7 @@
 
 TEMPLATE_TEST_CASE("a wild number among what is handed in comes to a safe outcome, and is forgotten", "[extremes][bad]",
                    double, float) {
-    for (int seed = 1; seed <= cases(2000, 40'000); ++seed) {
+    for (int seed = 1; seed <= cases(600, 40'000); ++seed) {
         CAPTURE(seed);
         test::hand_in_wild_number<TestType>(seed);
     }

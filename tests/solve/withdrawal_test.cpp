@@ -11,6 +11,7 @@
 #include <membrane/collision/aabb_tree.hpp>
 #include <membrane/collision/contact_tracker.hpp>
 #include <membrane/collision/grasper.hpp>
+#include <membrane/collision/winding_number.hpp>
 #include <membrane/mesh/shapes.hpp>
 #include <membrane/solve/press.hpp>
 
@@ -38,6 +39,7 @@ struct Scene {
     AabbTree<double> tree;
     ContactTracker<double> tracker;
     Grasper<double> grasper;
+    Contact<double> contact;  // of the last tick
     Points<double> x;
     double edge;
 
@@ -53,12 +55,13 @@ struct Scene {
           x(mesh.positions()),
           edge(Neighbourhood<double>(mesh).mean_edge()) {}
 
-    void tick(const Tool<double>& tool) {
-        const auto contact = tracker.update(tree, x, tool);
+    StepReport<double> tick(const Tool<double>& tool) {
+        contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
         const auto report = solver.step(x, dt, network, backing, press(tool, contact, grasp), pull(tool, grasp));
         REQUIRE(report.status == StepStatus::advanced);
         tree.refit(x, report.moved);
+        return report;
     }
 
     double off_rest() const { return (x - mesh.positions()).colwise().norm().maxCoeff(); }
@@ -166,6 +169,42 @@ Stroke random_stroke(const Scene& scene, test::Random& random) {
     return stroke;
 }
 
+/// Two edges deep into a closed surface, at 10 mm/s to 1 m/s: a shaft thinner than an edge, with its tip or its middle
+/// first, straight in, on a slant, or along itself.
+Stroke thin_shaft_stroke(const Scene& scene, test::Random& random) {
+    const auto& mesh = scene.mesh;
+    const auto triangle = triangle_at(mesh.positions(), mesh.triangles().col(random.index(mesh.triangle_count())));
+    const Point foot = random.chance(0.3) ? triangle.a : point_at<double>(triangle, random.barycentric());
+    const Point outward = foot.normalized();
+    Stroke stroke;
+    stroke.tool.radius = scene.edge * 0.05 * std::pow(10, random.number());
+    const double length = random.number(2.0, 6.0) * scene.edge;
+    const Point across = outward.cross(random.unit_vector()).normalized();
+    const double tilt = random.chance(0.3) ? 0.0 : random.number(0.0, 1.57);
+    stroke.tool.axis = length * (std::cos(tilt) * outward + std::sin(tilt) * across);
+    const double middle = random.chance(0.5) ? 0.0 : 0.5;
+    stroke.tool.position = foot + stroke.tool.radius * outward - middle * stroke.tool.axis;
+    while (overlaps(scene, stroke.tool)) stroke.tool.position += 2e-4 * outward;
+    stroke.start = stroke.tool.position;
+    const bool along = random.chance(0.3), slanted = random.chance(0.5);
+    const Point inward = along     ? Point(-stroke.tool.axis.normalized())
+                         : slanted ? Point((0.5 * random.vector() - outward).normalized())
+                                   : Point(-outward);
+    stroke.in = std::min(2 * scene.edge, size) * inward;
+    stroke.out = 2 * size * outward - stroke.in;
+    stroke.pressed = stroke.slides = stroke.slid = ticks_for(stroke.in, 0.01 * std::pow(100, random.number()));
+    stroke.leaves = stroke.pressed + 1000;
+    stroke.gone = stroke.leaves + 1000;
+    return stroke;
+}
+
+/// Whether no point of a shaft's axis is inside a closed surface.
+bool axis_is_outside(const Scene& scene, const Tool<double>& tool) {
+    const Neighbourhood<double> surface(scene.mesh);
+    return scene.tree.first_hit(scene.x, tool.position, Point(tool.position + tool.axis)).triangle == no_index &&
+           winding_number(surface, scene.tree, scene.x, tool.position) == 0;
+}
+
 }  // namespace
 
 TEST_CASE("after any stroke of any tool over creases, rims and coarse meshes the membrane comes back", "[withdrawal]") {
@@ -182,6 +221,54 @@ TEST_CASE("after any stroke of any tool over creases, rims and coarse meshes the
         Scene scene = scenes[static_cast<std::size_t>(seed) % scenes.size()];
         const Stroke stroke = random_stroke(scene, random);
         for (int tick = 0; tick <= stroke.gone; ++tick) scene.tick(stroke.at(tick));
+        CHECK(scene.comes_back(stroke.at(stroke.gone), 2100));
+    }
+}
+
+// Where nothing holds the border, a tool that slides off it may touch from the other side next, and lifts the membrane as
+// it is withdrawn. That is no failure to come back, and so it is lowered again, until it touches from there no more. In
+// these two strokes, a sphere on the flat sheet and a point on the folded one, the membrane is not back after that.
+TEST_CASE("a membrane with a free border comes back from what has gone round it", "[withdrawal][!shouldfail]") {
+    const std::vector<Scene> scenes{Scene(square(), false), Scene(folded_square(-0.7), false),
+                                    Scene(folded_square(0.7), false),
+                                    Scene(spherical_cap<double>({.rings = 8}), false)};
+    for (const int seed : {176, 234}) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Scene scene = scenes[static_cast<std::size_t>(seed) % scenes.size()];
+        const Stroke stroke = random_stroke(scene, random);
+        double first_side = 0;
+        for (int tick = 0; tick <= stroke.gone; ++tick) {
+            scene.tick(stroke.at(tick));
+            if (first_side == 0 && scene.contact.touching()) first_side = scene.contact.side;
+        }
+        Tool<double> tool = stroke.at(stroke.gone);
+        constexpr int lowering = 400;
+        for (int tick = 0; tick < lowering && scene.contact.touching() && scene.contact.side != first_side; ++tick) {
+            tool.position -= 2.0 / lowering * stroke.out;
+            scene.tick(tool);
+        }
+        CHECK(scene.comes_back(tool, 2100));
+    }
+}
+
+TEST_CASE("a shaft thinner than an edge, two edges deep, stays outside a closed surface and leaves it",
+          "[withdrawal]") {
+    const std::vector<Scene> scenes{Scene(icosphere<double>({.radius = size, .subdivisions = 1})),
+                                    Scene(icosphere<double>({.radius = size, .subdivisions = 2}))};
+    for (int seed = 1; seed <= cases(40, 2000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Scene scene = scenes[static_cast<std::size_t>(seed) % scenes.size()];
+        const Stroke stroke = thin_shaft_stroke(scene, random);
+        bool converged = false;
+        for (int tick = 0; tick < stroke.leaves; ++tick) {
+            converged = scene.tick(stroke.at(tick)).converged;
+            if (converged && tick >= stroke.pressed) break;
+        }
+        CHECK(converged);
+        CHECK(axis_is_outside(scene, stroke.at(stroke.pressed)));
+        for (int tick = stroke.leaves; tick <= stroke.gone; ++tick) scene.tick(stroke.at(tick));
         CHECK(scene.comes_back(stroke.at(stroke.gone), 2100));
     }
 }

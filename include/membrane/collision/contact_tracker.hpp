@@ -90,6 +90,12 @@ class ContactTracker {
     [[nodiscard]] bool touches(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept;
     void describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept;
+    void describe_shaft(const Scene& scene, Index f, Scalar side, Contact<Scalar>& contact) const noexcept;
+    static void turn(const Scene& scene, Contact<Scalar>& contact) noexcept {
+        contact.gap = -contact.gap - 2 * scene.radius;
+        contact.normal = -contact.normal;
+    }
+    [[nodiscard]] std::optional<Vector3<Scalar>> middle_inside(const Scene& scene, Index f, Scalar side) const noexcept;
     [[nodiscard]] bool has_passed(const Scene& scene, Index near, Scalar side, const Vector3<Scalar>& q) const noexcept;
     void gather_from_tree(const Scene& scene) noexcept;
     void flood(const Scene& scene) noexcept;
@@ -301,34 +307,66 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
         return contact.gap < -scene.radius - detail::rounding_at(contact.on_axis);  // not on the surface itself
     };
     const Scalar side = contact.side;
-    const auto turn = [&] {
-        contact.gap = -contact.gap - 2 * scene.radius;
-        contact.normal = -contact.normal;
-    };
     bool behind = seen_from(side);
     if (behind && !last_.touching() && side_ == 0 && !surface_.closed())
         behind = seen_from(-1);                 // it is first seen from there
     if (side_ != 0 && contact.side != side_) {  // beside a border
         contact.side = side_;
         behind = true;
-        turn();
+        turn(scene, contact);
     }
     const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1;  // stuck through, perhaps
     contact.crossed =
         behind && (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.on_axis));
-    if (behind && !contact.crossed) turn();
-    // Of a shaft across a border what is nearest may be outside, and an end behind.
-    for (const Vector3<Scalar>& end : {scene.tool.position, Vector3<Scalar>(scene.tool.position + scene.tool.axis)}) {
-        if (contact.crossed || side_ == 0 || surface_.closed() || feature_pairs(scene.tool) == 1) break;
-        if (!has_passed(scene, f, side_, end)) continue;
-        const Index g = surface_.descend(scene.x, f, end);
-        contact = contact_in(surface_, scene.x, g, Tool<Scalar>{.position = end}, scene.radius, side_);
-        contact.crossed = true;
-        if (contact.side == side_ && contact.gap < -scene.radius) continue;
-        contact.side = side_;
-        turn();
-    }
+    if (behind && !contact.crossed) turn(scene, contact);
+    if (!contact.crossed && feature_pairs(scene.tool) > 1) describe_shaft(scene, f, side, contact);
     contact.before = (contact.crossed ? contact.point : contact.on_axis) + margin_ * contact.normal;
+}
+
+// Of a shaft what is nearest may be outside, and another point behind: the middle of what is inside, or an end, if the
+// shaft lies across a border.
+template <Real Scalar>
+void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar side,
+                                            Contact<Scalar>& contact) const noexcept {
+    const auto take_if_behind = [&](const Vector3<Scalar>& q) {
+        if (contact.crossed || !has_passed(scene, f, side, q)) return;
+        const Index g = surface_.descend(scene.x, f, q);
+        contact = contact_in(surface_, scene.x, g, Tool<Scalar>{.position = q}, scene.radius, side);
+        contact.crossed = true;
+        if (contact.side == side && contact.gap < -scene.radius) return;
+        contact.side = side;
+        turn(scene, contact);
+    };
+    if (const auto middle = middle_inside(scene, f, side)) take_if_behind(*middle);
+    if (side_ == 0 || surface_.closed()) return;
+    take_if_behind(scene.tool.position);
+    take_if_behind(scene.tool.position + scene.tool.axis);
+}
+
+// Of a shaft that goes through `f` and comes out again farther along: halfway between. Both its ends may be outside, and
+// say nothing of how deep it is.
+template <Real Scalar>
+std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene& scene, Index f,
+                                                                     Scalar side) const noexcept {
+    const Tool<Scalar>& tool = scene.tool;
+    const auto hit_in = [&](const Triangle<Scalar>& triangle) {
+        return first_hit<Scalar>(triangle, tool.position, tool.position + tool.axis);
+    };
+    const auto climb = [&](const Triangle<Scalar>& triangle) { return side * dot(area_vector(triangle), tool.axis); };
+    const auto triangle = surface_.triangle(scene.x, f);
+    const auto here = hit_in(triangle);
+    if (!here) return std::nullopt;
+    const Scalar inward = climb(triangle) < 0 ? Scalar(1) : Scalar(-1);  // along the axis
+    Scalar inside = 2;                                                   // part of it
+    for (const Index g : near_.items()) {
+        const auto other = surface_.triangle(scene.x, g);
+        if (!(inward * climb(other) > 0)) continue;
+        const auto there = hit_in(other);
+        const Scalar length = there ? inward * (there->along - here->along) : Scalar(0);
+        if (length > 0) inside = (std::min)(inside, length);
+    }
+    if (inside > 1) return std::nullopt;
+    return tool.position + (here->along + inward * inside / 2) * tool.axis;
 }
 
 // Whether `q` is behind the surface and not outside, in a crease. An open surface has no inside: there it is behind what
@@ -455,8 +493,15 @@ bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Sca
 // be pulled.
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
-    const auto before = surface_.nearest(scene.anchors, contact.triangle, scene.tool).on_triangle;
-    if (contact.depth > 0 || before.squared_distance < scene.radius * scene.radius) return false;
+    const auto overlapped = [&](Index f) {
+        const auto before = surface_.nearest(scene.anchors, f, scene.tool).on_triangle;
+        return before.squared_distance < scene.radius * scene.radius;
+    };
+    // A shaft may be inside between the points where its depth is measured.
+    const auto near = near_.items();
+    if (contact.depth > 0 || overlapped(contact.triangle) || std::any_of(near.begin(), near.end(), overlapped)) {
+        return false;
+    }
     const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
     const auto nearest = closest_point(surface_.triangle(scene.anchors, f), contact.on_axis);
     return dot<Scalar>(contact.normal, contact.on_axis - nearest.point) < 0;

@@ -8,8 +8,6 @@
 #include <cstddef>
 #include <limits>
 #include <span>
-#include <tuple>
-#include <utility>
 
 #include <membrane/collision/grasper.hpp>
 #include <membrane/collision/tool.hpp>
@@ -76,27 +74,74 @@ consteval bool check_constraint() noexcept {
 template <class C, class Scalar>
 concept CheckedConstraint = detail::check_constraint<C, Scalar>();
 
+/// A constraint of any type, which must outlive this: what a step does depends on no type of constraint.
+template <Real Scalar>
+class ConstraintRef {
+  public:
+    template <Constraint<Scalar> C>
+    explicit ConstraintRef(const C& constraint) noexcept : constraint_(&constraint), calls_(&calls_of<C>) {}
+
+    [[nodiscard]] bool sound() const noexcept { return calls_->sound(constraint_); }
+    [[nodiscard]] Lead<Scalar> lead() const noexcept { return calls_->lead(constraint_); }
+    void hold(Region<Scalar>& region) const noexcept { calls_->hold(constraint_, region); }
+    void begin(Region<Scalar>& region) const noexcept { calls_->begin(constraint_, region); }
+    [[nodiscard]] bool enforce(Region<Scalar>& region) const noexcept { return calls_->enforce(constraint_, region); }
+    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& done) const noexcept {
+        return calls_->reaction(constraint_, done);
+    }
+
+  private:
+    struct Calls {
+        bool (*sound)(const void*) noexcept;
+        Lead<Scalar> (*lead)(const void*) noexcept;
+        void (*hold)(const void*, Region<Scalar>&) noexcept;
+        void (*begin)(const void*, Region<Scalar>&) noexcept;
+        bool (*enforce)(const void*, Region<Scalar>&) noexcept;
+        Vector3<Scalar> (*reaction)(const void*, const Region<Scalar>&) noexcept;
+    };
+    template <class C>
+    [[nodiscard]] static const C& as(const void* constraint) noexcept {
+        return *static_cast<const C*>(constraint);
+    }
+    template <class C>
+    static constexpr Calls calls_of{
+        .sound = [](const void* c) noexcept -> bool { return as<C>(c).sound(); },
+        .lead = [](const void* c) noexcept -> Lead<Scalar> {
+            if constexpr (requires { as<C>(c).lead(); }) return as<C>(c).lead();
+            return {};
+        },
+        .hold =
+            [](const void* c, Region<Scalar>& region) noexcept {
+                if constexpr (requires { as<C>(c).hold(region); }) as<C>(c).hold(region);
+            },
+        .begin = [](const void* c, Region<Scalar>& region) noexcept { as<C>(c).begin(region); },
+        .enforce = [](const void* c, Region<Scalar>& region) noexcept -> bool { return as<C>(c).enforce(region); },
+        .reaction = [](const void* c, const Region<Scalar>& done) noexcept -> Vector3<Scalar> {
+            return as<C>(c).reaction(done);
+        },
+    };
+
+    const void* constraint_;
+    const Calls* calls_;
+};
+
 /// All constraints of one step, in the order they were handed in.
-template <Real Scalar, Constraint<Scalar>... Constraints>
+template <Real Scalar>
 class ConstraintSet {
   public:
-    explicit ConstraintSet(Region<Scalar>& region, const Constraints&... constraints) noexcept
-        : region_(region), constraints_(constraints...) {}
+    ConstraintSet(Region<Scalar>& region, std::span<const ConstraintRef<Scalar>> constraints) noexcept
+        : region_(region), constraints_(constraints) {}
 
     [[nodiscard]] bool sound() const noexcept {
-        return std::apply([](const auto&... constraint) { return (constraint.sound() && ...); }, constraints_);
+        return std::all_of(constraints_.begin(), constraints_.end(), [](const auto& c) { return c.sound(); });
     }
     /// Where those that are led are led to.
     void tell(std::span<Lead<Scalar>> leads) const noexcept {
-        for_each([&]([[maybe_unused]] const auto& constraint, [[maybe_unused]] std::size_t i) {
-            if constexpr (requires { constraint.lead(); }) leads[i] = constraint.lead();
-        });
+        for (std::size_t i = 0; i < constraints_.size(); ++i) leads[i] = constraints_[i].lead();
     }
     /// Vertices that a constraint holds are fixed for all of them, in whatever order they were handed in.
     void begin() const noexcept {
-        for_each([this]([[maybe_unused]] const auto& constraint, std::size_t) {
-            if constexpr (requires { constraint.hold(region_); }) constraint.hold(region_);
-        });
+        for_each([this](const auto& constraint, std::size_t) { constraint.hold(region_); });
         for_each([this](const auto& constraint, std::size_t) {
             region_.open();
             constraint.begin(region_);
@@ -111,7 +156,7 @@ class ConstraintSet {
     [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {
         bool finite = true;
         for_each([&](const auto& constraint, std::size_t i) {
-            reactions[i] = constraint.reaction(std::as_const(region_));
+            reactions[i] = constraint.reaction(region_);
             finite &= is_finite(reactions[i]);
         });
         return finite;
@@ -119,13 +164,14 @@ class ConstraintSet {
 
   private:
     void for_each(auto act) const noexcept {
-        std::size_t i = 0;
-        std::apply([&](const auto&... constraint) { ((region_.turn_to(i), act(constraint, i), ++i), ...); },
-                   constraints_);
+        for (std::size_t i = 0; i < constraints_.size(); ++i) {
+            region_.turn_to(i);
+            act(constraints_[i], i);
+        }
     }
 
     Region<Scalar>& region_;
-    std::tuple<const Constraints&...> constraints_;
+    std::span<const ConstraintRef<Scalar>> constraints_;
 };
 
 /// Holds a point of a triangle at `target`; its corners are free otherwise.

@@ -66,15 +66,18 @@ struct NoHurry {
 
 /// How a step with a deadline does: it keeps as much time for its end as that took lately, a look at the forces on all
 /// vertices at work. The clock is read with every round over layer 0 and every batch beyond.
-template <class Now>
 class Hurry {
   public:
-    Hurry(const Deadline<Now>& deadline, StepCosts& costs) : deadline_(deadline), costs_(costs) {}
+    template <class Now>
+    Hurry(const Deadline<Now>& deadline, StepCosts& costs)
+        : deadline_(&deadline),
+          left_of_([](const void* of) { return static_cast<const Deadline<Now>*>(of)->left(); }),
+          costs_(costs) {}
 
     /// The visits begin. The end of the step will look at so many vertices.
     void begin(std::size_t vertices) {
         looks_at(vertices);
-        left_ = deadline_.left();
+        left_ = left_of_(deadline_);
     }
     void looks_at(std::size_t vertices) { closing_ = static_cast<double>(vertices); }
 
@@ -110,11 +113,12 @@ class Hurry {
     }
     [[nodiscard]] double in_visits(double time) const { return costs_.visit > 0 ? time / costs_.visit : 0; }
     [[nodiscard]] double lap() {
-        const double before = std::exchange(left_, deadline_.left());
+        const double before = std::exchange(left_, left_of_(deadline_));
         return (std::max)(before - left_, 0.0);
     }
 
-    const Deadline<Now>& deadline_;
+    const void* deadline_;  // of whatever clock
+    double (*left_of_)(const void* deadline);
     StepCosts& costs_;
     double left_ = 0, closing_ = 0, time_ = 0, visits_ = 0;
     bool first_round_ = true, first_batch_ = true;

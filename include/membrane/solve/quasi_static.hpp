@@ -73,7 +73,7 @@ class QuasiStaticSolver {
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                           const Constraints&... constraints) noexcept {
-        return step_in(NoHurry{}, x, dt, network, volume, constraints...);
+        return step_in(NoHurry{}, x, dt, network, volume, refer_to(constraints...));
     }
 
     /// The same, over at `deadline`, or later by what it misjudged its end by; or by what comes in any case, one round
@@ -84,7 +84,7 @@ class QuasiStaticSolver {
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
                                                 const Network& network, const Volume& volume,
                                                 const Constraints&... constraints) noexcept {
-        return step_in(Hurry<Now>(deadline, costs_), x, dt, network, volume, constraints...);
+        return step_in(Hurry(deadline, costs_), x, dt, network, volume, refer_to(constraints...));
     }
 
     /// Has a look at these vertices in the next steps: what moved them, or their anchors, was not a step of this solver.
@@ -106,14 +106,23 @@ class QuasiStaticSolver {
         volume.body();
     };
 
-    template <class Pace, class Network, class Volume, class... Constraints>
+    using ConstraintRefs = std::span<const ConstraintRef<Scalar>>;
+    template <class... Constraints>
+    [[nodiscard]] static std::array<ConstraintRef<Scalar>, sizeof...(Constraints)> refer_to(
+        const Constraints&... constraints) noexcept {
+        static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints,
+                      "a step takes 16 constraints at most");
+        return {ConstraintRef<Scalar>(constraints)...};
+    }
+
+    template <class Pace, class Network, class Volume>
     [[nodiscard]] StepReport<Scalar> step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt, const Network& network,
-                                             const Volume& volume, const Constraints&... constraints) noexcept;
+                                             const Volume& volume, ConstraintRefs constraints) noexcept;
     void open(std::size_t constraint_count) noexcept;
     template <class Volume>
     void go_along(const Volume& volume) noexcept;
-    template <class Volume, class Acting>
-    void predict(const Acting& acting, Region<Scalar>& region) noexcept;
+    template <class Volume>
+    void predict(const ConstraintSet<Scalar>& acting, Region<Scalar>& region) noexcept;
     template <class Network>
     void line_up(const Network& network, Region<Scalar>& region) noexcept;
     template <class Handed>
@@ -171,21 +180,20 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& netwo
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-template <class Pace, class Network, class Volume, class... Constraints>
+template <class Pace, class Network, class Volume>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
                                                                      const Network& network, const Volume& volume,
-                                                                     const Constraints&... constraints) noexcept {
-    static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints, "a step takes 16 constraints at most");
+                                                                     ConstraintRefs constraints) noexcept {
     MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());
     detail::require_made<QuasiStaticSolver>();
-    open(sizeof...(Constraints));
+    open(constraints.size());
     go_along(volume);
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) {
         return refuse_step(StepStatus::bad_time_step, x);
     }
 
     Region<Scalar> region(x, work_, network);
-    const ConstraintSet<Scalar, Constraints...> acting(region, constraints...);
+    const ConstraintSet<Scalar> acting(region, constraints);
     if (!acting.sound()) return refuse_step(StepStatus::bad_input, x);
     predict<Volume>(acting, region);
     acting.begin();
@@ -238,8 +246,9 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::go_along([[maybe_unused]] const V
 // cut short is not expected again: where vertices were not visited, what was predicted for them would be predicted anew,
 // and grow from step to step.
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-template <class Volume, class Acting>
-void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const Acting& acting, Region<Scalar>& region) noexcept {
+template <class Volume>
+void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const ConstraintSet<Scalar>& acting,
+                                                       Region<Scalar>& region) noexcept {
     if (!method_.options.predict) return;
     std::array<Lead<Scalar>, Workspace<Scalar>::most_constraints> leads{};
     acting.tell(leads);

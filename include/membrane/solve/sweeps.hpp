@@ -9,6 +9,7 @@
 
 #include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/compact_block.hpp>
+#include <membrane/solve/constraints.hpp>
 #include <membrane/solve/deadline.hpp>
 #include <membrane/solve/region.hpp>
 #include <membrane/solve/step.hpp>
@@ -36,10 +37,10 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The visits of one step: layer 0 and what the constraints then mend, in rounds, and all the vertices beyond; again until
 /// nothing changes, the sweeps are done, or time is up. In the end a look at the forces on all of them.
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
+template <class Method, class Scalar, class Scene, class Pace>
 class Sweeps {
   public:
-    Sweeps(const Method& method, const Scene& scene, Region<Scalar>& region, const Acting& acting,
+    Sweeps(const Method& method, const Scene& scene, Region<Scalar>& region, const ConstraintSet<Scalar>& acting,
            ActiveVertices& active, CompactBlock<Scalar>& block, Pace& pace, StepReport<Scalar>& report) noexcept
         : method_(method),
           scene_(scene),
@@ -82,7 +83,7 @@ class Sweeps {
     const Method& method_;
     const Scene& scene_;
     Region<Scalar>& region_;
-    const Acting& acting_;
+    const ConstraintSet<Scalar>& acting_;
     ActiveVertices& active_;
     CompactBlock<Scalar>& block_;
     Pace& pace_;
@@ -95,8 +96,8 @@ class Sweeps {
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-StepStatus Sweeps<Method, Scalar, Scene, Acting, Pace>::run(std::size_t& resume) noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+StepStatus Sweeps<Method, Scalar, Scene, Pace>::run(std::size_t& resume) noexcept {
     pace_.begin(active_.vertices().size() + active_.frontier().size());
     open_block();
     bool changed = true;
@@ -114,8 +115,8 @@ StepStatus Sweeps<Method, Scalar, Scene, Acting, Pace>::run(std::size_t& resume)
 }
 
 // Groups are visited in lanes, if all of the queue's are lined up, and forces of constraints act on layer 0 alone.
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-void Sweeps<Method, Scalar, Scene, Acting, Pace>::open_block() noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+void Sweeps<Method, Scalar, Scene, Pace>::open_block() noexcept {
     if constexpr (can_use_lanes) {
         if (active_.has_new_queue()) block_.packs().follow(active_.queue(), scene_.network);
         const auto pushed = scene_.work.pushed.items();
@@ -127,8 +128,8 @@ void Sweeps<Method, Scalar, Scene, Acting, Pace>::open_block() noexcept {
     }
 }
 
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::sweep(std::size_t& resume) noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::sweep(std::size_t& resume) noexcept {
     bool changed = rounds();
     if (report_.status != StepStatus::advanced) return changed;
     const auto beyond = active_.beyond();
@@ -141,8 +142,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::sweep(std::size_t& resume) noe
     return changed || moved;
 }
 
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::rounds() noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::rounds() noexcept {
     const auto touched = active_.touched();
     bool changed = false;
     for (Index i = 0; i < method_.options.contact_visits; ++i) {
@@ -161,8 +162,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::rounds() noexcept {
     return changed;
 }
 
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> vertices) noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::pass(std::span<const Index> vertices) noexcept {
     bool changed = false;
     const auto begin = static_cast<std::size_t>(vertices.data() - active_.beyond().data());
     if (in_lanes_ && begin < block_.packs().size()) {
@@ -185,8 +186,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::pass(std::span<const Index> ve
 }
 
 // Vertices number `begin` to `end` beyond layer 0, in whole groups.
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::pass_in_lanes(std::size_t begin, std::size_t end) noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::pass_in_lanes(std::size_t begin, std::size_t end) noexcept {
     bool changed = false;
     if constexpr (can_use_lanes) {
         auto& packs = block_.packs();
@@ -211,8 +212,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::pass_in_lanes(std::size_t begi
 }
 
 // Where a batch of packs ends that begins with `p`: with helpers, where the group does.
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-std::size_t Sweeps<Method, Scalar, Scene, Acting, Pace>::batch_from(std::size_t p, std::size_t last) const noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+std::size_t Sweeps<Method, Scalar, Scene, Pace>::batch_from(std::size_t p, std::size_t last) const noexcept {
     if constexpr (alone) return (std::min)(p + visits_in_batch / Lanes<Scalar>::count, last);
     const std::size_t touched = active_.touched().size(), place = touched + block_.packs().place_of(p);
     for (const auto ends : {active_.queue().group_ends(), active_.group_ends()}) {
@@ -222,8 +223,8 @@ std::size_t Sweeps<Method, Scalar, Scene, Acting, Pace>::batch_from(std::size_t 
     return last;
 }
 
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::visit_packs(std::size_t begin, std::size_t end) noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::visit_packs(std::size_t begin, std::size_t end) noexcept {
     bool changed = false;
     if constexpr (!alone) block_.visit(begin, end - begin, scene_, method_.rule, method_.executor);
     for (std::size_t p = begin; p < end && report_.status == StepStatus::advanced; ++p) {
@@ -233,9 +234,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::visit_packs(std::size_t begin,
 }
 
 // What came of a visit. Beyond a limit that costs nothing it is looked at closely whether a move is stable.
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::take(std::size_t p,
-                                                       typename CompactBlock<Scalar>::Visit visit) noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::take(std::size_t p, typename CompactBlock<Scalar>::Visit visit) noexcept {
     using Visit = typename CompactBlock<Scalar>::Visit;
     report_.visits += block_.free_count(p);
     if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
@@ -254,8 +254,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::take(std::size_t p,
 }
 
 // Where layers are added as needed: adds the next one, and visits it, if a force on it is not negligible.
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::grow() noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::grow() noexcept {
     const auto frontier = active_.frontier();
     if (frontier.empty() || next_ != nullptr) return false;
     if (!pace_.has_time_for_batch()) {
@@ -276,8 +276,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::grow() noexcept {
     return true;
 }
 
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::visit(Index v) noexcept {
     if (region_.fixed(v)) return false;
     ++report_.visits;
     const auto state = state_of<Rule>(scene_, v);
@@ -302,8 +302,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::visit(Index v) noexcept {
 }
 
 // The forces at the end; false if any is not finite.
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::look() noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::look() noexcept {
     bool finite = true;
     std::size_t seen = 0;  // beyond layer 0
     if constexpr (can_use_lanes) {
@@ -330,8 +330,8 @@ bool Sweeps<Method, Scalar, Scene, Acting, Pace>::look() noexcept {
     return finite;
 }
 
-template <class Method, class Scalar, class Scene, class Acting, class Pace>
-bool Sweeps<Method, Scalar, Scene, Acting, Pace>::look_at(Index v, const Vector3<Scalar>& force) noexcept {
+template <class Method, class Scalar, class Scene, class Pace>
+bool Sweeps<Method, Scalar, Scene, Pace>::look_at(Index v, const Vector3<Scalar>& force) noexcept {
     ++report_.visits;
     region_.set_unbalanced(v, force);
     if (!region_.fixed(v)) report_.residual = (std::max)(report_.residual, norm(force));

@@ -2,12 +2,15 @@
 // wrong: VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
 // wrong: VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
 // wrong: VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
+// wrong: VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
 #include <type_traits>
 
 #include <membrane/solve/quasi_static.hpp>
 
 struct Body {
-#if WRONG != 3
+#if WRONG == 4  // where the vertex was at the tick's beginning is left out
+    membrane::Pull<double> pull(membrane::Index, const membrane::Vector3<double>&, double) const noexcept;
+#elif WRONG != 3
     std::conditional_t<WRONG == 2, double, membrane::Pull<double>> pull(membrane::Index,
                                                                         const membrane::Vector3<double>&,
                                                                         const membrane::Vector3<double>&, double) const
