@@ -22,7 +22,7 @@ TEST_CASE("a pool does every task once, and has done all when it returns", "[exe
         CHECK(pool.threads() == threads);
         Random random(static_cast<std::uint64_t>(threads));
         std::vector<int> done;
-        for (int job = 0; job < cases(3000); ++job) {
+        for (int job = 0; job < cases(600, 3000); ++job) {
             CAPTURE(threads, job);
             done.assign(static_cast<std::size_t>(random.index(40)), 0);
             pool(static_cast<Index>(done.size()), [&](Index i) { ++done[static_cast<std::size_t>(i)]; });

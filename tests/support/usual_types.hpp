@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+
+#include <membrane/haptics/smooth_contact.hpp>
+#include <membrane/membrane.hpp>
+#include <membrane/mesh/moving_body.hpp>
+#include <membrane/network/foundation_springs.hpp>
+#include <membrane/network/moved_volume.hpp>
+
+// What most programs here are made of, compiled once, in a library: a file that includes this first leaves it to the
+// library, but for functions that are inline. Nothing of accuracy/ is here: its inline functions would have every file
+// instantiate Eigen's sparse solvers.
+
+namespace usual {
+
+template <class Scalar>
+using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
+
+}  // namespace usual
+
+#define MEMBRANE_USUAL_STEP(PREFIX, SCALAR, RULE, PACE, ...)                                                         \
+    PREFIX class membrane::Sweeps<membrane::Method<membrane::RULE, SCALAR, membrane::OneThread>, SCALAR,             \
+                                  membrane::StepInput<SCALAR, usual::Springs<SCALAR>, __VA_ARGS__>, membrane::PACE>; \
+    PREFIX membrane::StepReport<SCALAR> membrane::QuasiStaticSolver<SCALAR, membrane::RULE>::step_in(                \
+        membrane::PACE, membrane::PointsRef<SCALAR>&, SCALAR, const usual::Springs<SCALAR>&, const __VA_ARGS__&,     \
+        std::span<const membrane::ConstraintRef<SCALAR>>) noexcept
+
+#define MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, RULE)                                                   \
+    PREFIX class membrane::QuasiStaticSolver<SCALAR, membrane::RULE>;                                 \
+    PREFIX membrane::QuasiStaticSolver<SCALAR, membrane::RULE>::QuasiStaticSolver(                    \
+        const usual::Springs<SCALAR>&, const membrane::SolverOptions<SCALAR>&, const membrane::RULE&, \
+        const membrane::OneThread&);                                                                  \
+    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, RULE, NoHurry, membrane::VirtualVolumeSprings<SCALAR>)
+
+/// `PREFIX` is `template` where they are compiled, and `extern template` everywhere else.
+#define MEMBRANE_USUAL_TYPES(PREFIX, SCALAR)                                                                     \
+    PREFIX class membrane::TriangleMesh<SCALAR>;                                                                 \
+    PREFIX membrane::TriangleMesh<SCALAR>::TriangleMesh(const Eigen::MatrixBase<membrane::Points<SCALAR>>&,      \
+                                                        const Eigen::MatrixBase<membrane::Triangles>&);          \
+    PREFIX membrane::Adjacency::Adjacency(const membrane::TriangleMesh<SCALAR>&);                                \
+    PREFIX class membrane::NullDevice<SCALAR>;                                                                   \
+    PREFIX class membrane::VertexNormals<SCALAR>;                                                                \
+    PREFIX class membrane::MovingBody<SCALAR>;                                                                   \
+    PREFIX class membrane::Neighbourhood<SCALAR>;                                                                \
+    PREFIX class membrane::BoxTree<SCALAR>;                                                                      \
+    PREFIX class membrane::AabbTree<SCALAR>;                                                                     \
+    PREFIX class membrane::ContactTracker<SCALAR>;                                                               \
+    PREFIX class membrane::Grasper<SCALAR>;                                                                      \
+    PREFIX class membrane::SmoothContact<SCALAR>;                                                                \
+    PREFIX class membrane::MassSpringNetwork<SCALAR, membrane::LinearSpring>;                                    \
+    PREFIX class membrane::MassSpringNetwork<SCALAR, membrane::ExponentialSpring>;                               \
+    PREFIX class membrane::VirtualVolumeSprings<SCALAR>;                                                         \
+    PREFIX class membrane::FoundationSprings<SCALAR>;                                                            \
+    PREFIX class membrane::SpringPacks<SCALAR>;                                                                  \
+    PREFIX class membrane::CompactBlock<SCALAR>;                                                                 \
+    PREFIX struct membrane::Workspace<SCALAR>;                                                                   \
+    PREFIX class membrane::Region<SCALAR>;                                                                       \
+    PREFIX struct membrane::Press<SCALAR>;                                                                       \
+    PREFIX struct membrane::HeldPoint<SCALAR>;                                                                   \
+    PREFIX struct membrane::SolverOptions<SCALAR>;                                                               \
+    PREFIX membrane::TriangleMesh<SCALAR> membrane::icosphere<SCALAR>(const membrane::IcosphereOptions&);        \
+    PREFIX membrane::TriangleMesh<SCALAR> membrane::sheet<SCALAR>(const membrane::SheetOptions&);                \
+    PREFIX membrane::TriangleMesh<SCALAR> membrane::disc<SCALAR>(const membrane::DiscOptions&);                  \
+    PREFIX membrane::TriangleMesh<SCALAR> membrane::spherical_cap<SCALAR>(const membrane::SphericalCapOptions&); \
+    MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, BlockStep);                                                            \
+    MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, MassStep);                                                             \
+    MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, SafeStep);                                                             \
+    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, Hurry, membrane::VirtualVolumeSprings<SCALAR>);               \
+    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, NoHurry, membrane::NoVolumeSprings);                          \
+    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, NoHurry,                                                      \
+                        membrane::MovedVolume<membrane::VirtualVolumeSprings<SCALAR>, SCALAR>)
+
+MEMBRANE_USUAL_TYPES(extern template, double);
+MEMBRANE_USUAL_TYPES(extern template, float);
