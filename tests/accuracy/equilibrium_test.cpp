@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <membrane/collision/contact_tracker.hpp>
 #include <membrane/mesh/shapes.hpp>
 #include <membrane/network/moved_volume.hpp>

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <membrane/mesh/shapes.hpp>
 
 #include "support/cases.hpp"

@@ -77,7 +77,7 @@ TEST_CASE("the tracker agrees with a search of the whole surface along random tr
     AabbTree<double> tree(mesh);
     ContactTracker<double> tracker(mesh);
     long contact_ticks = 0, agreements = 0;
-    for (int seed = 1; seed <= cases(3'000, 100'000); ++seed) {
+    for (int seed = 1; seed <= cases(2'000, 100'000); ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));
         static Points<double> x;
         if (seed % 50 == 1) x = wavy(mesh.positions(), random);
@@ -179,7 +179,7 @@ double random_speed(test::Random& random, double slowest, double fastest) {
 TEST_CASE("a fast stroke leaves the tool on the side it came from") {
     Stroked sphere(2);
     const double edge = sphere.edge();
-    const int count = cases(2'000, 100'000);
+    const int count = cases(1'200, 100'000);
     int astray = 0;
     for (int seed = 1; seed <= count; ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include <Eigen/Geometry>
 #include <membrane/mesh/shapes.hpp>
 #include <membrane/network/tissue.hpp>
 #include <membrane/network/triangular_springs.hpp>

@@ -88,8 +88,8 @@ TEST_CASE("a million ticks allocate nothing", "[allocation]") {
     CHECK(loop.x.allFinite());
 }
 
-TEMPLATE_TEST_CASE("nor do a million of the complete loop of a hand, whatever goes wrong", "[allocation]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand allocate nothing, whatever goes wrong",
+                   "[allocation]", double, float) {
     test::HapticLoop<TestType> loop(8);
     test::Mishaps mishaps(9);
     const int ticks = cases(6'000, 500'000);  // of each scalar
@@ -190,7 +190,7 @@ TEMPLATE_TEST_CASE("copied and moved parts run on to the same bits, and allocate
     CHECK(same);
 }
 
-TEST_CASE("nor does a recorder, full or not, or a replay", "[allocation]") {
+TEST_CASE("a recorder, full or not, allocates nothing, nor does a replay", "[allocation]") {
     Recorder<double> recorder(100, 12);
     const Tool<double> tool;
     const Vector3<double> force(1, 2, 3);

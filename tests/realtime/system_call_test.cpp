@@ -57,8 +57,8 @@ TEST_CASE("a million ticks do not call the system", "[system_call]") {
     check_without_system_calls<test::WholeLoop<double>>(cases(30'000, 1'000'000));
 }
 
-TEMPLATE_TEST_CASE("nor do a million of the complete loop of a hand, whatever goes wrong", "[system_call]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand do not call the system, whatever goes wrong",
+                   "[system_call]", double, float) {
     test::HapticLoop<TestType> loop(10);
     test::Mishaps mishaps(11);
     const auto child = without_system_calls([&] {
@@ -69,7 +69,7 @@ TEMPLATE_TEST_CASE("nor do a million of the complete loop of a hand, whatever go
     CHECK(child.code == 0);
 }
 
-TEST_CASE("nor does a recorder, full or not, or a replay", "[system_call]") {
+TEST_CASE("neither a recorder, full or not, nor a replay calls the system", "[system_call]") {
     membrane::Recorder<double> recorder(100, 12);
     membrane::ReplayDevice<double> replay({.ticks = std::vector<membrane::RecordedTick<double>>(100)});
     const auto child = without_system_calls([&] {

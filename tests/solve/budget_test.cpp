@@ -227,7 +227,7 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
 TEST_CASE("no budget makes a step worse than what the tool explains", "[solver][deadline][budget]") {
     const Membrane<double> in_double;
     const Membrane<float> in_float;
-    const int runs = cases(160, 20'000);
+    const int runs = cases(120, 20'000);
     for (int seed = 1; seed <= runs; ++seed) {
         const auto number = static_cast<std::uint64_t>(seed);
         if (seed % 4 == 0) check_run(in_float, number, BlockStep{});

@@ -142,7 +142,7 @@ TEMPLATE_TEST_CASE(
     "[extremes]", double, float) {
     using S = TestType;
     Count count;
-    for (int seed = 1; seed <= cases(240, 20'000); ++seed) {
+    for (int seed = 1; seed <= cases(120, 20'000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed) + 1'000'000);
         const Units<S> units{.stiffness = tenth_power<S>(-12, 12, random)};
@@ -159,7 +159,7 @@ TEMPLATE_TEST_CASE(
 TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same mesh", "[extremes]", double, float) {
     using S = TestType;
     Count count;
-    for (int seed = 1; seed <= cases(240, 20'000); ++seed) {
+    for (int seed = 1; seed <= cases(120, 20'000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed) + 2'000'000);
         const Units<S> units{.size = tenth_power<S>(-6, 6, random)};
@@ -174,7 +174,7 @@ TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, a
     using S = TestType;
     const double epsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
     int refused = 0, accepted = 0, seen = 0, settled = 0;
-    for (int seed = 1; seed <= cases(240, 20'000); ++seed) {
+    for (int seed = 1; seed <= cases(120, 20'000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed) + 3'000'000);
         const S far = tenth_power<S>(-1, 6, random);
@@ -247,7 +247,7 @@ Outcome<S> run_scene(int scene, int seed) {
 
 TEST_CASE("in 24 scenes float is double, positions to a thousandth of the sphere, forces to a hundredth",
           "[extremes]") {
-    const int count = cases(240, 20'000);
+    const int count = cases(120, 20'000);
     int apart = 0;
     for (int seed = 1; seed <= count; ++seed) {
         const int scene = seed % 24;

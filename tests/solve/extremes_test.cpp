@@ -10,12 +10,13 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <membrane/mesh/normals.hpp>
 #include <membrane/mesh/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/eigenvalues.hpp"
 #include "support/guarded_loop.hpp"
 #include "support/meshes.hpp"
 #include "support/refusal.hpp"
@@ -142,8 +143,7 @@ double largest_block(const TriangleMesh<S>& mesh, const std::vector<S>& stiffnes
     }
     double largest = 0;
     for (const auto& block : blocks) {
-        const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(block);
-        largest = std::max(largest, solver.eigenvalues()[2]);
+        largest = std::max(largest, test::eigenvalues_of(block)[2]);
     }
     return largest;
 }

@@ -8,12 +8,12 @@
 #include <cstdint>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
+#include <Eigen/Core>
 #include <membrane/mesh/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/eigenvalues.hpp"
 #include "support/random.hpp"
 
 // Where each rule begins to diverge, found by bisection, against the eigenvalues of a Hessian assembled here.
@@ -101,23 +101,18 @@ Points<double> start_along(const Scene& scene, const Eigen::VectorXd& way) {
     return scene.mesh.positions() + 1e-6 / moved.cwiseAbs().maxCoeff() * moved;
 }
 
-double largest_eigenvalue(const Eigen::MatrixXd& a, Eigen::VectorXd& way) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(a);
-    way = solver.eigenvectors().rightCols<1>();
-    return solver.eigenvalues().tail<1>()[0];
-}
-
 }  // namespace
 
 TEST_CASE("explicit Euler diverges beyond dt sqrt(largest eigenvalue of M^-1 H) = 2", "[limits]") {
     for (int seed = 1; seed <= cases(15, 500); ++seed) {
         CAPTURE(seed);
         const Scene scene(seed);
-        Eigen::VectorXd root(126), way;  // of the masses
+        Eigen::VectorXd root(126);  // of the masses
         for (Index v = 0; v < 42; ++v) root.segment<3>(3 * v).setConstant(std::sqrt(scene.network.mass(v)));
         const Eigen::MatrixXd scaled =
             (scene.hessian().array().colwise() / root.array()).rowwise() / root.transpose().array();
-        const double theory = 2 / std::sqrt(largest_eigenvalue(scaled, way));
+        const auto [largest, way] = test::largest_eigenpair(scaled);
+        const double theory = 2 / std::sqrt(largest);
         const Points<double> start = start_along(scene, way.cwiseQuotient(root));
         const double found = limit_near(theory, [&](double dt) {
             ExplicitEuler euler(scene.network);
@@ -136,8 +131,8 @@ TEST_CASE("moving all vertices at once by F dt^2 / m diverges beyond dt^2 / m = 
     for (int seed = 1; seed <= cases(15, 500); ++seed) {
         CAPTURE(seed);
         const Scene scene(seed);
-        Eigen::VectorXd way;
-        const double theory = 2 / largest_eigenvalue(scene.hessian(), way);
+        const auto [largest, way] = test::largest_eigenpair(scene.hessian());
+        const double theory = 2 / largest;
         const Points<double> start = start_along(scene, way);
         const double found = limit_near(theory, [&](double compliance) {
             const auto move = [&](Points<double>& x) {
@@ -158,8 +153,8 @@ namespace {
 double factor_of_sweep(const Eigen::MatrixXd& h, double compliance) {
     Eigen::MatrixXd split = Eigen::MatrixXd::Identity(h.rows(), h.cols()) / compliance;
     for (Index v = 3; v < h.rows(); v += 3) split.block(v, 0, 3, v) = h.block(v, 0, 3, v);
-    const Eigen::MatrixXd sweep = Eigen::MatrixXd::Identity(h.rows(), h.cols()) - split.partialPivLu().solve(h);
-    return Eigen::EigenSolver<Eigen::MatrixXd>(sweep, false).eigenvalues().cwiseAbs().maxCoeff();
+    const Eigen::MatrixXd sweep = Eigen::MatrixXd::Identity(h.rows(), h.cols()) - test::solve(split, h);
+    return test::spectral_radius(sweep);
 }
 
 }  // namespace
@@ -176,8 +171,7 @@ TEST_CASE(
         Index worst = 0;
         Eigen::VectorXd way = Eigen::VectorXd::Zero(126);
         for (Index v = 0; v < 42; ++v) {
-            Eigen::VectorXd axis;
-            const double value = largest_eigenvalue(h.block<3, 3>(3 * v, 3 * v), axis);
+            const auto [value, axis] = test::largest_eigenpair(h.block<3, 3>(3 * v, 3 * v));
             if (value <= largest) continue;
             largest = value;
             worst = v;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "support/newton.hpp"
 
-#include <Eigen/LU>
+#include "support/eigenvalues.hpp"
 
 namespace test {
 
@@ -18,7 +18,7 @@ Eigen::VectorXd newton(const std::function<Eigen::VectorXd(const Eigen::VectorXd
             before[i] -= h;
             jacobian.col(i) = (residual(after) - residual(before)) / (2 * h);
         }
-        const Eigen::VectorXd way = -jacobian.partialPivLu().solve(here);
+        const Eigen::VectorXd way = -solve(jacobian, here);
         double step = 1;
         Eigen::VectorXd there = residual(x + way);
         while (!(there.norm() < here.norm()) && step > 1e-10) {
