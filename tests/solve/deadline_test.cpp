@@ -107,6 +107,7 @@ struct Rush {
 TEST_CASE("a deadline is told in seconds, whatever the clock", "[deadline]") {
     CHECK(Deadline([] { return 2.5; }, 3.0).left() == 0.5);
     CHECK(Deadline([] { return 3.5F; }, 3.0F).left() == -0.5);
+    CHECK(Deadline([] { return std::uint64_t(10); }, std::uint64_t(9)).left() == -1);
     using Clock = std::chrono::steady_clock;
     using namespace std::chrono_literals;
     const Clock::time_point start{};

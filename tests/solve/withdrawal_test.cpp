@@ -198,6 +198,35 @@ Stroke thin_shaft_stroke(const Scene& scene, test::Random& random) {
     return stroke;
 }
 
+/// Up to two edges deep into a sheet, dragged at 10 to 50 mm/s to where it is beside it, and out: a shaft that is upright,
+/// leans or lies, with its tip first.
+Stroke dragged_over_border(test::Random& random) {
+    Stroke stroke;
+    stroke.tool.radius = random.number(0.3e-3, 1.5e-3);
+    const double kind = random.number(), direction = random.number(0.0, 6.28), bearing = random.number(0.0, 6.28);
+    const double tilt = kind < 0.3 ? 0 : kind < 0.6 ? random.number(0.0, 1.2) : 1.45;
+    const Point along(std::cos(direction), std::sin(direction), 0), across(std::cos(bearing), std::sin(bearing), 0);
+    stroke.tool.axis = 0.03 * (std::sin(tilt) * across + std::cos(tilt) * Point::UnitZ());
+    stroke.start = 0.004 * along + (stroke.tool.radius + 1e-4) * Point::UnitZ();
+    stroke.in = -(random.number(0.3e-3, 2e-3) + stroke.start.z()) * Point::UnitZ();
+    stroke.slide = 0.016 * along;
+    stroke.out = 0.006 * Point::UnitZ();
+    const double speed = random.number(0.01, 0.05);
+    stroke.pressed = ticks_for(stroke.in, speed);
+    stroke.slides = stroke.pressed;
+    stroke.slid = stroke.leaves = stroke.slides + ticks_for(stroke.slide, speed);
+    stroke.gone = stroke.leaves + ticks_for(stroke.out, speed);
+    return stroke;
+}
+
+double longest_edge(const Scene& scene) {
+    double longest = 0;
+    for (const auto& spring : scene.network.springs()) {
+        longest = std::max(longest, norm<double>(scene.x.col(spring.second) - scene.x.col(spring.first)));
+    }
+    return longest;
+}
+
 /// Whether no point of a shaft's axis is inside a closed surface.
 bool axis_is_outside(const Scene& scene, const Tool<double>& tool) {
     const Neighbourhood<double> surface(scene.mesh);
@@ -250,6 +279,29 @@ TEST_CASE("a membrane with a free border comes back from what has gone round it"
         }
         CHECK(scene.comes_back(tool, 2100));
     }
+}
+
+// Most slide off and draw no edge out by much. Some, 16 of 200, catch on a border that has given way: they are taken to
+// have gone through it, and pull a corner along.
+TEST_CASE("a shaft dragged slowly over a free border slides off, and the membrane comes back", "[withdrawal]") {
+    const Scene fresh(sheet<double>({.width = 0.02, .height = 0.02, .columns = 20, .rows = 20}), false);
+    const int runs = cases(40, 1000);
+    int caught = 0;
+    for (int seed = 1; seed <= runs; ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Scene scene = fresh;
+        const Stroke stroke = dragged_over_border(random);
+        scene.solver = QuasiStaticSolver(scene.network, {.layers = 6, .sweeps = 2 << random.index(4)});
+        double longest = 0;
+        for (int tick = 0; tick <= stroke.gone; ++tick) {
+            scene.tick(stroke.at(tick));
+            longest = std::max(longest, longest_edge(scene));
+        }
+        CHECK(scene.comes_back(stroke.at(stroke.gone), 2100));
+        if (longest > 5 * scene.edge) ++caught;
+    }
+    CHECK(caught <= std::max(1, runs / 10));
 }
 
 TEST_CASE("a shaft thinner than an edge, two edges deep, stays outside a closed surface and leaves it",

@@ -95,6 +95,7 @@ class ContactTracker {
         contact.gap = -contact.gap - 2 * scene.radius;
         contact.normal = -contact.normal;
     }
+    [[nodiscard]] bool is_mostly_behind(const Scene& scene, Index f, Scalar side) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> middle_inside(const Scene& scene, Index f, Scalar side) const noexcept;
     [[nodiscard]] bool has_passed(const Scene& scene, Index near, Scalar side, const Vector3<Scalar>& q) const noexcept;
     void gather_from_tree(const Scene& scene) noexcept;
@@ -308,19 +309,31 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     };
     const Scalar side = contact.side;
     bool behind = seen_from(side);
-    if (behind && !last_.touching() && side_ == 0 && !surface_.closed())
-        behind = seen_from(-1);                 // it is first seen from there
+    const bool first_seen = !last_.touching() && side_ == 0 && !surface_.closed();
+    if (behind && first_seen && is_mostly_behind(scene, f, side)) behind = seen_from(-1);
     if (side_ != 0 && contact.side != side_) {  // beside a border
         contact.side = side_;
-        behind = true;
-        turn(scene, contact);
+        behind = !leaves_border(scene, contact);
+        if (behind) turn(scene, contact);
     }
-    const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1;  // stuck through, perhaps
+    const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1 &&  // stuck through, perhaps
+                                     !surface_.on_border(contact.triangle, contact.barycentric);
     contact.crossed =
         behind && (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.on_axis));
     if (behind && !contact.crossed) turn(scene, contact);
-    if (!contact.crossed && feature_pairs(scene.tool) > 1) describe_shaft(scene, f, side, contact);
+    if (!contact.crossed && feature_pairs(scene.tool) > 1 && !leaves_border(scene, contact)) {
+        describe_shaft(scene, f, side, contact);
+    }
     contact.before = (contact.crossed ? contact.point : contact.on_axis) + margin_ * contact.normal;
+}
+
+// Whether the tool is on the other side of an open surface, as that would be without it. A shaft beside a border may reach
+// to both sides: its middle tells.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_mostly_behind(const Scene& scene, Index f, Scalar side) const noexcept {
+    if (feature_pairs(scene.tool) == 1) return true;
+    const Vector3<Scalar> middle = scene.tool.position + scene.tool.axis / 2;
+    return side * surface_.height(scene.anchors, surface_.descend(scene.anchors, f, middle), middle) < 0;
 }
 
 // Of a shaft what is nearest may be outside, and another point behind: the middle of what is inside, or an end, if the

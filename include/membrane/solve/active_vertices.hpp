@@ -32,7 +32,8 @@ class ActiveVertices {
 
     /// Begins a step: builds the queue where the seeds are others than before, and lines up what is to be visited: the
     /// queue, then the restless, then what the queue has left behind, as many as `options` leaves room for, layer 0 and
-    /// one more in any case. What of the queue there is no room for has its turns among the restless. To be followed by `settle` and `close`, or by `cancel`. Online.
+    /// one more in any case. Vertices of the queue for which there is no room are visited in later steps. To be followed
+    /// by `settle` and `close`, or by `cancel`. Online.
     template <class Network, class Options>
     void arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept;
 

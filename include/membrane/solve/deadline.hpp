@@ -26,13 +26,12 @@ class Deadline {
 
     /// Until then [s]; negative when it is past.
     [[nodiscard]] double left() const {
-        const auto left = at_ - now_();
-        if constexpr (
-            requires { typename Time::period; } || requires { left.count(); }) {
+        if constexpr (std::is_arithmetic_v<Time>) {
+            return static_cast<double>(at_) - static_cast<double>(now_());  // below zero for unsigned times, too
+        } else {
+            const auto left = at_ - now_();
             using Period = typename decltype(left)::period;
             return static_cast<double>(left.count()) * Period::num / Period::den;
-        } else {
-            return static_cast<double>(left);
         }
     }
 

@@ -62,10 +62,13 @@ enum class StepStatus {
 template <Real Scalar>
 struct StepReport {
     StepStatus status = StepStatus::advanced;
-    bool converged = false;    ///< nothing is left to do: no force above the negligible one on any vertex that may move
-    bool out_of_time = false;  ///< the deadline cut the step short: without it, more would have been done
-    Scalar residual = 0;       ///< largest unbalanced force on a free vertex at work, at the end [N]
-    Index visits = 0;          ///< of vertices, those that only look included
+    /// No force above the negligible one is left on any vertex that the step may move: those of the queue, and with
+    /// `layers_as_needed` the whole membrane.
+    bool converged = false;
+    /// The deadline cut the step short: without it more vertices would have been visited, if only to look.
+    bool out_of_time = false;
+    Scalar residual = 0;                         ///< largest unbalanced force on a free vertex at work, at the end [N]
+    Index visits = 0;                            ///< of vertices, those that only look included
     std::span<const Index> moved;                ///< vertices whose position changed
     std::span<const Vector3<Scalar>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]
 
