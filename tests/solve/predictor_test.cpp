@@ -100,7 +100,7 @@ TEST_CASE("nothing is expected before something has gone on for two steps") {
     CHECK(predictor.expect(Leads{at(6)}) == 1);
 }
 
-TEST_CASE("what is expected is how far the lead goes on along its last way, at most as far as then") {
+TEST_CASE("what is expected is how far the lead goes on along its last way, less what it turns") {
     const auto expected = [](const Lead<double>& next) {
         Predictor<double, 2> predictor;
         static_cast<void>(predictor.expect(Leads{at(1)}));
@@ -110,7 +110,10 @@ TEST_CASE("what is expected is how far the lead goes on along its last way, at m
     CHECK(expected(at(5)) == 1);
     CHECK(expected(at(100)) == 1);
     CHECK(expected(at(4)) == 0.5);
-    CHECK(expected(at(4, 7)) == 0.5);
+    CHECK(expected(at(5, 0.5)) == 0.5);
+    CHECK(expected(at(5, 1)) == 0);
+    CHECK(expected(at(7, 1)) == 1);
+    CHECK(expected(at(4, 7)) == 0);
     CHECK(expected(at(3)) == 0);
     CHECK(expected(at(3, 2)) == 0);
     CHECK(expected(at(2)) == 0);

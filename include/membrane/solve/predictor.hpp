@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -31,10 +32,12 @@ using Lead = std::optional<LeadPoint<Scalar>>;
 /// Under a tool that slides on, a membrane goes on as it did in the tick before, but for how the tool speeds up or turns: a
 /// step that begins there has no more than that to mend.
 ///
-/// The part that is expected again is the least, over all that leads, of the new way along the last one, at most
-/// all of it; nothing where something comes, goes, jumps, stops or turns back. Sweeps that leave the part q of an error, 0 <= q < 1,
-/// then leave sqrt(q) of it at most from tick to tick, since z^2 = q ((1 + p) z - p) has no larger root for 0 <= p <= 1: what
-/// converges without a prediction converges with it.
+/// The part that is expected again is the least, over all that leads, of the new way along the last one, less twice the
+/// way across it, at most all of it; nothing where something comes, goes, jumps, stops or turns by more than 27 degrees.
+/// Less, since a way into the surface moves the membrane farther than one along it: where a tool turns from pressing to
+/// sliding, the membrane would run ahead of the tool, which pushes back what is behind but pulls nothing. Sweeps that leave
+/// the part q of an error, 0 <= q < 1, then leave sqrt(q) of it at most from tick to tick, since z^2 = q ((1 + p) z - p)
+/// has no larger root for 0 <= p <= 1: what converges without a prediction converges with it.
 template <Real Scalar, std::size_t most_leads>
 class Predictor {
   public:
@@ -79,8 +82,10 @@ Scalar Predictor<Scalar, most_leads>::expect(std::span<const Lead<Scalar>> leads
 template <Real Scalar, std::size_t most_leads>
 Scalar Predictor<Scalar, most_leads>::part_of(const Vector3<Scalar>& now, const Vector3<Scalar>& before) noexcept {
     const Scalar along = dot(now, before), all = squared_norm(before);
-    if (!(along > 0)) return 0;
-    return along < all ? along / all : Scalar(1);
+    const Vector3<Scalar> across = now - along / all * before;
+    const Scalar again = along - 2 * norm(across) * std::sqrt(all);
+    if (!(again > 0)) return 0;
+    return again < all ? again / all : Scalar(1);
 }
 
 }  // namespace membrane

@@ -33,7 +33,7 @@ struct SolverOptions {
     bool predict = true;  ///< a step starts from the last displacements again, if the last step was not cut short
     Index most_visits =
         unlimited;  ///< visits of vertices in a step; layer 0, what is held and one vertex get theirs anyway
-    Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's own figure, if any
+    Scalar negligible_force = 0;    ///< with less on it a vertex is at rest [N]; 0: the network's, above rounding
     Scalar rigid_stiffness = 0;     ///< a tool's of a pinned or held vertex [N/m]; 0: 4 times the stiffest beside it
     Index most_touches = 4096;      ///< room for touched triangles; it decides the memory, not the time
     Index most_in_groups = 32'768;  ///< room for vertices moved several at once: each 260 bytes, 460 in double
