@@ -387,3 +387,28 @@ TEST_CASE("a tool first seen with its centre on the surface is on its outer side
         REQUIRE(std::abs(contact.gap + 1e-3) <= 1e-15);
     }
 }
+
+TEST_CASE("on an open surface a tool that grazes a crest is on the side it came from") {
+    const auto flat = membrane::sheet<double>({.width = 2, .height = 2, .columns = 10, .rows = 10});
+    Points<double> x = flat.positions();
+    x.row(2) = -0.7 * x.row(0).cwiseAbs();
+    const TriangleMesh<double> roof(x, flat.triangles());
+    const AabbTree<double> tree(roof);
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        // Over one slope to the other, through the crest, to the last digits: a little above it or below.
+        const Vector crest(0, random.number(-0.5, 0.5), random.number(-1e-16, 1e-16));
+        const Vector way(1, 0, random.number(-0.6, 0.6));
+        const double radius = random.number(0.01, 0.05);
+        const Vector axis = random.chance(0.5) ? Vector(random.number(-0.3, 0.3) * Vector::UnitY()) : Vector::Zero();
+        Tool<double> tool{.position = crest - random.number(0.2, 0.4) * way, .axis = axis, .radius = radius};
+        if (distance_to(x, roof.triangles(), tool.position) <= radius) continue;
+        ContactTracker<double> tracker(roof);
+        REQUIRE_FALSE(tracker.update(tree, x, tool).touching());
+        tool.position = crest + random.number(0.01, 1.0) * radius * way;
+        const auto contact = tracker.update(tree, x, tool);
+        REQUIRE(contact.touching());
+        CHECK(contact.side == 1);
+    }
+}

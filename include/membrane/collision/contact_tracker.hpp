@@ -84,6 +84,8 @@ class ContactTracker {
     [[nodiscard]] Scalar expected_side() const noexcept {
         return side_ != 0 ? side_ : last_.touching() ? last_.side : Scalar(1);
     }
+    // Of an open surface either side may be the one that the tool comes from.
+    [[nodiscard]] bool is_first_seen() const noexcept { return !surface_.closed() && !last_.touching() && side_ == 0; }
     [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
@@ -95,7 +97,7 @@ class ContactTracker {
         contact.gap = -contact.gap - 2 * scene.radius;
         contact.normal = -contact.normal;
     }
-    [[nodiscard]] bool is_mostly_behind(const Scene& scene, Index f, Scalar side) const noexcept;
+    [[nodiscard]] bool was_behind(const Scene& scene, Index f, Scalar side, const Vector3<Scalar>& q) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> middle_inside(const Scene& scene, Index f, Scalar side) const noexcept;
     [[nodiscard]] bool has_passed(const Scene& scene, Index near, Scalar side, const Vector3<Scalar>& q) const noexcept;
     void gather_from_tree(const Scene& scene) noexcept;
@@ -289,7 +291,7 @@ bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& conta
                 return false;                // or comes out
             passed.normal = -passed.normal;  // of a crease, or an open surface from its other side
             passed.gap = -passed.gap;
-            if (!surface_.closed() && !last_.touching() && side_ == 0) passed.side = -side;
+            if (is_first_seen() && was_behind(scene, hit.triangle, side, from)) passed.side = -side;
         }
         contact = passed;
         contact.gap -= scene.radius;
@@ -309,8 +311,10 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     };
     const Scalar side = contact.side;
     bool behind = seen_from(side);
-    const bool first_seen = !last_.touching() && side_ == 0 && !surface_.closed();
-    if (behind && first_seen && is_mostly_behind(scene, f, side)) behind = seen_from(-1);
+    // A shaft beside a border may reach to both sides: the middle tells, where it was before it touched.
+    const Tool<Scalar>& before = last_tool_ ? *last_tool_ : scene.tool;
+    const Vector3<Scalar> middle = before.position + before.axis / 2;
+    if (behind && is_first_seen() && was_behind(scene, f, side, middle)) behind = seen_from(-1);
     if (side_ != 0 && contact.side != side_) {  // beside a border
         contact.side = side_;
         behind = !leaves_border(scene, contact);
@@ -327,13 +331,11 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     contact.before = (contact.crossed ? contact.point : contact.on_axis) + margin_ * contact.normal;
 }
 
-// Whether the tool is on the other side of an open surface, as that would be without it. A shaft beside a border may reach
-// to both sides: its middle tells.
+// Whether `q` is on the other side of the surface as that would be without the tool.
 template <Real Scalar>
-bool ContactTracker<Scalar>::is_mostly_behind(const Scene& scene, Index f, Scalar side) const noexcept {
-    if (feature_pairs(scene.tool) == 1) return true;
-    const Vector3<Scalar> middle = scene.tool.position + scene.tool.axis / 2;
-    return side * surface_.height(scene.anchors, surface_.descend(scene.anchors, f, middle), middle) < 0;
+bool ContactTracker<Scalar>::was_behind(const Scene& scene, Index f, Scalar side,
+                                        const Vector3<Scalar>& q) const noexcept {
+    return side * surface_.height(scene.anchors, surface_.descend(scene.anchors, f, q), q) < 0;
 }
 
 // Of a shaft what is nearest may be outside, and another point behind: the middle of what is inside, or an end, if the
