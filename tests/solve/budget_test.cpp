@@ -276,6 +276,11 @@ TEST_CASE("no budget makes a step worse than what the tool explains", "[solver][
     for_each_seed(1, cases(120, 20'000), [](const auto&... run) { check_run(run...); });
 }
 
+TEST_CASE("in float a contact at rest is seen to be at rest", "[solver][budget]") {
+    const Membrane<float> scene;
+    for (const std::uint64_t seed : {5688, 10732, 12196}) check_run(scene, seed, BlockStep{});
+}
+
 TEST_CASE("no path makes the force of a predicted step worse than that of one that is not", "[solver][budget]") {
     for_each_seed(1, cases(40, 3'600), [](const auto&... run) { check_prediction(run...); });
 }

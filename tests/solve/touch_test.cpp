@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -140,5 +141,23 @@ TEST_CASE("what a tool presses on yields where it is fixed by its share of the f
         const double part = 1 - weight * weight / touch.barycentric.squaredNorm();
         CHECK((at(m.x, touch.barycentric) - at(before, touch.barycentric) - part * way).norm() < 1e-12);
         if (seed % 2 == 0) CHECK(m.x.col(2) == before.col(2));
+    }
+}
+
+TEST_CASE("nothing is worth a shift that rounding makes nothing of") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane m(random);
+        const double far = std::pow(10, random.number(0.0, 6.0));
+        m.x.colwise() += far * random.unit_vector();
+        const Touch<double> touch{0, 0, corners, random.barycentric(), {}, {}, {}, {}};
+        const Vector3<double> where = at(m.x, touch.barycentric);
+        const double spacing = std::numeric_limits<double>::epsilon() * where.cwiseAbs().maxCoeff();
+        CAPTURE(seed, far);
+        m.work.negligible_force = 0;
+        CHECK(membrane::negligible_shift(m.region, touch) >= 4 * spacing);
+        CHECK(membrane::negligible_shift(m.region, touch) <= 100 * spacing);
+        m.work.negligible_force = 1;
+        CHECK(membrane::negligible_shift(m.region, 1) == m.region.compliance(1));
     }
 }

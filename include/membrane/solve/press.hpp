@@ -118,8 +118,7 @@ void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
     const auto out = way_out_of_support(region);
     if (contact.crossed && !out) take_along(region);
     for (const Index v : region.corners_of(contact.watched)) contact.crossed ? region.keep(v) : region.save(v);
-    const Scalar slack = region.negligible_force() * region.compliance(contact.corners[0]);
-    if (!contact.crossed && !out && contact.gap < -slack) give_way(region);
+    if (!contact.crossed && !out && contact.gap < -negligible_shift(region, contact.corners[0])) give_way(region);
     out ? touch_support(region, *out) : find_touches(region);
     for (const auto& touch : region.touches_before()) bear<Scalar>(region, touch, -touch.force);
     for (const auto& touch : region.touches()) {
@@ -338,7 +337,7 @@ bool Press<Scalar>::has_new_overlap(const Region<Scalar>& region) const noexcept
                 continue;
             }
             const auto nearest = proximity(triangle, tool, pair);
-            const Scalar slack = region.negligible_force() * region.compliance(touched.corners[0]);
+            const Scalar slack = negligible_shift(region, touched.corners[0]);
             if (nearest && norm(nearest->reach) < contact.radius - slack) return true;
         }
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 
@@ -104,7 +105,13 @@ template <Real Scalar>
     return sum;
 }
 
-/// A distance that is not worth moving it by: what a negligible force does where all springs resist [m].
+/// A distance that is not worth moving a vertex by: what a negligible force does, or a few roundings [m].
+template <Real Scalar>
+[[nodiscard]] Scalar negligible_shift(const Region<Scalar>& region, Index v) noexcept {
+    return (std::max)(region.negligible_force() * region.compliance(v), detail::rounding_at(region.position(v)));
+}
+
+/// The same of the touched point where all springs resist.
 template <Real Scalar>
 [[nodiscard]] Scalar negligible_shift(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
     Scalar sum = 0;
@@ -112,7 +119,7 @@ template <Real Scalar>
         const Scalar weight = touch.barycentric[static_cast<Eigen::Index>(k)];
         sum += weight * weight * region.compliance(touch.corners[k]);
     }
-    return region.negligible_force() * sum;
+    return (std::max)(region.negligible_force() * sum, detail::rounding_at(region.position(touch.corners[0])));
 }
 
 /// How far it moves along its normal for each newton along that [m/N].
