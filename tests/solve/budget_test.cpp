@@ -227,34 +227,47 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
     CHECK(double((cut.x - whole.x).cwiseAbs().maxCoeff()) <= tolerance * whole.depth);
 }
 
-/// Both steps, and one whose sweeps go on to the end, take the path tick by tick.
+/// The rms errors of the force, in parts of the largest.
+struct Errors {
+    double predicted = 0, unpredicted = 0;
+};
+
+/// Steps with and without a prediction, and without one but with sweeps to the end, take the path tick by tick. With all
+/// layers: with fewer, where the membrane rests hangs on which vertices have ever been within them.
 template <class Scalar, class Rule>
-void check_prediction(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
+void check_prediction(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule, Errors& sum) {
     CAPTURE(seed);
     Random random(seed);
     const auto path = static_cast<Path>(random.index(5));
     const auto strokes = tools<Scalar>(path, random);
     auto options = random_options(scene, random);
+    options.layers = unlimited;
     options.layers_as_needed = false;
     options.predict = false;
     Run<Scalar, Rule> unpredicted(scene, options, rule);
-    options.predict = true;
-    Run<Scalar, Rule> predicted(scene, options, rule);
-    options.sweeps = 300;
-    Run<Scalar, Rule> exact(scene, options, rule);
-    CAPTURE(int(path), options.layers, int(options.order));
+    auto other = options;
+    other.predict = true;
+    Run<Scalar, Rule> predicted(scene, other, rule);
+    other = options;
+    other.sweeps = 300;
+    Run<Scalar, Rule> exact(scene, other, rule);
+    CAPTURE(int(path), options.sweeps, int(options.order));
 
-    double error = 0, error_unpredicted = 0, largest = 0;  // rms
+    Errors errors;
+    double largest = 0;
     for (const auto& tool : strokes) {
         for (auto* run : {&exact, &unpredicted, &predicted}) run->tick(tool, no_end);
         const auto squared_error = [&](const auto& run) {
             return double(squared_norm<Scalar>(run.report.reactions[0] - exact.report.reactions[0]));
         };
-        error += squared_error(predicted) / double(strokes.size());
-        error_unpredicted += squared_error(unpredicted) / double(strokes.size());
+        errors.predicted += squared_error(predicted) / double(strokes.size());
+        errors.unpredicted += squared_error(unpredicted) / double(strokes.size());
         largest = std::max(largest, exact.force());
     }
-    CHECK(std::sqrt(error) <= 1.1 * std::sqrt(error_unpredicted) + 1e-3 * largest);
+    errors = {std::sqrt(errors.predicted) / largest, std::sqrt(errors.unpredicted) / largest};
+    CHECK(errors.predicted <= 1.25 * errors.unpredicted + 1e-3);
+    sum.predicted += errors.predicted;
+    sum.unpredicted += errors.unpredicted;
 }
 
 /// `check(membrane, seed, rule)` for all scalars and rules in turn.
@@ -281,6 +294,8 @@ TEST_CASE("in float a contact at rest is seen to be at rest", "[solver][budget]"
     for (const std::uint64_t seed : {5688, 10732, 12196}) check_run(scene, seed, BlockStep{});
 }
 
-TEST_CASE("no path makes the force of a predicted step worse than that of one that is not", "[solver][budget]") {
-    for_each_seed(1, cases(40, 3'600), [](const auto&... run) { check_prediction(run...); });
+TEST_CASE("a prediction makes the force worse on no path, and better by a third over all", "[solver][budget]") {
+    Errors sum;
+    for_each_seed(1, cases(120, 3'600), [&](const auto&... run) { check_prediction(run..., sum); });
+    CHECK(3 * sum.predicted <= 2 * sum.unpredicted);
 }
