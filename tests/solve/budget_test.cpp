@@ -291,7 +291,7 @@ TEST_CASE("no budget makes a step worse than what the tool explains", "[solver][
 
 TEST_CASE("in float a contact at rest is seen to be at rest", "[solver][budget]") {
     const Membrane<float> scene;
-    for (const std::uint64_t seed : {5688, 10732, 12196}) check_run(scene, seed, BlockStep{});
+    for (const std::uint64_t seed : {5688U, 10732U, 12196U}) check_run(scene, seed, BlockStep{});
 }
 
 TEST_CASE("a prediction makes the force worse on no path, and better by a third over all", "[solver][budget]") {
