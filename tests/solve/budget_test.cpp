@@ -87,11 +87,7 @@ std::vector<Tool<Scalar>> tools(Path path, Random& random) {
 template <class Scalar, class Rule>
 struct Run {
     Run(const Membrane<Scalar>& scene, const SolverOptions<Scalar>& options, Rule rule)
-        : membrane(scene),
-          solver(scene.network, options, rule),
-          tree(scene.mesh),
-          tracker(scene.mesh),
-          negligible_force(options.negligible_force) {}
+        : membrane(scene), solver(scene.network, options, rule), tree(scene.mesh), tracker(scene.mesh) {}
 
     /// A tick whose step has time for so many looks at the clock; returns how many it took.
     double tick(const Tool<Scalar>& tool, double looks_left) {
@@ -126,7 +122,6 @@ struct Run {
     QuasiStaticSolver<Scalar, Rule> solver;
     AabbTree<Scalar> tree;
     ContactTracker<Scalar> tracker;
-    Scalar negligible_force;
     Points<Scalar> x = membrane.mesh.positions(), start = x;
     Contact<Scalar> contact;
     StepReport<Scalar> report;
@@ -161,18 +156,18 @@ void check_report(Run<Scalar, Rule>& run, Run<Scalar, Rule> before, const Tool<S
     }
     const double rounding = 1e4 * radius * double(std::numeric_limits<Scalar>::epsilon());
     if (run.looks_at_all) REQUIRE(beyond <= double(report.residual) + rounding);
-    if (report.converged) REQUIRE(report.residual <= run.negligible_force);
+    if (report.converged) REQUIRE(double(report.residual) <= 1e-6 * (1 + 1e-6));
 }
 
 template <class Scalar>
-SolverOptions<Scalar> random_options(const Membrane<Scalar>& scene, Random& random) {
+SolverOptions<Scalar> random_options(Random& random) {
     constexpr std::array<Index, 4> layers{0, 1, 6, unlimited};
     SolverOptions<Scalar> options{.layers = layers[std::size_t(random.index(4))], .sweeps = 1 + random.index(3)};
     options.layers_as_needed = random.chance(0.2);
     options.order =
         std::array{VisitOrder::arrival, VisitOrder::groups, VisitOrder::colours}[std::size_t(random.index(3))];
     options.predict = random.chance(0.7);
-    options.negligible_force = std::max(Scalar(1e-6), scene.network.negligible_force());  // of some 10 mN
+    options.negligible_force = Scalar(1e-6);  // of some 10 mN
     return options;
 }
 
@@ -182,7 +177,7 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
     Random random(seed);
     const auto path = static_cast<Path>(random.index(5));
     const auto strokes = tools<Scalar>(path, random);
-    auto options = random_options(scene, random);
+    auto options = random_options<Scalar>(random);
     Run<Scalar, Rule> whole(scene, options, rule);
     constexpr std::array parts{0.0, 0.05, 0.1, 0.2, 0.4, 0.8};
     const bool by_deadline = random.chance(0.6);
@@ -240,7 +235,7 @@ void check_prediction(const Membrane<Scalar>& scene, std::uint64_t seed, Rule ru
     Random random(seed);
     const auto path = static_cast<Path>(random.index(5));
     const auto strokes = tools<Scalar>(path, random);
-    auto options = random_options(scene, random);
+    auto options = random_options<Scalar>(random);
     options.layers = unlimited;
     options.layers_as_needed = false;
     options.predict = false;
@@ -270,11 +265,11 @@ void check_prediction(const Membrane<Scalar>& scene, std::uint64_t seed, Rule ru
     sum.unpredicted += errors.unpredicted;
 }
 
-/// `check(membrane, seed, rule)` for all scalars and rules in turn.
-void for_each_seed(int from, int to, auto check) {
+/// `check(membrane, seed, rule)` for seeds from 1, for all scalars and rules in turn.
+void for_each_seed(int runs, auto check) {
     const Membrane<double> in_double;
     const Membrane<float> in_float;
-    for (int seed = from; seed <= to; ++seed) {
+    for (int seed = 1; seed <= runs; ++seed) {
         const auto number = static_cast<std::uint64_t>(seed);
         if (seed % 4 == 0) check(in_float, number, BlockStep{});
         if (seed % 4 == 1) check(in_double, number, SafeStep{});
@@ -286,16 +281,16 @@ void for_each_seed(int from, int to, auto check) {
 }  // namespace
 
 TEST_CASE("no budget makes a step worse than what the tool explains", "[solver][deadline][budget]") {
-    for_each_seed(1, cases(120, 20'000), [](const auto&... run) { check_run(run...); });
+    for_each_seed(cases(120, 20'000), [](const auto&... run) { check_run(run...); });
 }
 
 TEST_CASE("in float a contact at rest is seen to be at rest", "[solver][budget]") {
     const Membrane<float> scene;
-    for (const std::uint64_t seed : {5688U, 10732U, 12196U}) check_run(scene, seed, BlockStep{});
+    for (const std::uint64_t seed : {10732U, 12196U}) check_run(scene, seed, BlockStep{});
 }
 
 TEST_CASE("a prediction makes the force worse on no path, and better by a third over all", "[solver][budget]") {
     Errors sum;
-    for_each_seed(1, cases(120, 3'600), [&](const auto&... run) { check_prediction(run..., sum); });
+    for_each_seed(cases(120, 3'600), [&](const auto&... run) { check_prediction(run..., sum); });
     CHECK(3 * sum.predicted <= 2 * sum.unpredicted);
 }

@@ -336,38 +336,34 @@ TEST_CASE("a membrane with a free border comes back from what has gone round it"
 }
 
 // Most slide off and draw no edge out by much. One in ten catches on a border that has given way: it is taken to have gone
-// through it, and pulls a corner along. Some then hang on the shaft: 5 of 1000.
+// through it, and pulls a corner along. Some then hang on the shaft: in the long run 5 of 1000.
 TEST_CASE("a shaft dragged slowly over a free border slides off, and the membrane comes back", "[withdrawal]") {
     const Scene fresh = free_sheet();
     const int runs = cases(40, 1000);
-    int caught = 0, hanging = 0;
+    int caught = 0;
     for (int seed = 1; seed <= runs; ++seed) {
+        CAPTURE(seed);
         const auto left = drag_over_border(fresh, seed);
-        caught += left.longest > 5 * fresh.edge ? 1 : 0;
-        hanging += left.comes_back ? 0 : 1;
+        CHECK(left.comes_back);
+        if (left.longest > 5 * fresh.edge) ++caught;
     }
-    CHECK(caught <= std::max(1, runs / 8));
-    CHECK(hanging <= runs / 100);
+    CHECK(caught <= std::max(1, runs / 10));
 }
 
 TEST_CASE("no shaft that is dragged over a free border is left with the membrane on it", "[withdrawal][!shouldfail]") {
     for (const int seed : {169, 711}) CHECK(drag_over_border(free_sheet(), seed).comes_back);
 }
 
-// Of 2000, 22 are not at rest after a second, and 6 have their axis inside.
+// In the long run 22 of 2000 are not at rest after a second, and 6 have their axis inside.
 TEST_CASE("a shaft thinner than an edge, two edges deep, stays outside a closed surface and leaves it",
           "[withdrawal]") {
-    const int runs = cases(40, 2000);
-    int restless = 0, inside = 0;
-    for (int seed = 1; seed <= runs; ++seed) {
+    for (int seed = 1; seed <= cases(40, 2000); ++seed) {
         CAPTURE(seed);
         const auto left = press_thin_shaft(seed);
-        restless += left.converged ? 0 : 1;
-        inside += left.outside ? 0 : 1;
+        CHECK(left.converged);
+        CHECK(left.outside);
         CHECK(left.comes_back);
     }
-    CHECK(restless <= runs / 50);
-    CHECK(inside <= runs / 200);
 }
 
 TEST_CASE("every still thin shaft comes to rest outside a closed surface", "[withdrawal][!shouldfail]") {
