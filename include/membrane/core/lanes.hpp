@@ -96,6 +96,17 @@ class Lanes {
             for (std::size_t i = 0; i < parts; ++i) both.parts_[i] = a.parts_[i] & b.parts_[i];
             return both;
         }
+        [[nodiscard]] friend Mask operator|(const Mask& a, const Mask& b) noexcept {
+            Mask either;
+            for (std::size_t i = 0; i < parts; ++i) either.parts_[i] = a.parts_[i] | b.parts_[i];
+            return either;
+        }
+        [[nodiscard]] Mask operator!() const noexcept {
+            Mask none;
+            for (std::size_t i = 0; i < parts; ++i) none.parts_[i] = ~parts_[i];
+            return none;
+        }
+        [[nodiscard]] friend bool all(const Mask& mask) noexcept { return !any(!mask); }
         [[nodiscard]] friend bool any(const Mask& mask) noexcept {
             std::array<std::uint64_t, 4> bits;
             std::memcpy(bits.data(), &mask, sizeof bits);
@@ -213,6 +224,7 @@ template <Number N, class Choice>
         return N::choose(choice, yes, no);
 }
 [[nodiscard]] constexpr bool any(bool choice) noexcept { return choice; }
+[[nodiscard]] constexpr bool all(bool choice) noexcept { return choice; }
 
 /// The square root of a number, or of every lane.
 template <Number N>

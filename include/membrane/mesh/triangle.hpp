@@ -26,12 +26,12 @@ struct Triangle {
     Vector3<N> a, b, c;
 };
 
-/// A point of a triangle and how far it is from what was asked about.
-template <Real Scalar>
+/// A point of a triangle and how far it is from what was asked about. Of `Lanes`: of several triangles.
+template <Number N>
 struct TrianglePoint {
-    Vector3<Scalar> barycentric;  ///< Weights of a, b, c: not negative, sum 1; exactly zero for corners not involved.
-    Vector3<Scalar> point;        ///< [m]
-    Scalar squared_distance;      ///< [m^2]
+    Vector3<N> barycentric;  ///< Weights of a, b, c: not negative, sum 1; exactly zero for corners not involved.
+    Vector3<N> point;        ///< [m]
+    N squared_distance;      ///< [m^2]
 };
 
 /// A point of a segment and the point of a triangle nearest to it.
@@ -53,18 +53,18 @@ template <class Positions, class Corners>
 [[nodiscard]] Triangle<typename Positions::Scalar> triangle_at(const Positions& x, const Corners& corners) noexcept;
 
 /// The normal, as long as the triangle is large [m^2].
-template <Real Scalar>
-[[nodiscard]] Vector3<Scalar> area_vector(const Triangle<Scalar>& triangle) noexcept;
+template <Number N>
+[[nodiscard]] Vector3<N> area_vector(const Triangle<N>& triangle) noexcept;
 
 /// The point with the weights `barycentric`; the corner itself, to the bit, where one weight is 1 and the others 0.
-template <Real Scalar>
-[[nodiscard]] Vector3<Scalar> point_at(const Triangle<Scalar>& triangle, const Vector3<Scalar>& barycentric) noexcept;
+template <Number N>
+[[nodiscard]] Vector3<N> point_at(const Triangle<N>& triangle, const Vector3<N>& barycentric) noexcept;
 
-/// The point of the triangle nearest to `q`. A triangle whose height is below sqrt(epsilon) of its edges counts as its
+/// The point of the triangle nearest to `q`; of several triangles at once, to the same bits. A triangle whose height is below sqrt(epsilon) of its edges counts as its
 /// three edges, which moves the answer by no more than that height. One that is not finite, or so large that the square
 /// of its area is not, is infinitely far away.
-template <Real Scalar>
-[[nodiscard]] TrianglePoint<Scalar> closest_point(const Triangle<Scalar>& triangle, const Vector3<Scalar>& q) noexcept;
+template <Number N>
+[[nodiscard]] TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept;
 
 /// The nearest points of the triangle and of the segment from `p` to `q`; at distance 0 where they cross.
 template <Real Scalar>
@@ -94,10 +94,10 @@ template <Real Scalar>
 namespace detail {
 
 /// `part / whole` between 0 and 1, whatever the two are.
-template <Real Scalar>
-[[nodiscard]] Scalar fraction(Scalar part, Scalar whole) noexcept {
-    if (!(part > 0)) return 0;
-    return part < whole ? part / whole : Scalar(1);
+template <Number N>
+[[nodiscard]] N fraction(const N& part, const N& whole) noexcept {
+    const auto inside = (part > 0) & (part < whole);
+    return select<N>(inside, part / select<N>(inside, whole, 1), select<N>(part > 0, 1, 0));
 }
 
 template <Number N>
@@ -134,45 +134,53 @@ Triangle<typename Positions::Scalar> triangle_at(const Positions& x, const Corne
     return {point(x, corners[0]), point(x, corners[1]), point(x, corners[2])};
 }
 
-template <Real Scalar>
-Vector3<Scalar> area_vector(const Triangle<Scalar>& triangle) noexcept {
-    return cross<Scalar>(triangle.b - triangle.a, triangle.c - triangle.a) / 2;
+template <Number N>
+Vector3<N> area_vector(const Triangle<N>& triangle) noexcept {
+    const Vector3<N> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a;
+    return cross(ab, ac) / N(2);
 }
 
-template <Real Scalar>
-Vector3<Scalar> point_at(const Triangle<Scalar>& triangle, const Vector3<Scalar>& barycentric) noexcept {
+template <Number N>
+Vector3<N> point_at(const Triangle<N>& triangle, const Vector3<N>& barycentric) noexcept {
     return (barycentric[0] * triangle.a + barycentric[1] * triangle.b) + barycentric[2] * triangle.c;
 }
 
-template <Real Scalar>
-TrianglePoint<Scalar> closest_point(const Triangle<Scalar>& triangle, const Vector3<Scalar>& q) noexcept {
-    const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
-    const Vector3<Scalar> normal = cross(ab, ac);
-    const Scalar whole = squared_norm(normal);
-    Scalar nearest = std::numeric_limits<Scalar>::infinity();
-    if (!is_finite(whole)) return {{1, 0, 0}, triangle.a, nearest};  // then so is a corner, or far too large
-    const bool has_area = whole > std::numeric_limits<Scalar>::epsilon() * (squared_norm(ab) * squared_norm(ac));
-    const Scalar weight_b = dot(normal, cross(aq, ac)), weight_c = dot(normal, cross(ab, aq));
-    const Scalar weight_a = whole - weight_b - weight_c;
+template <Number N>
+TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
+    using Limits = std::numeric_limits<Each<N>>;
+    const Vector3<N> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
+    const Vector3<N> normal = cross(ab, ac);
+    const N whole = squared_norm(normal);
+    const N weight_b = dot(normal, cross(aq, ac)), weight_c = dot(normal, cross(ab, aq));
+    const N weight_a = whole - weight_b - weight_c;
+    const auto finite = whole <= (Limits::max)();  // else a corner is not, or far too large
+    const auto has_area = whole > Limits::epsilon() * (squared_norm(ab) * squared_norm(ac));
+    const auto over_face = finite & has_area & (weight_a >= 0) & (weight_b >= 0) & (weight_c >= 0);
 
-    if (has_area && weight_a >= 0 && weight_b >= 0 && weight_c >= 0) {
-        const Scalar b = weight_b / whole, c = weight_c / whole;
-        const Vector3<Scalar> barycentric((std::max)(Scalar(0), 1 - b - c), b, c);
-        return {barycentric, point_at(triangle, barycentric), squared_norm<Scalar>(aq - b * ab - c * ac)};
-    }
+    const N divisor = select<N>(over_face, whole, 1), b = weight_b / divisor, c = weight_c / divisor;
+    const Vector3<N> in_face(larger<N>(0, 1 - b - c), b, c), offset_in_face = aq - b * ab - c * ac;
+    if (all(over_face)) return {in_face, point_at(triangle, in_face), squared_norm(offset_in_face)};
+
     // Outside, the nearest point lies on an edge that faces q.
-    Vector3<Scalar> barycentric(1, 0, 0);
-    const auto consider = [&](int k, const Vector3<Scalar>& offset, const Vector3<Scalar>& edge) {
-        const Scalar along = detail::fraction(dot(offset, edge), squared_norm(edge));
-        const auto squared_distance = squared_norm<Scalar>(offset - along * edge);
-        if (!(squared_distance < nearest)) return;
-        nearest = squared_distance;
-        barycentric = detail::on_edge(k, along);
+    N nearest = Limits::infinity();
+    Vector3<N> barycentric(1, 0, 0);
+    const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge) {
+        if (!any(faces)) return;
+        const N along = detail::fraction(dot(offset, edge), squared_norm(edge));
+        const N squared_distance = squared_norm<N>(offset - along * edge);
+        const auto nearer = finite & faces & (squared_distance < nearest);
+        nearest = select<N>(nearer, squared_distance, nearest);
+        const Eigen::Index next = (k + 1) % 3, last = (k + 2) % 3;
+        barycentric[k] = select<N>(nearer, 1 - along, barycentric[k]);
+        barycentric[next] = select<N>(nearer, along, barycentric[next]);
+        barycentric[last] = select<N>(nearer, 0, barycentric[last]);
     };
-    if (!has_area || weight_c < 0) consider(0, aq, ab);
-    if (!has_area || weight_a < 0) consider(1, q - triangle.b, triangle.c - triangle.b);
-    if (!has_area || weight_b < 0) consider(2, q - triangle.c, -ac);
-    return {barycentric, point_at(triangle, barycentric), nearest};
+    consider(0, !has_area | (weight_c < 0), aq, ab);
+    consider(1, !has_area | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
+    consider(2, !has_area | (weight_b < 0), q - triangle.c, -ac);
+    for (Eigen::Index k = 0; k < 3; ++k) barycentric[k] = select<N>(over_face, in_face[k], barycentric[k]);
+    return {barycentric, point_at(triangle, barycentric),
+            select<N>(over_face, squared_norm(offset_in_face), nearest)};
 }
 
 template <Real Scalar>
