@@ -5,7 +5,7 @@
 
 #include "support/sweep.hpp"
 
-// What does one visit of a vertex cost, in a sweep over all of the mesh? The compact block against the loop one would
+// What does one visit of a vertex cost, in a sweep over all of the mesh? Packs against the loop one would
 // write, and against the same arithmetic on numbers that lie side by side, which no order of vertices can beat.
 
 namespace {
@@ -19,12 +19,12 @@ void sizes_in_cache(benchmark::internal::Benchmark* measured) {
 
 BENCHMARK(plain<double>)->Name("plain/double")->Apply(sizes_in_cache);
 BENCHMARK(plain<float>)->Name("plain/float")->Apply(sizes_in_cache);
-BENCHMARK(block<double, membrane::MassStep>)->Name("lanes/double/mass")->Apply(sizes_in_cache);
-BENCHMARK(block<double, membrane::SafeStep>)->Name("lanes/double/safe")->Apply(sizes_in_cache);
-BENCHMARK(block<double, membrane::BlockStep>)->Name("lanes/double/newton")->Apply(sizes_in_cache);
-BENCHMARK(block<float, membrane::MassStep>)->Name("lanes/float/mass")->Apply(sizes_in_cache);
-BENCHMARK(block<float, membrane::SafeStep>)->Name("lanes/float/safe")->Apply(sizes_in_cache);
-BENCHMARK(block<float, membrane::BlockStep>)->Name("lanes/float/newton")->Apply(sizes_in_cache);
+BENCHMARK(packs<double, membrane::MassStep>)->Name("lanes/double/mass")->Apply(sizes_in_cache);
+BENCHMARK(packs<double, membrane::SafeStep>)->Name("lanes/double/safe")->Apply(sizes_in_cache);
+BENCHMARK(packs<double, membrane::BlockStep>)->Name("lanes/double/newton")->Apply(sizes_in_cache);
+BENCHMARK(packs<float, membrane::MassStep>)->Name("lanes/float/mass")->Apply(sizes_in_cache);
+BENCHMARK(packs<float, membrane::SafeStep>)->Name("lanes/float/safe")->Apply(sizes_in_cache);
+BENCHMARK(packs<float, membrane::BlockStep>)->Name("lanes/float/newton")->Apply(sizes_in_cache);
 
 /// Six springs and a volume spring for each vertex, all numbers in the order of their use.
 template <Real Scalar>

@@ -5,11 +5,12 @@
 #include <span>
 #include <vector>
 
-#include <membrane/solve/compact_block.hpp>
+#include <membrane/solve/packed_vertices.hpp>
+#include <membrane/solve/propagation_queue.hpp>
 
 #include "scene.hpp"
 
-/// A sweep over all vertices of a mesh: the compact block, and the loop one would write.
+/// A sweep over all vertices of a mesh: in packs, and the loop one would write.
 namespace bench {
 
 using membrane::Lanes;
@@ -22,19 +23,20 @@ struct Field {
         : mesh(sphere_of<Scalar>(vertices)),
           network(mesh, {}, {.stiffness = Scalar(stiffness), .mass = Scalar(4e-4)}),
           volume(mesh, {.stiffness = Scalar(backing)}),
-          work(mesh.vertex_count(), 0) {
+          state(mesh.vertex_count(), 0) {
         std::mt19937_64 random(1);
         for (Index v = 0; v < x.cols(); ++v) {
             for (int k = 0; k < 3; ++k)
                 x(k, v) += static_cast<Scalar>(0.05 * radius * (static_cast<double>(random() % 2001) / 1000 - 1));
         }
-        work.start = x;
+        const membrane::ConstPointsRef<Scalar> start = x;
+        for (Index v = 0; v < x.cols(); ++v) state.load(v, start, network);
     }
 
     membrane::TriangleMesh<Scalar> mesh;
     membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network;
     membrane::VirtualVolumeSprings<Scalar> volume;
-    membrane::Workspace<Scalar> work;
+    membrane::StepState<Scalar> state;
     membrane::Points<Scalar> x = mesh.positions();
 };
 
@@ -74,33 +76,30 @@ void plain(benchmark::State& state) {
     count_visits(state);
 }
 
-/// The compact block, positions brought and fetched in every sweep.
+/// In packs, as a step does it beyond layer 0.
 template <Real Scalar, class Rule>
-void block(benchmark::State& state) {
+void packs(benchmark::State& state) {
     Field<Scalar> field(state.range(0));
-    membrane::PointsRef<Scalar> x = field.x;
+    const membrane::ConstPointsRef<Scalar> start = field.x, now = field.state.positions();
     const membrane::StepInput<Scalar, decltype(field.network), decltype(field.volume)> scene{
-        x, Scalar(tick), field.network, field.volume, field.work};
+        start, now, Scalar(tick), field.network, field.volume, field.state};
     const Index seed = 0;
     membrane::PropagationQueue queue(field.mesh.vertex_count());
     queue.build(field.network, std::span(&seed, 1), membrane::unlimited);
     queue.group(field.network);
-    membrane::CompactBlock<Scalar> compact(field.network);
-    compact.packs().follow(queue, field.network);
-    require(compact.packs().size() + 1 == static_cast<std::size_t>(state.range(0)),
-            "all vertices have room in the block");
-    compact.open(scene, [](Index) { return false; });
+    membrane::PackedVertices<Scalar> packed(field.network);
+    packed.assign(queue.vertices(), queue.group_ends(), field.network);
+    require(packed.size() == static_cast<std::size_t>(state.range(0)), "all vertices have room in the packs");
+    packed.begin_step(scene);
     for (auto _ : state) {
-        compact.packs().load(x);
-        for (std::size_t p = 0; p < compact.packs().count(); ++p) {
-            benchmark::DoNotOptimize(compact.visit(p, scene, Rule{}, true));
+        for (std::size_t p = 0; p < packed.count(); ++p) {
+            benchmark::DoNotOptimize(packed.template update<false>(p, scene, Rule{}, true));
         }
-        compact.packs().store(x);
     }
-    require(membrane::is_finite(field.x), "the block must not diverge");
+    require(membrane::is_finite(membrane::Points<Scalar>(now)), "the sweep must not diverge");
     count_visits(state);
-    state.counters["filled"] = static_cast<double>(compact.packs().size()) /
-                               static_cast<double>(compact.packs().count() * Lanes<Scalar>::count);
+    state.counters["filled"] = static_cast<double>(packed.size()) /
+                               static_cast<double>(packed.count() * Lanes<Scalar>::count);
 }
 
 }  // namespace bench

@@ -55,13 +55,45 @@ struct OneThread {
 
 static_assert(Executor<OneThread>);
 
-/// Calls `act(begin, end)` for parts of 0 to `count` of at most `at_once`, each part in a task.
-template <Executor Threads, class Act>
-void share_out(const Threads& executor, std::size_t count, std::size_t at_once, const Act& act) noexcept {
-    const std::size_t tasks = count / at_once + (count % at_once > 0 ? 1 : 0);
+/// An executor of any type, which must outlive this: what hands it tasks depends on no type of executor.
+class ExecutorRef {
+  public:
+    template <Executor E>
+    explicit ExecutorRef(const E& executor) noexcept
+        : executor_(&executor), run_(&run<E>), is_serial_(std::same_as<E, OneThread>) {}
+
+    /// Whether it is known that one thread does all tasks in order.
+    [[nodiscard]] bool is_serial() const noexcept { return is_serial_; }
+
+    template <class Task>
+    void operator()(Index count, const Task& task) const noexcept {
+        const TaskRef ref{&task, [](const void* of, Index i) noexcept { (*static_cast<const Task*>(of))(i); }};
+        run_(executor_, count, ref);
+    }
+
+  private:
+    struct TaskRef {
+        const void* task;
+        void (*call)(const void* task, Index i) noexcept;
+        void operator()(Index i) const noexcept { call(task, i); }
+    };
+    template <class E>
+    static void run(const void* executor, Index count, const TaskRef& task) noexcept {
+        (*static_cast<const E*>(executor))(count, task);
+    }
+
+    const void* executor_;
+    void (*run_)(const void* executor, Index count, const TaskRef& task) noexcept;
+    bool is_serial_;
+};
+
+/// Calls `act(begin, end)` for parts of 0 to `count` of at most `grain_size`, each part in a task.
+template <class Threads, class Act>
+void parallel_for(const Threads& executor, std::size_t count, std::size_t grain_size, const Act& act) noexcept {
+    const std::size_t tasks = count / grain_size + (count % grain_size > 0 ? 1 : 0);
     executor(static_cast<Index>(tasks), [&](Index task) noexcept {
-        const std::size_t begin = static_cast<std::size_t>(task) * at_once, left = count - begin;
-        act(begin, begin + (left < at_once ? left : at_once));
+        const std::size_t begin = static_cast<std::size_t>(task) * grain_size, left = count - begin;
+        act(begin, begin + (left < grain_size ? left : grain_size));
     });
 }
 

@@ -14,13 +14,14 @@
 ///     const auto there = membrane::gather(rows.data(), begins);             // a point in every lane
 namespace membrane {
 
-/// A point that is read as a whole.
+/// A point and one number more, read as a whole.
 template <Real Scalar>
 struct alignas(4 * sizeof(Scalar)) PaddedPoint {
-    std::array<Scalar, 4> number{};  ///< x, y, z, and one for the room it takes
+    std::array<Scalar, 4> number{};  ///< x, y, z, and a number that belongs to the point
 
     [[nodiscard]] Vector3<Scalar> point() const noexcept { return {number[0], number[1], number[2]}; }
-    void set(const Vector3<Scalar>& p) noexcept { number = {p.x(), p.y(), p.z(), 0}; }
+    [[nodiscard]] Scalar extra() const noexcept { return number[3]; }
+    void set(const Vector3<Scalar>& p, Scalar extra = 0) noexcept { number = {p.x(), p.y(), p.z(), extra}; }
 };
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
@@ -90,9 +91,22 @@ inline constexpr Index numbers_in_point = 4;
 template <Real Scalar>
 [[nodiscard]] Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
 
-/// Lane i to the point of `rows` that begins at number `begins[i]`.
+/// Lane i to the point of `rows` that begins at number `begins[i]`; the number beside it becomes zero.
 template <Real Scalar>
 void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
+
+/// Several padded points, each in its lane.
+template <Real Scalar>
+struct PaddedLanes {
+    Vector3<Lanes<Scalar>> point;
+    Lanes<Scalar> extra;
+};
+
+/// The same with the number beside the point.
+template <Real Scalar>
+[[nodiscard]] PaddedLanes<Scalar> gather_padded(const PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
+template <Real Scalar>
+void scatter_padded(const PaddedLanes<Scalar>& points, PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
 
 namespace detail {
 
@@ -107,9 +121,10 @@ void store_part(const Part& part, Scalar* to) noexcept {
     std::memcpy(to, &part, sizeof part);
 }
 
-/// The first three columns of a matrix whose rows begin at these numbers of `rows`; as many as a register holds numbers.
+/// The four columns of a matrix whose rows begin at these numbers of `rows`; as many as a register holds numbers. What is
+/// not used of them costs nothing.
 template <class Part, Real Scalar>
-[[gnu::always_inline, nodiscard]] inline std::array<Part, 3> columns(const PaddedPoint<Scalar>* rows,
+[[gnu::always_inline, nodiscard]] inline std::array<Part, 4> columns(const PaddedPoint<Scalar>* rows,
                                                                      const Index* begins) noexcept {
     constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
     const auto row = [&](std::size_t i) { return rows->number.data() + begins[i]; };
@@ -118,14 +133,19 @@ template <class Part, Real Scalar>
         const auto half = [&](std::size_t i, std::size_t k) { return load_part<Part>(row(i) + 2 * k); };
         const Part a = half(0, 0), b = half(1, 0), c = half(0, 1), d = half(1, 1);
         return {__builtin_shufflevector(a, b, 0, 2), __builtin_shufflevector(a, b, 1, 3),
-                __builtin_shufflevector(c, d, 0, 2)};
+                __builtin_shufflevector(c, d, 0, 2), __builtin_shufflevector(c, d, 1, 3)};
     } else if constexpr (width == 4) {
-        const Part a = load_part<Part>(row(0)), b = load_part<Part>(row(1)), c = load_part<Part>(row(2)),
-                   d = load_part<Part>(row(3));
-        const Part ab = __builtin_shufflevector(a, b, 0, 4, 1, 5), cd = __builtin_shufflevector(c, d, 0, 4, 1, 5);
-        const Part ab_z = __builtin_shufflevector(a, b, 2, 6, 3, 7), cd_z = __builtin_shufflevector(c, d, 2, 6, 3, 7);
-        return {__builtin_shufflevector(ab, cd, 0, 1, 4, 5), __builtin_shufflevector(ab, cd, 2, 3, 6, 7),
-                __builtin_shufflevector(ab_z, cd_z, 0, 1, 4, 5)};
+        // By halves of rows, so that nothing crosses the halves of a register afterwards.
+        using Half = typename Register<Scalar, 2 * sizeof(Scalar)>::Type;
+        const auto halves = [&](std::size_t i, std::size_t k) {
+            return __builtin_shufflevector(load_part<Half>(row(i) + 2 * k), load_part<Half>(row(i + 2) + 2 * k), 0, 1,
+                                           2, 3);
+        };
+        const Part xy_even = halves(0, 0), xy_odd = halves(1, 0), zw_even = halves(0, 1), zw_odd = halves(1, 1);
+        return {__builtin_shufflevector(xy_even, xy_odd, 0, 4, 2, 6),
+                __builtin_shufflevector(xy_even, xy_odd, 1, 5, 3, 7),
+                __builtin_shufflevector(zw_even, zw_odd, 0, 4, 2, 6),
+                __builtin_shufflevector(zw_even, zw_odd, 1, 5, 3, 7)};
     } else if constexpr (width == 8) {
         using Half __attribute__((vector_size(16))) = float;
         const auto pair = [&](std::size_t i) {
@@ -139,44 +159,46 @@ template <class Part, Real Scalar>
         const Part cd_z = __builtin_shufflevector(c, d, 2, 10, 3, 11, 6, 14, 7, 15);
         return {__builtin_shufflevector(ab, cd, 0, 1, 8, 9, 4, 5, 12, 13),
                 __builtin_shufflevector(ab, cd, 2, 3, 10, 11, 6, 7, 14, 15),
-                __builtin_shufflevector(ab_z, cd_z, 0, 1, 8, 9, 4, 5, 12, 13)};
+                __builtin_shufflevector(ab_z, cd_z, 0, 1, 8, 9, 4, 5, 12, 13),
+                __builtin_shufflevector(ab_z, cd_z, 2, 3, 10, 11, 6, 7, 14, 15)};
     }
 #endif
-    std::array<Part, 3> result{};
+    std::array<Part, 4> result{};
     for (std::size_t i = 0; i < width; ++i) {
-        for (std::size_t k = 0; k < 3; ++k) result[k][i] = row(i)[k];
+        for (std::size_t k = 0; k < 4; ++k) result[k][i] = row(i)[k];
     }
     return result;
 }
 
 /// The other way round.
 template <class Part, Real Scalar>
-[[gnu::always_inline]] inline void put_columns(const std::array<Part, 3>& column, PaddedPoint<Scalar>* rows,
+[[gnu::always_inline]] inline void put_columns(const std::array<Part, 4>& column, PaddedPoint<Scalar>* rows,
                                                const Index* begins) noexcept {
     constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
     const auto row = [&](std::size_t i) { return rows->number.data() + begins[i]; };
 #if defined(__GNUC__)
-    const Part x = column[0], y = column[1], z = column[2], none{};
+    const Part x = column[0], y = column[1], z = column[2], extra = column[3];
     if constexpr (width == 2) {
         store_part(__builtin_shufflevector(x, y, 0, 2), row(0));
-        store_part(__builtin_shufflevector(z, none, 0, 2), row(0) + 2);
+        store_part(__builtin_shufflevector(z, extra, 0, 2), row(0) + 2);
         store_part(__builtin_shufflevector(x, y, 1, 3), row(1));
-        store_part(__builtin_shufflevector(z, none, 1, 3), row(1) + 2);
+        store_part(__builtin_shufflevector(z, extra, 1, 3), row(1) + 2);
         return;
     } else if constexpr (width == 4) {
-        const Part xy = __builtin_shufflevector(x, y, 0, 4, 1, 5), xy_next = __builtin_shufflevector(x, y, 2, 6, 3, 7);
-        const Part z_first = __builtin_shufflevector(z, none, 0, 4, 1, 5),
-                   z_next = __builtin_shufflevector(z, none, 2, 6, 3, 7);
-        store_part(__builtin_shufflevector(xy, z_first, 0, 1, 4, 5), row(0));
-        store_part(__builtin_shufflevector(xy, z_first, 2, 3, 6, 7), row(1));
-        store_part(__builtin_shufflevector(xy_next, z_next, 0, 1, 4, 5), row(2));
-        store_part(__builtin_shufflevector(xy_next, z_next, 2, 3, 6, 7), row(3));
+        const Part xy_even = __builtin_shufflevector(x, y, 0, 4, 2, 6),
+                   xy_odd = __builtin_shufflevector(x, y, 1, 5, 3, 7),
+                   zw_even = __builtin_shufflevector(z, extra, 0, 4, 2, 6),
+                   zw_odd = __builtin_shufflevector(z, extra, 1, 5, 3, 7);
+        store_part(__builtin_shufflevector(xy_even, zw_even, 0, 1, 4, 5), row(0));
+        store_part(__builtin_shufflevector(xy_odd, zw_odd, 0, 1, 4, 5), row(1));
+        store_part(__builtin_shufflevector(xy_even, zw_even, 2, 3, 6, 7), row(2));
+        store_part(__builtin_shufflevector(xy_odd, zw_odd, 2, 3, 6, 7), row(3));
         return;
     } else if constexpr (width == 8) {
         const Part xy = __builtin_shufflevector(x, y, 0, 8, 1, 9, 4, 12, 5, 13);
         const Part xy_next = __builtin_shufflevector(x, y, 2, 10, 3, 11, 6, 14, 7, 15);
-        const Part z_first = __builtin_shufflevector(z, none, 0, 8, 1, 9, 4, 12, 5, 13);
-        const Part z_next = __builtin_shufflevector(z, none, 2, 10, 3, 11, 6, 14, 7, 15);
+        const Part z_first = __builtin_shufflevector(z, extra, 0, 8, 1, 9, 4, 12, 5, 13);
+        const Part z_next = __builtin_shufflevector(z, extra, 2, 10, 3, 11, 6, 14, 7, 15);
         const auto put = [&](const Part& a, const Part& b, std::size_t i) {
             store_part(__builtin_shufflevector(a, b, 0, 1, 8, 9), row(i));
             store_part(__builtin_shufflevector(a, b, 2, 3, 10, 11), row(i + 1));
@@ -189,33 +211,48 @@ template <class Part, Real Scalar>
     }
 #endif
     for (std::size_t i = 0; i < width; ++i) {
-        for (std::size_t k = 0; k < 3; ++k) row(i)[k] = column[k][i];
+        for (std::size_t k = 0; k < 4; ++k) row(i)[k] = column[k][i];
     }
 }
 
 }  // namespace detail
 
 template <Real Scalar>
-[[gnu::always_inline]] inline Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows,
-                                                            const Index* begins) noexcept {
+[[gnu::always_inline]] inline PaddedLanes<Scalar> gather_padded(const PaddedPoint<Scalar>* rows,
+                                                                const Index* begins) noexcept {
     using Part = typename Lanes<Scalar>::Part;
     constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
-    Vector3<Lanes<Scalar>> points;
+    PaddedLanes<Scalar> points;
     for (std::size_t i = 0; i < Lanes<Scalar>::parts; ++i) {
         const auto part = detail::columns<Part>(rows, begins + i * width);
-        for (std::size_t k = 0; k < 3; ++k) points[static_cast<Eigen::Index>(k)].part(i) = part[k];
+        for (std::size_t k = 0; k < 3; ++k) points.point[static_cast<Eigen::Index>(k)].part(i) = part[k];
+        points.extra.part(i) = part[3];
     }
     return points;
 }
 
 template <Real Scalar>
-[[gnu::always_inline]] inline void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows,
-                                           const Index* begins) noexcept {
+[[gnu::always_inline]] inline void scatter_padded(const PaddedLanes<Scalar>& points, PaddedPoint<Scalar>* rows,
+                                                  const Index* begins) noexcept {
     using Part = typename Lanes<Scalar>::Part;
     constexpr std::size_t width = sizeof(Part) / sizeof(Scalar);
+    const auto& point = points.point;
     for (std::size_t i = 0; i < Lanes<Scalar>::parts; ++i) {
-        detail::put_columns<Part>({points[0].part(i), points[1].part(i), points[2].part(i)}, rows, begins + i * width);
+        detail::put_columns<Part>({point[0].part(i), point[1].part(i), point[2].part(i), points.extra.part(i)}, rows,
+                                  begins + i * width);
     }
+}
+
+template <Real Scalar>
+[[gnu::always_inline]] inline Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows,
+                                                            const Index* begins) noexcept {
+    return gather_padded(rows, begins).point;
+}
+
+template <Real Scalar>
+[[gnu::always_inline]] inline void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows,
+                                           const Index* begins) noexcept {
+    scatter_padded<Scalar>({points, Lanes<Scalar>(0)}, rows, begins);
 }
 
 }  // namespace membrane

@@ -107,11 +107,7 @@ class Lanes {
             return none;
         }
         [[nodiscard]] friend bool all(const Mask& mask) noexcept { return !any(!mask); }
-        [[nodiscard]] friend bool any(const Mask& mask) noexcept {
-            std::array<std::uint64_t, 4> bits;
-            std::memcpy(bits.data(), &mask, sizeof bits);
-            return ((bits[0] | bits[1]) | (bits[2] | bits[3])) != 0;
-        }
+        [[nodiscard]] friend bool any(const Mask& mask) noexcept { return bits(mask) != 0; }
 
         /// Lane i in bit i.
         [[nodiscard]] friend std::uint32_t bits(const Mask& mask) noexcept {

@@ -155,6 +155,7 @@ TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q)
     const N weight_a = whole - weight_b - weight_c;
     const auto finite = whole <= (Limits::max)();  // else a corner is not, or far too large
     const auto has_area = whole > Limits::epsilon() * (squared_norm(ab) * squared_norm(ac));
+    const auto degenerate = !has_area;
     const auto over_face = finite & has_area & (weight_a >= 0) & (weight_b >= 0) & (weight_c >= 0);
 
     const N divisor = select<N>(over_face, whole, 1), b = weight_b / divisor, c = weight_c / divisor;
@@ -175,9 +176,9 @@ TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q)
         barycentric[next] = select<N>(nearer, along, barycentric[next]);
         barycentric[last] = select<N>(nearer, 0, barycentric[last]);
     };
-    consider(0, !has_area | (weight_c < 0), aq, ab);
-    consider(1, !has_area | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
-    consider(2, !has_area | (weight_b < 0), q - triangle.c, -ac);
+    consider(0, degenerate | (weight_c < 0), aq, ab);
+    consider(1, degenerate | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
+    consider(2, degenerate | (weight_b < 0), q - triangle.c, -ac);
     for (Eigen::Index k = 0; k < 3; ++k) barycentric[k] = select<N>(over_face, in_face[k], barycentric[k]);
     return {barycentric, point_at(triangle, barycentric),
             select<N>(over_face, squared_norm(offset_in_face), nearest)};

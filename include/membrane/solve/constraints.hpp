@@ -12,7 +12,7 @@
 #include <membrane/collision/grasper.hpp>
 #include <membrane/collision/tool.hpp>
 #include <membrane/solve/predictor.hpp>
-#include <membrane/solve/touch.hpp>
+#include <membrane/solve/surface_point.hpp>
 
 /// What acts on the membrane from outside, as arguments of a step.
 ///
@@ -24,14 +24,14 @@ namespace membrane {
 /// place what it holds; `enforce` is called in every sweep once layer 0 has moved, and once more at the end; it mends
 /// what they broke and says whether there was anything to mend; `reaction` is the force of the membrane on whoever acts
 /// [N]. One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it. One
-/// that holds vertices may do so in `hold(region)`, which is called before any `begin`.
+/// that holds vertices may do so in `hold(context)`, which is called before any `begin`.
 template <class C, class Scalar>
-concept Constraint = Real<Scalar> && requires(const C& constraint, Region<Scalar>& region, const Region<Scalar>& done) {
+concept Constraint = Real<Scalar> && requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
     { constraint.sound() }
     noexcept->std::same_as<bool>;  // else the step is refused
-    { constraint.begin(region) }
+    { constraint.begin(context) }
     noexcept;
-    { constraint.enforce(region) }
+    { constraint.enforce(context) }
     noexcept->std::same_as<bool>;
     { constraint.reaction(done) }
     noexcept->std::same_as<Vector3<Scalar>>;
@@ -48,23 +48,23 @@ consteval bool check_constraint() noexcept {
         },
         "Constraint: sound() const noexcept must return bool");
     static_assert(
-        requires(const C& constraint, Region<Scalar>& region) {
-            { constraint.begin(region) }
+        requires(const C& constraint, ConstraintContext<Scalar>& context) {
+            { constraint.begin(context) }
             noexcept;
         },
-        "Constraint: there must be begin(Region<Scalar>&) const noexcept");
+        "Constraint: there must be begin(ConstraintContext<Scalar>&) const noexcept");
     static_assert(
-        requires(const C& constraint, Region<Scalar>& region) {
-            { constraint.enforce(region) }
+        requires(const C& constraint, ConstraintContext<Scalar>& context) {
+            { constraint.enforce(context) }
             noexcept->std::same_as<bool>;
         },
-        "Constraint: enforce(Region<Scalar>&) const noexcept must return bool");
+        "Constraint: enforce(ConstraintContext<Scalar>&) const noexcept must return bool");
     static_assert(
-        requires(const C& constraint, const Region<Scalar>& done) {
+        requires(const C& constraint, const ConstraintContext<Scalar>& done) {
             { constraint.reaction(done) }
             noexcept->std::same_as<Vector3<Scalar>>;
         },
-        "Constraint: reaction(const Region<Scalar>&) const noexcept must return Vector3<Scalar>");
+        "Constraint: reaction(const ConstraintContext<Scalar>&) const noexcept must return Vector3<Scalar>");
     return Constraint<C, Scalar>;
 }
 
@@ -83,10 +83,10 @@ class ConstraintRef {
 
     [[nodiscard]] bool sound() const noexcept { return calls_->sound(constraint_); }
     [[nodiscard]] Lead<Scalar> lead() const noexcept { return calls_->lead(constraint_); }
-    void hold(Region<Scalar>& region) const noexcept { calls_->hold(constraint_, region); }
-    void begin(Region<Scalar>& region) const noexcept { calls_->begin(constraint_, region); }
-    [[nodiscard]] bool enforce(Region<Scalar>& region) const noexcept { return calls_->enforce(constraint_, region); }
-    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& done) const noexcept {
+    void hold(ConstraintContext<Scalar>& context) const noexcept { calls_->hold(constraint_, context); }
+    void begin(ConstraintContext<Scalar>& context) const noexcept { calls_->begin(constraint_, context); }
+    [[nodiscard]] bool enforce(ConstraintContext<Scalar>& context) const noexcept { return calls_->enforce(constraint_, context); }
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& done) const noexcept {
         return calls_->reaction(constraint_, done);
     }
 
@@ -94,10 +94,10 @@ class ConstraintRef {
     struct Calls {
         bool (*sound)(const void*) noexcept;
         Lead<Scalar> (*lead)(const void*) noexcept;
-        void (*hold)(const void*, Region<Scalar>&) noexcept;
-        void (*begin)(const void*, Region<Scalar>&) noexcept;
-        bool (*enforce)(const void*, Region<Scalar>&) noexcept;
-        Vector3<Scalar> (*reaction)(const void*, const Region<Scalar>&) noexcept;
+        void (*hold)(const void*, ConstraintContext<Scalar>&) noexcept;
+        void (*begin)(const void*, ConstraintContext<Scalar>&) noexcept;
+        bool (*enforce)(const void*, ConstraintContext<Scalar>&) noexcept;
+        Vector3<Scalar> (*reaction)(const void*, const ConstraintContext<Scalar>&) noexcept;
     };
     template <class C>
     [[nodiscard]] static const C& as(const void* constraint) noexcept {
@@ -111,12 +111,12 @@ class ConstraintRef {
             return {};
         },
         .hold =
-            [](const void* c, Region<Scalar>& region) noexcept {
-                if constexpr (requires { as<C>(c).hold(region); }) as<C>(c).hold(region);
+            [](const void* c, ConstraintContext<Scalar>& context) noexcept {
+                if constexpr (requires { as<C>(c).hold(context); }) as<C>(c).hold(context);
             },
-        .begin = [](const void* c, Region<Scalar>& region) noexcept { as<C>(c).begin(region); },
-        .enforce = [](const void* c, Region<Scalar>& region) noexcept -> bool { return as<C>(c).enforce(region); },
-        .reaction = [](const void* c, const Region<Scalar>& done) noexcept -> Vector3<Scalar> {
+        .begin = [](const void* c, ConstraintContext<Scalar>& context) noexcept { as<C>(c).begin(context); },
+        .enforce = [](const void* c, ConstraintContext<Scalar>& context) noexcept -> bool { return as<C>(c).enforce(context); },
+        .reaction = [](const void* c, const ConstraintContext<Scalar>& done) noexcept -> Vector3<Scalar> {
             return as<C>(c).reaction(done);
         },
     };
@@ -127,36 +127,36 @@ class ConstraintRef {
 
 /// All constraints of one step, in the order they were handed in.
 template <Real Scalar>
-class ConstraintSet {
+class ConstraintList {
   public:
-    ConstraintSet(Region<Scalar>& region, std::span<const ConstraintRef<Scalar>> constraints) noexcept
-        : region_(region), constraints_(constraints) {}
+    ConstraintList(ConstraintContext<Scalar>& context, std::span<const ConstraintRef<Scalar>> constraints) noexcept
+        : context_(context), constraints_(constraints) {}
 
     [[nodiscard]] bool sound() const noexcept {
         return std::all_of(constraints_.begin(), constraints_.end(), [](const auto& c) { return c.sound(); });
     }
     /// Where those that are led are led to.
-    void tell(std::span<Lead<Scalar>> leads) const noexcept {
+    void collect_leads(std::span<Lead<Scalar>> leads) const noexcept {
         for (std::size_t i = 0; i < constraints_.size(); ++i) leads[i] = constraints_[i].lead();
     }
     /// Vertices that a constraint holds are fixed for all of them, in whatever order they were handed in.
     void begin() const noexcept {
-        for_each([this](const auto& constraint, std::size_t) { constraint.hold(region_); });
+        for_each([this](const auto& constraint, std::size_t) { constraint.hold(context_); });
         for_each([this](const auto& constraint, std::size_t) {
-            region_.open();
-            constraint.begin(region_);
+            context_.begin_points();
+            constraint.begin(context_);
         });
     }
     [[nodiscard]] bool enforce() const noexcept {
         bool mended = false;
-        for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(region_); });
+        for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(context_); });
         return mended;
     }
     /// The forces on those who act; false if any is not finite.
     [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {
         bool finite = true;
         for_each([&](const auto& constraint, std::size_t i) {
-            reactions[i] = constraint.reaction(region_);
+            reactions[i] = constraint.reaction(context_);
             finite &= is_finite(reactions[i]);
         });
         return finite;
@@ -165,12 +165,12 @@ class ConstraintSet {
   private:
     void for_each(auto act) const noexcept {
         for (std::size_t i = 0; i < constraints_.size(); ++i) {
-            region_.turn_to(i);
+            context_.select_constraint(i);
             act(constraints_[i], i);
         }
     }
 
-    Region<Scalar>& region_;
+    ConstraintContext<Scalar>& context_;
     std::span<const ConstraintRef<Scalar>> constraints_;
 };
 
@@ -186,9 +186,9 @@ struct HeldPoint {
     [[nodiscard]] Lead<Scalar> lead() const noexcept {
         return triangle == no_index ? Lead<Scalar>() : LeadPoint<Scalar>{target};
     }
-    void begin(Region<Scalar>& region) const noexcept;
-    bool enforce(Region<Scalar>& region) const noexcept;
-    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
+    void begin(ConstraintContext<Scalar>& context) const noexcept;
+    bool enforce(ConstraintContext<Scalar>& context) const noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
 };
 
 /// Holds a vertex at `target`.
@@ -199,13 +199,13 @@ struct HeldVertex {
 
     [[nodiscard]] bool sound() const noexcept { return is_finite(target); }
     [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{target}; }
-    void hold(Region<Scalar>& region) const noexcept {
-        if (region.check(vertex)) region.hold(vertex, target);
+    void hold(ConstraintContext<Scalar>& context) const noexcept {
+        if (context.check(vertex)) context.prescribe(vertex, target);
     }
-    void begin(Region<Scalar>& region) const noexcept;
-    bool enforce(Region<Scalar>&) const noexcept { return false; }
-    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept {
-        return region.unbalanced(vertex);
+    void begin(ConstraintContext<Scalar>& context) const noexcept;
+    bool enforce(ConstraintContext<Scalar>&) const noexcept { return false; }
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept {
+        return context.residual_force(vertex);
     }
 };
 
@@ -215,17 +215,17 @@ struct Pinned {
 
     [[nodiscard]] bool sound() const noexcept { return true; }
     template <Real Scalar>
-    void hold(Region<Scalar>& region) const noexcept;
+    void hold(ConstraintContext<Scalar>& context) const noexcept;
     template <Real Scalar>
-    void begin(Region<Scalar>& region) const noexcept {
-        hold(region);
+    void begin(ConstraintContext<Scalar>& context) const noexcept {
+        hold(context);
     }
     template <Real Scalar>
-    bool enforce(Region<Scalar>&) const noexcept {
+    bool enforce(ConstraintContext<Scalar>&) const noexcept {
         return false;
     }
     template <Real Scalar>
-    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
 };
 
 /// An external force on a point of a triangle, F^ext of [Liu07] (1).
@@ -237,9 +237,9 @@ struct Load {
 
     [[nodiscard]] bool sound() const noexcept;
     [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{.at = force, .is_force = true}; }
-    void begin(Region<Scalar>& region) const noexcept;
-    bool enforce(Region<Scalar>&) const noexcept { return false; }
-    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>&) const noexcept { return -force; }
+    void begin(ConstraintContext<Scalar>& context) const noexcept;
+    bool enforce(ConstraintContext<Scalar>&) const noexcept { return false; }
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>&) const noexcept { return -force; }
 };
 
 /// What forceps hold follows the tool.
@@ -280,55 +280,55 @@ bool HeldPoint<Scalar>::sound() const noexcept {
 }
 
 template <Real Scalar>
-void HeldPoint<Scalar>::begin(Region<Scalar>& region) const noexcept {
-    if (triangle == no_index || !seed_corners(region, corners)) return;
+void HeldPoint<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
+    if (triangle == no_index || !seed_corners(context, corners)) return;
     const Vector3<Scalar> none = Vector3<Scalar>::Zero();
-    Touch<Scalar> touch{triangle, 0, corners, barycentric, none, none, none};
-    if (const auto* before = region.recall(triangle, 0)) touch.force = before->force;
-    push_point(region, corners, barycentric, touch.force);
-    region.remember(touch);
-    const Vector3<Scalar> now = point_at(triangle_of(region, corners), barycentric);
-    shift_point<Scalar>(region, corners, barycentric, target - now);
+    ContactPoint<Scalar> point{triangle, 0, corners, barycentric, none, none};
+    if (const auto* before = context.cached_point(triangle, 0)) point.force = before->force;
+    add_point_force(context, corners, barycentric, point.force);
+    context.add_point(point);
+    const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
+    move_point<Scalar>(context, corners, barycentric, target - now);
 }
 
 template <Real Scalar>
-bool HeldPoint<Scalar>::enforce(Region<Scalar>& region) const noexcept {
+bool HeldPoint<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
     bool changed = false;
-    for (auto& touch : region.touches()) {
-        const Vector3<Scalar> now = point_at(triangle_of(region, corners), barycentric);
-        if (!(norm<Scalar>(target - now) > negligible_shift(region, touch))) continue;
-        const Vector3<Scalar> more = force_for<Scalar>(region, touch, target - now);
+    for (auto& point : context.points()) {
+        const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
+        if (!(norm<Scalar>(target - now) > negligible_distance(context, point))) continue;
+        const Vector3<Scalar> more = force_for<Scalar>(context, point, target - now);
         if (more.isZero(0)) continue;
-        change_force(region, touch, more);
+        change_force(context, point, more);
         changed = true;
     }
     return changed;
 }
 
 template <Real Scalar>
-Vector3<Scalar> HeldPoint<Scalar>::reaction(const Region<Scalar>& region) const noexcept {
-    return reaction_of_touches(region);
+Vector3<Scalar> HeldPoint<Scalar>::reaction(const ConstraintContext<Scalar>& context) const noexcept {
+    return reaction_at_points(context);
 }
 
 template <Real Scalar>
-void HeldVertex<Scalar>::begin(Region<Scalar>& region) const noexcept {
-    if (!region.check(vertex)) return;
-    region.seed(vertex);
-    region.hold(vertex, target);
+void HeldVertex<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
+    if (!context.check(vertex)) return;
+    context.seed(vertex);
+    context.prescribe(vertex, target);
 }
 
 template <Real Scalar>
-void Pinned::hold(Region<Scalar>& region) const noexcept {
+void Pinned::hold(ConstraintContext<Scalar>& context) const noexcept {
     for (const Index v : vertices) {
-        if (!region.check(v)) return;
-        region.hold(v);
+        if (!context.check(v)) return;
+        context.prescribe(v);
     }
 }
 
 template <Real Scalar>
-Vector3<Scalar> Pinned::reaction(const Region<Scalar>& region) const noexcept {
+Vector3<Scalar> Pinned::reaction(const ConstraintContext<Scalar>& context) const noexcept {
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
-    for (const Index v : vertices) sum += region.unbalanced(v);
+    for (const Index v : vertices) sum += context.residual_force(v);
     return sum;
 }
 
@@ -338,8 +338,8 @@ bool Load<Scalar>::sound() const noexcept {
 }
 
 template <Real Scalar>
-void Load<Scalar>::begin(Region<Scalar>& region) const noexcept {
-    if (seed_corners(region, corners)) push_point(region, corners, barycentric, force);
+void Load<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
+    if (seed_corners(context, corners)) add_point_force(context, corners, barycentric, force);
 }
 
 }  // namespace membrane

@@ -40,87 +40,83 @@ class Deadline {
     Time at_;
 };
 
-/// Beyond layer 0 the clock is read each time so many vertices have been visited.
-inline constexpr std::size_t visits_in_batch = 32;
+/// Beyond layer 0 the clock is read each time so many vertices have been updated.
+inline constexpr std::size_t updates_in_batch = 32;
 
 /// What the parts of a step cost, as the last steps have shown.
 struct StepCosts {
-    double visit = 0;        ///< [s]
-    double enforcement = 0;  ///< in visits
-    double closing = 4;      ///< for each vertex that the end of the step looks at, in visits; at first a guess
+    double update = 0;       ///< [s]
+    double enforcement = 0;  ///< in updates
+    double residual = 4;     ///< of each vertex whose force is evaluated at the end, in updates; at first a guess
     bool known = false;
 };
 
-/// How a step without a deadline goes on: there is always time.
-struct NoHurry {
-    static constexpr void begin(std::size_t) noexcept {}
-    static constexpr bool has_time_for_round(std::size_t) noexcept { return true; }
-    static constexpr bool has_time_for_batch() noexcept { return true; }
-    static constexpr bool has_time_to_enforce() noexcept { return true; }
-    static constexpr void looks_at(std::size_t) noexcept {}
-    static constexpr void visited(std::size_t) noexcept {}
-    static constexpr void enforced() noexcept {}
-    static constexpr void done() noexcept {}
-};
-
-/// How a step with a deadline does: it keeps as much time for its end as that took lately, a look at the forces on all
-/// vertices at work. The clock is read with every round over layer 0 and every batch beyond.
-class Hurry {
+/// The time that a step has: no limit, or until a deadline, of which it keeps as much for the residual forces at its end as
+/// those took lately. The clock is read with every contact iteration and every batch of updates beyond layer 0.
+class TimeBudget {
   public:
+    TimeBudget() = default;  ///< No limit.
+
+    /// Both must outlive this.
     template <class Now>
-    Hurry(const Deadline<Now>& deadline, StepCosts& costs)
+    TimeBudget(const Deadline<Now>& deadline, StepCosts& costs)
         : deadline_(&deadline),
           left_of_([](const void* of) { return static_cast<const Deadline<Now>*>(of)->left(); }),
-          costs_(costs) {}
+          costs_(&costs) {}
 
-    /// The visits begin. The end of the step will look at so many vertices.
+    [[nodiscard]] bool limited() const noexcept { return deadline_ != nullptr; }
+
+    /// The updates begin. At the end of the step so many forces are evaluated.
     void begin(std::size_t vertices) {
-        looks_at(vertices);
-        left_ = left_of_(deadline_);
+        set_residual_count(vertices);
+        if (limited()) left_ = left_of_(deadline_);
     }
-    void looks_at(std::size_t vertices) { closing_ = static_cast<double>(vertices); }
+    void set_residual_count(std::size_t vertices) { residual_count_ = static_cast<double>(vertices); }
 
-    /// Whether there is time for a round over so many vertices of layer 0, or for a batch beyond. The first of each is
+    /// Whether there is time for a contact iteration of so many updates, or for a batch beyond layer 0. The first of each is
     /// made in any case, or a membrane would never come to rest.
-    [[nodiscard]] bool has_time_for_round(std::size_t visits) {
-        return std::exchange(first_round_, false) || has_time_for(static_cast<double>(visits) + costs_.enforcement);
+    [[nodiscard]] bool has_time_for_contact(std::size_t updates) {
+        return !limited() || std::exchange(first_contact_, false) ||
+               has_time_for(static_cast<double>(updates) + costs_->enforcement);
     }
     [[nodiscard]] bool has_time_for_batch() {
-        return std::exchange(first_batch_, false) || has_time_for(visits_in_batch);
+        return !limited() || std::exchange(first_batch_, false) || has_time_for(updates_in_batch);
     }
-    [[nodiscard]] bool has_time_to_enforce() const { return has_time_for(costs_.enforcement); }
+    [[nodiscard]] bool has_time_to_enforce() const { return !limited() || has_time_for(costs_->enforcement); }
 
-    void visited(std::size_t count) {
-        if (count == 0) return;
+    void updated(std::size_t count) {
+        if (!limited() || count == 0) return;
         time_ += lap();
-        visits_ += static_cast<double>(count);
-        if (time_ > 0) costs_.visit = time_ / visits_;
+        updates_ += static_cast<double>(count);
+        if (time_ > 0) costs_->update = time_ / updates_;
     }
-    void enforced() { costs_.enforcement = in_visits(lap()); }
+    void enforced() {
+        if (limited()) costs_->enforcement = in_updates(lap());
+    }
 
     /// The step is over.
-    void done() {
-        if (closing_ == 0) return;
-        const double found = in_visits(lap()) / closing_, known = costs_.closing;
-        const bool first = !std::exchange(costs_.known, true);
-        costs_.closing = first ? found : known + (std::clamp(found, known / 2, 2 * known) - known) / 4;
+    void end() {
+        if (!limited() || residual_count_ == 0) return;
+        const double found = in_updates(lap()) / residual_count_, known = costs_->residual;
+        const bool first = !std::exchange(costs_->known, true);
+        costs_->residual = first ? found : known + (std::clamp(found, known / 2, 2 * known) - known) / 4;
     }
 
   private:
-    [[nodiscard]] bool has_time_for(double visits) const {
-        return left_ >= costs_.visit * (visits + costs_.closing * closing_);
+    [[nodiscard]] bool has_time_for(double updates) const {
+        return left_ >= costs_->update * (updates + costs_->residual * residual_count_);
     }
-    [[nodiscard]] double in_visits(double time) const { return costs_.visit > 0 ? time / costs_.visit : 0; }
+    [[nodiscard]] double in_updates(double time) const { return costs_->update > 0 ? time / costs_->update : 0; }
     [[nodiscard]] double lap() {
         const double before = std::exchange(left_, left_of_(deadline_));
         return (std::max)(before - left_, 0.0);
     }
 
-    const void* deadline_;  // of whatever clock
-    double (*left_of_)(const void* deadline);
-    StepCosts& costs_;
-    double left_ = 0, closing_ = 0, time_ = 0, visits_ = 0;
-    bool first_round_ = true, first_batch_ = true;
+    const void* deadline_ = nullptr;  // of whatever clock
+    double (*left_of_)(const void* deadline) = nullptr;
+    StepCosts* costs_ = nullptr;
+    double left_ = 0, residual_count_ = 0, time_ = 0, updates_ = 0;
+    bool first_contact_ = true, first_batch_ = true;
 };
 
 }  // namespace membrane

@@ -5,15 +5,16 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <optional>
+#include <span>
 
 #include <membrane/collision/contact.hpp>
 #include <membrane/collision/grasper.hpp>
 #include <membrane/collision/tool.hpp>
 #include <membrane/mesh/passing.hpp>
 #include <membrane/solve/constraints.hpp>
-#include <membrane/solve/touch.hpp>
+#include <membrane/solve/contact_points.hpp>
+#include <membrane/solve/surface_point.hpp>
 
 /// The tool against the membrane.
 ///
@@ -23,8 +24,8 @@
 namespace membrane {
 
 /// Keeps the surface outside the tool, without friction: every touched triangle in its point nearest to the tool, by a
-/// force along the normal that pushes and never pulls, shared out to the corners by barycentric weights. Corners that are
-/// pinned or held stay in their place, and push with their stiffness times how deep the tool is in, see
+/// force along the normal that pushes and never pulls, distributed to the corners by barycentric weights. Corners that are
+/// pinned or prescribed stay where they are, and push with their stiffness times how deep the tool is in, see
 /// `SolverOptions::rigid_stiffness`: there, and beside them, the tool stays inside by force over stiffness. If its axis is
 /// behind such a corner, it touches in its nearest point alone; where that passes a border, or another part of a surface
 /// that is folded around a pin more sharply than its triangles, the force may jump.
@@ -38,26 +39,44 @@ struct Press {
         if (!contact.touching() || contact.crossed) return {};
         return LeadPoint<Scalar>{contact.on_axis, contact.radius / 2};  // farther, the surface might pass the tool
     }
-    void begin(Region<Scalar>& region) const noexcept;
-    bool enforce(Region<Scalar>& region) const noexcept;
-    [[nodiscard]] Vector3<Scalar> reaction(const Region<Scalar>& region) const noexcept;
+    void begin(ConstraintContext<Scalar>& context) const noexcept;
+    bool enforce(ConstraintContext<Scalar>& context) const noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
 
   private:
-    void take_along(Region<Scalar>& region) const noexcept;
-    void give_way(Region<Scalar>& region) const noexcept;
-    void find_touches(Region<Scalar>& region) const noexcept;
-    [[nodiscard]] std::optional<Vector3<Scalar>> way_out_of_support(const Region<Scalar>& region) const noexcept;
-    void touch_support(Region<Scalar>& region, const Vector3<Scalar>& out) const noexcept;
-    void keep_side(Region<Scalar>& region) const noexcept;
-    [[nodiscard]] bool has_new_overlap(const Region<Scalar>& region) const noexcept;
-    Scalar aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept;
-    [[nodiscard]] static Scalar most_pressure(const Region<Scalar>& region, const Touch<Scalar>& touch,
-                                              Scalar gap) noexcept;
-    [[nodiscard]] static Scalar negligible_gap(const Region<Scalar>& region, const Touch<Scalar>& touch) noexcept {
-        return negligible_shift(region, touch) + region.negligible_force() * support_compliance_of(region, touch);
+    using Context = ConstraintContext<Scalar>;
+    using Corners = std::array<Index, 3>;
+
+    bool seed(Context& context) const noexcept;
+    void list_watched(Context& context) const noexcept;
+    void carry_with_tool(Context& context) const noexcept;
+    void clear_contact_point(Context& context) const noexcept;
+    void find_points(Context& context) const noexcept;
+    void add_point(Context& context, const TouchedTriangle& triangle, int feature,
+                   const Proximity<Scalar>& nearest) const noexcept;
+    void pack_points(Context& context) const noexcept;
+    [[nodiscard]] std::optional<Vector3<Scalar>> way_out_of_support(const Context& context) const noexcept;
+    void touch_support(Context& context, const Vector3<Scalar>& out) const noexcept;
+    void prevent_tunnelling(Context& context) const noexcept;
+    [[nodiscard]] bool has_new_overlap(const Context& context) const noexcept;
+
+    [[nodiscard]] ContactTool<Scalar> shape() const noexcept {
+        return {tool.position, tool.axis, contact.on_axis, contact.radius};
     }
-    [[nodiscard]] static bool on_face(const Touch<Scalar>& touch) noexcept {
-        return touch.pair < 2 && touch.barycentric.minCoeff() > 0;
+    [[nodiscard]] static auto packs(const Context& context) noexcept {
+        return context.state().pack_ranges[context.constraint()].of(context.state().packs.items());
+    }
+    [[nodiscard]] static bool on_support(const Context& context) noexcept {
+        return !context.points().empty() && context.points().front().feature == fixed_feature;
+    }
+    // The triangle as a tool finds it, now and where its vertices were kept.
+    [[nodiscard]] static Triangle<Scalar> surface_triangle(const Context& context, const Corners& corners) noexcept {
+        const auto at = [&](Index v) { return Vector3<Scalar>(context.position(v) + context.support_displacement(v)); };
+        return {at(corners[0]), at(corners[1]), at(corners[2])};
+    }
+    [[nodiscard]] static Triangle<Scalar> kept_triangle(const Context& context, const Corners& corners) noexcept {
+        const auto at = [&](Index v) { return Vector3<Scalar>(context.kept(v) + context.support_displacement(v)); };
+        return {at(corners[0]), at(corners[1]), at(corners[2])};
     }
 };
 
@@ -72,144 +91,167 @@ template <Real Scalar>
 
 namespace detail {
 
-// Touches share vertices: within one call they take turns this often at the most.
-inline constexpr int most_turns = 8;
-
-// The pair of a touch whose point and normal stay as they are through a step.
-inline constexpr int on_support = -1;
-
-/// A face that rocks under a tool moves the contact point along itself, and with it the pressure from corner to corner:
-/// for each corner the stiffness [N/m] that this amounts to. `moment` is the pressure times the distance from the face
-/// to the tool's axis [N m].
-template <Real Scalar>
-[[nodiscard]] Vector3<Scalar> wandering_stiffness(const Triangle<Scalar>& triangle, const Vector3<Scalar>& barycentric,
-                                                  Scalar moment) noexcept {
-    Vector3<Scalar> squares;  // of the side across from each corner
-    squares << squared_norm<Scalar>(triangle.c - triangle.b), squared_norm<Scalar>(triangle.a - triangle.c),
-        squared_norm<Scalar>(triangle.b - triangle.a);
-    Vector3<Scalar> stiffness = Vector3<Scalar>::Zero();
-    if (barycentric.minCoeff() > 0) {
-        stiffness = (moment / (4 * squared_norm(area_vector(triangle)))) * squares;
-    } else if (barycentric.maxCoeff() < 1) {
-        Eigen::Index apart;
-        barycentric.minCoeff(&apart);
-        stiffness.setConstant(moment / squares[apart]);
-        stiffness[apart] = 0;
-    }
-    return is_finite(stiffness) ? stiffness : Vector3<Scalar>(Vector3<Scalar>::Zero());
-}
+// Points share vertices: until none is inside they are moved out this often at the most, and solved this often before the
+// vertices find their balance anew. More passes than two close the gaps further, but give no other force.
+inline constexpr int max_push_passes = 8, max_contact_passes = 2;
 
 }  // namespace detail
 
 template <Real Scalar>
-void Press<Scalar>::begin(Region<Scalar>& region) const noexcept {
-    if (!contact.touching()) return;
-    const auto are_vertices = [&](const auto& corners) {
-        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return region.check(v); });
-    };
-    if (!are_vertices(contact.corners)) return;
-    for (const auto triangles : {contact.touched, contact.watched}) {
-        for (const auto& triangle : triangles) {
-            if (!are_vertices(triangle.corners)) return;
-        }
+void Press<Scalar>::begin(Context& context) const noexcept {
+    if (!contact.touching() || !seed(context)) return;
+    for (const auto& point : context.previous_points()) bear(context, point, point.force);
+    const auto out = way_out_of_support(context);
+    if (contact.crossed && !out) carry_with_tool(context);
+    list_watched(context);
+    if (!contact.crossed && !out && contact.gap < -negligible_distance(context, contact.corners[0])) {
+        clear_contact_point(context);
     }
-    for (const auto& touched : contact.touched) seed_corners(region, touched.corners);
-    for (const auto& touch : region.touches_before()) bear(region, touch, touch.force);
-    const auto out = way_out_of_support(region);
-    if (contact.crossed && !out) take_along(region);
-    for (const Index v : region.corners_of(contact.watched)) contact.crossed ? region.keep(v) : region.save(v);
-    if (!contact.crossed && !out && contact.gap < -negligible_shift(region, contact.corners[0])) give_way(region);
-    out ? touch_support(region, *out) : find_touches(region);
-    for (const auto& touch : region.touches_before()) bear<Scalar>(region, touch, -touch.force);
-    for (const auto& touch : region.touches()) {
-        if (!touch.force.isZero(0)) attach(region, touch);
+    out ? touch_support(context, *out) : find_points(context);
+    for (const auto& point : context.previous_points()) bear<Scalar>(context, point, -point.force);
+    if (context.state().full) return;
+    pack_points(context);
+    for (int pass = 0; pass < detail::max_push_passes; ++pass) {
+        if (!push_out(context.state(), shape(), packs(context))) break;
     }
-    // The surface gives way before any force is known.
-    for (int pass = 0; pass < detail::most_turns; ++pass) {
-        bool moved = false;
-        for (auto& touch : region.touches()) {
-            const Scalar overlap = -aim(region, touch);
-            if (!(overlap > negligible_gap(region, touch))) continue;
-            press_in<Scalar>(region, touch.corners, touch.barycentric, -overlap * touch.normal);
-            moved = true;
-        }
-        if (!moved) break;
-    }
-    keep_side(region);
+    prevent_tunnelling(context);
 }
 
-// The tool does not pass the surface: what its way since the last tick leads through goes the same way, all of it, or
-// until it is a radius ahead.
+// False if a corner is no vertex: the step is refused then.
+template <Real Scalar>
+bool Press<Scalar>::seed(Context& context) const noexcept {
+    const auto are_vertices = [&](const auto& corners) {
+        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return context.check(v); });
+    };
+    if (!are_vertices(contact.corners)) return false;
+    for (const auto triangles : {contact.touched, contact.watched}) {
+        for (const auto& triangle : triangles) {
+            if (!are_vertices(triangle.corners)) return false;
+        }
+    }
+    for (const auto& touched : contact.touched) {
+        for (const Index v : touched.corners) context.seed(v);
+    }
+    return true;
+}
+
+// The vertices that must not pass the tool, each once. Where there is no room for the list, all that are loaded are checked.
+template <Real Scalar>
+void Press<Scalar>::list_watched(Context& context) const noexcept {
+    auto& state = context.state();
+    auto& range = state.watched_ranges[context.constraint()];
+    range = {state.watched.size(), state.watched.size()};
+    state.marked.clear();
+    for (const auto& watched : contact.watched) {
+        for (const Index v : watched.corners) {
+            if (!state.marked.insert(v)) continue;
+            contact.crossed ? context.keep(v) : context.keep_start(v);
+            if (!state.watched.push(v)) state.full = true;
+        }
+    }
+    range.end = state.watched.size();
+}
+
+// The tool does not pass the surface: triangles that it crossed since the last tick are carried with it, all the distance or
+// until they are one radius ahead.
 //
 // Seen from a tool that moves by d, a vertex that moves by w d, 0 <= w <= 1, moves by (w - 1) d. So the tool can meet
-// only points of triangles that lie on its way, and does not meet one a part s of the way ahead if the corners there
-// move by w > 1 - s. Triangles off the way are safe however their corners move by such w.
+// only points of triangles that lie on its path, and does not meet one a part s of the path ahead if the corners there
+// move by w > 1 - s. Triangles off the path are safe however their corners move by such w.
 template <Real Scalar>
-void Press<Scalar>::take_along(Region<Scalar>& region) const noexcept {
-    const Vector3<Scalar> way = contact.on_axis - contact.before;
-    const Scalar length = norm(way);
-    for (const Index v : region.corners_of(contact.touched)) region.keep(v);
+void Press<Scalar>::carry_with_tool(Context& context) const noexcept {
+    const Vector3<Scalar> path = contact.on_axis - contact.before;
+    const Scalar length = norm(path);
+    for (const auto& touched : contact.touched) {
+        for (const Index v : touched.corners) context.keep(v);
+    }
     for (const auto& touched : contact.touched) {
         const auto& v = touched.corners;
-        const auto before = kept_surface_triangle(region, v);
+        const auto before = kept_triangle(context, v);
         const auto hit = first_hit(before, contact.before, contact.on_axis);
         if (!hit) continue;
         const Scalar part = 1 - detail::fraction(hit->along * length - contact.radius, length);
         for (const Index corner : v) {
-            if (region.fixed(corner)) continue;
-            const Vector3<Scalar> so_far = region.position(corner) - region.kept(corner);
-            if (dot(so_far, way) < part * squared_norm(way)) region.place(corner, region.kept(corner) + part * way);
+            if (context.fixed(corner)) continue;
+            const Vector3<Scalar> so_far = context.position(corner) - context.kept(corner);
+            if (dot(so_far, path) < part * squared_norm(path)) {
+                context.place(corner, context.kept(corner) + part * path);
+            }
         }
     }
 }
 
 // The surface gives way at the contact point first, to where it just touches the tool, if it is not there already.
 template <Real Scalar>
-void Press<Scalar>::give_way(Region<Scalar>& region) const noexcept {
-    const Vector3<Scalar> now = point_at(surface_triangle(region, contact.corners), contact.barycentric);
-    const Vector3<Scalar> way = contact.on_axis - contact.radius * contact.normal - now;
-    if (dot(way, contact.normal) < 0) press_in<Scalar>(region, contact.corners, contact.barycentric, way);
+void Press<Scalar>::clear_contact_point(Context& context) const noexcept {
+    const Vector3<Scalar> now = point_at(surface_triangle(context, contact.corners), contact.barycentric);
+    const Vector3<Scalar> by = contact.on_axis - contact.radius * contact.normal - now;
+    if (dot(by, contact.normal) < 0) press_in<Scalar>(context, contact.corners, contact.barycentric, by);
 }
 
 template <Real Scalar>
-void Press<Scalar>::find_touches(Region<Scalar>& region) const noexcept {
-    const int pairs = feature_pairs(tool);
+void Press<Scalar>::find_points(Context& context) const noexcept {
+    const int features = feature_pairs(tool);
     for (const auto& touched : contact.touched) {
-        const auto triangle = triangle_of(region, touched.corners);
-        const bool on_fixed =
-            std::any_of(touched.corners.begin(), touched.corners.end(), [&](Index v) { return region.fixed(v); });
-        for (int pair = 0; pair < pairs; ++pair) {
-            const auto nearest = proximity(triangle, tool, pair);
-            if (!nearest) continue;
-            const bool apart = norm(nearest->reach) > contact.radius / 1000;
-            const Vector3<Scalar> towards = apart ? nearest->reach : Vector3<Scalar>(contact.before - contact.on_axis);
-            const Vector3<Scalar> normal = direction(towards, contact.normal), none = Vector3<Scalar>::Zero();
-            Touch<Scalar> touch{touched.triangle, pair, touched.corners, nearest->barycentric, normal, none, none,
-                                on_fixed};
-            // Fixed corners have not been taken along: what the tool has crossed is between it and where it was.
-            if (contact.crossed && on_fixed) {
-                const Vector3<Scalar> came =
-                    contact.before - contact.on_axis + nearest->reach - yielding_of(region, touch);
-                if (dot(came, touch.normal) < 0) touch.normal = -touch.normal;
-            }
-            if (const auto* before = region.recall(touched.triangle, pair)) {
-                touch.force = -norm(before->force) * touch.normal;
-            } else if (norm(nearest->reach) > contact.reach) {
-                continue;
-            }
-            region.remember(touch);
+        const auto triangle = triangle_of(context, touched.corners);
+        for (int feature = 0; feature < features; ++feature) {
+            const auto nearest = proximity(triangle, tool, feature);
+            if (nearest) add_point(context, touched, feature, *nearest);
         }
     }
 }
 
-// Fixed vertices do not give way to a tool, and one that is deeper in than its radius has its axis behind them. It touches
-// the surface in one point then, the nearest, as it did before: the way out is given, none else.
+// A point that was there in the last step goes on with its force; another one joins if it is near enough.
 template <Real Scalar>
-std::optional<Vector3<Scalar>> Press<Scalar>::way_out_of_support(const Region<Scalar>& region) const noexcept {
-    const Vector3<Scalar> weights = contact.barycentric - free_weights(region, contact.corners, contact.barycentric);
-    if (!(weights.maxCoeff() > 0)) return std::nullopt;
+void Press<Scalar>::add_point(Context& context, const TouchedTriangle& triangle, int feature,
+                              const Proximity<Scalar>& nearest) const noexcept {
+    const auto* before = context.cached_point(triangle.triangle, feature);
+    const Scalar distance = norm(nearest.reach);
+    if (before == nullptr && distance > contact.reach) return;
+    const bool apart = distance > contact.radius / 1000;
+    const Vector3<Scalar> towards = apart ? nearest.reach : Vector3<Scalar>(contact.before - contact.on_axis);
+    ContactPoint<Scalar> point{triangle.triangle,
+                               feature,
+                               triangle.corners,
+                               nearest.barycentric,
+                               direction(towards, contact.normal),
+                               Vector3<Scalar>::Zero()};
+    point.on_fixed =
+        std::any_of(point.corners.begin(), point.corners.end(), [&](Index v) { return context.fixed(v); });
+    // Fixed corners have not been carried along: what the tool has crossed is between it and where it was.
+    if (contact.crossed && point.on_fixed) {
+        const Vector3<Scalar> came =
+            contact.before - contact.on_axis + nearest.reach - support_displacement(context, point);
+        if (dot(came, point.normal) < 0) point.normal = -point.normal;
+    }
+    if (before != nullptr) point.force = -norm(before->force) * point.normal;
+    context.add_point(point);
+}
+
+// The points' forces act from here on.
+template <Real Scalar>
+void Press<Scalar>::pack_points(Context& context) const noexcept {
+    auto& state = context.state();
+    const auto points = context.points();
+    for (const auto& point : points) {
+        add_point_force(context, point.corners, point.weights, point.force);
+        bear(context, point, point.force);
+    }
+    auto& range = state.pack_ranges[context.constraint()];
+    range.begin = state.packs.size();
+    state.packs.append(std::span<const ContactPoint<Scalar>>(points), state.point_ranges[context.constraint()].begin,
+                       [&](Index v) { return context.fixed(v); });
+    range.end = state.packs.size();
+}
+
+// Fixed vertices do not give way to a tool, and one that is deeper in than its radius has its axis behind them. It touches
+// the surface in one point then, the nearest, as it did before: the direction out is given, no other.
+template <Real Scalar>
+std::optional<Vector3<Scalar>> Press<Scalar>::way_out_of_support(const Context& context) const noexcept {
+    const Vector3<Scalar> fixed = contact.barycentric - free_weights(context, contact.corners, contact.barycentric);
+    if (!(fixed.maxCoeff() > 0)) return std::nullopt;
     Vector3<Scalar> pressed = Vector3<Scalar>::Zero();
-    for (const auto& touch : region.touches_before()) pressed += touch.force;
+    for (const auto& point : context.previous_points()) pressed += point.force;
     const bool turned = dot(pressed, contact.normal) > 0;
     const Vector3<Scalar> out = turned ? Vector3<Scalar>(-contact.normal) : contact.normal;
     // A point is given a radius: half of that far from the surface there is a direction still.
@@ -219,125 +261,68 @@ std::optional<Vector3<Scalar>> Press<Scalar>::way_out_of_support(const Region<Sc
 }
 
 template <Real Scalar>
-void Press<Scalar>::touch_support(Region<Scalar>& region, const Vector3<Scalar>& out) const noexcept {
-    Scalar pressure = 0;
-    for (const auto& touch : region.touches_before()) pressure -= dot(touch.force, out);
-    const Vector3<Scalar> force = -(std::max)(pressure, Scalar(0)) * out, none = Vector3<Scalar>::Zero();
-    region.remember(
-        {contact.triangle, detail::on_support, contact.corners, contact.barycentric, out, force, none, true});
+void Press<Scalar>::touch_support(Context& context, const Vector3<Scalar>& out) const noexcept {
+    Scalar pressed = 0;
+    for (const auto& point : context.previous_points()) pressed -= dot(point.force, out);
+    const Vector3<Scalar> force = -(std::max)(pressed, Scalar(0)) * out;
+    context.add_point({contact.triangle, fixed_feature, contact.corners, contact.barycentric, out, force, true});
 }
 
-// Brings the touch up to date with the positions, its pressure unchanged, and returns the gap. The tool stays on the
-// side of the triangle, or of the edge or corner it is nearest to, where the touch was found.
+// However far vertices have jumped, the surface has not passed the tool: if it would have, all go back to before the earliest
+// time of impact, with some clearance.
 template <Real Scalar>
-Scalar Press<Scalar>::aim(Region<Scalar>& region, Touch<Scalar>& touch) const noexcept {
-    if (touch.pair == detail::on_support) {
-        const Vector3<Scalar> here = point_at(triangle_of(region, touch.corners), touch.barycentric);
-        return dot<Scalar>(contact.on_axis - here - yielding_of(region, touch), touch.normal) - contact.radius;
-    }
-    const Scalar pressure = norm(touch.force);
-    if (pressure > 0) detach(region, touch);
-    const auto triangle = triangle_of(region, touch.corners);
-    const auto nearest = proximity(triangle, tool, touch.pair);
-    if (!nearest) {
-        touch.force.setZero();
-        touch.stiffness.setZero();
-        return std::numeric_limits<Scalar>::infinity();
-    }
-    touch.barycentric = nearest->barycentric;
-    const Vector3<Scalar> along = on_face(touch) ? area_vector(triangle) : nearest->reach;
-    const Vector3<Scalar> away = direction(along, touch.normal);
-    touch.normal = dot(away, touch.normal) < 0 ? Vector3<Scalar>(-away) : away;
-    touch.force = -pressure * touch.normal;
-    if (pressure > 0) {
-        touch.stiffness = detail::wandering_stiffness(triangle, touch.barycentric, pressure * norm(nearest->reach));
-        attach(region, touch);
-    }
-    return dot(nearest->reach, touch.normal) - dot(yielding_of(region, touch), touch.normal) - contact.radius;
-}
-
-// In balance the pressure is what springs and backing at the corners resist with, or will once the gap is mended. Touches
-// that press much harder, where a tool has jumped to the wrong side of some, press against one another, and ever harder.
-template <Real Scalar>
-Scalar Press<Scalar>::most_pressure(const Region<Scalar>& region, const Touch<Scalar>& touch, Scalar gap) noexcept {
-    Scalar sum = 0, firmness = 0;
-    for (const Index v : touch.corners) {
-        sum += region.resistance(v);
-        firmness += region.firmness(v);
-    }
-    return 8 * (sum + std::abs(gap) * firmness);
-}
-
-// However far vertices have jumped, the surface has not passed the tool: if it would have, all go back to where on their
-// way it had not, and leave the tool some room.
-template <Real Scalar>
-void Press<Scalar>::keep_side(Region<Scalar>& region) const noexcept {
-    if (!region.touches().empty() && region.touches().front().pair == detail::on_support) return;
-    Scalar farthest = 0;
-    for (const Index v : region.corners_of(contact.watched)) {
-        farthest = (std::max)(farthest, squared_norm<Scalar>(region.position(v) - region.kept(v)));
-    }
+void Press<Scalar>::prevent_tunnelling(Context& context) const noexcept {
+    if (on_support(context)) return;
+    const auto& state = context.state();
+    const auto watched = state.watched_ranges[context.constraint()].of(state.watched.items());
+    const Scalar farthest = largest_squared_move(state, watched);
     if (4 * farthest < contact.radius * contact.radius && contact.gap > -contact.radius / 2) return;
     const Scalar rounding = detail::rounding_at(contact.on_axis);
     Scalar first = 1;
-    for (const auto& watched : contact.watched) {
-        const auto& v = watched.corners;
-        const auto before = kept_surface_triangle(region, v);
-        const Scalar time = passing_time<Scalar>(before, surface_triangle(region, v), contact.on_axis);
+    for (const auto& triangle : contact.watched) {
+        const auto before = kept_triangle(context, triangle.corners);
+        const Scalar time =
+            passing_time<Scalar>(before, surface_triangle(context, triangle.corners), contact.on_axis);
         if (time == 1) continue;
         const Scalar room = std::sqrt(closest_point(before, contact.on_axis).squared_distance);
-        if (room <= rounding) continue;  // on the tool's axis: there is no telling its side
+        if (room <= rounding) continue;  // on the tool's axis: its side is not known
         const Scalar part = room > contact.radius / 2 ? 1 - contact.radius / (4 * room) : Scalar(0.1);
         first = (std::min)(first, part * time);
     }
-    if (first < 1) region.go_back(1 - first);
+    if (first < 1) context.go_back(1 - first);
 }
 
 template <Real Scalar>
-bool Press<Scalar>::enforce(Region<Scalar>& region) const noexcept {
+bool Press<Scalar>::enforce(Context& context) const noexcept {
     if (!contact.touching()) return false;
-    Scalar first = 0;  // largest change of a force in the first turn [N]
-    bool wedged = false;
-    for (int turn = 0; turn < detail::most_turns; ++turn) {
-        Scalar largest = 0;
-        for (auto& touch : region.touches()) {
-            const Scalar gap = aim(region, touch);
-            const Scalar compliance = compliance_of(region, touch) + support_compliance_of(region, touch);
-            const Scalar pressure = -dot(touch.force, touch.normal);
-            if (!(compliance > 0) || (pressure == 0 && gap >= 0)) continue;
-            Scalar more = (std::max)(-gap / compliance, -pressure);
-            if (pressure + more > most_pressure(region, touch, gap)) {
-                more = -pressure;  // let go
-                wedged = true;
-            }
-            if (!(std::abs(more) * compliance > negligible_gap(region, touch))) continue;
-            change_force<Scalar>(region, touch, -more * touch.normal);
-            bear<Scalar>(region, touch, -more * touch.normal);
-            largest = (std::max)(largest, std::abs(more));
-        }
-        if (turn == 0) first = largest;
-        if (!(largest > first / 2)) break;  // the vertices have to find their balance anew
+    Scalar first = 0;  // largest change of a force in the first pass [N]
+    bool released = false;
+    for (int i = 0; i < detail::max_contact_passes; ++i) {
+        const auto pass = solve_contacts(context.state(), shape(), packs(context));
+        released = released || pass.released;
+        if (i == 0) first = pass.largest;
+        if (!(pass.largest > first / 2)) break;  // the vertices have to find their balance anew
     }
-    keep_side(region);
-    return first > 0 || wedged || has_new_overlap(region);
+    apply_forces(context.state(), packs(context));
+    prevent_tunnelling(context);
+    return first > 0 || released || has_new_overlap(context);
 }
 
-// Whether a triangle that was out of reach when the step began, and is no contact point of it, has come into the tool.
+// Whether a triangle that was out of range when the step began, and has no contact point in it, has come into the tool.
 template <Real Scalar>
-bool Press<Scalar>::has_new_overlap(const Region<Scalar>& region) const noexcept {
-    const int pairs = feature_pairs(tool);
-    const auto touches = region.touches();
-    if (!touches.empty() && touches.front().pair == detail::on_support) return false;  // none else counts
-    auto next = touches.begin();                                                       // in the same order
+bool Press<Scalar>::has_new_overlap(const Context& context) const noexcept {
+    if (on_support(context)) return false;  // no other point counts
+    const int features = feature_pairs(tool);
+    const auto points = context.points();
+    auto next = points.begin();  // in the same order
     for (const auto& touched : contact.touched) {
-        const auto triangle = surface_triangle(region, touched.corners);
-        for (int pair = 0; pair < pairs; ++pair) {
-            if (next != touches.end() && next->triangle == touched.triangle && next->pair == pair) {
+        for (int feature = 0; feature < features; ++feature) {
+            if (next != points.end() && next->triangle == touched.triangle && next->feature == feature) {
                 ++next;
                 continue;
             }
-            const auto nearest = proximity(triangle, tool, pair);
-            const Scalar slack = negligible_shift(region, touched.corners[0]);
+            const auto nearest = proximity(surface_triangle(context, touched.corners), tool, feature);
+            const Scalar slack = negligible_distance(context, touched.corners[0]);
             if (nearest && norm(nearest->reach) < contact.radius - slack) return true;
         }
     }
@@ -345,8 +330,9 @@ bool Press<Scalar>::has_new_overlap(const Region<Scalar>& region) const noexcept
 }
 
 template <Real Scalar>
-Vector3<Scalar> Press<Scalar>::reaction(const Region<Scalar>& region) const noexcept {
-    return reaction_of_touches(region);
+Vector3<Scalar> Press<Scalar>::reaction(const Context& context) const noexcept {
+    unpack<Scalar>(packs(context), context.state().points.items());
+    return reaction_at_points(context);
 }
 
 }  // namespace membrane

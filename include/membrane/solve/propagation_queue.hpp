@@ -33,13 +33,13 @@ class PropagationQueue {
     template <class Network>
     bool grow(const Network& network) noexcept;
 
-    /// Orders every layer but layer 0 in groups that no spring joins; or all of them together, in fewer and larger ones,
-    /// which makes one layer of them.
+    /// Orders every layer in groups that no spring joins; or layer 0 and all others together, in fewer and larger ones, which
+    /// makes one layer of them.
     /// Online. Cost: the springs of the vertices in the queue.
     template <class Network>
     void group(const Network& network, bool together = false) noexcept;
 
-    /// Where in `vertices` the groups end: the first begins after layer 0. None before `group` is called.
+    /// Where in `vertices` the groups end. None before `group` is called.
     [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return groups_.ends(); }
 
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
@@ -102,7 +102,7 @@ void PropagationQueue::group(const Network& network, bool together) noexcept {
         layer_ends_.push(vertices().size());
     }
     const auto ends = layer_ends_.items();
-    for (std::size_t k = 1; k < ends.size(); ++k) groups_.add(network, reached_, ends[k - 1], ends[k]);
+    for (std::size_t k = 0; k < ends.size(); ++k) groups_.add(network, reached_, k > 0 ? ends[k - 1] : 0, ends[k]);
 }
 
 }  // namespace membrane

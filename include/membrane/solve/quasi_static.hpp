@@ -3,29 +3,27 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <utility>
-#include <vector>
 
 #include <membrane/core/executor.hpp>
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
-#include <membrane/solve/compact_block.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/deadline.hpp>
+#include <membrane/solve/packed_vertices.hpp>
 #include <membrane/solve/predictor.hpp>
-#include <membrane/solve/region.hpp>
 #include <membrane/solve/rigid_support.hpp>
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_rule.hpp>
-#include <membrane/solve/sweeps.hpp>
-#include <membrane/solve/visit.hpp>
+#include <membrane/solve/step_state.hpp>
+#include <membrane/solve/vertex_update.hpp>
 
 /// Where the membrane comes to rest, and what it pushes back with.
 ///
@@ -50,13 +48,13 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// The quasi-static solver, [Liu07] 2.2: every step is taken to be at rest, and the vertices of the propagation queue
 /// move one after the other, nearest to the contact first, by (4) or another rule, each seeing those that have moved.
 ///
-/// Beyond the paper: a step begins where the last one leads to, if what acts goes on; it may sweep the queue several
-/// times; what a contact leaves behind stays at work until it is at rest, and then costs nothing; constraints keep the
-/// forces they act with from step to step, so that a sweep ends with forces that balance. A step that is refused leaves
-/// the positions as they were, to the bit: it keeps the positions of the vertices it works on, three numbers for each.
+/// Beyond the paper: a step starts from an extrapolation of the last one, if what acts goes on; it may sweep the queue
+/// several times; what a contact leaves behind stays at work until it is at rest, and then costs nothing; constraints keep
+/// their forces from step to step, so that a sweep ends with forces that balance. A step that is refused leaves the
+/// positions as they were, to the bit: it works on a copy of those that it loads, and writes back what has moved.
 ///
-/// Positions, network and backing are handed in at each step, always those of one membrane; what is remembered (queue,
-/// restless vertices, contact forces) is a cache. One thread at a time for each solver.
+/// Positions, network and volume springs are arguments of each step, always those of one membrane; what is remembered
+/// (queue, vertices awake, contact forces) is a cache. One thread at a time for each solver.
 template <Real Scalar, CheckedStepRule<Scalar> Rule = BlockStep, CheckedExecutor Threads = OneThread>
 class QuasiStaticSolver {
   public:
@@ -67,27 +65,27 @@ class QuasiStaticSolver {
                                const Threads& executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
-    /// Cost: `sweeps` + 1 visits for each vertex in the queue or still restless, in layer 0 `contact_visits` in each
-    /// sweep; a visit costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
+    /// Cost: `sweeps` + 1 updates for each vertex in the queue or awake, in layer 0 `contact_visits` in each sweep; an
+    /// update costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
     template <CheckedElasticNetwork<Scalar> Network, CheckedVolumeModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                           const Constraints&... constraints) noexcept {
-        return step_in(NoHurry{}, x, dt, network, volume, refer_to(constraints...));
+        return step_in(TimeBudget(), x, dt, network, volume, refer_to(constraints...));
     }
 
-    /// The same, over at `deadline`, or later by what it misjudged its end by; or by what comes in any case, one round
-    /// over layer 0, 32 vertices beyond, and a look at all that are at work. One thread visits. The next step goes on
-    /// where time ran out, so that a membrane comes to rest however little time its steps have.
+    /// The same, but stops at `deadline`. It may overrun by the error of its cost estimate, or by the minimum work: one
+    /// contact iteration, 32 updates beyond, and the residual forces of all at work. One thread does the updates. The next
+    /// step goes on where time ran out, so that a membrane comes to rest however little time its steps have.
     template <class Now, CheckedElasticNetwork<Scalar> Network, CheckedVolumeModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
                                                 const Network& network, const Volume& volume,
                                                 const Constraints&... constraints) noexcept {
-        return step_in(Hurry(deadline, costs_), x, dt, network, volume, refer_to(constraints...));
+        return step_in(TimeBudget(deadline, costs_), x, dt, network, volume, refer_to(constraints...));
     }
 
-    /// Has a look at these vertices in the next steps: what moved them, or their anchors, was not a step of this solver.
+    /// Has the next steps update these vertices: what moved them, or their anchors, was not a step of this solver.
     /// An index that is no vertex is passed over. A `MovingBody` says by itself what it moves.
     void wake(std::span<const Index> vertices) noexcept;
     void wake_all() noexcept;
@@ -106,44 +104,80 @@ class QuasiStaticSolver {
         volume.body();
     };
 
-    using ConstraintRefs = std::span<const ConstraintRef<Scalar>>;
-    template <class... Constraints>
-    [[nodiscard]] static std::array<ConstraintRef<Scalar>, sizeof...(Constraints)> refer_to(
-        const Constraints&... constraints) noexcept {
-        static_assert(sizeof...(Constraints) <= Workspace<Scalar>::most_constraints,
-                      "a step takes 16 constraints at most");
+    using Constraints = std::span<const ConstraintRef<Scalar>>;
+    template <class... C>
+    [[nodiscard]] static std::array<ConstraintRef<Scalar>, sizeof...(C)> refer_to(const C&... constraints) noexcept {
+        static_assert(sizeof...(C) <= StepState<Scalar>::max_constraints, "a step takes 16 constraints at most");
         return {ConstraintRef<Scalar>(constraints)...};
     }
 
-    template <class Pace, class Network, class Volume>
-    [[nodiscard]] StepReport<Scalar> step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt, const Network& network,
-                                             const Volume& volume, ConstraintRefs constraints) noexcept;
-    void open(std::size_t constraint_count) noexcept;
+    // How far a step has come.
+    struct Progress {
+        TimeBudget budget;
+        bool in_lanes = false;             // packs hold the vertices at work, the first ones or all
+        bool constraints_hold = false;     // when they were last enforced, and nothing has moved since
+        bool constraints_changed = false;  // at the very end, or may have
+        std::size_t resume = 0;            // where the next step is to begin beyond layer 0
+        const Index* next = nullptr;       // the vertex beyond layer 0 at which time ran out
+    };
+
+    template <class Network, class Volume>
+    [[nodiscard]] StepReport<Scalar> step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt, const Network& network,
+                                             const Volume& volume, Constraints constraints) noexcept;
+    void begin_report(std::size_t constraint_count) noexcept;
     template <class Volume>
-    void go_along(const Volume& volume) noexcept;
+    void follow_body(const Volume& volume) noexcept;
     template <class Volume>
-    void predict(const ConstraintSet<Scalar>& acting, Region<Scalar>& region) noexcept;
+    void extrapolate(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
-    void line_up(const Network& network, Region<Scalar>& region) noexcept;
-    template <class Handed>
-    void settle(const Handed& scene, bool mended) noexcept;
-    [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status, PointsRef<Scalar>& x) noexcept;
+    void select(const Network& network, const ConstraintContext<Scalar>& context) noexcept;
+    template <class Scene>
+    void load_and_pack(const Scene& scene, Progress& progress) noexcept;
+    template <class Scene>
+    void sweep(const Scene& scene, const ConstraintList<Scalar>& acting, Progress& progress) noexcept;
+    template <class Scene>
+    bool iterate_contact(const Scene& scene, const ConstraintList<Scalar>& acting, Progress& progress) noexcept;
+    template <class Scene>
+    bool update_beyond(const Scene& scene, std::span<const Index> vertices, Progress& progress) noexcept;
+    template <class Scene>
+    bool update_packs_beyond(const Scene& scene, std::size_t begin, std::size_t end, Progress& progress) noexcept;
+    template <bool in_contact, class Scene>
+    bool update_packs(const Scene& scene, std::size_t begin, std::size_t end, bool serial) noexcept;
+    template <bool in_contact, class Scene>
+    bool finish_update(const Scene& scene, std::size_t p, typename PackedVertices<Scalar>::Outcome outcome) noexcept;
+    template <class Scene>
+    bool add_layer(const Scene& scene, Progress& progress) noexcept;
+    template <class Scene>
+    bool update(const Scene& scene, Index v) noexcept;
+    [[nodiscard]] std::size_t end_of_group(std::size_t p, std::size_t last) const noexcept;
+    template <class Scene>
+    [[nodiscard]] bool evaluate_residuals(const Scene& scene, const Progress& progress) noexcept;
+    template <class Scene>
+    void load_neighbours(const Scene& scene, Index v) noexcept;
+    template <class Scene>
+    void write_back(const Scene& scene, PointsRef<Scalar>& x, const Progress& progress) noexcept;
+    [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status) noexcept;
+
+    template <class Scene>
+    static constexpr bool can_use_lanes =
+        UpdatesInLanes<Scalar, Rule, std::remove_cvref_t<decltype(std::declval<Scene>().network)>,
+                       std::remove_cvref_t<decltype(std::declval<Scene>().volume)>>;
 
     Method<Rule, Scalar, Threads> method_;
     ActiveVertices active_;
-    CompactBlock<Scalar> block_;
-    Workspace<Scalar> work_;
-    IndexSet last_held_;
-    IndexSet woken_;            // since the last step
-    BoundedList<Index> moved_;  // in the last step that advanced, and how far [m]
-    Points<Scalar> ways_;
-    Predictor<Scalar, Workspace<Scalar>::most_constraints> predictor_;
-    std::array<Vector3<Scalar>, Workspace<Scalar>::most_constraints> reactions_{};
+    PackedVertices<Scalar> packed_;
+    StepState<Scalar> state_;
+    IndexSet last_prescribed_;
+    IndexSet woken_;                    // since the last step
+    BoundedList<Index> moved_;          // in the last step that advanced, and by how much [m]
+    Points<Scalar> last_displacements_;
+    Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
+    std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
-    bool complete_ = false;    // the last step visited all that were at work, as often as it should
+    bool complete_ = false;    // the last step updated all that were at work, as often as it should
     RigidFrame<Scalar> pose_;  // of the body, and how often it was deformed, at the last step
     std::uint64_t deformations_ = 0;
-    std::size_t resume_ = 0;  // the vertex beyond layer 0 at which the last sweep ran out of time
+    std::size_t resume_ = 0;  // the number beyond layer 0 of the vertex at which the last sweep ran out of time
     StepCosts costs_;
 };
 
@@ -155,6 +189,17 @@ QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>&
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
+namespace detail {
+
+// Nothing where updates cannot be in lanes whatever the volume model.
+template <class Scalar, class Rule, class Network>
+[[nodiscard]] Index most_in_lanes(const SolverOptions<Scalar>& options) noexcept {
+    constexpr bool possible = UpdatesInLanes<Scalar, Rule, Network, NoVolumeSprings>;
+    return possible && options.order != VisitOrder::arrival && !options.layers_as_needed ? options.most_in_groups : 0;
+}
+
+}  // namespace detail
+
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <detail::NetworkOfSolver<Scalar> Network>
 QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& network,
@@ -162,66 +207,64 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& netwo
                                                             const Threads& executor)
     : method_{rule, (options.check(), options), executor},
       active_(network.vertex_count()),
-      block_(network, detail::most_in_lanes<Scalar, Rule, Network>(options)),
-      work_(network.vertex_count(), options.most_touches),
-      last_held_(network.vertex_count()),
+      packed_(network, detail::most_in_lanes<Scalar, Rule, Network>(options)),
+      state_(network.vertex_count(), options.most_touches),
+      last_prescribed_(network.vertex_count()),
       woken_(network.vertex_count()),
       moved_(static_cast<std::size_t>(network.vertex_count())),
-      ways_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
+      last_displacements_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
     detail::define_made<QuasiStaticSolver>();
     if constexpr (requires { rule.check(); }) rule.check();
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
     }
-    if constexpr (!moves_along_force<Rule, Scalar>) {
-        work_.block_compliance.resize(static_cast<std::size_t>(network.vertex_count()));
-    }
-    work_.negligible_force = options.negligible_force > 0 ? options.negligible_force : network.negligible_force();
+    state_.force_tolerance = options.negligible_force > 0 ? options.negligible_force : network.negligible_force();
 }
 
+// A step, in the order in which it happens.
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-template <class Pace, class Network, class Volume>
-StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(Pace pace, PointsRef<Scalar>& x, Scalar dt,
+template <class Network, class Volume>
+StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt,
                                                                      const Network& network, const Volume& volume,
-                                                                     ConstraintRefs constraints) noexcept {
-    MEMBRANE_ASSERT(x.cols() == work_.vertex_count() && network.vertex_count() == work_.vertex_count());
+                                                                     Constraints constraints) noexcept {
+    MEMBRANE_ASSERT(x.cols() == state_.vertex_count() && network.vertex_count() == state_.vertex_count());
     detail::require_made<QuasiStaticSolver>();
-    open(constraints.size());
-    go_along(volume);
-    if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) {
-        return refuse_step(StepStatus::bad_time_step, x);
-    }
+    begin_report(constraints.size());
+    follow_body(volume);
+    state_.begin_step();
+    if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
 
-    Region<Scalar> region(x, work_, network);
-    const ConstraintSet<Scalar> acting(region, constraints);
-    if (!acting.sound()) return refuse_step(StepStatus::bad_input, x);
-    predict<Volume>(acting, region);
+    const ConstPointsRef<Scalar> start = x, now = state_.positions();
+    ConstraintContext<Scalar> context(start, state_, network);
+    const ConstraintList<Scalar> acting(context, constraints);
+    if (!acting.sound()) return refuse_step(StepStatus::bad_input);
+    extrapolate<Volume>(acting, context);
     acting.begin();
-    if (work_.invalid) return refuse_step(StepStatus::bad_input, x);
-    if (work_.full) return refuse_step(StepStatus::too_many_touches, x);
+    if (state_.invalid) return refuse_step(StepStatus::bad_input);
+    if (state_.full) return refuse_step(StepStatus::too_many_touches);
 
-    set_supports(network, volume, method_.options.rigid_stiffness, region, work_.seeds.items());
-    line_up(network, region);
-    const StepInput<Scalar, Network, Volume> scene{x, dt, network, volume, work_};
-    std::size_t resume = resume_;
-    Sweeps sweeps(method_, scene, region, acting, active_, block_, pace, report_);
-    StepStatus status = sweeps.run(resume);
-    if (status == StepStatus::advanced && !acting.react(reactions_)) status = StepStatus::unstable;
-    if (status != StepStatus::advanced) {
-        active_.cancel(network);
-        return refuse_step(status, x);
+    const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
+    Progress progress{.budget = budget};
+    set_supports(scene, method_.options.rigid_stiffness, state_.seeds.items());
+    select(network, context);
+    load_and_pack(scene, progress);
+    sweep(scene, acting, progress);
+    if (report_.status == StepStatus::advanced && !evaluate_residuals(scene, progress)) {
+        state_.restore(start);  // not finite there either: then the input is not valid
+        report_.status = evaluate_residuals(scene, progress) ? StepStatus::unstable : StepStatus::bad_input;
     }
-    resume_ = resume;
-    settle(scene, sweeps.mended());
-    complete_ = !report_.out_of_time && !active_.truncated();
-    work_.close();
-    pace.done();
+    if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
+    if (report_.status != StepStatus::advanced) {
+        active_.cancel(network);
+        return refuse_step(report_.status);
+    }
+    write_back(scene, x, progress);
+    progress.budget.end();
     return report_;
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-void QuasiStaticSolver<Scalar, Rule, Threads>::open(std::size_t constraint_count) noexcept {
-    work_.open();
+void QuasiStaticSolver<Scalar, Rule, Threads>::begin_report(std::size_t constraint_count) noexcept {
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {};
     report_.reactions = {reactions_.data(), constraint_count};
@@ -230,28 +273,29 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::open(std::size_t constraint_count
 // The body has moved since the last step, and the membrane with it: what is remembered goes along.
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <class Volume>
-void QuasiStaticSolver<Scalar, Rule, Threads>::go_along([[maybe_unused]] const Volume& volume) noexcept {
+void QuasiStaticSolver<Scalar, Rule, Threads>::follow_body([[maybe_unused]] const Volume& volume) noexcept {
     if constexpr (moves<Volume>) {
         const auto& body = volume.body();
         if (std::exchange(deformations_, body.deformations()) != body.deformations()) wake_all();
         if (body.pose().same_pose(pose_)) return;
         const auto motion = motion_between(std::exchange(pose_, body.pose()), body.pose());
-        work_.turn(motion.rotation);
+        state_.rotate(motion.rotation);
         if (!method_.options.predict) return;
-        for (const Index v : moved_.items()) ways_.col(v) = motion.direction_out(point(ways_, v));
+        for (const Index v : moved_.items()) {
+            last_displacements_.col(v) = motion.direction_out(point(last_displacements_, v));
+        }
     }
 }
 
-// Those that moved go on, as far as what leads them does. They are to be visited, wherever they are now. A step that was
-// cut short is not expected again: where vertices were not visited, what was predicted for them would be predicted anew,
-// and grow from step to step.
+// Vertices that moved in the last step go on, as far as what drives them does. A step that was cut short is not
+// extrapolated: where vertices were not updated, the extrapolation would be extrapolated again, and grow from step to step.
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <class Volume>
-void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const ConstraintSet<Scalar>& acting,
-                                                       Region<Scalar>& region) noexcept {
+void QuasiStaticSolver<Scalar, Rule, Threads>::extrapolate(const ConstraintList<Scalar>& acting,
+                                                           ConstraintContext<Scalar>& context) noexcept {
     if (!method_.options.predict) return;
-    std::array<Lead<Scalar>, Workspace<Scalar>::most_constraints> leads{};
-    acting.tell(leads);
+    std::array<Lead<Scalar>, StepState<Scalar>::max_constraints> leads{};
+    acting.collect_leads(leads);
     if constexpr (moves<Volume>) {  // as they go on the body
         for (auto& lead : leads) {
             if (lead) lead->at = lead->is_force ? pose_.direction_in(lead->at) : pose_.point_in(lead->at);
@@ -260,55 +304,327 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::predict(const ConstraintSet<Scala
     const Scalar part = predictor_.expect(leads);
     if (part == 0 || !complete_) return;
     for (const Index v : moved_.items()) {
-        if (region.fixed(v)) continue;
-        region.shift(v, part * point(ways_, v));
+        if (context.fixed(v)) continue;
+        context.move(v, part * point(last_displacements_, v));
         active_.wake(v);
     }
 }
 
-// Who is at work in this step, what has been let go of as well.
+// The vertices at work in this step, those that were prescribed until now as well.
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <class Network>
-void QuasiStaticSolver<Scalar, Rule, Threads>::line_up(const Network& network, Region<Scalar>& region) noexcept {
-    for (const Index v : last_held_.items()) {
-        if (!region.fixed(v)) active_.wake(v);
+void QuasiStaticSolver<Scalar, Rule, Threads>::select(const Network& network,
+                                                      const ConstraintContext<Scalar>& context) noexcept {
+    for (const Index v : last_prescribed_.items()) {
+        if (!context.fixed(v)) active_.wake(v);
     }
     for (const Index v : woken_.items()) {
         if (!network.pinned(v)) active_.wake(v);
     }
     woken_.clear();
-    active_.arrange(network, work_.seeds.items(), method_.options);
-    for (const auto vertices : {active_.vertices(), active_.frontier()}) {
-        for (const Index v : vertices) region.save(v);
-    }
+    active_.arrange(network, state_.seeds.items(), method_.options);
 }
 
-// Who has moved, and who has to be looked at again.
+// Loads the vertices at work and their neighbours. Those at work are packed if the whole queue is at work and no constraint
+// adds a force beyond layer 0.
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-template <class Handed>
-void QuasiStaticSolver<Scalar, Rule, Threads>::settle(const Handed& scene, bool mended) noexcept {
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule, Threads>::load_and_pack(const Scene& scene, Progress& progress) noexcept {
+    std::size_t packed = 0;
+    if constexpr (can_use_lanes<Scene>) {
+        const auto& queue = active_.queue();
+        if (active_.has_new_queue()) packed_.assign(queue.vertices(), queue.group_ends(), scene.network);
+        const auto forced = state_.forced.items();
+        progress.in_lanes =
+            active_.from_queue() == queue.vertices().size() &&
+            std::all_of(forced.begin(), forced.end(), [&](Index v) { return state_.seeds.contains(v); });
+        if (progress.in_lanes) {
+            packed_.append(active_.vertices(), active_.from_queue(), active_.group_ends(), scene.network);
+            for (const Index v : packed_.needed()) state_.load(v, scene.start, scene.network);
+            packed_.begin_step(scene);
+            packed = packed_.size();
+        }
+    }
+    for (const auto vertices : {active_.vertices().subspan(packed), active_.frontier(), state_.prescribed.items()}) {
+        for (const Index v : vertices) load_neighbours(scene, v);
+    }
+    progress.budget.begin(active_.vertices().size() + active_.frontier().size());
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule, Threads>::load_neighbours(const Scene& scene, Index v) noexcept {
+    state_.load(v, scene.start, scene.network);
+    for (const auto& end : scene.network.neighbours(v)) state_.load(end.other, scene.start, scene.network);
+}
+
+// Sweeps until nothing changes, they are done, or time is up.
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule, Threads>::sweep(const Scene& scene, const ConstraintList<Scalar>& acting,
+                                                     Progress& progress) noexcept {
+    bool changed = true;
+    std::size_t resume = resume_;
+    for (Index i = 0; i < method_.options.sweeps && changed && !report_.out_of_time; ++i) {
+        changed = iterate_contact(scene, acting, progress);
+        if (report_.status != StepStatus::advanced) return;
+        const auto beyond = active_.beyond();
+        const std::size_t begin = (std::min)(std::exchange(resume, 0), beyond.size());
+        bool moved = update_beyond(scene, beyond.subspan(begin), progress);
+        moved |= update_beyond(scene, beyond.first(begin), progress);
+        while (add_layer(scene, progress)) moved = true;
+        if (report_.status != StepStatus::advanced) return;
+        if (moved) progress.constraints_hold = false;
+        if (progress.next != nullptr) resume = static_cast<std::size_t>(progress.next - beyond.data());
+        changed |= moved;
+    }
+    if (changed && !progress.constraints_hold) {
+        if (!progress.budget.has_time_to_enforce()) report_.out_of_time = true;
+        progress.constraints_changed = report_.out_of_time || acting.enforce();
+    }
+    progress.resume = resume;
+}
+
+// Updates of layer 0 in turn with its constraints.
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule, Threads>::iterate_contact(const Scene& scene, const ConstraintList<Scalar>& acting,
+                                                               Progress& progress) noexcept {
+    const auto layer = active_.touched();
+    const std::size_t packs = progress.in_lanes ? packed_.pack_from(layer.size()) : 0;
+    const std::size_t packed = packs > 0 ? (std::min)(layer.size(), packed_.size()) : 0;
+    bool changed = false;
+    for (Index i = 0; i < method_.options.contact_visits; ++i) {
+        if (!progress.budget.has_time_for_contact(layer.size())) {
+            report_.out_of_time = true;
+            break;
+        }
+        changed |= update_packs<true>(scene, 0, packs, true);
+        for (const Index v : layer.subspan(packed)) changed |= update(scene, v);
+        progress.budget.updated(layer.size());
+        if (report_.status != StepStatus::advanced) break;
+        progress.constraints_hold = !acting.enforce();
+        progress.budget.enforced();
+        if (progress.constraints_hold) break;
+        changed = true;
+    }
+    return changed;
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule, Threads>::update_beyond(const Scene& scene, std::span<const Index> vertices,
+                                                             Progress& progress) noexcept {
+    bool changed = false;
+    const auto begin = static_cast<std::size_t>(vertices.data() - active_.vertices().data());
+    if (progress.in_lanes && begin < packed_.size()) {
+        const std::size_t end = (std::min)(begin + vertices.size(), packed_.size());
+        changed = update_packs_beyond(scene, begin, end, progress);
+        vertices = vertices.subspan(end - begin);
+    }
+    while (!vertices.empty() && progress.next == nullptr && report_.status == StepStatus::advanced) {
+        if (!progress.budget.has_time_for_batch()) {
+            report_.out_of_time = true;
+            progress.next = vertices.data();
+            break;
+        }
+        const auto batch = vertices.first((std::min)(updates_in_batch, vertices.size()));
+        for (const Index v : batch) changed |= update(scene, v);
+        progress.budget.updated(batch.size());
+        vertices = vertices.subspan(batch.size());
+    }
+    return changed;
+}
+
+// The packs of vertices number `begin` to `end`.
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs_beyond(const Scene& scene, std::size_t begin,
+                                                                   std::size_t end, Progress& progress) noexcept {
+    // Under a deadline batches are too small to distribute over threads.
+    const bool serial = progress.budget.limited() || ExecutorRef(method_.executor).is_serial();
+    bool changed = false;
+    std::size_t p = packed_.pack_from(begin);
+    const std::size_t last = packed_.pack_from(end);
+    while (p < last && report_.status == StepStatus::advanced) {
+        if (!progress.budget.has_time_for_batch()) {
+            report_.out_of_time = true;
+            progress.next = active_.vertices().data() + packed_.first_of(p);
+            break;
+        }
+        const Index before = report_.visits;
+        const std::size_t next =
+            serial ? (std::min)(p + updates_in_batch / Lanes<Scalar>::count, last) : end_of_group(p, last);
+        changed |= update_packs<false>(scene, p, next, serial);
+        progress.budget.updated(static_cast<std::size_t>(report_.visits - before));
+        p = next;
+    }
+    return changed;
+}
+
+// The pack at which the group of pack `p` ends.
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+std::size_t QuasiStaticSolver<Scalar, Rule, Threads>::end_of_group(std::size_t p, std::size_t last) const noexcept {
+    const std::size_t first = packed_.first_of(p);
+    for (const auto ends : {active_.queue().group_ends(), active_.group_ends()}) {
+        const auto end = std::upper_bound(ends.begin(), ends.end(), first);
+        if (end != ends.end()) return (std::min)(packed_.pack_from(*end), last);
+    }
+    return last;
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <bool in_contact, class Scene>
+bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs([[maybe_unused]] const Scene& scene, std::size_t begin,
+                                                            std::size_t end, [[maybe_unused]] bool serial) noexcept {
+    bool changed = false;
+    if constexpr (can_use_lanes<Scene>) {
+        if constexpr (!in_contact) {
+            if (!serial) packed_.update(begin, end, scene, method_.rule, ExecutorRef(method_.executor));
+        }
+        for (std::size_t p = begin; p < end && report_.status == StepStatus::advanced; ++p) {
+            changed |= finish_update<in_contact>(
+                scene, p,
+                serial ? packed_.template update<in_contact>(p, scene, method_.rule) : packed_.outcome(p));
+        }
+    }
+    return changed;
+}
+
+// Where the stiffness bound does not prove that a move is stable, its eigenvalues decide.
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <bool in_contact, class Scene>
+bool QuasiStaticSolver<Scalar, Rule, Threads>::finish_update(
+    const Scene& scene, std::size_t p, typename PackedVertices<Scalar>::Outcome outcome) noexcept {
+    using Outcome = typename PackedVertices<Scalar>::Outcome;
+    report_.visits += packed_.free_count(p);
+    if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+        if (outcome == Outcome::too_far) {
+            for (const Index v : packed_.vertices(p)) {
+                if (state_.is_fixed(v) || !diverges(scene, v, method_.rule.compliance(state_of<Rule>(scene, v))))
+                    continue;
+                report_.status = StepStatus::unstable;
+                return false;
+            }
+            outcome = packed_.template update<in_contact>(p, scene, method_.rule, true);
+        }
+    }
+    return outcome == Outcome::moved;
+}
+
+// With `layers_as_needed`: adds the next layer, and updates it, if a force on it is above the tolerance.
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule, Threads>::add_layer(const Scene& scene, Progress& progress) noexcept {
+    const auto frontier = active_.frontier();
+    if (frontier.empty() || progress.next != nullptr || report_.status != StepStatus::advanced) return false;
+    if (!progress.budget.has_time_for_batch()) {
+        report_.out_of_time = true;
+        return false;
+    }
+    report_.visits += static_cast<Index>(frontier.size());
+    const bool needed = std::any_of(frontier.begin(), frontier.end(), [&](Index v) {
+        return !state_.is_fixed(v) && norm(pull_on(scene, v).force) > state_.force_tolerance;
+    });
+    progress.budget.updated(frontier.size());
+    const std::size_t before = active_.vertices().size();
+    if (!needed) return false;
+    active_.grow(scene.network, method_.options);
+    for (const Index v : active_.frontier()) load_neighbours(scene, v);
+    progress.budget.set_residual_count(active_.vertices().size() + active_.frontier().size());
+    update_beyond(scene, active_.vertices().subspan(before), progress);
+    return true;
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule, Threads>::update(const Scene& scene, Index v) noexcept {
+    if (state_.is_fixed(v) || report_.status != StepStatus::advanced) return false;
+    ++report_.visits;
+    const auto vertex = state_of<Rule>(scene, v);
+    const auto move = move_of(method_.rule, vertex, state_.force_tolerance);
+    if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+        if (move.may_overshoot && diverges(scene, v, move.compliance)) {
+            report_.status = StepStatus::unstable;
+            return false;
+        }
+    }
+    state_.set_compliance(v, as_block<Scalar>(move.compliance), move.least);
+    if (vertex.touched) {
+        const auto& of_constraints = state_.row(state_.force, v);
+        state_.set_internal(v, norm<Scalar>(vertex.force - of_constraints.point()),
+                            vertex.stiffness - (std::max)(of_constraints.extra(), Scalar(0)));
+    }
+    if (!move.moves) return false;
+    state_.set_position(v, point(scene.x, v) + backtracked<Rule>(scene, v, move.displacement));
+    return true;
+}
+
+// The forces at the end on all vertices at work; false if any is not finite.
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+bool QuasiStaticSolver<Scalar, Rule, Threads>::evaluate_residuals(const Scene& scene,
+                                                                  const Progress& progress) noexcept {
+    bool finite = true;
+    const auto count = [&](Index v) {
+        const Vector3<Scalar> force = state_.row(state_.residual, v).point();
+        ++report_.visits;
+        if (!state_.is_fixed(v)) report_.residual = (std::max)(report_.residual, norm(force));
+        finite &= is_finite(force);
+    };
+    const auto evaluate = [&](Index v) {
+        const Vector3<Scalar> force = pull_on(scene, v).force;
+        state_.row(state_.residual, v).set(force, norm(undamped_force(scene, v, force)));
+        count(v);
+    };
+    std::size_t packed = 0;
+    if constexpr (can_use_lanes<Scene>) {
+        packed = progress.in_lanes ? packed_.size() : 0;
+        for (std::size_t p = 0; p < (packed > 0 ? packed_.count() : 0); ++p) {
+            packed_.evaluate_residual(p, scene);
+            for (const Index v : packed_.vertices(p)) {
+                if (!state_.prescribed.contains(v)) count(v);
+            }
+        }
+    }
+    for (const auto vertices : {active_.vertices().subspan(packed), active_.frontier()}) {
+        for (const Index v : vertices) {
+            if (!state_.prescribed.contains(v)) evaluate(v);
+        }
+    }
+    for (const Index v : state_.prescribed.items()) evaluate(v);
+    return finite;
+}
+
+// Vertices that have moved get their new positions, and wake their neighbours.
+template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule, Threads>::write_back(const Scene& scene, PointsRef<Scalar>& x,
+                                                          const Progress& progress) noexcept {
     moved_.clear();
     active_.settle([&](Index v) {
-        return work_.held.contains(v) || scene.network.pinned(v) ||
-               norm(lasting_force(scene, v)) <= work_.negligible_force;
+        return state_.is_fixed(v) || state_.row(state_.residual, v).extra() <= state_.force_tolerance;
     });
-    for (const Index v : work_.saved.items()) {
-        const Vector3<Scalar> way = point(scene.x, v) - point(work_.start, v);
-        if (way.isZero(0)) continue;
+    for (const Index v : state_.loaded.items()) {
+        const Vector3<Scalar> now = state_.row(state_.position, v).point(), before = point(x, v);
+        if (now == before) continue;
         moved_.push(v);
-        if (method_.options.predict) ways_.col(v) = way;
+        if (method_.options.predict) last_displacements_.col(v) = now - before;
+        x.col(v) = now;
         active_.stir_neighbours(scene.network, v);
     }
     report_.moved = moved_.items();
-    report_.converged = active_.close() && !mended && report_.residual <= work_.negligible_force;
-    std::swap(last_held_, work_.held);
+    report_.converged =
+        active_.close() && !progress.constraints_changed && report_.residual <= state_.force_tolerance;
+    complete_ = !report_.out_of_time && !active_.truncated();
+    std::swap(last_prescribed_, state_.prescribed);
+    resume_ = progress.resume;
+    state_.end_step();
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepStatus status,
-                                                                         PointsRef<Scalar>& x) noexcept {
-    for (const Index v : work_.saved.items()) x.col(v) = work_.start.col(v);
-    if (status == StepStatus::unstable) work_.forget();  // what ran away may be a force from the step before
+StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepStatus status) noexcept {
+    if (status == StepStatus::unstable) state_.forget_points();  // what ran away may be a force from the step before
     predictor_.forget();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_.status = status;
@@ -318,22 +634,22 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepSta
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::wake(std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
-        if (v >= 0 && v < work_.vertex_count()) woken_.insert(v);
+        if (v >= 0 && v < state_.vertex_count()) woken_.insert(v);
     }
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::wake_all() noexcept {
-    for (Index v = 0; v < work_.vertex_count(); ++v) wake({&v, 1});
+    for (Index v = 0; v < state_.vertex_count(); ++v) wake({&v, 1});
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
     active_.clear();
-    work_.clear();
+    state_.reset();
     predictor_.forget();
     complete_ = false;
-    last_held_.clear();
+    last_prescribed_.clear();
     woken_.clear();
     pose_ = {};
     deformations_ = 0;

@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <limits>
 #include <span>
+#include <type_traits>
 
-#include <membrane/solve/region.hpp>
+#include <membrane/solve/vertex_update.hpp>
 
 /// How stiff a pinned or held vertex is to a tool.
 ///
@@ -25,31 +26,31 @@ inline constexpr int support_factor = 4;
 
 }  // namespace detail
 
-/// The stiffness of the vertex `v`, its springs and backing without damping [N/m].
-template <Real Scalar, class Network, class Volume>
-[[nodiscard]] Scalar own_stiffness(const Network& network, const Volume& volume, const Region<Scalar>& region,
-                                   Index v) noexcept {
-    const Vector3<Scalar> here = region.position(v);
+/// The stiffness of the vertex `v` where the step begins, its springs and volume spring without damping [N/m].
+template <class Scalar, class Network, class Volume>
+[[nodiscard]] Scalar own_stiffness(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
+    const Vector3<Scalar> here = point(scene.start, v);
     constexpr Scalar for_ever = (std::numeric_limits<Scalar>::max)();  // nothing is left of damping
-    return network.pull(v, region.positions()).stiffness + volume.pull(v, here, here, for_ever).stiffness;
+    return scene.network.pull(v, scene.start).stiffness + scene.volume.pull(v, here, here, for_ever).stiffness;
 }
 
 /// Sets how stiff those of the `vertices` are to tools that are fixed: `stiffness` [N/m], or for 0 four times as stiff as
 /// the stiffest of each and its neighbours. Online. Cost: for 0, the springs of the fixed vertices' neighbours.
-template <Real Scalar, class Network, class Volume>
-void set_supports(const Network& network, const Volume& volume, Scalar stiffness, Region<Scalar>& region,
+template <class Scalar, class Network, class Volume>
+void set_supports(const StepInput<Scalar, Network, Volume>& scene, std::type_identity_t<Scalar> stiffness,
                   std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
-        if (!region.fixed(v)) continue;
+        if (!scene.state.is_fixed(v)) continue;
         Scalar support = stiffness;
         if (stiffness == 0) {
-            Scalar stiffest = own_stiffness(network, volume, region, v);
-            for (const auto& end : network.neighbours(v)) {
-                stiffest = (std::max)(stiffest, own_stiffness(network, volume, region, end.other));
+            Scalar stiffest = own_stiffness(scene, v);
+            for (const auto& end : scene.network.neighbours(v)) {
+                stiffest = (std::max)(stiffest, own_stiffness(scene, end.other));
             }
             support = detail::support_factor * stiffest;
         }
-        region.set_support(v, support);
+        scene.state.row(scene.state.support, v).number[3] = support;
+        scene.state.clear_response(v);
     }
 }
 

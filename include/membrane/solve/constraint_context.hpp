@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include <membrane/mesh/triangle.hpp>
+#include <membrane/solve/step_state.hpp>
+
+/// What a constraint sees of a step.
+///
+///     void begin(membrane::ConstraintContext<double>& context) const noexcept {      // of a constraint of one's own
+///         if (!context.check(v)) return;
+///         context.seed(v);
+///         context.add_force(v, pressure * area * outward);                           // [N]
+///     }
+namespace membrane {
+
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
+/// The vertices that a step works on, as its constraints see them: they name the vertices where a force enters, prescribe
+/// where some are, and add forces to others. A vertex that is named or moved is loaded, at the cost of three numbers.
+template <Real Scalar>
+class ConstraintContext {
+  public:
+    /// `network.pinned(v)` says which vertices never move. All three must outlive this.
+    template <class Network>
+    ConstraintContext(const ConstPointsRef<Scalar>& x, StepState<Scalar>& state, const Network& network) noexcept
+        : x_(x), state_(state), network_(&network), is_pinned_([](const void* of, Index v) noexcept {
+              return static_cast<const Network*>(of)->pinned(v);
+          }) {}
+
+    /// Whether `v` is a vertex; if not, the step is refused.
+    bool check(Index v) noexcept;
+
+    /// Puts `v` into layer 0 of the queue: a force enters here.
+    void seed(Index v) noexcept {
+        load(v);
+        state_.seeds.insert(v);
+        if (state_.is_fixed(v)) state_.clear_response(v);
+    }
+
+    /// Where `v` is [m], and where it was when the step began.
+    [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept {
+        return state_.loaded.contains(v) ? state_.row(state_.position, v).point() : start(v);
+    }
+    [[nodiscard]] Vector3<Scalar> start(Index v) const noexcept { return point(x_, v); }
+
+    /// `v` is at `target`, or where it was when the step began, until the step ends. A pinned vertex stays where it is, a
+    /// prescribed one too if there is no target.
+    void prescribe(Index v, const Vector3<Scalar>& target) noexcept;
+    void prescribe(Index v) noexcept;
+    [[nodiscard]] bool prescribed(Index v) const noexcept { return state_.prescribed.contains(v); }
+
+    /// Whether nothing moves `v` in this step but `prescribe`: it is pinned or prescribed.
+    [[nodiscard]] bool fixed(Index v) const noexcept {
+        return state_.loaded.contains(v) ? state_.is_fixed(v) : is_pinned_(network_, v);
+    }
+
+    /// Moves `v` by a displacement [m].
+    void move(Index v, const Vector3<Scalar>& by) noexcept { place(v, position(v) + by); }
+
+    /// Adds to the external force on `v` for this step [N].
+    void add_force(Index v, const Vector3<Scalar>& force) noexcept {
+        state_.forced.insert(v);
+        auto& number = state_.row(state_.force, v).number;
+        for (std::size_t k = 0; k < 3; ++k) number[k] += force[static_cast<Eigen::Index>(k)];
+    }
+
+    /// Adds to the stiffness of `v` for this step [N/m]: for a force that turns as `v` moves.
+    void add_stiffness(Index v, Scalar by) noexcept {
+        state_.forced.insert(v);
+        state_.row(state_.force, v).number[3] += by;
+    }
+
+    /// How far `v` moves for `force` by the rule of the last update, not at all if it is fixed [m].
+    [[nodiscard]] Vector3<Scalar> response(Index v, const Vector3<Scalar>& force) const noexcept {
+        return fixed(v) ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : state_.compliance_block(v) * force;
+    }
+
+    /// How far at least [m/N].
+    [[nodiscard]] Scalar compliance(Index v) const noexcept {
+        return fixed(v) ? Scalar(0) : state_.row(state_.position, v).extra();
+    }
+
+    /// At the end of the step: the sum of all forces on `v` [N].
+    [[nodiscard]] Vector3<Scalar> residual_force(Index v) const noexcept {
+        return state_.row(state_.residual, v).point();
+    }
+
+    /// A change of force that is not worth making [N].
+    [[nodiscard]] Scalar force_tolerance() const noexcept { return state_.force_tolerance; }
+
+    /// The point with this number that this constraint had in the step before, or null.
+    [[nodiscard]] const ContactPoint<Scalar>* cached_point(Index triangle, int feature) noexcept;
+
+    /// Keeps a point of this constraint for the next step; refuses the step where there is no room for more.
+    void add_point(const ContactPoint<Scalar>& point) noexcept;
+
+    /// The points of this constraint, in this step and in the one before.
+    [[nodiscard]] std::span<ContactPoint<Scalar>> points() noexcept {
+        return state_.point_ranges[constraint_].of(state_.points.items());
+    }
+    [[nodiscard]] std::span<const ContactPoint<Scalar>> points() const noexcept {
+        return const_cast<ConstraintContext&>(*this).points();
+    }
+    [[nodiscard]] std::span<const ContactPoint<Scalar>> previous_points() const noexcept {
+        return state_.previous_ranges[constraint_].of(std::span<const ContactPoint<Scalar>>(state_.previous_points.items()));
+    }
+
+    // For the solver and `Press`.
+
+    [[nodiscard]] StepState<Scalar>& state() const noexcept { return state_; }
+    void select_constraint(std::size_t constraint) noexcept { constraint_ = constraint; }
+    [[nodiscard]] std::size_t constraint() const noexcept { return constraint_; }
+
+    /// The constraint that is selected has no points yet.
+    void begin_points() noexcept {
+        state_.point_ranges[constraint_] = {state_.points.size(), state_.points.size()};
+        last_found_ = 0;
+    }
+
+    void load(Index v) noexcept {
+        if (!state_.loaded.contains(v)) state_.load(v, x_, Pins{*this});
+    }
+    void place(Index v, const Vector3<Scalar>& target) noexcept {
+        load(v);
+        state_.set_position(v, target);
+    }
+
+    /// The position that `v` goes back to: where it was when `keep` was called, or when the step began.
+    void keep(Index v) noexcept {
+        load(v);
+        state_.kept.insert(v);
+        state_.row(state_.anchor, v) = state_.row(state_.position, v);
+    }
+    void keep_start(Index v) noexcept {
+        load(v);
+        if (state_.kept.insert(v)) state_.row(state_.anchor, v).set(start(v));
+    }
+    [[nodiscard]] Vector3<Scalar> kept(Index v) const noexcept {
+        return state_.kept.contains(v) ? state_.row(state_.anchor, v).point() : start(v);
+    }
+
+    /// All that this step moves goes back to where it was kept, part of the distance or all of it.
+    void go_back(Scalar part) noexcept {
+        for (const Index v : state_.loaded.items()) {
+            if (!state_.is_fixed(v)) state_.set_position(v, (1 - part) * position(v) + part * kept(v));
+        }
+    }
+
+    /// By how much a fixed vertex gives way to the tools that press on it, as a spring of its support stiffness does [m]; no
+    /// other does.
+    [[nodiscard]] Vector3<Scalar> support_displacement(Index v) const noexcept {
+        const auto& support = state_.row(state_.support, v);
+        if (!state_.bearing.contains(v) || !(support.extra() > 0)) return Vector3<Scalar>::Zero();
+        return support.point() / support.extra();
+    }
+    [[nodiscard]] Scalar support_compliance(Index v) const noexcept {
+        const Scalar stiffness = state_.row(state_.support, v).extra();
+        return fixed(v) && stiffness > 0 ? 1 / stiffness : Scalar(0);
+    }
+    void set_support(Index v, Scalar stiffness) noexcept { state_.row(state_.support, v).number[3] = stiffness; }
+
+    /// Adds to the force of the tools on `v` [N], if it is fixed.
+    void bear(Index v, const Vector3<Scalar>& force) noexcept {
+        if (!fixed(v)) return;
+        state_.bearing.insert(v);
+        auto& number = state_.row(state_.support, v).number;
+        for (std::size_t k = 0; k < 3; ++k) number[k] += force[static_cast<Eigen::Index>(k)];
+    }
+
+  private:
+    struct Pins {
+        const ConstraintContext& context;
+        [[nodiscard]] bool pinned(Index v) const noexcept { return context.is_pinned_(context.network_, v); }
+    };
+
+    const ConstPointsRef<Scalar>& x_;  // when the step began
+    StepState<Scalar>& state_;
+    const void* network_;  // of a type that only the next knows
+    bool (*is_pinned_)(const void*, Index) noexcept;
+    std::size_t constraint_ = 0;
+    std::size_t last_found_ = 0;
+};
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
+template <Real Scalar>
+bool ConstraintContext<Scalar>::check(Index v) noexcept {
+    const bool valid = v >= 0 && v < state_.vertex_count();
+    if (!valid) state_.invalid = true;
+    return valid;
+}
+
+template <Real Scalar>
+void ConstraintContext<Scalar>::prescribe(Index v, const Vector3<Scalar>& target) noexcept {
+    prescribe(v);
+    if (!is_pinned_(network_, v)) place(v, target);
+}
+
+template <Real Scalar>
+void ConstraintContext<Scalar>::prescribe(Index v) noexcept {
+    load(v);
+    if (!state_.prescribed.insert(v)) return;
+    state_.set_position(v, start(v));
+    state_.fixed[static_cast<std::size_t>(v)] = 1;
+    state_.clear_response(v);
+}
+
+template <Real Scalar>
+const ContactPoint<Scalar>* ConstraintContext<Scalar>::cached_point(Index triangle, int feature) noexcept {
+    // Points come in nearly the same order every time: the search starts where the last one ended.
+    const auto before = previous_points();
+    for (std::size_t i = 0; i < before.size(); ++i) {
+        const std::size_t at = (last_found_ + i) % before.size();
+        if (before[at].triangle != triangle || before[at].feature != feature) continue;
+        last_found_ = at + 1;
+        return &before[at];
+    }
+    return nullptr;
+}
+
+template <Real Scalar>
+void ConstraintContext<Scalar>::add_point(const ContactPoint<Scalar>& point) noexcept {
+    if (!state_.points.push(point)) state_.full = true;
+    state_.point_ranges[constraint_].end = state_.points.size();
+}
+
+}  // namespace membrane

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <membrane/core/bounded_list.hpp>
+#include <membrane/core/lane_points.hpp>
+#include <membrane/solve/contact_point.hpp>
+
+namespace membrane {
+
+/// How a contact point follows the tool.
+enum class ContactKind : unsigned char {
+    end,    ///< the point of the triangle nearest to an end of the tool's axis
+    edge,   ///< the point of the edge from corner 0 to corner 1 nearest to the axis
+    fixed,  ///< weights and normal stay as they are through a step
+};
+
+/// The feature of a point whose weights and normal stay as they are.
+inline constexpr int fixed_feature = -1;
+
+/// Features are numbered as `proximity` has its pairs.
+[[nodiscard]] constexpr ContactKind kind_of(int feature) noexcept {
+    if (feature == fixed_feature) return ContactKind::fixed;
+    return feature < 2 ? ContactKind::end : ContactKind::edge;
+}
+
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
+/// As many contact points of one kind as there are lanes, no two with a corner in common: what they act with, and what was
+/// found when they were last located. They lie in memory alike for every instruction set.
+template <Real Scalar>
+struct alignas(32) ContactPack {
+    using Wide = Lanes<Scalar>;
+    static constexpr std::size_t lanes = Wide::count;
+
+    Vector3<Wide> weights, normal;
+    Wide force;                          ///< multiplier [N], 0 or more
+    Vector3<Wide> stiffness;             ///< that it adds to each corner [N/m]
+    Vector3<Wide> axis_point;            ///< of the tool, nearest to the point [m]
+
+    // What the rows of forces have of it.
+    Vector3<Wide> added_weights, added_normal;
+    Wide added_force;
+    Vector3<Wide> added_stiffness;
+
+    Vector3<Wide> free;                              ///< 1 for a corner that may move
+    Wide end;                                        ///< 0 or 1: which end of the tool's axis
+    Wide listed;                                     ///< 1 for lanes in use
+    Wide used;                                       ///< the same, but 0 where the tool's axis is nearest with an end
+    std::array<std::array<Index, lanes>, 3> corner;  ///< where the rows of the corners begin
+    std::array<Index, lanes> point;                  ///< which contact point, of all of the step
+    std::array<unsigned char, lanes> turn;           ///< which corner of the point is corner 0 here
+    std::size_t size = 0;                            ///< lanes in use
+    ContactKind kind = ContactKind::end;
+    bool on_fixed = false;                           ///< whether a corner of one is fixed
+};
+
+/// Contact points in packs, for all constraints of a step. A point goes to the first pack of its kind with room that has none
+/// of its corners: as a greedy colouring goes, so that points of one pack may be solved at once.
+template <Real Scalar>
+class ContactPacks {
+  public:
+    ContactPacks(Index vertex_count, std::size_t capacity)
+        : packs_(capacity), colours_(static_cast<std::size_t>(vertex_count), 0), nobody_(numbers_in_point * vertex_count) {}
+
+    void clear() noexcept { packs_.clear(); }
+    [[nodiscard]] std::size_t size() const noexcept { return packs_.size(); }
+    [[nodiscard]] std::span<ContactPack<Scalar>> items() noexcept { return packs_.items(); }
+    [[nodiscard]] std::span<const ContactPack<Scalar>> items() const noexcept { return packs_.items(); }
+
+    /// Appends packs of these points, whose forces are in the rows of forces; the first is number `first` of all. There is room for as many
+    /// packs as for points. Cost: linear in their number.
+    template <class IsFixed>
+    void append(std::span<const ContactPoint<Scalar>> points, std::size_t first, IsFixed is_fixed) noexcept;
+
+  private:
+    static constexpr std::size_t colour_count = 64;
+    static constexpr std::size_t lanes = ContactPack<Scalar>::lanes;
+
+    [[nodiscard]] ContactPack<Scalar>& begin_pack(ContactKind kind) noexcept;
+
+    BoundedList<ContactPack<Scalar>> packs_;
+    std::vector<std::uint64_t> colours_;  // of each vertex, those of the points it is a corner of; zero between calls
+    Index nobody_;
+};
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
+template <Real Scalar>
+auto ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept -> ContactPack<Scalar>& {
+    ContactPack<Scalar> pack;
+    const Vector3<Lanes<Scalar>> none(0, 0, 0);
+    pack.weights = pack.normal = pack.stiffness = pack.axis_point = pack.free = none;
+    pack.added_weights = pack.added_normal = pack.added_stiffness = none;
+    pack.force = pack.added_force = pack.end = pack.listed = pack.used = Scalar(0);
+    for (auto& begins : pack.corner) begins.fill(nobody_);
+    pack.point.fill(no_index);
+    pack.turn.fill(0);
+    pack.kind = kind;
+    packs_.push(pack);
+    return packs_.items().back();
+}
+
+template <Real Scalar>
+template <class IsFixed>
+void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, std::size_t first,
+                                  IsFixed is_fixed) noexcept {
+    constexpr std::size_t none = static_cast<std::size_t>(-1);
+    std::array<std::array<std::size_t, colour_count>, 3> open;  // of each kind and colour, the pack with room
+    for (auto& of_kind : open) of_kind.fill(none);
+    const auto colours = [this](Index v) -> std::uint64_t& { return colours_[static_cast<std::size_t>(v)]; };
+    for (const auto& point : points) {
+        const auto& v = point.corners;
+        const ContactKind kind = kind_of(point.feature);
+        // A vertex with so many points that all colours are taken has the next ones in packs of their own.
+        const auto colour = static_cast<std::size_t>(std::countr_one(colours(v[0]) | colours(v[1]) | colours(v[2])));
+        std::size_t at = colour < colour_count ? open[static_cast<std::size_t>(kind)][colour] : none;
+        if (at == none || packs_[at].size == lanes) {
+            at = packs_.size();
+            static_cast<void>(begin_pack(kind));
+            if (colour < colour_count) open[static_cast<std::size_t>(kind)][colour] = at;
+        }
+        ContactPack<Scalar>& pack = packs_.items()[at];
+        const std::size_t i = pack.size++;
+        const unsigned char turn = kind == ContactKind::edge ? static_cast<unsigned char>(point.feature - 2) : 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const std::size_t corner = (k + turn) % 3;
+            const auto row = static_cast<Eigen::Index>(k);
+            pack.corner[k][i] = numbers_in_point * v[corner];
+            pack.weights[row].set(i, point.weights[static_cast<Eigen::Index>(corner)]);
+            pack.normal[row].set(i, point.normal[row]);
+            pack.added_weights[row].set(i, pack.weights[row][i]);
+            pack.added_normal[row].set(i, point.normal[row]);
+            pack.free[row].set(i, is_fixed(v[corner]) ? Scalar(0) : Scalar(1));
+            if (colour < colour_count) colours(v[k]) |= std::uint64_t{1} << colour;
+        }
+        pack.force.set(i, norm(point.force));
+        pack.added_force.set(i, norm(point.force));
+        pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
+        pack.listed.set(i, 1);
+        pack.used.set(i, 1);
+        pack.point[i] = static_cast<Index>(first + static_cast<std::size_t>(&point - points.data()));
+        pack.turn[i] = turn;
+        pack.on_fixed = pack.on_fixed || point.on_fixed;
+    }
+    for (const auto& point : points) {
+        for (const Index v : point.corners) colours(v) = 0;
+    }
+}
+
+}  // namespace membrane

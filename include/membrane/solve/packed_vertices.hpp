@@ -1,0 +1,385 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <membrane/core/bounded_list.hpp>
+#include <membrane/core/executor.hpp>
+#include <membrane/core/lane_points.hpp>
+#include <membrane/solve/vertex_update.hpp>
+
+/// Updates of several vertices at once.
+///
+///     packed.assign(queue.vertices(), queue.group_ends(), network);         // where the queue has changed
+///     packed.append(active.vertices(), active.from_queue(), active.group_ends(), network);
+///     packed.begin_step(scene);
+///     for (std::size_t p = 0; p < packed.count(); ++p) packed.update<false>(p, scene, rule);
+namespace membrane {
+
+/// Whether a rule's updates may be made in lanes: the network is of springs, their law and the rule take `Lanes`, the volume
+/// model hands out its springs, and no update needs a line search.
+template <class Scalar, class Rule, class Network, class Volume>
+concept UpdatesInLanes = (Network::never_stiffens ||
+                          !is_safe_rule<Rule>)&&requires(const Rule& rule, const Network& network,
+                                                         const SpringState<Lanes<Scalar>>& spring,
+                                                         const VertexState<Lanes<Scalar>>& vertex) {
+    network.law()(spring);
+    rule.compliance(vertex);
+}
+&&(std::same_as<Volume, NoVolumeSprings> || requires(const Volume& volume, const Vector3<Scalar>& start, Scalar dt) {
+    { volume.spring(Index(0), start, dt) } -> std::same_as<VolumeSpring<Scalar>>;
+});
+
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
+/// The vertices of a queue, and then others, in packs of as many as there are lanes: of each its springs, its volume spring
+/// and whether it may move. Vertices of one pack are of one group, which no spring joins. Positions are in `StepState`.
+/// It holds as many groups as there is room for, from the first on.
+template <Real Scalar>
+class PackedVertices {
+  public:
+    using Wide = Lanes<Scalar>;
+
+    /// Has room for `capacity` vertices.
+    template <ElasticNetwork<Scalar> Network>
+    explicit PackedVertices(const Network& network, Index capacity = unlimited);
+
+    /// Packs these vertices, in groups that end at `ends`, in place of all there were. Online. Cost: their springs.
+    template <class Network>
+    void assign(std::span<const Index> vertices, std::span<const std::size_t> ends, const Network& network) noexcept;
+
+    /// Appends, until the next call, the groups of `vertices` from number `begin` on; none if not all of those that were
+    /// assigned have room. Online. Cost: their springs.
+    template <class Network>
+    void append(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
+                const Network& network) noexcept;
+
+    /// How many vertices and packs there are.
+    [[nodiscard]] std::size_t size() const noexcept { return members_.size(); }
+    [[nodiscard]] std::size_t count() const noexcept { return packs_.size(); }
+
+    /// The vertices of pack `p`, and the number of the first among all.
+    [[nodiscard]] std::span<const Index> vertices(std::size_t p) const noexcept {
+        return members_.items().subspan(packs_[p].first, packs_[p].size);
+    }
+    [[nodiscard]] std::size_t first_of(std::size_t p) const noexcept { return packs_[p].first; }
+
+    /// The first pack that begins at vertex number `first` or later.
+    [[nodiscard]] std::size_t pack_from(std::size_t first) const noexcept {
+        const auto packs = packs_.items();
+        const auto begins_before = [](const Pack& pack, std::size_t at) { return pack.first < at; };
+        return static_cast<std::size_t>(std::lower_bound(packs.begin(), packs.end(), first, begins_before) -
+                                        packs.begin());
+    }
+
+    /// All vertices in packs and their neighbours, each once: their positions must be loaded.
+    [[nodiscard]] std::span<const Index> needed() const noexcept { return needed_.items(); }
+
+    /// Takes volume springs, masses and who is fixed for the step. @pre `needed` are loaded
+    template <class Scene>
+    void begin_step(const Scene& scene) noexcept;
+
+    /// How many of pack `p` may move.
+    [[nodiscard]] Index free_count(std::size_t p) const noexcept { return terms_[p].free_count; }
+
+    enum class Outcome : unsigned char { at_rest, moved, too_far };
+
+    /// Moves the vertices of pack `p` as `rule` says; `in_contact`, constraints act on them, and what they answer with is
+    /// kept. Where the move may be beyond what is stable, it is `too_far`, and nothing moves, unless it is `allowed`.
+    template <bool in_contact, class Scene, class Rule>
+    Outcome update(std::size_t p, const Scene& scene, const Rule& rule, bool allowed = false) noexcept;
+
+    /// The same for packs number `begin` to `end` that no spring joins, some by each thread.
+    template <class Scene, class Rule>
+    void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule,
+                const ExecutorRef& executor) noexcept {
+        constexpr std::size_t packs_in_task = 32;
+        parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
+            for (std::size_t p = begin + first; p < begin + last; ++p) outcomes_[p] = update<false>(p, scene, rule);
+        });
+    }
+    [[nodiscard]] Outcome outcome(std::size_t p) const noexcept { return outcomes_[p]; }
+
+    /// Leaves the forces on the vertices of pack `p` in the rows of residual forces.
+    template <class Scene>
+    void evaluate_residual(std::size_t p, const Scene& scene) const noexcept;
+
+  private:
+    static constexpr std::size_t lanes = Wide::count;
+    using Begins = std::array<Index, lanes>;  // of each lane, where its row begins
+    struct Pack {
+        std::size_t first, size;  // of the members
+        std::size_t slot, slot_count;
+        Begins own;
+    };
+    // One spring of each vertex of a pack. It lies in memory alike for every instruction set.
+    struct alignas(32) Slot {
+        Wide stiffness, rest_length;
+        Begins other;
+    };
+    struct alignas(32) Terms {
+        VolumeSpring<Wide> spring;
+        Wide mass = 1;
+        Wide free = 0;  // 1 where it may move
+        Index free_count = 0;
+        bool damps = false;
+    };
+    struct Extent {
+        std::size_t members = 0, packs = 0, slots = 0, needed = 0;
+    };
+
+    template <class Network>
+    [[nodiscard]] bool pack(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
+                            const Network& network) noexcept;
+    template <class Network>
+    [[nodiscard]] bool append_pack(std::span<const Index> vertices, const Network& network) noexcept;
+    void truncate(const Extent& extent) noexcept;
+    void need(Index v) noexcept {
+        unsigned char& marked = is_needed_[static_cast<std::size_t>(v)];
+        if (marked == 0) needed_.push(v);
+        marked = 1;
+    }
+    template <class Sum, class Scene>
+    [[nodiscard]] Sum springs_on(std::size_t p, const Vector3<Wide>& here, const Scene& scene) const noexcept;
+    template <bool in_contact, class Scene>
+    void add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene, Pull<Wide>& others) const noexcept;
+
+    // Packs are half empty at the worst that is made room for.
+    [[nodiscard]] static std::size_t packs_for(std::size_t vertices) noexcept {
+        return vertices == 0 ? 0 : 2 * vertices / lanes + 64;
+    }
+
+    Index nobody_;  // where the row begins that is no vertex's
+    BoundedList<Index> members_;
+    BoundedList<Pack> packs_;
+    std::vector<Terms> terms_;
+    std::vector<Outcome> outcomes_;
+    std::size_t slot_count_ = 0;
+    std::vector<Slot> slots_;
+    BoundedList<Index> needed_;
+    std::vector<unsigned char> is_needed_;
+    Extent assigned_;
+    bool is_whole_ = false;  // what was assigned has room
+};
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
+template <Real Scalar>
+template <ElasticNetwork<Scalar> Network>
+PackedVertices<Scalar>::PackedVertices(const Network& network, Index capacity)
+    : nobody_(numbers_in_point * network.vertex_count()),
+      members_(static_cast<std::size_t>((std::min)(network.vertex_count(), capacity))),
+      packs_(packs_for(members_.room())),
+      terms_(packs_.room()),
+      outcomes_(packs_.room()),
+      needed_(capacity > 0 ? static_cast<std::size_t>(network.vertex_count()) : 0),
+      is_needed_(needed_.room(), 0) {
+    std::size_t ends = 0, longest = 0;
+    for (Index v = 0; v < network.vertex_count(); ++v) {
+        ends += network.neighbours(v).size();
+        longest = (std::max)(longest, network.neighbours(v).size());
+    }
+    ends = (std::min)(ends, longest * members_.room());
+    if (capacity > 0) slots_.resize(2 * ends / lanes + 64 * longest);
+}
+
+template <Real Scalar>
+template <class Network>
+void PackedVertices<Scalar>::assign(std::span<const Index> vertices, std::span<const std::size_t> ends,
+                                    const Network& network) noexcept {
+    truncate({});
+    is_whole_ = pack(vertices, 0, ends, network);
+    assigned_ = {members_.size(), packs_.size(), slot_count_, needed_.size()};
+}
+
+template <Real Scalar>
+template <class Network>
+void PackedVertices<Scalar>::append(std::span<const Index> vertices, std::size_t begin,
+                                    std::span<const std::size_t> ends, const Network& network) noexcept {
+    truncate(assigned_);
+    if (is_whole_) static_cast<void>(pack(vertices, begin, ends, network));
+}
+
+// False if there is no room for all.
+template <Real Scalar>
+template <class Network>
+bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t begin,
+                                  std::span<const std::size_t> ends, const Network& network) noexcept {
+    for (const std::size_t end : ends) {
+        while (begin < end) {
+            const std::size_t size = (std::min)(lanes, end - begin);
+            if (!append_pack(vertices.subspan(begin, size), network)) return false;
+            begin += size;
+        }
+    }
+    return true;
+}
+
+template <Real Scalar>
+void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
+    for (const Index v : needed_.items().subspan(extent.needed)) is_needed_[static_cast<std::size_t>(v)] = 0;
+    members_.cut(extent.members);
+    packs_.cut(extent.packs);
+    slot_count_ = extent.slots;
+    needed_.cut(extent.needed);
+}
+
+// False if there is no room. Lanes without a vertex, and those of vertices with fewer springs, have springs of no length
+// that never pull.
+template <Real Scalar>
+template <class Network>
+bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const Network& network) noexcept {
+    std::size_t springs = 0;
+    for (const Index v : vertices) springs = (std::max)(springs, network.neighbours(v).size());
+    if (members_.size() + vertices.size() > members_.room() || slot_count_ + springs > slots_.size()) return false;
+    Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}};
+    pack.own.fill(nobody_);
+    for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
+    if (!packs_.push(pack)) return false;
+    const auto slots = std::span(slots_).subspan(slot_count_, springs);
+    for (Slot& slot : slots) slot = {Scalar(0), Scalar(0), pack.own};
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        members_.push(vertices[i]);
+        need(vertices[i]);
+        Slot* slot = slots.data();
+        for (const auto& spring : network.springs_of(vertices[i])) {
+            slot->stiffness.set(i, spring.stiffness);
+            slot->rest_length.set(i, spring.rest_length);
+            slot->other[i] = numbers_in_point * spring.other;
+            need(spring.other);
+            ++slot;
+        }
+    }
+    slot_count_ += springs;
+    return true;
+}
+
+template <Real Scalar>
+template <class Scene>
+void PackedVertices<Scalar>::begin_step(const Scene& scene) noexcept {
+    for (std::size_t p = 0; p < count(); ++p) {
+        Terms& terms = terms_[p] = {};
+        const auto members = vertices(p);
+        for (std::size_t i = 0; i < members.size(); ++i) {
+            const Index v = members[i];
+            if (!scene.state.is_fixed(v)) {
+                terms.free.set(i, 1);
+                ++terms.free_count;
+            }
+            if (scene.network.has_masses()) terms.mass.set(i, scene.network.mass(v));
+            if constexpr (requires { scene.volume.spring(v, point(scene.start, v), scene.dt); }) {
+                const auto spring = scene.volume.spring(v, point(scene.start, v), scene.dt);
+                for (Eigen::Index k = 0; k < 3; ++k) terms.spring.anchor[k].set(i, spring.anchor[k]);
+                terms.spring.stiffness.set(i, spring.stiffness);
+                terms.spring.rate.set(i, spring.rate);
+                terms.damps = terms.damps || spring.rate != 0;
+                terms.spring.before.set(i, spring.before);
+            }
+        }
+    }
+}
+
+template <Real Scalar>
+template <class Sum, class Scene>
+[[gnu::always_inline]] inline Sum PackedVertices<Scalar>::springs_on(std::size_t p, const Vector3<Wide>& here,
+                                                                     const Scene& scene) const noexcept {
+    Sum sum{};
+    const auto* rows = scene.state.position.data();
+    for (const Slot& slot : std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count)) {
+        const Vector3<Wide> edge = gather(rows, slot.other.data()) - here;
+        add(sum, pull_of<Wide>(scene.network.law(), edge, slot.stiffness, slot.rest_length));
+    }
+    return sum;
+}
+
+// Volume springs and constraints; `others` comes with what the latter do.
+template <Real Scalar>
+template <bool in_contact, class Scene>
+[[gnu::always_inline]] inline void PackedVertices<Scalar>::add_others(std::size_t p, const Vector3<Wide>& here,
+                                                                      const Scene& scene,
+                                                                      Pull<Wide>& others) const noexcept {
+    if constexpr (!std::same_as<std::remove_cvref_t<decltype(scene.volume)>, NoVolumeSprings>) {
+        const auto& spring = terms_[p].spring;
+        const auto foundation = terms_[p].damps ? spring.pull(here) : spring.elastic_pull(here);
+        others.force = in_contact ? Vector3<Wide>(foundation.force + others.force) : foundation.force;
+        others.stiffness = in_contact ? Wide(foundation.stiffness + others.stiffness) : foundation.stiffness;
+    }
+}
+
+template <Real Scalar>
+template <bool in_contact, class Scene, class Rule>
+[[gnu::flatten]] auto PackedVertices<Scalar>::update(std::size_t p, const Scene& scene, const Rule& rule,
+                                    [[maybe_unused]] bool allowed) noexcept -> Outcome {
+    StepState<Scalar>& rows = scene.state;
+    const auto& own = packs_[p].own;
+    auto here = gather_padded(rows.position.data(), own.data());
+    VertexState<Wide> vertex;
+    if constexpr (requires { requires Rule::needs_relief; }) {
+        static_cast<CurvedPull<Wide>&>(vertex) = springs_on<CurvedPull<Wide>>(p, here.point, scene);
+    } else {
+        const auto sum = springs_on<Pull<Wide>>(p, here.point, scene);
+        vertex.force = sum.force;
+        vertex.stiffness = sum.stiffness;
+    }
+    Pull<Wide> others;
+    PaddedLanes<Scalar> of_constraints;
+    if constexpr (in_contact) {
+        of_constraints = gather_padded(rows.force.data(), own.data());
+        of_constraints.extra = larger<Wide>(of_constraints.extra, 0);
+        others = {of_constraints.point, of_constraints.extra};
+    }
+    add_others<in_contact>(p, here.point, scene, others);
+    vertex.force += others.force;
+    vertex.stiffness += others.stiffness;
+    vertex.mass = terms_[p].mass;
+    vertex.dt = scene.dt;
+    vertex.touched = in_contact;
+    const auto may_move = terms_[p].free != 0;
+    const auto move = move_of(rule, vertex, rows.force_tolerance);
+    if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+        if (!allowed && any(move.may_overshoot & may_move)) {
+            const auto springs = springs_on<CurvedPull<Wide>>(p, here.point, scene);
+            const Wide bound = curvature_bound(springs) + others.stiffness;
+            if (any((move.compliance * bound >= 2) & may_move)) return Outcome::too_far;
+        }
+    }
+    here.extra = select<Wide>(may_move, move.least, 0);
+    if constexpr (in_contact) {
+        const Symmetric3<Wide> block = select<Wide>(may_move, 1, 0) * as_block<Wide>(move.compliance);
+        const Wide internal = norm<Wide>(vertex.force - of_constraints.point);
+        Begins begins;
+        for (std::size_t i = 0; i < lanes; ++i) begins[i] = 2 * own[i];
+        scatter_padded<Scalar>({{block.xx, block.yy, block.zz}, block.xy}, rows.response.data(), begins.data());
+        scatter_padded<Scalar>({{block.xz, block.yz, select<Wide>(may_move, internal, 0)},
+                                select<Wide>(may_move, vertex.stiffness - of_constraints.extra, 0)},
+                               rows.response.data() + 1, begins.data());
+    }
+    const auto moves = move.moves & may_move;
+    const Vector3<Wide> there = here.point + move.displacement;
+    for (Eigen::Index k = 0; k < 3; ++k) here.point[k] = select(moves, there[k], here.point[k]);
+    scatter_padded(here, rows.position.data(), own.data());
+    return any(moves) ? Outcome::moved : Outcome::at_rest;
+}
+
+template <Real Scalar>
+template <class Scene>
+[[gnu::flatten]] void PackedVertices<Scalar>::evaluate_residual(std::size_t p, const Scene& scene) const noexcept {
+    StepState<Scalar>& rows = scene.state;
+    const auto& own = packs_[p].own;
+    const Vector3<Wide> here = gather(rows.position.data(), own.data());
+    const auto springs = springs_on<Pull<Wide>>(p, here, scene);
+    const auto of_constraints = gather_padded(rows.force.data(), own.data());
+    Pull<Wide> others{of_constraints.point, of_constraints.extra};
+    add_others<true>(p, here, scene, others);
+    const Vector3<Wide> force = springs.force + others.force;
+    Vector3<Wide> undamped = force;
+    if (terms_[p].damps) undamped -= terms_[p].spring.drag(here);
+    scatter_padded<Scalar>({force, norm(undamped)}, rows.residual.data(), own.data());
+}
+
+}  // namespace membrane

@@ -1,0 +1,205 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <membrane/core/bounded_list.hpp>
+#include <membrane/core/index_set.hpp>
+#include <membrane/core/lane_points.hpp>
+#include <membrane/core/rigid_frame.hpp>
+#include <membrane/core/symmetric3.hpp>
+#include <membrane/solve/contact_pack.hpp>
+#include <membrane/solve/contact_point.hpp>
+
+namespace membrane {
+
+/// What a constraint has of a list that all of them share.
+struct ListRange {
+    std::size_t begin = 0, end = 0;
+
+    template <class Item>
+    [[nodiscard]] std::span<Item> of(std::span<Item> items) const noexcept {
+        return items.subspan(begin, end - begin);
+    }
+};
+
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
+/// All that a step works with and keeps for the next one: of each vertex a row of four numbers in each of some arrays, read
+/// and written several at a time. The user's positions are read when a vertex is loaded, and written when the step is over:
+/// until then they are where the vertices were when it began.
+///
+/// A row is up to date where the vertex has been loaded in this step; `response` and the number beside a position are those
+/// of the vertex's last update, in whatever step that was.
+template <Real Scalar>
+struct StepState {
+    /// The largest number of constraints of one step.
+    static constexpr std::size_t max_constraints = 16;
+
+    using Rows = std::vector<PaddedPoint<Scalar>>;
+
+    StepState(Index vertex_count, Index max_contact_points);
+
+    [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed.size()); }
+
+    /// Positions as parts that read a matrix see them.
+    [[nodiscard]] auto positions() const noexcept {
+        using Map = Eigen::Map<const Points<Scalar>, 0, Eigen::OuterStride<>>;
+        return Map(position.front().number.data(), 3, vertex_count(), Eigen::OuterStride<>(numbers_in_point));
+    }
+
+    void begin_step() noexcept;  ///< No vertex is loaded, no force acts.
+    void end_step() noexcept;    ///< Keeps the contact points of the step that ends for the next one.
+    void forget_points() noexcept;
+    void reset() noexcept;                                               ///< As new.
+    void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< What is kept, with the body.
+
+    /// Takes the position of `v` from `x`, unless it has been taken in this step.
+    template <class Network>
+    void load(Index v, const ConstPointsRef<Scalar>& x, const Network& network) noexcept {
+        if (!loaded.insert(v)) return;
+        row(position, v).number[0] = x(0, v);
+        row(position, v).number[1] = x(1, v);
+        row(position, v).number[2] = x(2, v);
+        fixed[static_cast<std::size_t>(v)] = network.pinned(v) ? 1 : 0;
+    }
+    /// Takes all loaded positions from `x` again, but for prescribed ones.
+    void restore(const ConstPointsRef<Scalar>& x) noexcept {
+        for (const Index v : loaded.items()) {
+            if (!prescribed.contains(v)) set_position(v, point(x, v));
+        }
+    }
+    [[nodiscard]] bool is_fixed(Index v) const noexcept { return fixed[static_cast<std::size_t>(v)] != 0; }
+
+    [[nodiscard]] static PaddedPoint<Scalar>& row(Rows& rows, Index v) noexcept {
+        return rows[static_cast<std::size_t>(v)];
+    }
+    [[nodiscard]] static const PaddedPoint<Scalar>& row(const Rows& rows, Index v) noexcept {
+        return rows[static_cast<std::size_t>(v)];
+    }
+    void set_position(Index v, const Vector3<Scalar>& p) noexcept {
+        auto& number = row(position, v).number;
+        for (std::size_t k = 0; k < 3; ++k) number[k] = p[static_cast<Eigen::Index>(k)];
+    }
+
+    /// What the last update of `v` has found: by how much it moves for each newton, and without constraints its force and
+    /// stiffness.
+    [[nodiscard]] Symmetric3<Scalar> compliance_block(Index v) const noexcept {
+        const auto& a = row(response, 2 * v).number;
+        const auto& b = row(response, 2 * v + 1).number;
+        return {a[0], a[1], a[2], a[3], b[0], b[1]};
+    }
+    void set_compliance(Index v, const Symmetric3<Scalar>& block, Scalar least) noexcept {
+        row(response, 2 * v).number = {block.xx, block.yy, block.zz, block.xy};
+        row(response, 2 * v + 1).number[0] = block.xz;
+        row(response, 2 * v + 1).number[1] = block.yz;
+        row(position, v).number[3] = least;
+    }
+    /// Nothing moves `v`.
+    void clear_response(Index v) noexcept {
+        row(response, 2 * v) = row(response, 2 * v + 1) = {};
+        row(position, v).number[3] = 0;
+    }
+    void set_internal(Index v, Scalar size, Scalar stiffness) noexcept {
+        row(response, 2 * v + 1).number[2] = size;
+        row(response, 2 * v + 1).number[3] = stiffness;
+    }
+
+    // One row more than vertices: nobody's, for lanes that are not in use.
+    Rows position;  ///< [m]; the least compliance [m/N]
+    Rows force;     ///< of the constraints [N]; the stiffness that contact adds [N/m]
+    Rows response;  ///< two rows: compliance xx, yy, zz, xy; xz, yz [m/N], internal force [N], internal stiffness [N/m]
+    Rows support;   ///< of fixed vertices: force of the tools [N]; stiffness to tools, 0 where none has come near [N/m]
+    Rows residual;  ///< force at the end of the step [N]; size of that without damping [N]
+    Rows anchor;    ///< where `kept` vertices go back to [m]
+
+    IndexSet loaded, seeds, prescribed, forced;
+    IndexSet bearing;                  // fixed vertices that a tool presses on
+    IndexSet kept;                     // vertices with an `anchor`
+    std::vector<unsigned char> fixed;  // of loaded vertices: pinned or prescribed
+
+    BoundedList<ContactPoint<Scalar>> points, previous_points;
+    std::array<ListRange, max_constraints> point_ranges{}, previous_ranges{};
+    ContactPacks<Scalar> packs;
+    std::array<ListRange, max_constraints> pack_ranges{}, watched_ranges{};
+    BoundedList<Index> watched;  // vertices whose way past a tool is checked
+    IndexSet marked;             // scratch of one call
+
+    Scalar force_tolerance = 0;
+    bool invalid = false, full = false;
+};
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
+template <Real Scalar>
+StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
+    : position(static_cast<std::size_t>(vertices) + 1),
+      force(position),
+      response(2 * position.size()),
+      support(position),
+      residual(position),
+      anchor(position),
+      loaded(vertices),
+      seeds(vertices),
+      prescribed(vertices),
+      forced(vertices),
+      bearing(vertices),
+      kept(vertices),
+      fixed(static_cast<std::size_t>(vertices), 0),
+      points(static_cast<std::size_t>(max_contact_points)),
+      previous_points(points),
+      packs(vertices, static_cast<std::size_t>(max_contact_points)),
+      watched(2 * static_cast<std::size_t>(vertices)),
+      marked(vertices) {}
+
+template <Real Scalar>
+void StepState<Scalar>::begin_step() noexcept {
+    for (const Index v : forced.items()) row(force, v) = {};
+    for (const Index v : bearing.items()) row(support, v).set(Vector3<Scalar>::Zero(), row(support, v).extra());
+    for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &bearing, &kept}) set->clear();
+    points.clear();
+    packs.clear();
+    watched.clear();
+    point_ranges = {};
+    pack_ranges = {};
+    watched_ranges = {};
+    invalid = full = false;
+}
+
+template <Real Scalar>
+void StepState<Scalar>::end_step() noexcept {
+    std::swap(points, previous_points);
+    std::swap(point_ranges, previous_ranges);
+}
+
+template <Real Scalar>
+void StepState<Scalar>::forget_points() noexcept {
+    previous_points.clear();
+    previous_ranges = {};
+}
+
+template <Real Scalar>
+void StepState<Scalar>::reset() noexcept {
+    begin_step();
+    forget_points();
+    for (Rows* rows : {&position, &response, &support}) std::fill(rows->begin(), rows->end(), PaddedPoint<Scalar>{});
+}
+
+template <Real Scalar>
+void StepState<Scalar>::rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept {
+    const RigidFrame<Scalar> turned{.rotation = rotation};
+    for (auto& point : previous_points.items()) {
+        point.normal = turned.direction_out(point.normal);
+        point.force = turned.direction_out(point.force);
+    }
+    for (const Index v : loaded.items()) {  // in the last step
+        const Symmetric3<Scalar> block = rotated(compliance_block(v), rotation);
+        set_compliance(v, block, row(position, v).extra());
+    }
+}
+
+}  // namespace membrane
