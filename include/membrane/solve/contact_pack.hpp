@@ -96,7 +96,8 @@ template <Real Scalar>
 auto ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept -> ContactPack<Scalar>& {
     ContactPack<Scalar> pack;
     const Vector3<Lanes<Scalar>> none(0, 0, 0);
-    pack.weights = pack.normal = pack.stiffness = pack.axis_point = pack.free = none;
+    pack.weights = Vector3<Lanes<Scalar>>(1, 0, 0);  // of unused lanes: numbers that one can reckon with
+    pack.normal = pack.stiffness = pack.axis_point = pack.free = none;
     pack.added_weights = pack.added_normal = pack.added_stiffness = none;
     pack.force = pack.added_force = pack.end = pack.listed = pack.used = Scalar(0);
     for (auto& begins : pack.corner) begins.fill(nobody_);

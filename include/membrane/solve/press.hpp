@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include <membrane/collision/contact.hpp>
 #include <membrane/collision/grasper.hpp>
@@ -91,9 +92,12 @@ template <Real Scalar>
 
 namespace detail {
 
-// Points share vertices: until none is inside they are moved out this often at the most, and solved this often before the
-// vertices find their balance anew. More passes than two close the gaps further, but give no other force.
-inline constexpr int max_push_passes = 8, max_contact_passes = 2;
+// Points share vertices: until none is inside they are moved out this often at the most.
+inline constexpr int max_push_passes = 8;
+
+// And this often they are solved before the vertices find their balance anew. More passes close the gaps further, but give
+// no other force; beside fixed corners, which do not move, they do.
+inline constexpr int max_contact_passes = 2, max_passes_on_fixed = 8;
 
 }  // namespace detail
 
@@ -297,7 +301,10 @@ bool Press<Scalar>::enforce(Context& context) const noexcept {
     if (!contact.touching()) return false;
     Scalar first = 0;  // largest change of a force in the first pass [N]
     bool released = false;
-    for (int i = 0; i < detail::max_contact_passes; ++i) {
+    const auto points = std::as_const(context).points();
+    const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
+    const int most = on_fixed ? detail::max_passes_on_fixed : detail::max_contact_passes;
+    for (int i = 0; i < most; ++i) {
         const auto pass = solve_contacts(context.state(), shape(), packs(context));
         released = released || pass.released;
         if (i == 0) first = pass.largest;
