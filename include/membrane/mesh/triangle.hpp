@@ -175,9 +175,9 @@ TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q)
         barycentric[next] = select<N>(nearer, along, barycentric[next]);
         barycentric[last] = select<N>(nearer, 0, barycentric[last]);
     };
-    consider(0, !has_area | (weight_c < 0), aq, ab);
-    consider(1, !has_area | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
-    consider(2, !has_area | (weight_b < 0), q - triangle.c, -ac);
+    consider(0, (!has_area) | (weight_c < 0), aq, ab);
+    consider(1, (!has_area) | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
+    consider(2, (!has_area) | (weight_b < 0), q - triangle.c, -ac);
     for (Eigen::Index k = 0; k < 3; ++k) barycentric[k] = select<N>(over_face, in_face[k], barycentric[k]);
     return {barycentric, point_at(triangle, barycentric),
             select<N>(over_face, squared_norm(offset_in_face), nearest)};
