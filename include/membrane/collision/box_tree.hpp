@@ -235,12 +235,12 @@ template <Real Scalar>
 
 template <Real Scalar>
 void BoxTree<Scalar>::fit_node(Index n) noexcept {
-    const auto count = static_cast<Index>(nodes_[static_cast<std::size_t>(n)].children);
-    const Index first = n * static_cast<Index>(width), end = first + static_cast<Index>(width);
+    const std::size_t children = nodes_[static_cast<std::size_t>(n)].children;
+    const Index first = n * static_cast<Index>(width);
     const Box<Scalar> in_place_of_missing = box_in(first);
-    for (Index i = first + count; i < end; ++i) put(in_place_of_missing, i);
+    for (std::size_t i = children; i < width; ++i) put(in_place_of_missing, first + static_cast<Index>(i));
     Box<Scalar> box;
-    for (Index i = first; i < end; ++i) box.include(box_in(i));
+    for (Index i = 0; i < static_cast<Index>(width); ++i) box.include(box_in(first + i));
     const Index place = place_of_part_[static_cast<std::size_t>(n)];
     if (place == no_index) {
         surface_ = box;
