@@ -174,6 +174,9 @@ SegmentPair<Scalar> Neighbourhood<Scalar>::nearest(const ConstPointsRef<Scalar>&
 template <Real Scalar>
 Lanes<Scalar> Neighbourhood<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Several& some,
                                                        const Vector3<Scalar>& q) const noexcept {
+    if constexpr (Lanes<Scalar>::parts > 1) {  // registers of half the lanes, without a blend: slower than one by one
+        return Lanes<Scalar>::of([&](std::size_t i) { return squared_distance(triangle(x, some[i]), q); });
+    }
     const auto corner = [&](Eigen::Index k) {
         std::array<const Scalar*, Lanes<Scalar>::count> p;
         for (std::size_t i = 0; i < p.size(); ++i) p[i] = x.data() + triangles_(k, some[i]) * x.outerStride();

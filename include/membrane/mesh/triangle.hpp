@@ -99,7 +99,7 @@ namespace detail {
 
 /// `part / whole` between 0 and 1, whatever the two are.
 template <Number N>
-[[nodiscard]] N fraction(const N& part, const N& whole) noexcept {
+[[gnu::always_inline, nodiscard]] inline N fraction(const N& part, const N& whole) noexcept {
     const auto inside = (part > 0) & (part < whole);
     return select<N>(inside, part / select<N>(inside, whole, 1), select<N>(part > 0, 1, 0));
 }
@@ -174,7 +174,8 @@ template <Number N>
     // Outside, the nearest point lies on an edge that faces q.
     N nearest = Limits::infinity();
     Vector3<N> barycentric(1, 0, 0);
-    const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge) {
+    const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge)
+        __attribute__((always_inline)) {
         if (one && !any(faces)) return;
         const N along = fraction(dot(offset, edge), squared_norm(edge));
         const N squared_distance = squared_norm<N>(offset - along * edge);
