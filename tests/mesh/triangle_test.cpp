@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <type_traits>
 #include <vector>
@@ -167,6 +168,58 @@ TEMPLATE_TEST_CASE("no point of a triangle of any shape is nearer than the neare
         // A height is lost at most, and only where it is below sqrt(epsilon).
         CHECK(distance <= least + 2 * std::sqrt(epsilon<S>) * scale);
         if (seed % static_cast<int>(shapes.size()) == 0) CHECK(distance <= least + 64 * epsilon<S> * scale);
+    }
+}
+
+/// A triangle of any shape and size, in one case of ten with a coordinate that is no number or too large a one.
+template <class S>
+Triangle<S> wild_triangle(Random& random) {
+    using Limits = std::numeric_limits<S>;
+    auto t = random_triangle<S>(shapes[static_cast<std::size_t>(random.index(6))], random);
+    if (random.chance(0.3)) {
+        const auto scale = static_cast<S>(std::pow(10, random.number(-35.0, 35.0)));
+        for (auto* p : {&t.a, &t.b, &t.c}) *p *= scale;
+    }
+    if (random.chance(0.1)) {
+        const std::array bad{Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity(), Limits::max(), S(-0.0)};
+        auto& p = *std::array{&t.a, &t.b, &t.c}[static_cast<std::size_t>(random.index(3))];
+        p[random.index(3)] = bad[static_cast<std::size_t>(random.index(5))];
+    }
+    return t;
+}
+
+TEMPLATE_TEST_CASE("of several triangles at once the nearest points are, bit for bit, those of each", "[triangle][bad]",
+                   float, double) {
+    using S = TestType;
+    constexpr std::size_t count = Lanes<S>::count;
+    const auto same = [](S a, S b) { return std::isnan(a) ? std::isnan(b) : std::memcmp(&a, &b, sizeof a) == 0; };
+    for (int seed = 1; seed <= cases(5000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        std::array<Triangle<S>, count> triangles;
+        for (auto& t : triangles) t = wild_triangle<S>(random);
+        if (random.chance(0.1)) triangles.fill(triangles[0]);
+        const Vector3<S> q = random_point_near(triangles[0], random);
+        const auto lanes_of = [&](Vector3<S> Triangle<S>::*corner) {
+            const auto along = [&](Eigen::Index k) {
+                return Lanes<S>::of([&](std::size_t i) { return (triangles[i].*corner)[k]; });
+            };
+            return Vector3<Lanes<S>>(along(0), along(1), along(2));
+        };
+        const Triangle<Lanes<S>> all{lanes_of(&Triangle<S>::a), lanes_of(&Triangle<S>::b), lanes_of(&Triangle<S>::c)};
+        const auto found = closest_point(all, Vector3<Lanes<S>>(q.x(), q.y(), q.z()));
+        const auto squares = squared_distance(all, Vector3<Lanes<S>>(q.x(), q.y(), q.z()));
+        for (std::size_t i = 0; i < count; ++i) {
+            CAPTURE(i);
+            const auto expected = closest_point(triangles[i], q);
+            for (Eigen::Index k = 0; k < 3; ++k) {
+                REQUIRE(same(found.barycentric[k][i], expected.barycentric[k]));
+                REQUIRE(same(found.point[k][i], expected.point[k]));
+            }
+            REQUIRE(same(found.squared_distance[i], expected.squared_distance));
+            REQUIRE(same(squares[i], expected.squared_distance));
+            REQUIRE(same(squared_distance(triangles[i], q), expected.squared_distance));
+        }
     }
 }
 

@@ -250,7 +250,7 @@ TEST_CASE("nor does it jump over a pin, or a vertex that is held, in whatever or
 }
 
 TEST_CASE("beside a rim a tool that stands still feels a force that does, however the solver predicts") {
-    // Near y = 9.72 mm there are two states of rest, with and without the axis behind the rim: see `Press`.
+    // At some places beside a rim there are two states of rest, and the path decides between them.
     int places = 0, with_two_states = 0;
     for (double y = 0.0085; y < 0.0104; y += 5e-5) {
         double forces[2];

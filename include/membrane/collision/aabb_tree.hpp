@@ -58,7 +58,8 @@ class AabbTree {
     void refit(const ConstPointsRef<Scalar>& x) noexcept { boxes_.refit(x); }
 
     /// Fits the boxes around the vertices `moved`, each once, in any order, repeated or not: to the bit what a refit of
-    /// all gives if only these have moved since the last one. O(moved * depth), no allocation.
+    /// all gives if only these have moved since the last one. O(moved * depth) and a bit for each node, no
+    /// allocation.
     /// @pre `x` has as many points as the mesh and `moved` names some of them (asserted)
     void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept { boxes_.refit(x, moved); }
 

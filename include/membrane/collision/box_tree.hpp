@@ -14,6 +14,7 @@
 #include <membrane/collision/tree_shape.hpp>
 #include <membrane/core/compressed_rows.hpp>
 #include <membrane/core/index_set.hpp>
+#include <membrane/core/lane_points.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/mesh/triangle.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
@@ -62,6 +63,8 @@ class BoxTree {
 
   private:
     static constexpr std::size_t width = Lanes<Scalar>::count;
+    static constexpr std::size_t bits_in_word = 64;
+    static constexpr Index filled = 4;  // what the length of most rows of vertices and leaves is a multiple of
 
     /// Of each child the box, and which part it is. In place of those that are missing the first one's box: a key is
     /// to be reckoned with sound numbers only.
@@ -86,7 +89,10 @@ class BoxTree {
         return std::span(items_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
     }
     [[nodiscard]] Box<Scalar> box_in(Index place) const noexcept;
-    void fit(const ConstPointsRef<Scalar>& x, Index part) noexcept;
+    void fit_leaf(const ConstPointsRef<Scalar>& x, Index leaf) noexcept;
+    void fit_node(Index n) noexcept;
+    void put(const Box<Scalar>& box, Index place) noexcept;
+    void mark_parent(Index part) noexcept;
     [[nodiscard]] static Triangle<Lanes<Scalar>> triangles_at(const ConstPointsRef<Scalar>& x,
                                                               const Item* some) noexcept;
 
@@ -101,12 +107,13 @@ class BoxTree {
     std::vector<Leaf> leaves_;
 
     // Parts are the nodes, and after them the leaves; places number node for node what may be a child.
-    std::vector<Index> place_of_node_;   // of the shape; `no_index` for the root and what is folded in
-    std::vector<Index> place_of_part_;   // `no_index` for the root
-    CompressedRows<Index> vertices_of_;  // of a leaf
-    CompressedRows<Index> leaves_of_;    // around a vertex
-    IndexSet stale_;                     // the parts to fit
-    std::vector<std::int8_t> awaited_;   // how many of a node's children are to be fitted before it
+    std::vector<Index> place_of_node_;  // of the shape; `no_index` for the root and what is folded in
+    std::vector<Index> place_of_part_;  // `no_index` for the root
+    // Filled up by repetition: a processor predicts rows that are nearly all equally long.
+    CompressedRows<Index> vertices_of_;       // of a leaf
+    CompressedRows<Index> leaves_of_;         // around a vertex
+    IndexSet stale_leaves_;                   // to be fitted
+    std::vector<std::uint64_t> stale_nodes_;  // 64 in a word
     TreeStatistics statistics_;
 };
 
@@ -137,8 +144,8 @@ BoxTree<Scalar>::BoxTree(const TriangleMesh<Scalar>& mesh, const TreeOptions& op
     items_.insert(items_.end(), width - 1, items_.back());  // several are read at once, from any on
     fold();
     share_out_vertices(mesh.vertex_count());
-    stale_ = IndexSet(node_count() + statistics_.leaves);
-    awaited_.assign(nodes_.size(), 0);
+    stale_leaves_ = IndexSet(statistics_.leaves);
+    stale_nodes_.assign(nodes_.size() / bits_in_word + 1, 0);
     refit(mesh.positions());
 }
 
@@ -174,16 +181,29 @@ void BoxTree<Scalar>::share_out_vertices(Index vertex_count) {
     vertices_of_ = CompressedRows<Index>(statistics_.leaves, [&](auto put) {
         std::vector<Index> latest(static_cast<std::size_t>(vertex_count), no_index);
         for (Index leaf = 0; leaf < statistics_.leaves; ++leaf) {
+            Index count = 0;
             for (const Item& item : items_of(leaf)) {
                 for (const Index v : item.corners) {
-                    if (std::exchange(latest[static_cast<std::size_t>(v)], leaf) != leaf) put(leaf, v);
+                    if (std::exchange(latest[static_cast<std::size_t>(v)], leaf) == leaf) continue;
+                    put(leaf, v);
+                    ++count;
                 }
             }
+            for (; count % filled != 0; ++count) put(leaf, items_of(leaf)[0].corners[0]);
         }
     });
     leaves_of_ = CompressedRows<Index>(vertex_count, [&](auto put) {
+        std::vector<Index> latest(static_cast<std::size_t>(vertex_count), no_index), count(latest.size(), 0);
         for (Index leaf = 0; leaf < statistics_.leaves; ++leaf) {
-            for (const Index v : vertices_of_[leaf]) put(v, leaf);
+            for (const Index v : vertices_of_[leaf]) {
+                if (std::exchange(latest[static_cast<std::size_t>(v)], leaf) == leaf) continue;
+                put(v, leaf);
+                ++count[static_cast<std::size_t>(v)];
+            }
+        }
+        for (Index v = 0; v < vertex_count; ++v) {
+            const auto some = static_cast<std::size_t>(v);
+            for (; count[some] != 0 && count[some] < filled; ++count[some]) put(v, latest[some]);
         }
     });
 }
@@ -197,30 +217,52 @@ Box<Scalar> BoxTree<Scalar>::box_in(Index place) const noexcept {
 }
 
 template <Real Scalar>
-void BoxTree<Scalar>::fit(const ConstPointsRef<Scalar>& x, Index part) noexcept {
-    Box<Scalar> box;
-    if (part < node_count()) {
-        const std::size_t first = static_cast<std::size_t>(part) * width;
-        const std::size_t children = nodes_[static_cast<std::size_t>(part)].children;
-        for (std::size_t i = 0; i < children; ++i) box.include(box_in(static_cast<Index>(first + i)));
-    } else {
-        for (const Index v : vertices_of_[part - node_count()]) box.include(point(x, v));
+[[gnu::always_inline]] inline void BoxTree<Scalar>::fit_leaf(const ConstPointsRef<Scalar>& x, Index leaf) noexcept {
+    using Limits = std::numeric_limits<Scalar>;
+    const Scalar* const first = x.data();
+    const std::ptrdiff_t stride = x.outerStride();
+    const auto vertices = vertices_of_[leaf];
+    PaddedVector<Scalar> low((Limits::max)()), high(Limits::lowest());
+    for (std::size_t i = 0; i < vertices.size(); i += static_cast<std::size_t>(filled)) {
+        for (std::size_t k = i; k < i + static_cast<std::size_t>(filled); ++k) {
+            const auto p = PaddedVector<Scalar>::load_point(first + vertices[k] * stride);
+            low = smaller(low, p);
+            high = larger(high, p);
+        }
     }
-    const Index place = place_of_part_[static_cast<std::size_t>(part)];
+    put({low.point(), high.point()}, place_of_part_[static_cast<std::size_t>(node_count() + leaf)]);
+}
+
+template <Real Scalar>
+void BoxTree<Scalar>::fit_node(Index n) noexcept {
+    const std::size_t children = nodes_[static_cast<std::size_t>(n)].children;
+    const Index first = n * static_cast<Index>(width);
+    const Box<Scalar> in_place_of_missing = box_in(first);
+    for (std::size_t i = children; i < width; ++i) put(in_place_of_missing, first + static_cast<Index>(i));
+    Box<Scalar> box;
+    for (Index i = 0; i < static_cast<Index>(width); ++i) box.include(box_in(first + i));
+    const Index place = place_of_part_[static_cast<std::size_t>(n)];
     if (place == no_index) {
         surface_ = box;
-        return;
+    } else {
+        put(box, place);
     }
-    Node& node = nodes_[static_cast<std::size_t>(place) / width];
-    const auto put = [&](std::size_t i) {
-        for (int k = 0; k < 3; ++k) {
-            node.boxes.low[k].set(i, box.low[k]);
-            node.boxes.high[k].set(i, box.high[k]);
-        }
-    };
-    const std::size_t own = static_cast<std::size_t>(place) % width;
-    put(own);
-    for (std::size_t i = node.children; own == 0 && i < width; ++i) put(i);
+}
+
+template <Real Scalar>
+[[gnu::always_inline]] inline void BoxTree<Scalar>::put(const Box<Scalar>& box, Index place) noexcept {
+    auto& boxes = nodes_[static_cast<std::size_t>(place) / width].boxes;
+    const std::size_t i = static_cast<std::size_t>(place) % width;
+    for (int k = 0; k < 3; ++k) {
+        boxes.low[k].set(i, box.low[k]);
+        boxes.high[k].set(i, box.high[k]);
+    }
+}
+
+template <Real Scalar>
+void BoxTree<Scalar>::mark_parent(Index part) noexcept {
+    const std::size_t parent = static_cast<std::size_t>(place_of_part_[static_cast<std::size_t>(part)]) / width;
+    stale_nodes_[parent / bits_in_word] |= std::uint64_t{1} << parent % bits_in_word;
 }
 
 template <Real Scalar>
@@ -243,27 +285,31 @@ Triangle<Lanes<Scalar>> BoxTree<Scalar>::triangles_at(const ConstPointsRef<Scala
 template <Real Scalar>
 void BoxTree<Scalar>::refit(const ConstPointsRef<Scalar>& x) noexcept {
     MEMBRANE_ASSERT(x.cols() == leaves_of_.row_count());
-    for (auto i = static_cast<Index>(place_of_part_.size()); i-- > 0;) fit(x, i);  // children come after their parent
+    for (Index leaf = 0; leaf < statistics_.leaves; ++leaf) fit_leaf(x, leaf);
+    for (Index n = node_count(); n-- > 0;) fit_node(n);  // children come after their parent
 }
 
 template <Real Scalar>
 void BoxTree<Scalar>::refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
     MEMBRANE_ASSERT(x.cols() == leaves_of_.row_count());
     if (moved.size() >= static_cast<std::size_t>(x.cols()) / 2) return refit(x);  // costs less from there on
-    const auto parent = [this](Index part) {
-        return place_of_part_[static_cast<std::size_t>(part)] / static_cast<Index>(width);
-    };
-    const auto awaited = [this](Index part) -> std::int8_t& { return awaited_[static_cast<std::size_t>(part)]; };
-    stale_.clear();
+    stale_leaves_.clear();
     for (const Index v : moved) {
-        for (const Index leaf : leaves_of_[v]) {
-            for (Index i = node_count() + leaf; stale_.insert(i) && i != 0; i = parent(i)) ++awaited(parent(i));
-        }
+        for (const Index leaf : leaves_of_[v]) stale_leaves_.insert(leaf);
     }
-    for (Index i : stale_.items()) {
-        if (i < node_count()) continue;
-        fit(x, i);
-        while (i != 0 && --awaited(parent(i)) == 0) fit(x, i = parent(i));
+    for (const Index leaf : stale_leaves_.items()) {
+        fit_leaf(x, leaf);
+        mark_parent(node_count() + leaf);
+    }
+    // Parents come before their children: of what is marked the last is fitted first, and all of it once.
+    for (std::size_t word = stale_nodes_.size(); word-- > 0;) {
+        while (const std::uint64_t left = stale_nodes_[word]) {
+            const auto last = bits_in_word - 1 - static_cast<std::size_t>(std::countl_zero(left));
+            stale_nodes_[word] = left ^ (std::uint64_t{1} << last);
+            const auto n = static_cast<Index>(word * bits_in_word + last);
+            fit_node(n);
+            if (n != 0) mark_parent(n);
+        }
     }
 }
 

@@ -6,13 +6,16 @@
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <span>
 
 #include <membrane/collision/aabb_tree.hpp>
 #include <membrane/collision/contact_geometry.hpp>
 #include <membrane/collision/neighbourhood.hpp>
 #include <membrane/collision/tool.hpp>
 #include <membrane/collision/winding_number.hpp>
+#include <membrane/core/bounded_list.hpp>
 #include <membrane/core/index_set.hpp>
+#include <membrane/core/lanes.hpp>
 
 /// Does the tool touch, where, how deep, and since when?
 ///
@@ -102,7 +105,8 @@ class ContactTracker {
     [[nodiscard]] bool has_passed(const Scene& scene, Index near, Scalar side, const Vector3<Scalar>& q) const noexcept;
     void gather_from_tree(const Scene& scene) noexcept;
     void flood(const Scene& scene) noexcept;
-    void gather(const Scene& scene, Index f) noexcept;
+    void examine(const Scene& scene, std::span<const Index> some) noexcept;
+    void watch_rings(int rings) noexcept;
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
@@ -122,7 +126,9 @@ class ContactTracker {
     IndexSet near_, near_before_;  // the local model: triangles within reach of the tool
     Index nearest_ = no_index;     // of those
     Scalar nearest_square_ = 0;
-    IndexSet watched_;  // those and the ones around them
+    IndexSet candidates_;  // for those, in the order in which they are examined
+    IndexSet watched_;     // those near and the ones around them
+    IndexSet expanded_;    // vertices whose triangles are all watched
     BoundedList<TouchedTriangle> listed_;
     Contact<Scalar> last_;
     std::optional<Tool<Scalar>> last_tool_;
@@ -142,7 +148,9 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
       check_every_(options.check_every),
       near_(mesh.triangle_count()),
       near_before_(near_),
+      candidates_(near_),
       watched_(near_),
+      expanded_(mesh.vertex_count()),
       listed_(static_cast<std::size_t>(mesh.triangle_count())) {
     if (!is_finite(options.margin) || !(options.margin > 0 && options.margin <= 1)) {
         refuse("ContactTracker", "margin must be above 0 and at most 1 [mean edges], got ", options.margin);
@@ -234,7 +242,8 @@ template <Real Scalar>
 bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact) noexcept {
     std::swap(near_, near_before_);
     near_.clear();
-    for (const Index f : near_before_.items()) gather(scene, f);
+    candidates_.clear();
+    for (const Index f : near_before_.items()) candidates_.insert(f);
     if (++ticks_ % check_every_ == 0 || lively_ticks_ > 0) {
         ++tree_checks_;
         gather_from_tree(scene);
@@ -252,6 +261,7 @@ template <Real Scalar>
 bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) noexcept {
     contact = {};
     near_.clear();
+    candidates_.clear();
     gather_from_tree(scene);
     flood(scene);
     if (!crossing(scene, contact)) {
@@ -400,30 +410,43 @@ bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar s
 
 template <Real Scalar>
 void ContactTracker<Scalar>::gather_from_tree(const Scene& scene) noexcept {
-    const auto take = [&](Index f) { gather(scene, f); };
     const auto& tool = scene.tool;
-    scene.tree.touching_capsule(scene.x, tool.position, tool.position + tool.axis, scene.reach, take);
+    scene.tree.touching_capsule(scene.x, tool.position, tool.position + tool.axis, scene.reach,
+                                [&](Index f) { candidates_.insert(f); });
 }
 
-// Spreads over the neighbours as far as the tool reaches.
+// Takes the candidates that the tool reaches, and of their neighbours those that it reaches, and so on.
 template <Real Scalar>
 void ContactTracker<Scalar>::flood(const Scene& scene) noexcept {
-    for (Index i = 0; i < near_.count(); ++i) {
-        surface_.across_sides(near_.items()[static_cast<std::size_t>(i)], [&](Index f) { gather(scene, f); });
+    constexpr auto at_a_time = static_cast<Index>(Lanes<Scalar>::count);
+    for (Index examined = 0, spread = 0;;) {
+        while (spread < near_.count() && candidates_.count() - examined < at_a_time) {
+            surface_.across_sides(near_.items()[static_cast<std::size_t>(spread++)],
+                                  [&](Index f) { candidates_.insert(f); });
+        }
+        const Index count = (std::min)(at_a_time, candidates_.count() - examined);
+        if (count == 0) return;
+        examine(scene,
+                candidates_.items().subspan(static_cast<std::size_t>(examined), static_cast<std::size_t>(count)));
+        examined += count;
     }
 }
 
-// Takes `f` into the local model if the tool reaches it.
+// Takes those of `some` into the local model that the tool reaches; as many as there are lanes at most.
 template <Real Scalar>
-void ContactTracker<Scalar>::gather(const Scene& scene, Index f) noexcept {
-    if (near_.contains(f)) return;
-    const Scalar square = surface_.nearest(scene.x, f, scene.tool).on_triangle.squared_distance;
-    if (!(square <= scene.reach * scene.reach)) return;
-    if (near_.empty() || square < nearest_square_) {
-        nearest_ = f;
-        nearest_square_ = square;
+void ContactTracker<Scalar>::examine(const Scene& scene, std::span<const Index> some) noexcept {
+    std::array<Index, Lanes<Scalar>::count> triangles;
+    for (std::size_t i = 0; i < triangles.size(); ++i) triangles[i] = some[(std::min)(i, some.size() - 1)];
+    const auto squares = surface_.squared_distances(scene.x, triangles, scene.tool);
+    for (std::size_t i = 0; i < some.size(); ++i) {
+        const Scalar square = squares[i];
+        if (!(square <= scene.reach * scene.reach)) continue;
+        if (near_.empty() || square < nearest_square_) {
+            nearest_ = some[i];
+            nearest_square_ = square;
+        }
+        near_.insert(some[i]);
     }
-    near_.insert(f);
 }
 
 template <Real Scalar>
@@ -435,21 +458,37 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
         scene.tree.touching_capsule(scene.x, contact.before, contact.on_axis, Scalar(0),
                                     [&](Index f) { near_.insert(f); });
     }
-    watched_.clear();
-    listed_.clear();
-    for (const Index f : near_.items()) watched_.insert(f);
-    std::size_t next = 0;
     lively_ticks_ = contact.crossed ? ticks_after_crossing : (std::max)(lively_ticks_ - 1, 0);
-    for (int ring = lively_ticks_ > 0 ? rings_after_crossing : rings_watched; ring > 0; --ring) {
-        for (const std::size_t end = watched_.items().size(); next < end; ++next) {
-            surface_.around_corners(watched_.items()[next], [&](Index f) { watched_.insert(f); });
-        }
-    }
+    watch_rings(lively_ticks_ > 0 ? rings_after_crossing : rings_watched);
+    listed_.clear();
     for (const Index f : watched_.items()) listed_.push({f, surface_.corners(f)});
     contact.radius = scene.radius;
     contact.reach = scene.reach;
     contact.watched = listed_.items();
     contact.touched = contact.watched.first(near_.items().size());
+}
+
+// Watches what is near and so many rings around it. The triangles of a vertex are one fan: where they are not all watched,
+// two of them with a side in common are, and are not. So the first ring is around those beside what is not near.
+template <Real Scalar>
+void ContactTracker<Scalar>::watch_rings(int rings) noexcept {
+    watched_.clear();
+    expanded_.clear();
+    const auto expand = [&](Index f) {
+        for (const Index v : surface_.corners(f)) {
+            if (!expanded_.insert(v)) continue;
+            for (const Index g : surface_.triangles_of(v)) watched_.insert(g);
+        }
+    };
+    for (const Index f : near_.items()) watched_.insert(f);
+    for (const Index f : near_.items()) {
+        bool inside = true;
+        surface_.across_sides(f, [&](Index g) { inside &= near_.contains(g); });
+        if (!inside) expand(f);
+    }
+    for (std::size_t next = near_.items().size(); rings > 1; --rings) {
+        for (const std::size_t end = watched_.items().size(); next < end; ++next) expand(watched_.items()[next]);
+    }
 }
 
 template <Real Scalar>

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include <membrane/collision/tool.hpp>
+#include <membrane/core/lanes.hpp>
 #include <membrane/mesh/adjacency.hpp>
 #include <membrane/mesh/normals.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
@@ -36,7 +39,10 @@ class Neighbourhood {
         return triangle_at(x, triangles_.col(f));
     }
 
-    /// Calls `visit(g)` for each triangle that has a side in common with `f`, or a corner; some more than once.
+    /// Those with the corner `v`, ascending.
+    [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return adjacency_.triangles_of(v); }
+
+    /// Calls `visit(g)` once for each triangle that has a side in common with `f`; or a corner, as `f` itself has.
     template <class Visit>
     void across_sides(Index f, Visit&& visit) const noexcept;
     template <class Visit>
@@ -60,6 +66,15 @@ class Neighbourhood {
     /// Where triangle `f` and the tool's axis come nearest.
     [[nodiscard]] SegmentPair<Scalar> nearest(const ConstPointsRef<Scalar>& x, Index f,
                                               const Tool<Scalar>& tool) const noexcept;
+
+    using Several = std::array<Index, Lanes<Scalar>::count>;  ///< triangles
+
+    /// In lane i the squared distance of triangle `some[i]` from `q`, or from the tool's axis [m^2]: what `closest_point`
+    /// and `nearest` give, to the bit.
+    [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Several& some,
+                                                  const Vector3<Scalar>& q) const noexcept;
+    [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Several& some,
+                                                  const Tool<Scalar>& tool) const noexcept;
 
   private:
     Triangles triangles_;
@@ -89,8 +104,15 @@ void Neighbourhood<Scalar>::across_sides(Index f, Visit&& visit) const noexcept 
 template <Real Scalar>
 template <class Visit>
 void Neighbourhood<Scalar>::around_corners(Index f, Visit&& visit) const noexcept {
-    for (const Index v : corners(f)) {
-        for (const Index g : adjacency_.triangles_of(v)) visit(g);
+    const auto vertices = corners(f);
+    const auto has = [this](Index g, Index v) {
+        return triangles_(0, g) == v || triangles_(1, g) == v || triangles_(2, g) == v;
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+        for (const Index g : triangles_of(vertices[k])) {
+            const bool seen = (k > 0 && has(g, vertices[0])) || (k > 1 && has(g, vertices[1]));
+            if (!seen) visit(g);
+        }
     }
 }
 
@@ -110,16 +132,26 @@ bool Neighbourhood<Scalar>::on_border(Index f, const Vector3<Scalar>& barycentri
 template <Real Scalar>
 Index Neighbourhood<Scalar>::descend(const ConstPointsRef<Scalar>& x, Index f,
                                      const Vector3<Scalar>& q) const noexcept {
-    const auto square_to = [&](Index g) { return closest_point(triangle(x, g), q).squared_distance; };
-    Scalar square = square_to(f);
+    Scalar square = closest_point(triangle(x, f), q).squared_distance;
+    Several some;
+    std::size_t count = 0;
+    const auto examine = [&] {
+        std::fill(some.begin() + static_cast<std::ptrdiff_t>(count), some.end(), some[0]);
+        const auto squares = squared_distances(x, some, q);
+        for (std::size_t i = 0; i < count; ++i) {
+            if (!(squares[i] < square)) continue;
+            square = squares[i];
+            f = some[i];
+        }
+        count = 0;
+    };
     for (Index from = no_index; from != f;) {
         from = f;
         around_corners(from, [&](Index g) {
-            const Scalar other = square_to(g);
-            if (!(other < square)) return;
-            square = other;
-            f = g;
+            some[count++] = g;
+            if (count == some.size()) examine();
         });
+        if (count > 0) examine();
     }
     return f;
 }
@@ -137,6 +169,31 @@ SegmentPair<Scalar> Neighbourhood<Scalar>::nearest(const ConstPointsRef<Scalar>&
                                                    const Tool<Scalar>& tool) const noexcept {
     if (feature_pairs(tool) == 1) return {0, closest_point(triangle(x, f), tool.position)};
     return closest_to_segment<Scalar>(triangle(x, f), tool.position, tool.position + tool.axis);
+}
+
+template <Real Scalar>
+Lanes<Scalar> Neighbourhood<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Several& some,
+                                                       const Vector3<Scalar>& q) const noexcept {
+    if constexpr (Lanes<Scalar>::parts > 1) {  // registers of half the lanes, without a blend: slower than one by one
+        return Lanes<Scalar>::of([&](std::size_t i) { return squared_distance(triangle(x, some[i]), q); });
+    }
+    const auto corner = [&](Eigen::Index k) {
+        std::array<const Scalar*, Lanes<Scalar>::count> p;
+        for (std::size_t i = 0; i < p.size(); ++i) p[i] = x.data() + triangles_(k, some[i]) * x.outerStride();
+        const auto along = [&](std::size_t axis) {
+            return Lanes<Scalar>::of([&](std::size_t i) { return p[i][axis]; });
+        };
+        return Vector3<Lanes<Scalar>>(along(0), along(1), along(2));
+    };
+    const Triangle<Lanes<Scalar>> triangles{corner(0), corner(1), corner(2)};
+    return squared_distance(triangles, Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));
+}
+
+template <Real Scalar>
+Lanes<Scalar> Neighbourhood<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Several& some,
+                                                       const Tool<Scalar>& tool) const noexcept {
+    if (feature_pairs(tool) == 1) return squared_distances(x, some, tool.position);
+    return Lanes<Scalar>::of([&](std::size_t i) { return nearest(x, some[i], tool).on_triangle.squared_distance; });
 }
 
 }  // namespace membrane

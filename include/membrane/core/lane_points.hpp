@@ -30,7 +30,10 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 template <Real Scalar>
 class PaddedVector {
   public:
-    PaddedVector() = default;  ///< Zero.
+    PaddedVector() = default;                     ///< Zero.
+    explicit PaddedVector(Scalar all) noexcept {  ///< Four times the same number.
+        for (auto& part : parts_) part = all - Part{};
+    }
 
     /// The four numbers from `from` on.
     [[nodiscard]] static PaddedVector load(const Scalar* from) noexcept {
@@ -40,6 +43,30 @@ class PaddedVector {
     }
     void store(Scalar* to) const noexcept { std::memcpy(to, parts_.data(), sizeof parts_); }
 
+    /// The three numbers from `from` on, and a zero: what lies behind them is not read.
+    [[nodiscard]] static PaddedVector load_point(const Scalar* from) noexcept {
+        PaddedVector vector;
+#if defined(__AVX__)
+        if constexpr (sizeof(Scalar) == 8) {
+            vector.parts_[0] = _mm256_maskload_pd(from, _mm256_setr_epi64x(-1, -1, -1, 0));
+        } else {
+            vector.parts_[0] = _mm_maskload_ps(from, _mm_setr_epi32(-1, -1, -1, 0));
+        }
+#else
+        if constexpr (parts == 1) {
+            vector.parts_[0] = Part{from[0], from[1], from[2], 0};
+        } else {
+            vector.parts_ = {Part{from[0], from[1]}, Part{from[2], 0}};
+        }
+#endif
+        return vector;
+    }
+
+    /// The first three numbers.
+    [[nodiscard]] Vector3<Scalar> point() const noexcept {
+        return {parts_[0][0], parts_[0][1], parts_[2 / width][2 % width]};
+    }
+
     [[nodiscard]] friend PaddedVector operator+(const PaddedVector& a, const PaddedVector& b) noexcept {
         return each([](auto x, auto y) { return x + y; }, a, b);
     }
@@ -48,6 +75,14 @@ class PaddedVector {
     }
     [[nodiscard]] friend PaddedVector operator*(const PaddedVector& a, const PaddedVector& b) noexcept {
         return each([](auto x, auto y) { return x * y; }, a, b);
+    }
+
+    /// `membrane::smaller` and `larger`, of each number.
+    [[nodiscard]] friend PaddedVector smaller(const PaddedVector& a, const PaddedVector& b) noexcept {
+        return each([](auto x, auto y) { return y < x ? y : x; }, a, b);
+    }
+    [[nodiscard]] friend PaddedVector larger(const PaddedVector& a, const PaddedVector& b) noexcept {
+        return each([](auto x, auto y) { return x < y ? y : x; }, a, b);
     }
 
     /// Of all four numbers.
@@ -78,7 +113,7 @@ class PaddedVector {
 
     // As many numbers as a register holds.
     using Part = typename Register<Scalar, (std::min)(4 * sizeof(Scalar), register_bytes)>::Type;
-    static constexpr std::size_t parts = 4 * sizeof(Scalar) / sizeof(Part);
+    static constexpr std::size_t parts = 4 * sizeof(Scalar) / sizeof(Part), width = 4 / parts;
     std::array<Part, parts> parts_{};
 };
 

@@ -60,6 +60,22 @@ class Lanes {
         std::memcpy(lanes.parts_.data(), from, sizeof lanes.parts_);
         return lanes;
     }
+
+    /// `at(i)` in lane i.
+    template <class At>
+    [[nodiscard]] static Lanes of(const At& at) noexcept {
+        Lanes lanes;
+        for (std::size_t i = 0; i < parts; ++i) {
+            const std::size_t k = i * width;
+            if constexpr (width == 2) lanes.parts_[i] = Part{at(k), at(k + 1)};
+            if constexpr (width == 4) lanes.parts_[i] = Part{at(k), at(k + 1), at(k + 2), at(k + 3)};
+            if constexpr (width == 8) {
+                lanes.parts_[i] =
+                    Part{at(k), at(k + 1), at(k + 2), at(k + 3), at(k + 4), at(k + 5), at(k + 6), at(k + 7)};
+            }
+        }
+        return lanes;
+    }
     void store(Scalar* to) const noexcept { std::memcpy(to, parts_.data(), sizeof parts_); }
     [[nodiscard]] Scalar operator[](std::size_t i) const noexcept { return parts_[i / width][i % width]; }
     void set(std::size_t i, Scalar value) noexcept { parts_[i / width][i % width] = value; }

@@ -24,9 +24,9 @@ namespace membrane {
 
 namespace detail {
 
-/// The border of the triangles around a vertex, as begins in rows of `PaddedPoint`; see `borders_of`.
+/// The border of the triangles around a vertex; see `borders_of`.
 struct Border {
-    std::array<Index, 6> begins;    ///< The first, of most vertices all.
+    std::array<Index, 6> vertices;  ///< The first, of most vertices all.
     Index rest = 0, rest_size = 0;  ///< Where the others are in an array of them.
 };
 
@@ -48,8 +48,8 @@ class VertexNormals {
     void update(const ConstPointsRef<Scalar>& x) noexcept;
 
     /// Of the vertices `moved` and their neighbours, each once; a vertex may be named several times. Returns them, valid
-    /// until the next update: no other normal has changed, and no other point is read. Linear in the number of their
-    /// triangles, no allocation.
+    /// until the next update: no other normal has changed, and no point is read but the corners of their triangles. Linear
+    /// in the number of these, no allocation.
     /// @pre `x` has a column for each vertex and `moved` names vertices (asserted).
     std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
@@ -58,21 +58,20 @@ class VertexNormals {
 
   private:
     static constexpr auto lanes = static_cast<Index>(Lanes<Scalar>::count);
+    static constexpr Index at_a_time = 256;  // vertices: what is in between stays in the cache
 
     template <class VertexAt>
-    void face(Index count, const VertexAt& vertex) noexcept;
+    void face(const ConstPointsRef<Scalar>& x, Index count, const VertexAt& vertex) noexcept;
     template <class VertexAt>
-    void normalise(const VertexAt& vertex) noexcept;
-    void mend(Index v, Scalar squared) noexcept;
-    PaddedPoint<Scalar>& place(Index v) noexcept { return places_[static_cast<std::size_t>(v)]; }
+    void normalise(const ConstPointsRef<Scalar>& x, const VertexAt& vertex, Index first, Index end) noexcept;
+    void check(const Vector3<Scalar>& place, Index v, Scalar squared) noexcept;
 
     std::vector<detail::Border> borders_;
     std::vector<Index> rests_;  // of the borders
-    std::vector<PaddedPoint<Scalar>> places_;
-    std::vector<PaddedPoint<Scalar>> padded_;  // twice the area around each vertex as z, x, y; then its normal
     Points<Scalar> values_;
     Points<Scalar> at_rest_;
-    IndexSet updated_;  // by the last call
+    IndexSet updated_;                        // by the last call
+    std::vector<PaddedPoint<Scalar>> areas_;  // twice those around the vertices at hand, as z, x, y; then their normals
 };
 
 /// The angle-weighted normal where `barycentric` says, of the face, edge or corner: its sign against the way from there
@@ -129,17 +128,17 @@ template <Real Scalar>
 /// have the same together. They are taken two at a time, as the product of their diagonals.
 template <Real Scalar>
 [[gnu::always_inline]] inline PaddedVector<Scalar> area_within(const Border& border, const Index* rests,
-                                                               const PaddedPoint<Scalar>* places) noexcept {
-    const auto at = [&](Index begin) { return PaddedVector<Scalar>::load(places->number.data() + begin); };
-    const auto first = at(border.begins[0]);
-    auto last = at(border.begins[1]);
+                                                               const Scalar* x, std::ptrdiff_t stride) noexcept {
+    const auto at = [&](Index v) { return PaddedVector<Scalar>::load_point(x + v * stride); };
+    const auto first = at(border.vertices[0]);
+    auto last = at(border.vertices[1]);
     const auto next_two = [&](Index p, Index q) {
         const auto next = at(q), a = at(p) - first, b = next - last;
         last = next;
         return a * b.turned() - a.turned() * b;
     };
-    auto area = next_two(border.begins[2], border.begins[3]);
-    area = area + next_two(border.begins[4], border.begins[5]);
+    auto area = next_two(border.vertices[2], border.vertices[3]);
+    area = area + next_two(border.vertices[4], border.vertices[5]);
     for (Index k = border.rest; k < border.rest + border.rest_size; k += 2) {
         area = area + next_two(rests[k], rests[k + 1]);
     }
@@ -157,21 +156,20 @@ template <Real Scalar>
 template <Real Scalar>
 VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
     : borders_(static_cast<std::size_t>(mesh.vertex_count())),
-      places_(borders_.size()),
-      padded_(borders_.size()),
       values_(3, mesh.vertex_count()),
       at_rest_(Vector3<Scalar>(0, 0, 1).replicate(1, mesh.vertex_count())),
-      updated_(mesh.vertex_count()) {
+      updated_(mesh.vertex_count()),
+      areas_(static_cast<std::size_t>(at_a_time)) {
     const CompressedRows<Index> whole = detail::borders_of(mesh);
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         detail::Border& border = borders_[static_cast<std::size_t>(v)];
         const auto points = whole[v];
-        const std::size_t here = (std::min)(points.size(), border.begins.size());
-        border.begins.fill(numbers_in_point * points[0]);
+        const std::size_t here = (std::min)(points.size(), border.vertices.size());
+        border.vertices.fill(points[0]);
         border.rest = static_cast<Index>(rests_.size());
         border.rest_size = static_cast<Index>(points.size() - here);
-        for (std::size_t k = 0; k < here; ++k) border.begins[k] = numbers_in_point * points[k];
-        for (const Index w : points.subspan(here)) rests_.push_back(numbers_in_point * w);
+        for (std::size_t k = 0; k < here; ++k) border.vertices[k] = points[k];
+        for (const Index w : points.subspan(here)) rests_.push_back(w);
     }
     update(mesh.positions());
     at_rest_ = values_;
@@ -180,9 +178,7 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
 template <Real Scalar>
 void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
-    const auto count = static_cast<Index>(values_.cols());
-    for (Index v = 0; v < count; ++v) place(v).set(point(x, v));
-    face(count, [](Index v) { return v; });
+    face(x, static_cast<Index>(values_.cols()), [](Index v) { return v; });
 }
 
 template <Real Scalar>
@@ -190,66 +186,83 @@ std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar
                                                      std::span<const Index> moved) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
     updated_.clear();
+    for (const Index v : moved) updated_.insert(v);
+    // The neighbours of what moves have nearly all moved too: one branch for all of them is predicted.
     for (const Index v : moved) {
-        updated_.insert(v);
         const detail::Border& border = borders_[static_cast<std::size_t>(v)];
-        for (const Index begin : border.begins) updated_.insert(begin / numbers_in_point);
+        bool all_in = true;
+        for (const Index w : border.vertices) all_in &= updated_.contains(w);
+        if (!all_in) {
+            for (const Index w : border.vertices) updated_.insert(w);
+        }
         for (Index k = border.rest; k < border.rest + border.rest_size; ++k) {
-            updated_.insert(rests_[static_cast<std::size_t>(k)] / numbers_in_point);
+            updated_.insert(rests_[static_cast<std::size_t>(k)]);
         }
     }
     const auto updated = updated_.items();
-    for (const Index v : updated) place(v).set(point(x, v));
-    face(updated_.count(), [&](Index n) { return updated[static_cast<std::size_t>(n)]; });
+    face(x, updated_.count(), [&](Index n) { return updated[static_cast<std::size_t>(n)]; });
     return updated;
 }
 
 /// Finds the normals of `vertex(n)` for n from 0 to `count` - 1.
 template <Real Scalar>
 template <class VertexAt>
-void VertexNormals<Scalar>::face(Index count, const VertexAt& vertex) noexcept {
+void VertexNormals<Scalar>::face(const ConstPointsRef<Scalar>& x, Index count, const VertexAt& vertex) noexcept {
     // Read once: for all the compiler knows, what is stored below changes them.
     const detail::Border* borders = borders_.data();
     const Index* rests = rests_.data();
-    const PaddedPoint<Scalar>* places = places_.data();
-    PaddedPoint<Scalar>* padded = padded_.data();
-    for (Index n = 0; n < count; ++n) {
-        const Index v = vertex(n);
-        detail::area_within(borders[v], rests, places).store(padded[v].number.data());
+    const Scalar* places = x.data();
+    PaddedPoint<Scalar>* areas = areas_.data();
+    const std::ptrdiff_t stride = x.outerStride();
+    for (Index first = 0; first < count; first += at_a_time) {
+        const Index some = (std::min)(at_a_time, count - first);
+        for (Index k = 0; k < some; ++k) {
+            const auto area = detail::area_within(borders[vertex(first + k)], rests, places, stride);
+            area.store(areas[k].number.data());
+        }
+        const auto at_hand = [&](Index k) { return vertex(first + k); };
+        Index k = 0;
+        for (; k + lanes <= some; k += lanes) normalise(x, at_hand, k, k + lanes);
+        if (k < some) normalise(x, at_hand, k, some);
     }
-    Index n = 0;
-    for (; n + lanes <= count; n += lanes) normalise([&](Index i) { return vertex(n + i); });
-    if (n < count) normalise([&](Index i) { return vertex((std::min)(n + i, count - 1)); });
 }
 
-/// Makes normals of areas, of as many vertices as there are lanes: square root and division are slow one by one.
+/// Makes normals of areas `first` to `end` - 1, those of `vertex(first)` and so on; as many as there are lanes at most:
+/// square root and division are slow one by one.
 template <Real Scalar>
 template <class VertexAt>
-[[gnu::always_inline]] inline void VertexNormals<Scalar>::normalise(const VertexAt& vertex) noexcept {
-    std::array<Index, Lanes<Scalar>::count> begins;
+[[gnu::always_inline]] inline void VertexNormals<Scalar>::normalise(const ConstPointsRef<Scalar>& x,
+                                                                    const VertexAt& vertex, Index first,
+                                                                    Index end) noexcept {
+    std::array<Index, Lanes<Scalar>::count> begins, vertices;
     PaddedVector<Scalar> places;
-    for (Index i = 0; i < lanes; ++i) {
-        begins[static_cast<std::size_t>(i)] = numbers_in_point * vertex(i);
-        places = places + PaddedVector<Scalar>::load(place(vertex(i)).number.data());
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        const Index k = (std::min)(first + static_cast<Index>(i), end - 1);
+        begins[i] = numbers_in_point * k;
+        vertices[i] = vertex(k);
+        places = places + PaddedVector<Scalar>::load_point(x.data() + vertices[i] * x.outerStride());
     }
-    const Vector3<Lanes<Scalar>> turned = gather(padded_.data(), begins.data());
+    const Vector3<Lanes<Scalar>> turned = gather(areas_.data(), begins.data());
     const Vector3<Lanes<Scalar>> area(turned.y(), turned.z(), turned.x());
     const Lanes<Scalar> squared = squared_norm(area), length = sqrt(squared);
-    scatter<Scalar>({area.x() / length, area.y() / length, area.z() / length}, padded_.data(), begins.data());
-    for (Index i = 0; i < lanes; ++i) values_.col(vertex(i)) = padded_[static_cast<std::size_t>(vertex(i))].point();
+    scatter<Scalar>({area.x() / length, area.y() / length, area.z() / length}, areas_.data(), begins.data());
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        const Scalar* normal = areas_.front().number.data() + begins[i];
+        values_.col(vertices[i]) << normal[0], normal[1], normal[2];
+    }
 
     Scalar all = places.sum();  // finite only if all that is added is; a vertex is no part of its border
-    for (std::size_t i = 0; i < Lanes<Scalar>::count; ++i) all += squared[i];
+    for (std::size_t i = 0; i < vertices.size(); ++i) all += squared[i];
     if (is_finite(all) && !any(squared < (std::numeric_limits<Scalar>::min)())) [[likely]]
         return;
-    for (Index i = 0; i < lanes; ++i) mend(vertex(i), squared[static_cast<std::size_t>(i)]);
+    for (std::size_t i = 0; i < vertices.size(); ++i) check(point(x, vertices[i]), vertices[i], squared[i]);
 }
 
 /// Gives vertex `v` its normal at rest unless it has one; `squared` is the square of twice its area.
 template <Real Scalar>
-[[gnu::noinline]] void VertexNormals<Scalar>::mend(Index v, Scalar squared) noexcept {
+[[gnu::noinline]] void VertexNormals<Scalar>::check(const Vector3<Scalar>& place, Index v, Scalar squared) noexcept {
     const bool measurable = is_finite(squared) && squared >= (std::numeric_limits<Scalar>::min)();
-    if (!measurable || !is_finite(place(v).point())) values_.col(v) = at_rest_.col(v);
+    if (!measurable || !is_finite(place)) values_.col(v) = at_rest_.col(v);
 }
 
 template <class Positions>

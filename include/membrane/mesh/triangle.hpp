@@ -66,6 +66,10 @@ template <Number N>
 template <Number N>
 [[nodiscard]] TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept;
 
+/// How far `closest_point` is from `q` [m^2], to the same bits.
+template <Number N>
+[[nodiscard]] N squared_distance(const Triangle<N>& triangle, const Vector3<N>& q) noexcept;
+
 /// The nearest points of the triangle and of the segment from `p` to `q`; at distance 0 where they cross.
 template <Real Scalar>
 [[nodiscard]] SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, const Vector3<Scalar>& p,
@@ -95,7 +99,7 @@ namespace detail {
 
 /// `part / whole` between 0 and 1, whatever the two are.
 template <Number N>
-[[nodiscard]] N fraction(const N& part, const N& whole) noexcept {
+[[gnu::always_inline, nodiscard]] inline N fraction(const N& part, const N& whole) noexcept {
     const auto inside = (part > 0) & (part < whole);
     return select<N>(inside, part / select<N>(inside, whole, 1), select<N>(part > 0, 1, 0));
 }
@@ -145,8 +149,12 @@ Vector3<N> point_at(const Triangle<N>& triangle, const Vector3<N>& barycentric) 
     return (barycentric[0] * triangle.a + barycentric[1] * triangle.b) + barycentric[2] * triangle.c;
 }
 
+namespace detail {
+
+/// What is not asked for of the point is not reckoned.
 template <Number N>
-TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
+[[gnu::always_inline]] inline TrianglePoint<N> closest_point_inline(const Triangle<N>& triangle,
+                                                                    const Vector3<N>& q) noexcept {
     using Limits = std::numeric_limits<Each<N>>;
     const Vector3<N> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
     const Vector3<N> normal = cross(ab, ac);
@@ -155,19 +163,21 @@ TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q)
     const N weight_a = whole - weight_b - weight_c;
     const auto finite = whole <= (Limits::max)();  // else a corner is not, or far too large
     const auto has_area = whole > Limits::epsilon() * (squared_norm(ab) * squared_norm(ac));
-    const auto degenerate = !has_area;
     const auto over_face = finite & has_area & (weight_a >= 0) & (weight_b >= 0) & (weight_c >= 0);
 
     const N divisor = select<N>(over_face, whole, 1), b = weight_b / divisor, c = weight_c / divisor;
     const Vector3<N> in_face(larger<N>(0, 1 - b - c), b, c), offset_in_face = aq - b * ab - c * ac;
-    if (all(over_face)) return {in_face, point_at(triangle, in_face), squared_norm(offset_in_face)};
+    // Of several triangles all edges are gone through: which of them count, no processor predicts.
+    constexpr bool one = Real<N>;
+    if (one && all(over_face)) return {in_face, point_at(triangle, in_face), squared_norm(offset_in_face)};
 
     // Outside, the nearest point lies on an edge that faces q.
     N nearest = Limits::infinity();
     Vector3<N> barycentric(1, 0, 0);
-    const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge) {
-        if (!any(faces)) return;
-        const N along = detail::fraction(dot(offset, edge), squared_norm(edge));
+    const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge)
+        __attribute__((always_inline)) {
+        if (one && !any(faces)) return;
+        const N along = fraction(dot(offset, edge), squared_norm(edge));
         const N squared_distance = squared_norm<N>(offset - along * edge);
         const auto nearer = finite & faces & (squared_distance < nearest);
         nearest = select<N>(nearer, squared_distance, nearest);
@@ -176,12 +186,23 @@ TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q)
         barycentric[next] = select<N>(nearer, along, barycentric[next]);
         barycentric[last] = select<N>(nearer, 0, barycentric[last]);
     };
-    consider(0, degenerate | (weight_c < 0), aq, ab);
-    consider(1, degenerate | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
-    consider(2, degenerate | (weight_b < 0), q - triangle.c, -ac);
+    consider(0, (!has_area) | (weight_c < 0), aq, ab);
+    consider(1, (!has_area) | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
+    consider(2, (!has_area) | (weight_b < 0), q - triangle.c, -ac);
     for (Eigen::Index k = 0; k < 3; ++k) barycentric[k] = select<N>(over_face, in_face[k], barycentric[k]);
-    return {barycentric, point_at(triangle, barycentric),
-            select<N>(over_face, squared_norm(offset_in_face), nearest)};
+    return {barycentric, point_at(triangle, barycentric), select<N>(over_face, squared_norm(offset_in_face), nearest)};
+}
+
+}  // namespace detail
+
+template <Number N>
+TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
+    return detail::closest_point_inline(triangle, q);
+}
+
+template <Number N>
+N squared_distance(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
+    return detail::closest_point_inline(triangle, q).squared_distance;
 }
 
 template <Real Scalar>
