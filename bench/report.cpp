@@ -14,9 +14,11 @@
 #include <nlohmann/json.hpp>
 
 #include "support/peers_tables.hpp"
+#include "support/tick_tables.hpp"
 
 // report FOLDER TOPIC...: prints tables of what the benchmarks of these topics left in FOLDER, and leaves the same
-// figures there as summary.json and, for the plots, a .tsv for each table; of `trade`, all that was tried as trade.csv.
+// figures there as summary.json and, for the plots, a .tsv for each table; of `trade`, all that was tried as trade.csv, of
+// `tick` the figures of all instruction sets as tick.csv.
 
 namespace {
 
@@ -319,7 +321,9 @@ void print_table(const Results& results, const Table& table) {
     std::string line = first("  " + table.column);
     for (const int column : table.columns) line += right(std::to_string(column), 9) + right("", gap);
     print_line("\n" + table.title);
-    print_line(line + (grows ? "642/162" : ""));
+    const auto& columns = table.columns;
+    const bool has_162 = std::find(columns.begin(), columns.end(), 162) != columns.end();
+    print_line(line + (grows && has_162 ? "642/162" : ""));
     for (const Row& row : table.rows) {
         line = first("  " + row.name);
         for (const int column : table.columns) {
@@ -357,6 +361,18 @@ void write_tsv(const std::string& path, const Results& results, const Table& tab
     }
 }
 
+/// The words of a benchmark's name that have a value, as in "layers:6/sweeps:2".
+std::map<std::string, std::string> words_of(const std::string& name) {
+    std::map<std::string, std::string> values;
+    std::istringstream words(name);
+    for (std::string word; std::getline(words, word, '/');) {
+        if (const auto colon = word.find(':'); colon != std::string::npos) {
+            values[word.substr(0, colon)] = word.substr(colon + 1);
+        }
+    }
+    return values;
+}
+
 /// A setting of the solver in a scene, and what it comes to.
 struct Trial {
     std::map<std::string, std::string> setting;  ///< by the words of its name, as in "rule:block/sweeps:2"
@@ -377,14 +393,7 @@ std::vector<Trial> trials_in(const Results& results) {
     std::vector<Trial> trials;
     for (const auto& [name, run] : results) {
         if (name.rfind("trade/", 0) != 0) continue;
-        Trial trial{{}, time_of(run), run.at("force_error"), run.at("position_error")};
-        std::istringstream words(name);
-        for (std::string word; std::getline(words, word, '/');) {
-            if (const auto colon = word.find(':'); colon != std::string::npos) {
-                trial.setting[word.substr(0, colon)] = word.substr(colon + 1);
-            }
-        }
-        trials.push_back(trial);
+        trials.push_back({words_of(name), time_of(run), run.at("force_error"), run.at("position_error")});
     }
     std::stable_sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) { return a.time < b.time; });
     return trials;
@@ -406,6 +415,33 @@ void write_trials(const std::string& path, const std::vector<Trial>& trials) {
     }
 }
 
+/// Times in microseconds, of a tick and of its parts, ours and Bullet's.
+void write_ticks(const std::string& path, const Results& results) {
+    std::ofstream file(path);
+    file << "build,scalar,vertices,layers,sweeps,us,us_contact,us_sweep,us_other,error_percent,bullet_us\n";
+    const auto write = [&](const std::string& name) {
+        const auto found = results.find(name);
+        if (found == results.end()) return;
+        const Json& run = found->second;
+        file << run.at("label").get<std::string>();
+        const auto words = words_of(name);
+        for (const char* word : {"scalar", "vertices", "layers", "sweeps"}) file << ',' << words.at(word);
+        const auto counter = [&](const char* of) { return run.at(of).get<double>(); };
+        for (const double time : {time_of(run), counter("contact"), counter("sweep"), counter("other")}) {
+            file << ',' << 1e6 * time;
+        }
+        file << ',' << 100 * counter("force_error") << ',' << 1e6 * counter("bullet") << '\n';
+    };
+    for (const Table& table : bench::tick_tables()) {
+        for (const Row& row : table.rows) {
+            if (row.kind != Row::time || row.benchmark.rfind("path/", 0) != 0) continue;
+            for (const int vertices : table.columns) {
+                write(table.topic + "/" + row.benchmark + "/vertices:" + std::to_string(vertices));
+            }
+        }
+    }
+}
+
 void report(const std::string& folder, const std::vector<std::string>& topics) {
     Results results;
     Json summary{{"context", {}}, {"tables", Json::object()}};
@@ -419,7 +455,9 @@ void report(const std::string& folder, const std::vector<std::string>& topics) {
         said("processor").c_str(), context.at("mhz_per_cpu").get<int>(), said("compiler").c_str(),
         said("flags").c_str());
     std::vector<Table> tables = all_tables;
-    for (const Table& table : bench::peers_tables()) tables.push_back(table);
+    for (const auto& more : {bench::peers_tables(), bench::tick_tables()}) {
+        tables.insert(tables.end(), more.begin(), more.end());
+    }
     for (const Table& table : tables) {
         if (std::find(topics.begin(), topics.end(), table.topic) == topics.end()) continue;
         if (!has_results(results, table)) continue;
@@ -428,6 +466,9 @@ void report(const std::string& folder, const std::vector<std::string>& topics) {
         write_tsv(folder + "/" + table.key + ".tsv", results, table);
     }
     if (const auto trials = trials_in(results); !trials.empty()) write_trials(folder + "/trade.csv", trials);
+    if (std::any_of(topics.begin(), topics.end(), [](const auto& topic) { return topic.rfind("tick", 0) == 0; })) {
+        write_ticks(folder + "/tick.csv", results);
+    }
     std::ofstream(folder + "/summary.json") << summary.dump(2) << '\n';
 }
 

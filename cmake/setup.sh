@@ -42,7 +42,14 @@ if command -v ccache > /dev/null; then
 fi
 
 # runs_here BENCHMARK: whether this processor has what the benchmark is built for.
-runs_here() { [[ $1 != *_avx2* ]] || grep -qs avx2 /proc/cpuinfo; }
+runs_here() {
+    local flag flags=()
+    case $1 in
+        *_avx2*) flags=(avx2) ;;
+        *_avx512*) flags=(avx512f avx512dq avx512vl avx512bw fma) ;;
+    esac
+    for flag in "${flags[@]}"; do grep -qsw "$flag" /proc/cpuinfo || return; done
+}
 
 # configure PRESET PART... [-- CMAKE ARGUMENT...]: build/PRESET with these parts (tests, examples, benchmarks). A part that
 # was asked for before stays, so that nothing is built twice.

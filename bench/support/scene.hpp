@@ -104,12 +104,12 @@ struct Path {
 
 enum class Stage { contact, solve, refit, normals, force };
 
-/// The loop of the README, its stages one by one.
-template <membrane::Real Scalar, class Rule = membrane::BlockStep>
+/// The loop of the README, its stages one by one, with a tool that goes a way like `Path`.
+template <membrane::Real Scalar, class Rule = membrane::BlockStep, class Way = Path>
 struct LoopOf {
-    explicit LoopOf(std::int64_t vertices, const Path& way = {},
+    explicit LoopOf(std::int64_t vertices, const Way& way = {},
                     const membrane::SolverOptions<Scalar>& options = usual(),
-                    Index ticks = Path::ticks_in + ticks_around)
+                    Index ticks = Way::ticks_in + ticks_around)
         : path(way), mesh(sphere_of<Scalar>(vertices)), solver(network, options) {
         while (now < ticks) frame();
     }
@@ -124,21 +124,21 @@ struct LoopOf {
     /// One frame, each stage by the hands of `run(stage, work)`.
     template <class Run>
     void frame(Run run) {
-        tool = path.at<Scalar>(now++);
+        tool = path.template at<Scalar>(now++);
         run(Stage::contact, [&] { contact = tracker.update(tree, x, tool); });
         run(Stage::solve, [&] { report = solver.step(x, Scalar(tick), network, volume, press(tool, contact)); });
         run(Stage::refit, [&] { tree.refit(x, report.moved); });
         run(Stage::normals, [&] { normals.update(x, report.moved); });
         run(Stage::force, [&] { force = feel({tool, contact, report}); });
         pressing =
-            pressing && report.status == membrane::StepStatus::advanced && (now < Path::ticks_in || contact.touching());
+            pressing && report.status == membrane::StepStatus::advanced && (now < Way::ticks_in || contact.touching());
     }
 
     /// Requires that the tool has pressed all the way, that nothing lags behind the positions, and that the membrane
     /// pushes back.
     void check() const;
 
-    Path path;
+    Way path;
     Index now = 0;  // ticks
     membrane::TriangleMesh<Scalar> mesh;
     membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network{mesh, {}, {.stiffness = Scalar(stiffness)}};
@@ -245,8 +245,8 @@ template <membrane::Real Scalar>
     return best;
 }
 
-template <membrane::Real Scalar, class Rule>
-void LoopOf<Scalar, Rule>::check() const {
+template <membrane::Real Scalar, class Rule, class Way>
+void LoopOf<Scalar, Rule, Way>::check() const {
     const membrane::Vector3<Scalar>& reaction = report.reactions[0];
     require(pressing, "the tool has lost the membrane, or a step was refused");
     require(report.residual < membrane::norm(reaction) / 2, "the forces must nearly balance");

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <span>
+
+#include <membrane/membrane.hpp>
+
+namespace bench {
+
+/// A cup that sucks: the vertices under its mouth share a force along its axis. A constraint as a user writes one.
+///
+///     const auto report = solver.step(x, dt, network, backing, Suction<double>{under, mouth, force});
+template <membrane::Real Scalar>
+struct Suction {
+    std::span<const membrane::Index> vertices;  ///< under the mouth; of the caller
+    membrane::Vector3<Scalar> mouth;            ///< its centre [m]
+    membrane::Vector3<Scalar> force;            ///< of all of it [N]
+
+    [[nodiscard]] bool sound() const noexcept { return membrane::is_finite(mouth) && membrane::is_finite(force); }
+    [[nodiscard]] membrane::Lead<Scalar> lead() const noexcept {
+        return vertices.empty() ? membrane::Lead<Scalar>() : membrane::LeadPoint<Scalar>{mouth};
+    }
+    void begin(membrane::Region<Scalar>& region) const noexcept {
+        for (const membrane::Index v : vertices) {
+            if (!region.check(v)) return;
+            region.seed(v);
+            region.push(v, force / static_cast<Scalar>(vertices.size()));
+        }
+    }
+    bool enforce(membrane::Region<Scalar>&) const noexcept { return false; }
+    [[nodiscard]] membrane::Vector3<Scalar> reaction(const membrane::Region<Scalar>&) const noexcept {
+        return vertices.empty() ? membrane::Vector3<Scalar>(membrane::Vector3<Scalar>::Zero())
+                                : membrane::Vector3<Scalar>(-force);
+    }
+};
+static_assert(membrane::Constraint<Suction<double>, double>);
+
+}  // namespace bench

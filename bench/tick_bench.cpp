@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include <membrane/network/calibration.hpp>
+
+#include "support/bullet_scene.hpp"
+#include "support/slide.hpp"
+#include "support/tick_scenes.hpp"
+
+// What does one whole tick take, and how far off is its force? A tool of 2 mm is pressed 1 mm deep and slides at 50 mm/s: by
+// scalar, mesh, layers and sweeps, beside the tick of Bullet's soft body on the same way. Then the same with other tools,
+// laws, rules and bodies.
+
+namespace {
+
+using namespace bench;
+
+#define BENCH_TEXT(name) #name
+#define BENCH_TEXT_OF(name) BENCH_TEXT(name)
+constexpr const char* instruction_set = BENCH_TEXT_OF(MEMBRANE_INSTRUCTION_SET);
+
+// Ours and Bullet's take turns of so many ticks: what else the machine does meets both, and the median leaves out the
+// first ticks of a turn, which find little of theirs in the caches.
+constexpr Index ticks_in_turn = 20;
+static_assert(Slide::ticks % ticks_in_turn == 0);
+
+/// What the stages of a tick took [s], tick by tick.
+struct Times {
+    std::vector<double> whole, contact, sweep, other;
+};
+
+/// How far the loop's forces and its membrane are off.
+struct Errors {
+    double squares = 0;  // of the differences to the reference's forces [N^2]
+    double largest = 0;  // force [N]
+    double overlap = 0;  // of the tool with a triangle [m]
+};
+
+/// How deep the tool is in one of the triangles that it touches [m]. Its centre is on the outer side.
+template <Real Scalar>
+double overlap_of(const SlidingLoop<Scalar>& loop) {
+    const Vector3 centre = loop.tool.position.template cast<double>();
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const auto& touched : loop.contact.touched) {
+        const auto [a, b, c] = membrane::triangle_at(loop.x, touched.corners);
+        const membrane::Triangle<double> triangle{a.template cast<double>(), b.template cast<double>(),
+                                                  c.template cast<double>()};
+        nearest = std::min(nearest, std::sqrt(membrane::closest_point(triangle, centre).squared_distance));
+    }
+    return std::max(static_cast<double>(loop.tool.radius) - nearest, 0.0);
+}
+
+/// One tick, each stage by the clock. What a step does for the contact in its sweeps is in `sweep`: between the visits it
+/// cannot be told apart.
+template <Real Scalar>
+void measure(SlidingLoop<Scalar>& loop, Times& times) {
+    std::array<double, 3> taken{};
+    loop.frame([&](Stage stage, auto work) {
+        taken[stage == Stage::contact ? 0 : stage == Stage::solve ? 1 : 2] += seconds(work);
+    });
+    if (loop.now <= Slide::first_measured) return;
+    times.contact.push_back(taken[0]);
+    times.sweep.push_back(taken[1]);
+    times.other.push_back(taken[2]);
+    times.whole.push_back(taken[0] + taken[1] + taken[2]);
+}
+
+template <Real Scalar>
+void compare(const SlidingLoop<Scalar>& loop, const Reference& reference, Errors& errors) {
+    if (loop.now <= Slide::first_measured) return;
+    const Vector3 force = loop.report.reactions[0].template cast<double>();
+    const auto at = static_cast<std::size_t>(loop.now - Slide::first_measured - 1);
+    errors.squares += membrane::squared_norm<double>(force - reference.forces[at]);
+    errors.largest = std::max(errors.largest, membrane::norm(force));
+    errors.overlap = std::max(errors.overlap, overlap_of(loop));
+}
+
+/// Bullet's body at rest; made once for each mesh.
+BulletScene& bullet_of(std::int64_t vertices) {
+    static std::map<std::int64_t, std::unique_ptr<BulletScene>> made;
+    auto& scene = made[vertices];
+    if (!scene) scene = std::make_unique<BulletScene>(vertices, Slide{}.tool_radius);
+    scene->reset();
+    return *scene;
+}
+
+template <Real Scalar>
+void path(benchmark::State& state) {
+    const std::int64_t vertices = state.range(2);
+    const membrane::SolverOptions<Scalar> options{.layers = static_cast<Index>(state.range(0)),
+                                                  .sweeps = static_cast<Index>(state.range(1))};
+    const Reference& reference = reference_of(vertices);
+    for (auto _ : state) {
+        SlidingLoop<Scalar> loop(vertices, {}, options, 0);
+        BulletScene& bullet = bullet_of(vertices);
+        Times times;
+        Errors errors;
+        std::vector<double> bullets;
+        int touched = 0;
+        while (loop.now < Slide::ticks) {
+            const Index turn = loop.now;
+            for (Index t = turn; t < turn + ticks_in_turn; ++t) {
+                measure(loop, times);
+                compare(loop, reference, errors);
+            }
+            for (Index t = turn; t < turn + ticks_in_turn; ++t) {
+                const Vector3 position = loop.path.position(t);
+                const double time = seconds([&] { bullet.frame(position); });
+                touched += bullet.touched();
+                if (t >= Slide::first_measured) bullets.push_back(time);
+            }
+        }
+        loop.check();
+        require(bullet.finite() && touched > 0, "the tool must press on Bullet's body");
+        require(bullet.overlap() < depth / 2, "Bullet's nodes must go out of the tool's way");
+
+        const double time = median(times.whole), theirs = median(bullets);
+        state.SetIterationTime(time);
+        state.counters["contact"] = median(times.contact);
+        state.counters["sweep"] = median(times.sweep);
+        state.counters["other"] = median(times.other);
+        state.counters["force_error"] =
+            std::sqrt(errors.squares / static_cast<double>(reference.forces.size())) / reference.rms;
+        state.counters["largest_force"] = errors.largest / reference.largest;
+        state.counters["overlap"] = errors.overlap / static_cast<double>(membrane::mean_edge(loop.mesh));
+        state.counters["bullet"] = theirs;
+        state.counters["ratio"] = theirs / time;
+    }
+    state.SetLabel(instruction_set);
+}
+void settings(benchmark::internal::Benchmark* measured) {
+    measured->ArgNames({"layers", "sweeps", "vertices"});
+    for (const int vertices : {642, 2562, 10242, 40962}) {
+        measured->Args({6, 2, vertices});
+        measured->Args({3, 1, vertices});
+    }
+    measured->Iterations(1)->UseManualTime();
+}
+BENCHMARK(path<double>)->Name("path/scalar:double")->Apply(settings);
+BENCHMARK(path<float>)->Name("path/scalar:float")->Apply(settings);
+
+/// A scene's tick is measured with all that is in it.
+template <class Scene>
+void scene(benchmark::State& state) {
+    for (auto _ : state) {
+        Scene played(sphere(state.range(0)));
+        std::vector<double> times;
+        bool advanced = true, felt = true;
+        for (Index t = 0; t < Slide::ticks; ++t) {
+            played.aim(t);
+            const double time = seconds([&] { played.frame(); });
+            advanced = advanced && played.report.status == membrane::StepStatus::advanced;
+            if (t < Slide::first_measured) continue;
+            felt = felt && played.felt();
+            times.push_back(time);
+        }
+        require(advanced, "every step must advance");
+        require(felt, "whatever acts must be felt");
+        state.SetIterationTime(median(times));
+    }
+    state.SetLabel(instruction_set);
+}
+void sizes_of_scenes(benchmark::internal::Benchmark* measured) {
+    measured->ArgName("vertices");
+    for (const int vertices : {642, 2562, 10242}) measured->Arg(vertices);
+    measured->Iterations(1)->UseManualTime();
+}
+BENCHMARK(scene<SphereScene>)->Name("scene/sphere")->Apply(sizes_of_scenes);
+BENCHMARK(scene<TwoTools>)->Name("scene/two_tools")->Apply(sizes_of_scenes);
+BENCHMARK(scene<CapsuleTool>)->Name("scene/capsule")->Apply(sizes_of_scenes);
+BENCHMARK(scene<PointTool>)->Name("scene/point")->Apply(sizes_of_scenes);
+BENCHMARK(scene<Forceps>)->Name("scene/forceps")->Apply(sizes_of_scenes);
+BENCHMARK(scene<PinnedRim>)->Name("scene/pinned")->Apply(sizes_of_scenes);
+BENCHMARK(scene<TurningBody>)->Name("scene/turning")->Apply(sizes_of_scenes);
+BENCHMARK(scene<BeatingBody>)->Name("scene/beating")->Apply(sizes_of_scenes);
+BENCHMARK(scene<StiffeningLaw>)->Name("scene/stiffening")->Apply(sizes_of_scenes);
+BENCHMARK(scene<Published>)->Name("scene/published")->Apply(sizes_of_scenes);
+BENCHMARK(scene<Cup>)->Name("scene/suction")->Apply(sizes_of_scenes);
+BENCHMARK(scene<WithDeadline>)->Name("scene/deadline")->Apply(sizes_of_scenes);
+BENCHMARK(scene<BentTissue>)->Name("scene/tissue")->Apply(sizes_of_scenes);
+
+}  // namespace
