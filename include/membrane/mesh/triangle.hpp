@@ -151,8 +151,9 @@ Vector3<N> point_at(const Triangle<N>& triangle, const Vector3<N>& barycentric) 
 
 namespace detail {
 
-/// What is not asked for of the point is not reckoned.
-template <Number N>
+/// What is not asked for of the point is not computed. With `branches` a triangle that is faced costs half: for several
+/// triangles that pays where all of them are.
+template <bool branches, Number N>
 [[gnu::always_inline]] inline TrianglePoint<N> closest_point_inline(const Triangle<N>& triangle,
                                                                     const Vector3<N>& q) noexcept {
     using Limits = std::numeric_limits<Each<N>>;
@@ -167,16 +168,14 @@ template <Number N>
 
     const N divisor = select<N>(over_face, whole, 1), b = weight_b / divisor, c = weight_c / divisor;
     const Vector3<N> in_face(larger<N>(0, 1 - b - c), b, c), offset_in_face = aq - b * ab - c * ac;
-    // Of several triangles all edges are gone through: which of them count, no processor predicts.
-    constexpr bool one = Real<N>;
-    if (one && all(over_face)) return {in_face, point_at(triangle, in_face), squared_norm(offset_in_face)};
+    if (branches && all(over_face)) return {in_face, point_at(triangle, in_face), squared_norm(offset_in_face)};
 
     // Outside, the nearest point lies on an edge that faces q.
     N nearest = Limits::infinity();
     Vector3<N> barycentric(1, 0, 0);
     const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge)
         __attribute__((always_inline)) {
-        if (one && !any(faces)) return;
+        if (Real<N> && !any(faces)) return;  // of several triangles, which of them count no processor predicts
         const N along = fraction(dot(offset, edge), squared_norm(edge));
         const N squared_distance = squared_norm<N>(offset - along * edge);
         const auto nearer = finite & faces & (squared_distance < nearest);
@@ -197,12 +196,12 @@ template <Number N>
 
 template <Number N>
 TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
-    return detail::closest_point_inline(triangle, q);
+    return detail::closest_point_inline<Real<N>>(triangle, q);
 }
 
 template <Number N>
 N squared_distance(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
-    return detail::closest_point_inline(triangle, q).squared_distance;
+    return detail::closest_point_inline<Real<N>>(triangle, q).squared_distance;
 }
 
 template <Real Scalar>

@@ -92,8 +92,9 @@ class ConstraintContext {
     /// A change of force that is not worth making [N].
     [[nodiscard]] Scalar force_tolerance() const noexcept { return state_.force_tolerance; }
 
-    /// The point with this number that this constraint had in the step before, or null.
-    [[nodiscard]] const ContactPoint<Scalar>* cached_point(Index triangle, int feature) noexcept;
+    /// The point with this number that this constraint had in the step before, or null; `corner` is its first corner.
+    /// Cost: linear in the points with that first corner.
+    [[nodiscard]] const ContactPoint<Scalar>* cached_point(Index triangle, int feature, Index corner) const noexcept;
 
     /// Keeps a point of this constraint for the next step; refuses the step where there is no room for more.
     void add_point(const ContactPoint<Scalar>& point) noexcept;
@@ -118,7 +119,6 @@ class ConstraintContext {
     /// The constraint that is selected has no points yet.
     void begin_points() noexcept {
         state_.point_ranges[constraint_] = {state_.points.size(), state_.points.size()};
-        last_found_ = 0;
     }
 
     void load(Index v) noexcept {
@@ -182,7 +182,6 @@ class ConstraintContext {
     const void* network_;  // of a type that only the next knows
     bool (*is_pinned_)(const void*, Index) noexcept;
     std::size_t constraint_ = 0;
-    std::size_t last_found_ = 0;
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
@@ -210,14 +209,13 @@ void ConstraintContext<Scalar>::prescribe(Index v) noexcept {
 }
 
 template <Real Scalar>
-const ContactPoint<Scalar>* ConstraintContext<Scalar>::cached_point(Index triangle, int feature) noexcept {
-    // Points come in nearly the same order every time: the search starts where the last one ended.
-    const auto before = previous_points();
-    for (std::size_t i = 0; i < before.size(); ++i) {
-        const std::size_t at = (last_found_ + i) % before.size();
-        if (before[at].triangle != triangle || before[at].feature != feature) continue;
-        last_found_ = at + 1;
-        return &before[at];
+const ContactPoint<Scalar>* ConstraintContext<Scalar>::cached_point(Index triangle, int feature,
+                                                                    Index corner) const noexcept {
+    const auto range = state_.previous_ranges[constraint_];
+    for (Index i = state_.previous_at(corner); i != no_index; i = state_.next_previous(i)) {
+        const auto at = static_cast<std::size_t>(i);
+        const auto& point = state_.previous_points[at];
+        if (at >= range.begin && at < range.end && point.triangle == triangle && point.feature == feature) return &point;
     }
     return nullptr;
 }

@@ -284,7 +284,7 @@ void HeldPoint<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept
     if (triangle == no_index || !seed_corners(context, corners)) return;
     const Vector3<Scalar> none = Vector3<Scalar>::Zero();
     ContactPoint<Scalar> point{triangle, 0, corners, barycentric, none, none};
-    if (const auto* before = context.cached_point(triangle, 0)) point.force = before->force;
+    if (const auto* before = context.cached_point(triangle, 0, corners[0])) point.force = before->force;
     add_point_force(context, corners, barycentric, point.force);
     context.add_point(point);
     const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);

@@ -10,7 +10,7 @@ namespace membrane {
 /// A point of the surface that a constraint acts on, and the force it acts with.
 ///
 ///     context.add_point({triangle, 0, corners, weights, normal, force});
-///     const auto* before = context.cached_point(triangle, 0);               // of the step before, or null
+///     const auto* before = context.cached_point(triangle, 0, corners[0]);   // of the step before, or null
 template <Real Scalar>
 struct ContactPoint {
     Index triangle;  ///< with `feature`, what identifies the point from step to step

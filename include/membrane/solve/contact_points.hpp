@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 
+#include <membrane/collision/contact.hpp>
 #include <membrane/collision/tool.hpp>
 #include <membrane/mesh/triangle.hpp>
 #include <membrane/solve/contact_pack.hpp>
@@ -50,6 +51,12 @@ ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<S
 /// Lets the vertices feel the forces that these passes have found.
 template <Real Scalar>
 void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept;
+
+/// The points nearest to `q` of as many triangles as there are lanes; of fewer, the last one again.
+template <Real Scalar>
+[[nodiscard]] TrianglePoint<Lanes<Scalar>> closest_points(const StepState<Scalar>& state,
+                                                          std::span<const TouchedTriangle> triangles,
+                                                          const Vector3<Scalar>& q) noexcept;
 
 /// Brings weights, normal and force of the contact points up to date with their packs. Online. Cost: linear in the points.
 template <Real Scalar>
@@ -122,7 +129,7 @@ template <Real Scalar>
     Vector3<Wide> separation, along;
     if (pack.kind == ContactKind::end) {
         pack.axis_point = broadcast(tool.position) + pack.end * broadcast(tool.axis);
-        const auto nearest = closest_point(triangle, pack.axis_point);
+        const auto nearest = closest_point_inline<true>(triangle, pack.axis_point);
         pack.weights = nearest.barycentric;
         separation = pack.axis_point - nearest.point;
         const auto in_face = (pack.weights[0] > 0) & (pack.weights[1] > 0) & (pack.weights[2] > 0);
@@ -359,6 +366,21 @@ template <Real Scalar>
     for (auto& pack : packs) {
         if (any((pack.force > 0) | (pack.added_force > 0))) detail::add_forces(state, pack);
     }
+}
+
+template <Real Scalar>
+[[gnu::flatten]] TrianglePoint<Lanes<Scalar>> closest_points(const StepState<Scalar>& state,
+                                                             std::span<const TouchedTriangle> triangles,
+                                                             const Vector3<Scalar>& q) noexcept {
+    std::array<std::array<Index, Lanes<Scalar>::count>, 3> begins;
+    for (std::size_t i = 0; i < Lanes<Scalar>::count; ++i) {
+        const auto& corners = triangles[(std::min)(i, triangles.size() - 1)].corners;
+        for (std::size_t k = 0; k < 3; ++k) begins[k][i] = numbers_in_point * corners[k];
+    }
+    const auto* rows = state.position.data();
+    return closest_point<Lanes<Scalar>>(
+        {gather(rows, begins[0].data()), gather(rows, begins[1].data()), gather(rows, begins[2].data())},
+        detail::broadcast(q));
 }
 
 template <Real Scalar>

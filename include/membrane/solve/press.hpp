@@ -53,6 +53,7 @@ struct Press {
     void carry_with_tool(Context& context) const noexcept;
     void clear_contact_point(Context& context) const noexcept;
     void find_points(Context& context) const noexcept;
+    void find_points_of_sphere(Context& context) const noexcept;
     void add_point(Context& context, const TouchedTriangle& triangle, int feature,
                    const Proximity<Scalar>& nearest) const noexcept;
     void pack_points(Context& context) const noexcept;
@@ -196,6 +197,7 @@ void Press<Scalar>::clear_contact_point(Context& context) const noexcept {
 template <Real Scalar>
 void Press<Scalar>::find_points(Context& context) const noexcept {
     const int features = feature_pairs(tool);
+    if (features == 1) return find_points_of_sphere(context);
     for (const auto& touched : contact.touched) {
         const auto triangle = triangle_of(context, touched.corners);
         for (int feature = 0; feature < features; ++feature) {
@@ -205,11 +207,27 @@ void Press<Scalar>::find_points(Context& context) const noexcept {
     }
 }
 
+// The same, several triangles at a time.
+template <Real Scalar>
+void Press<Scalar>::find_points_of_sphere(Context& context) const noexcept {
+    constexpr std::size_t lanes = Lanes<Scalar>::count;
+    for (std::size_t first = 0; first < contact.touched.size(); first += lanes) {
+        const auto touched = contact.touched.subspan(first, (std::min)(lanes, contact.touched.size() - first));
+        const auto nearest = closest_points(context.state(), touched, tool.position);
+        for (std::size_t i = 0; i < touched.size(); ++i) {
+            const auto of_lane = [i](const Vector3<Lanes<Scalar>>& a) {
+                return Vector3<Scalar>(a[0][i], a[1][i], a[2][i]);
+            };
+            add_point(context, touched[i], 0, {of_lane(nearest.barycentric), tool.position - of_lane(nearest.point)});
+        }
+    }
+}
+
 // A point that was there in the last step goes on with its force; another one joins if it is near enough.
 template <Real Scalar>
 void Press<Scalar>::add_point(Context& context, const TouchedTriangle& triangle, int feature,
                               const Proximity<Scalar>& nearest) const noexcept {
-    const auto* before = context.cached_point(triangle.triangle, feature);
+    const auto* before = context.cached_point(triangle.triangle, feature, triangle.corners[0]);
     const Scalar distance = norm(nearest.reach);
     if (before == nullptr && distance > contact.reach) return;
     const bool apart = distance > contact.radius / 1000;

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/bounded_list.hpp>
@@ -57,6 +58,12 @@ struct StepState {
     void forget_points() noexcept;
     void reset() noexcept;                                               ///< As new.
     void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< What is kept, with the body.
+
+    /// The first of the previous points whose first corner is `v`, and the next one of the same; or no index.
+    [[nodiscard]] Index previous_at(Index v) const noexcept { return first_previous[static_cast<std::size_t>(v)]; }
+    [[nodiscard]] Index next_previous(Index point) const noexcept {
+        return next_of_same_corner[static_cast<std::size_t>(point)];
+    }
 
     /// Takes the position of `v` from `x`, unless it has been taken in this step.
     template <class Network>
@@ -123,6 +130,8 @@ struct StepState {
     std::vector<unsigned char> fixed;  // of loaded vertices: pinned or prescribed
 
     BoundedList<ContactPoint<Scalar>> points, previous_points;
+    std::vector<Index> first_previous;        // of each vertex, the last previous point of which it is the first corner
+    std::vector<Index> next_of_same_corner;   // of each previous point
     std::array<ListRange, max_constraints> point_ranges{}, previous_ranges{};
     ContactPacks<Scalar> packs;
     std::array<ListRange, max_constraints> pack_ranges{}, watched_ranges{};
@@ -152,6 +161,8 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       fixed(static_cast<std::size_t>(vertices), 0),
       points(static_cast<std::size_t>(max_contact_points)),
       previous_points(points),
+      first_previous(static_cast<std::size_t>(vertices), no_index),
+      next_of_same_corner(points.room(), no_index),
       packs(vertices, static_cast<std::size_t>(max_contact_points)),
       watched(2 * static_cast<std::size_t>(vertices)),
       marked(vertices) {}
@@ -172,12 +183,22 @@ void StepState<Scalar>::begin_step() noexcept {
 
 template <Real Scalar>
 void StepState<Scalar>::end_step() noexcept {
+    forget_points();
     std::swap(points, previous_points);
     std::swap(point_ranges, previous_ranges);
+    for (std::size_t i = 0; i < previous_points.size(); ++i) {
+        const Index v = previous_points[i].corners[0];
+        if (v < 0 || v >= vertex_count()) continue;
+        next_of_same_corner[i] = std::exchange(first_previous[static_cast<std::size_t>(v)], static_cast<Index>(i));
+    }
 }
 
 template <Real Scalar>
 void StepState<Scalar>::forget_points() noexcept {
+    for (const auto& point : previous_points.items()) {
+        const Index v = point.corners[0];
+        if (v >= 0 && v < vertex_count()) first_previous[static_cast<std::size_t>(v)] = no_index;
+    }
     previous_points.clear();
     previous_ranges = {};
 }
