@@ -20,15 +20,15 @@ struct Suction {
     [[nodiscard]] membrane::Lead<Scalar> lead() const noexcept {
         return vertices.empty() ? membrane::Lead<Scalar>() : membrane::LeadPoint<Scalar>{mouth};
     }
-    void begin(membrane::Region<Scalar>& region) const noexcept {
+    void begin(membrane::ConstraintContext<Scalar>& context) const noexcept {
         for (const membrane::Index v : vertices) {
-            if (!region.check(v)) return;
-            region.seed(v);
-            region.push(v, force / static_cast<Scalar>(vertices.size()));
+            if (!context.check(v)) return;
+            context.seed(v);
+            context.add_force(v, force / static_cast<Scalar>(vertices.size()));
         }
     }
-    bool enforce(membrane::Region<Scalar>&) const noexcept { return false; }
-    [[nodiscard]] membrane::Vector3<Scalar> reaction(const membrane::Region<Scalar>&) const noexcept {
+    bool enforce(membrane::ConstraintContext<Scalar>&) const noexcept { return false; }
+    [[nodiscard]] membrane::Vector3<Scalar> reaction(const membrane::ConstraintContext<Scalar>&) const noexcept {
         return vertices.empty() ? membrane::Vector3<Scalar>(membrane::Vector3<Scalar>::Zero())
                                 : membrane::Vector3<Scalar>(-force);
     }

@@ -14,7 +14,6 @@
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/solve/contact_pack.hpp>
-#include <membrane/solve/contact_point.hpp>
 
 namespace membrane {
 
