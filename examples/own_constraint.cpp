@@ -27,9 +27,7 @@ struct Suction {
         }
     }
     bool enforce(Context&) const noexcept { return false; }  // a given force needs no correction
-    Eigen::Vector3d reaction(const Context&) const noexcept {
-        return -static_cast<double>(vertices.size()) * force;
-    }
+    Eigen::Vector3d reaction(const Context&) const noexcept { return -static_cast<double>(vertices.size()) * force; }
 };
 static_assert(membrane::Constraint<Suction, double>);
 

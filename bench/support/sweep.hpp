@@ -98,8 +98,8 @@ void packs(benchmark::State& state) {
     }
     require(membrane::is_finite(membrane::Points<Scalar>(now)), "the sweep must not diverge");
     count_visits(state);
-    state.counters["filled"] = static_cast<double>(packed.size()) /
-                               static_cast<double>(packed.count() * Lanes<Scalar>::count);
+    state.counters["filled"] =
+        static_cast<double>(packed.size()) / static_cast<double>(packed.count() * Lanes<Scalar>::count);
 }
 
 }  // namespace bench

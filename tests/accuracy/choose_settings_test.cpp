@@ -42,9 +42,9 @@ struct CountedSpring {
 };
 
 struct CountedPress : Press<double> {
-    bool enforce(Region<double>& region) const noexcept {
+    bool enforce(ConstraintContext<double>& context) const noexcept {
         WorkClock::add(3e-6);
-        return Press<double>::enforce(region);
+        return Press<double>::enforce(context);
     }
 };
 

@@ -48,12 +48,13 @@ struct NoDamping {
 };
 static_assert(membrane::VolumeModel<NoDamping, S>);
 
-/// What the solver does with a vertex that it visits alone, by a rule that moves it along the force.
+/// What the solver does with a vertex that it updates alone, by a rule that moves it along the force.
 template <class Scene>
 [[gnu::always_inline]] inline void visit(const Scene& scene, Index v, const membrane::VertexState<S>& state) noexcept {
     const S compliance = Rule{}.compliance(state);
     if (compliance * state.stiffness >= 2) std::abort();
-    scene.x.col(v) += membrane::held_back<Rule>(scene, v, compliance * state.force);
+    const auto by = membrane::backtracked<Rule>(scene, v, compliance * state.force);
+    scene.state.set_position(v, membrane::point(scene.x, v) + by);
 }
 
 template <class Volume>
@@ -65,12 +66,12 @@ membrane::VertexState<S> bare_state(const SceneOf<membrane::NoVolumeSprings>& sc
     const auto springs = scene.network.pull(v, scene.x);
     state.force = springs.force;
     state.stiffness = springs.stiffness;
-    const S touches = (std::max)(scene.work.stiffness[static_cast<std::size_t>(v)], S(0));
-    state.force += membrane::point(scene.work.external, v);
-    state.stiffness += touches;
+    const auto& of_constraints = scene.state.row(scene.state.force, v);
+    state.force += of_constraints.point();
+    state.stiffness += (std::max)(of_constraints.extra(), S(0));
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : S(0);
     state.dt = scene.dt;
-    state.touched = scene.work.seeds.contains(v);
+    state.touched = scene.state.seeds.contains(v);
     return state;
 }
 
@@ -159,7 +160,7 @@ int main(int argc, char** argv) {
     const membrane::NoVolumeSprings none;
     const std::vector<S> stiffnesses(static_cast<std::size_t>(mesh.vertex_count()), backing);
     const NoDamping undamped{&springs.anchors(), &stiffnesses};
-    membrane::Workspace<S> work(mesh.vertex_count(), 0);
+    membrane::StepState<S> state(mesh.vertex_count(), 0);
 
     Points start = mesh.positions();
     std::mt19937_64 random(1);
@@ -168,7 +169,6 @@ int main(int argc, char** argv) {
             start(k, v) += static_cast<S>(1e-4 * (static_cast<double>(random() % 2001) / 1000 - 1));
         }
     }
-    work.start = start;
 
     bool same = true;
     const auto compare = [&](const char* name, const auto& ours, const auto& bare) {
@@ -182,8 +182,11 @@ int main(int argc, char** argv) {
     };
     const auto visited = [&](const auto& visit, const auto& volume) {
         return [&](Points& x) {
-            PointsRef ref = x;
-            visit(SceneOf<std::remove_cvref_t<decltype(volume)>>{ref, dt, network, volume, work});
+            const membrane::ConstPointsRef<S> begin = start, now = state.positions();
+            state.begin_step();
+            for (Index v = 0; v < x.cols(); ++v) state.load(v, begin, network);
+            visit(SceneOf<std::remove_cvref_t<decltype(volume)>>{begin, now, dt, network, volume, state});
+            x = now;
         };
     };
     compare("backing", visited(backing_ours, none), visited(backing_bare, none));
@@ -192,8 +195,10 @@ int main(int argc, char** argv) {
         "energy", [&](Points& x) { energy_ours(network, start, x); },
         [&](Points& x) { energy_bare(network_without_energy, start, x); });
     const Rows rows(network);
+    const Points no_forces = Points::Zero(3, mesh.vertex_count());
+    const std::vector<S> no_stiffness(static_cast<std::size_t>(mesh.vertex_count()), S(0));
     compare("by_hand", visited(backing_ours, none),
-            [&](Points& x) { by_hand_bare(rows, x.data(), work.external.data(), work.stiffness.data()); });
+            [&](Points& x) { by_hand_bare(rows, x.data(), no_forces.data(), no_stiffness.data()); });
     std::printf("%d visits\n", static_cast<int>(mesh.vertex_count()));
     return same ? 0 : 1;
 }

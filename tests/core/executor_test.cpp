@@ -27,10 +27,10 @@ TEST_CASE("one thread does every task once, in order", "[executor]") {
     }
 }
 
-TEST_CASE("what is shared out is done once, so many in each task at the most", "[executor]") {
+TEST_CASE("what is distributed is done once, so many in each task at the most", "[executor]") {
     for (const Index count : {0, 1, 2, 9, 10, 11, 100}) {
-        for (const Index at_once : {1, 3, 10, 1000}) {
-            CAPTURE(count, at_once);
+        for (const Index grain_size : {1, 3, 10, 1000}) {
+            CAPTURE(count, grain_size);
             std::vector<int> done(static_cast<std::size_t>(count), 0);
             Index tasks = 0, largest = 0;
             const auto backwards = [&](Index all, const auto& task) {
@@ -41,14 +41,28 @@ TEST_CASE("what is shared out is done once, so many in each task at the most", "
                     largest = std::max(largest, static_cast<Index>(std::count(done.begin(), done.end(), 1) - before));
                 }
             };
-            share_out(backwards, static_cast<std::size_t>(count), static_cast<std::size_t>(at_once),
-                      [&](std::size_t begin, std::size_t end) {
-                          CHECK(begin < end);
-                          for (; begin < end; ++begin) ++done[begin];
-                      });
+            parallel_for(backwards, static_cast<std::size_t>(count), static_cast<std::size_t>(grain_size),
+                         [&](std::size_t begin, std::size_t end) {
+                             CHECK(begin < end);
+                             for (; begin < end; ++begin) ++done[begin];
+                         });
             CHECK(std::all_of(done.begin(), done.end(), [](int times) { return times == 1; }));
-            CHECK(tasks == (count + at_once - 1) / at_once);
-            CHECK(largest <= at_once);
+            CHECK(tasks == (count + grain_size - 1) / grain_size);
+            CHECK(largest <= grain_size);
         }
     }
+}
+
+TEST_CASE("a reference to an executor does what the executor does", "[executor]") {
+    std::vector<Index> order;
+    const auto backwards = [](Index count, const auto& task) {
+        for (Index i = count; i-- > 0;) task(i);
+    };
+    const ExecutorRef serial{OneThread{}}, other{backwards};
+    CHECK(serial.is_serial());
+    CHECK_FALSE(other.is_serial());
+    serial(3, [&](Index i) { order.push_back(i); });
+    other(3, [&](Index i) { order.push_back(i); });
+    serial(0, [&](Index i) { order.push_back(i); });
+    CHECK(order == std::vector<Index>{0, 1, 2, 2, 1, 0});
 }

@@ -42,6 +42,20 @@ TEMPLATE_TEST_CASE("points are gathered from where they are, and scattered to wh
             REQUIRE(there == Vector3<S>(points[0][i], points[1][i], points[2][i]));
             REQUIRE(to[static_cast<std::size_t>(places[i] / numbers_in_point)].point() == there);
         }
+        const auto padded = gather_padded(from.data(), begins.data());
+        for (std::size_t k = 0; k < 3; ++k) {
+            const auto row = static_cast<Eigen::Index>(k);
+            for (std::size_t i = 0; i < lanes; ++i) REQUIRE(padded.point[row][i] == points[row][i]);
+        }
+        for (std::size_t i = 0; i < lanes; ++i) {
+            REQUIRE(padded.extra[i] == from[static_cast<std::size_t>(begins[i] / numbers_in_point)].extra());
+            REQUIRE(to[static_cast<std::size_t>(places[i] / numbers_in_point)].extra() == 0);
+        }
+        scatter_padded(padded, to.data(), places.data());
+        for (std::size_t i = 0; i < lanes; ++i) {
+            REQUIRE(to[static_cast<std::size_t>(places[i] / numbers_in_point)].number ==
+                    from[static_cast<std::size_t>(begins[i] / numbers_in_point)].number);
+        }
         for (const Index i : free) REQUIRE(to[static_cast<std::size_t>(i)].point() == Vector3<S>(7, 8, 9));
     }
 }

@@ -113,3 +113,25 @@ TEMPLATE_TEST_CASE("lanes are set one by one, all at once, and from numbers in a
     CHECK(any(true));
     CHECK_FALSE(any(false));
 }
+
+TEMPLATE_TEST_CASE("masks are joined lane by lane", "[lanes]", float, double) {
+    using S = TestType;
+    constexpr std::size_t lanes = Lanes<S>::count;
+    for (unsigned a = 0; a < 1U << lanes; ++a) {
+        for (unsigned b = 0; b < 1U << lanes; b += lanes == 8 ? 7 : 1) {
+            Lanes<S> first = S(0), second = S(0);
+            for (std::size_t i = 0; i < lanes; ++i) {
+                first.set(i, (a >> i & 1) != 0 ? S(1) : S(0));
+                second.set(i, (b >> i & 1) != 0 ? S(1) : S(0));
+            }
+            const auto x = first > 0, y = second > 0;
+            const unsigned every = (1U << lanes) - 1;
+            REQUIRE(bits(x) == a);
+            REQUIRE(bits(x & y) == (a & b));
+            REQUIRE(bits(x | y) == (a | b));
+            REQUIRE(bits(!x) == (~a & every));
+            REQUIRE(any(x) == (a != 0));
+            REQUIRE(all(x) == (a == every));
+        }
+    }
+}

@@ -52,9 +52,9 @@ struct CountingClock {
 template <class Scalar>
 struct CountedPress : Press<Scalar> {
     int* enforced;
-    bool enforce(Region<Scalar>& region) const noexcept {
+    bool enforce(ConstraintContext<Scalar>& context) const noexcept {
         ++*enforced;
-        return Press<Scalar>::enforce(region);
+        return Press<Scalar>::enforce(context);
     }
 };
 

@@ -419,22 +419,22 @@ struct Told {
     Index* begun;
 
     bool sound() const noexcept { return is_sound; }
-    void begin(Region<double>&) const noexcept { ++*begun; }
-    bool enforce(Region<double>&) const noexcept { return mends; }
-    Vector3<double> reaction(const Region<double>&) const noexcept { return {force, 0, 0}; }
+    void begin(ConstraintContext<double>&) const noexcept { ++*begun; }
+    bool enforce(ConstraintContext<double>&) const noexcept { return mends; }
+    Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return {force, 0, 0}; }
 };
 
 }  // namespace
 
 TEST_CASE("a set of constraints is sound if all are, mends if any does, finite if all forces are") {
-    Workspace<double> work(1, 8);
-    Points<double> positions = Points<double>::Zero(3, 1);
-    PointsRef<double> x = positions;
-    work.open();
+    StepState<double> work(1, 8);
+    const Points<double> positions = Points<double>::Zero(3, 1);
+    const ConstPointsRef<double> x = positions;
+    work.begin_step();
     const struct {
         bool pinned(Index) const { return false; }
     } none_pinned;
-    Region<double> region(x, work, none_pinned);
+    ConstraintContext<double> context(x, work, none_pinned);
     Index begun = 0;
     std::array<Vector3<double>, 2> reactions{};
     const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -442,7 +442,7 @@ TEST_CASE("a set of constraints is sound if all are, mends if any does, finite i
         for (const bool second : {false, true}) {
             const Told a{first, first, first ? 1 : nan, &begun}, b{second, second, second ? 2 : nan, &begun};
             const std::array refs{ConstraintRef<double>(a), ConstraintRef<double>(b)};
-            const ConstraintSet<double> both(region, refs);
+            const ConstraintList<double> both(context, refs);
             CHECK(both.sound() == (first && second));
             CHECK(both.enforce() == (first || second));
             CHECK(both.react(reactions) == (first && second));
@@ -453,7 +453,7 @@ TEST_CASE("a set of constraints is sound if all are, mends if any does, finite i
     CHECK(reactions[0].x() == 1);
     CHECK(reactions[1].x() == 2);
 
-    const ConstraintSet<double> none(region, {});
+    const ConstraintList<double> none(context, {});
     CHECK(none.sound());
     CHECK_FALSE(none.enforce());
     CHECK(none.react({}));

@@ -51,16 +51,16 @@ struct CostlyPress {
     WorkClock* clock;
 
     [[nodiscard]] bool sound() const noexcept { return inner.sound(); }
-    void begin(Region<double>& region) const noexcept {
-        inner.begin(region);
-        clock->work(0.5 * static_cast<double>(region.touches().size()));
+    void begin(ConstraintContext<double>& context) const noexcept {
+        inner.begin(context);
+        clock->work(0.5 * static_cast<double>(context.points().size()));
     }
-    bool enforce(Region<double>& region) const noexcept {
-        clock->work(0.5 * static_cast<double>(region.touches().size()));
-        return inner.enforce(region);
+    bool enforce(ConstraintContext<double>& context) const noexcept {
+        clock->work(0.5 * static_cast<double>(context.points().size()));
+        return inner.enforce(context);
     }
-    [[nodiscard]] Vector3<double> reaction(const Region<double>& region) const noexcept {
-        return inner.reaction(region);
+    [[nodiscard]] Vector3<double> reaction(const ConstraintContext<double>& context) const noexcept {
+        return inner.reaction(context);
     }
 };
 

@@ -56,12 +56,12 @@ struct Witness {
     Points<double>* seen;
 
     bool sound() const noexcept { return true; }
-    void hold(Region<double>& region) const noexcept {
-        for (Index v = 0; v < seen->cols(); ++v) seen->col(v) = region.position(v);
+    void hold(ConstraintContext<double>& context) const noexcept {
+        for (Index v = 0; v < seen->cols(); ++v) seen->col(v) = context.position(v);
     }
-    void begin(Region<double>&) const noexcept {}
-    bool enforce(Region<double>&) const noexcept { return false; }
-    Vector3<double> reaction(const Region<double>&) const noexcept { return Vector3<double>::Zero(); }
+    void begin(ConstraintContext<double>&) const noexcept {}
+    bool enforce(ConstraintContext<double>&) const noexcept { return false; }
+    Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return Vector3<double>::Zero(); }
 };
 
 /// A vertex is led outward, 0.2 mm in a tick.

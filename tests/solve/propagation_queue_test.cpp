@@ -184,7 +184,7 @@ TEST_CASE("a layer that there is not is a broken precondition", "[queue][bad]") 
 }
 #endif
 
-TEST_CASE("every layer but the first is ordered in groups, whatever was there before", "[queue]") {
+TEST_CASE("every layer is ordered in groups, whatever was there before", "[queue]") {
     for (int seed = 1; seed <= cases(500); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -202,8 +202,8 @@ TEST_CASE("every layer but the first is ordered in groups, whatever was there be
         IndexSet expected(vertices);
         VertexGroups groups(vertices);
         for (const Index v : plain.vertices()) expected.insert(v);
-        std::size_t begin = plain.layer_count() > 0 ? plain.layer(0).size() : 0;
-        for (Index k = 1; k < plain.layer_count(); begin += plain.layer(k++).size()) {
+        std::size_t begin = 0;
+        for (Index k = 0; k < plain.layer_count(); begin += plain.layer(k++).size()) {
             groups.add(network, expected, begin, begin + plain.layer(k).size());
         }
         REQUIRE(std::ranges::equal(queue.vertices(), expected.items()));
@@ -224,9 +224,10 @@ TEST_CASE("or all beyond the first together, which makes one layer of them", "[q
         queue.group(network, true);
         REQUIRE(queue.layer_count() == std::min(plain.layer_count(), Index(2)));
         if (queue.layer_count() == 0) continue;
-        REQUIRE(std::ranges::equal(queue.layer(0), plain.layer(0)));
+        REQUIRE(std::ranges::is_permutation(queue.layer(0), plain.layer(0)));
         REQUIRE(std::ranges::is_permutation(queue.vertices(), plain.vertices()));
-        std::size_t begin = queue.layer(0).size();
+        REQUIRE(std::ranges::count(queue.group_ends(), queue.layer(0).size()) == 1);
+        std::size_t begin = 0;
         for (const std::size_t end : queue.group_ends()) {
             const auto group = queue.vertices().subspan(begin, end - begin);
             for (const Index v : group) {

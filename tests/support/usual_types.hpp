@@ -20,11 +20,9 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
 
 }  // namespace usual
 
-#define MEMBRANE_USUAL_STEP(PREFIX, SCALAR, RULE, PACE, ...)                                                         \
-    PREFIX class membrane::Sweeps<membrane::Method<membrane::RULE, SCALAR, membrane::OneThread>, SCALAR,             \
-                                  membrane::StepInput<SCALAR, usual::Springs<SCALAR>, __VA_ARGS__>, membrane::PACE>; \
-    PREFIX membrane::StepReport<SCALAR> membrane::QuasiStaticSolver<SCALAR, membrane::RULE>::step_in(                \
-        membrane::PACE, membrane::PointsRef<SCALAR>&, SCALAR, const usual::Springs<SCALAR>&, const __VA_ARGS__&,     \
+#define MEMBRANE_USUAL_STEP(PREFIX, SCALAR, RULE, ...)                                                                 \
+    PREFIX membrane::StepReport<SCALAR> membrane::QuasiStaticSolver<SCALAR, membrane::RULE>::step_in(                  \
+        membrane::TimeBudget, membrane::PointsRef<SCALAR>&, SCALAR, const usual::Springs<SCALAR>&, const __VA_ARGS__&, \
         std::span<const membrane::ConstraintRef<SCALAR>>) noexcept
 
 #define MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, RULE)                                                   \
@@ -32,7 +30,7 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
     PREFIX membrane::QuasiStaticSolver<SCALAR, membrane::RULE>::QuasiStaticSolver(                    \
         const usual::Springs<SCALAR>&, const membrane::SolverOptions<SCALAR>&, const membrane::RULE&, \
         const membrane::OneThread&);                                                                  \
-    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, RULE, NoHurry, membrane::VirtualVolumeSprings<SCALAR>)
+    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, RULE, membrane::VirtualVolumeSprings<SCALAR>)
 
 /// `PREFIX` is `template` where they are compiled, and `extern template` everywhere else.
 #define MEMBRANE_USUAL_TYPES(PREFIX, SCALAR)                                                                     \
@@ -53,10 +51,10 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
     PREFIX class membrane::MassSpringNetwork<SCALAR, membrane::ExponentialSpring>;                               \
     PREFIX class membrane::VirtualVolumeSprings<SCALAR>;                                                         \
     PREFIX class membrane::FoundationSprings<SCALAR>;                                                            \
-    PREFIX class membrane::SpringPacks<SCALAR>;                                                                  \
-    PREFIX class membrane::CompactBlock<SCALAR>;                                                                 \
-    PREFIX struct membrane::Workspace<SCALAR>;                                                                   \
-    PREFIX class membrane::Region<SCALAR>;                                                                       \
+    PREFIX class membrane::PackedVertices<SCALAR>;                                                               \
+    PREFIX class membrane::ContactPacks<SCALAR>;                                                                 \
+    PREFIX struct membrane::StepState<SCALAR>;                                                                   \
+    PREFIX class membrane::ConstraintContext<SCALAR>;                                                            \
     PREFIX struct membrane::Press<SCALAR>;                                                                       \
     PREFIX struct membrane::HeldPoint<SCALAR>;                                                                   \
     PREFIX struct membrane::SolverOptions<SCALAR>;                                                               \
@@ -67,9 +65,8 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
     MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, BlockStep);                                                            \
     MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, MassStep);                                                             \
     MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, SafeStep);                                                             \
-    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, Hurry, membrane::VirtualVolumeSprings<SCALAR>);               \
-    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, NoHurry, membrane::NoVolumeSprings);                          \
-    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, NoHurry,                                                      \
+    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, membrane::NoVolumeSprings);                                   \
+    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep,                                                               \
                         membrane::MovedVolume<membrane::VirtualVolumeSprings<SCALAR>, SCALAR>)
 
 MEMBRANE_USUAL_TYPES(extern template, double);

@@ -177,10 +177,9 @@ template <class Part, Real Scalar>
                                            2, 3);
         };
         const Part xy_even = halves(0, 0), xy_odd = halves(1, 0), zw_even = halves(0, 1), zw_odd = halves(1, 1);
-        return {__builtin_shufflevector(xy_even, xy_odd, 0, 4, 2, 6),
-                __builtin_shufflevector(xy_even, xy_odd, 1, 5, 3, 7),
-                __builtin_shufflevector(zw_even, zw_odd, 0, 4, 2, 6),
-                __builtin_shufflevector(zw_even, zw_odd, 1, 5, 3, 7)};
+        return {
+            __builtin_shufflevector(xy_even, xy_odd, 0, 4, 2, 6), __builtin_shufflevector(xy_even, xy_odd, 1, 5, 3, 7),
+            __builtin_shufflevector(zw_even, zw_odd, 0, 4, 2, 6), __builtin_shufflevector(zw_even, zw_odd, 1, 5, 3, 7)};
     } else if constexpr (width == 8) {
         using Half __attribute__((vector_size(16))) = float;
         const auto pair = [&](std::size_t i) {

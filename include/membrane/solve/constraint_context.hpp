@@ -27,9 +27,10 @@ class ConstraintContext {
     /// `network.pinned(v)` says which vertices never move. All three must outlive this.
     template <class Network>
     ConstraintContext(const ConstPointsRef<Scalar>& x, StepState<Scalar>& state, const Network& network) noexcept
-        : x_(x), state_(state), network_(&network), is_pinned_([](const void* of, Index v) noexcept {
-              return static_cast<const Network*>(of)->pinned(v);
-          }) {}
+        : x_(x),
+          state_(state),
+          network_(&network),
+          is_pinned_([](const void* of, Index v) noexcept { return static_cast<const Network*>(of)->pinned(v); }) {}
 
     /// Whether `v` is a vertex; if not, the step is refused.
     bool check(Index v) noexcept;
@@ -107,7 +108,8 @@ class ConstraintContext {
         return const_cast<ConstraintContext&>(*this).points();
     }
     [[nodiscard]] std::span<const ContactPoint<Scalar>> previous_points() const noexcept {
-        return state_.previous_ranges[constraint_].of(std::span<const ContactPoint<Scalar>>(state_.previous_points.items()));
+        return state_.previous_ranges[constraint_].of(
+            std::span<const ContactPoint<Scalar>>(state_.previous_points.items()));
     }
 
     // For the solver and `Press`.
@@ -117,9 +119,7 @@ class ConstraintContext {
     [[nodiscard]] std::size_t constraint() const noexcept { return constraint_; }
 
     /// The constraint that is selected has no points yet.
-    void begin_points() noexcept {
-        state_.point_ranges[constraint_] = {state_.points.size(), state_.points.size()};
-    }
+    void begin_points() noexcept { state_.point_ranges[constraint_] = {state_.points.size(), state_.points.size()}; }
 
     void load(Index v) noexcept {
         if (!state_.loaded.contains(v)) state_.load(v, x_, Pins{*this});
@@ -215,7 +215,8 @@ const ContactPoint<Scalar>* ConstraintContext<Scalar>::cached_point(Index triang
     for (Index i = state_.previous_at(corner); i != no_index; i = state_.next_previous(i)) {
         const auto at = static_cast<std::size_t>(i);
         const auto& point = state_.previous_points[at];
-        if (at >= range.begin && at < range.end && point.triangle == triangle && point.feature == feature) return &point;
+        if (at >= range.begin && at < range.end && point.triangle == triangle && point.feature == feature)
+            return &point;
     }
     return nullptr;
 }

@@ -26,7 +26,8 @@ namespace membrane {
 /// [N]. One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it. One
 /// that holds vertices may do so in `hold(context)`, which is called before any `begin`.
 template <class C, class Scalar>
-concept Constraint = Real<Scalar> && requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
+concept Constraint = Real<Scalar> &&
+    requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
     { constraint.sound() }
     noexcept->std::same_as<bool>;  // else the step is refused
     { constraint.begin(context) }
@@ -85,7 +86,9 @@ class ConstraintRef {
     [[nodiscard]] Lead<Scalar> lead() const noexcept { return calls_->lead(constraint_); }
     void hold(ConstraintContext<Scalar>& context) const noexcept { calls_->hold(constraint_, context); }
     void begin(ConstraintContext<Scalar>& context) const noexcept { calls_->begin(constraint_, context); }
-    [[nodiscard]] bool enforce(ConstraintContext<Scalar>& context) const noexcept { return calls_->enforce(constraint_, context); }
+    [[nodiscard]] bool enforce(ConstraintContext<Scalar>& context) const noexcept {
+        return calls_->enforce(constraint_, context);
+    }
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& done) const noexcept {
         return calls_->reaction(constraint_, done);
     }
@@ -115,7 +118,9 @@ class ConstraintRef {
                 if constexpr (requires { as<C>(c).hold(context); }) as<C>(c).hold(context);
             },
         .begin = [](const void* c, ConstraintContext<Scalar>& context) noexcept { as<C>(c).begin(context); },
-        .enforce = [](const void* c, ConstraintContext<Scalar>& context) noexcept -> bool { return as<C>(c).enforce(context); },
+        .enforce = [](const void* c, ConstraintContext<Scalar>& context) noexcept -> bool {
+            return as<C>(c).enforce(context);
+        },
         .reaction = [](const void* c, const ConstraintContext<Scalar>& done) noexcept -> Vector3<Scalar> {
             return as<C>(c).reaction(done);
         },

@@ -58,9 +58,9 @@ struct alignas(32) ContactPack {
     static constexpr std::size_t lanes = Wide::count;
 
     Vector3<Wide> weights, normal;
-    Wide force;                          ///< multiplier [N], 0 or more
-    Vector3<Wide> stiffness;             ///< that it adds to each corner [N/m]
-    Vector3<Wide> axis_point;            ///< of the tool, nearest to the point [m]
+    Wide force;                ///< multiplier [N], 0 or more
+    Vector3<Wide> stiffness;   ///< that it adds to each corner [N/m]
+    Vector3<Wide> axis_point;  ///< of the tool, nearest to the point [m]
 
     // What the rows of forces have of it.
     Vector3<Wide> added_weights, added_normal;
@@ -76,7 +76,7 @@ struct alignas(32) ContactPack {
     std::array<unsigned char, lanes> turn;           ///< which corner of the point is corner 0 here
     std::size_t size = 0;                            ///< lanes in use
     ContactKind kind = ContactKind::end;
-    bool on_fixed = false;                           ///< whether a corner of one is fixed
+    bool on_fixed = false;  ///< whether a corner of one is fixed
 };
 
 /// Contact points in packs, for all constraints of a step. A point goes to the first pack of its kind with room that has none
@@ -85,7 +85,9 @@ template <Real Scalar>
 class ContactPacks {
   public:
     ContactPacks(Index vertex_count, std::size_t capacity)
-        : packs_(capacity), colours_(static_cast<std::size_t>(vertex_count), 0), nobody_(numbers_in_point * vertex_count) {}
+        : packs_(capacity),
+          colours_(static_cast<std::size_t>(vertex_count), 0),
+          nobody_(numbers_in_point * vertex_count) {}
 
     void clear() noexcept { packs_.clear(); }
     [[nodiscard]] std::size_t size() const noexcept { return packs_.size(); }

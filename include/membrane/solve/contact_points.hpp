@@ -39,14 +39,13 @@ struct ContactPass {
 /// Moves corners that are free until no point is inside the tool, or for one pass only; returns whether any had to move.
 /// Brings all points up to date. Online. Cost: linear in the points.
 template <Real Scalar>
-bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
-              std::span<ContactPack<Scalar>> packs) noexcept;
+bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs) noexcept;
 
 /// One pass of projected Gauss-Seidel: brings each point up to date with the positions, changes its force by what closes
 /// the gap at the compliance of its corners, never below zero, and moves them along. Online. Cost: linear in the points.
 template <Real Scalar>
 ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
-                                  std::span<ContactPack<Scalar>> packs) noexcept;
+                                   std::span<ContactPack<Scalar>> packs) noexcept;
 
 /// Lets the vertices feel the forces that these passes have found.
 template <Real Scalar>
@@ -282,8 +281,8 @@ template <Real Scalar>
 [[gnu::always_inline]] inline Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lanes<Scalar>::Mask& acts,
                                                   const Lanes<Scalar>& gap, const Lanes<Scalar>& tolerance,
                                                   const PackResponse<Scalar>& response,
-                                                  std::array<PaddedLanes<Scalar>, 3>& corner,
-                                                  ContactPack<Scalar>& pack, ContactPass<Scalar>& pass) noexcept {
+                                                  std::array<PaddedLanes<Scalar>, 3>& corner, ContactPack<Scalar>& pack,
+                                                  ContactPass<Scalar>& pass) noexcept {
     using Wide = Lanes<Scalar>;
     const auto moves = acts & (response.compliance > 0);
     const Wide divisor = select<Wide>(moves, response.compliance, 1);

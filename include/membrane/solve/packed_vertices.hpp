@@ -208,8 +208,8 @@ void PackedVertices<Scalar>::append(std::span<const Index> vertices, std::size_t
 // False if there is no room for all.
 template <Real Scalar>
 template <class Network>
-bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t begin,
-                                  std::span<const std::size_t> ends, const Network& network) noexcept {
+bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
+                                  const Network& network) noexcept {
     for (const std::size_t end : ends) {
         while (begin < end) {
             const std::size_t size = (std::min)(lanes, end - begin);
@@ -314,7 +314,7 @@ template <bool in_contact, class Scene>
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
 [[gnu::flatten]] auto PackedVertices<Scalar>::update(std::size_t p, const Scene& scene, const Rule& rule,
-                                    [[maybe_unused]] bool allowed) noexcept -> Outcome {
+                                                     [[maybe_unused]] bool allowed) noexcept -> Outcome {
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     auto here = gather_padded(rows.position.data(), own.data());

@@ -232,14 +232,10 @@ void Press<Scalar>::add_point(Context& context, const TouchedTriangle& triangle,
     if (before == nullptr && distance > contact.reach) return;
     const bool apart = distance > contact.radius / 1000;
     const Vector3<Scalar> towards = apart ? nearest.reach : Vector3<Scalar>(contact.before - contact.on_axis);
-    ContactPoint<Scalar> point{triangle.triangle,
-                               feature,
-                               triangle.corners,
-                               nearest.barycentric,
-                               direction(towards, contact.normal),
-                               Vector3<Scalar>::Zero()};
-    point.on_fixed =
-        std::any_of(point.corners.begin(), point.corners.end(), [&](Index v) { return context.fixed(v); });
+    ContactPoint<Scalar> point{
+        triangle.triangle,      feature, triangle.corners, nearest.barycentric, direction(towards, contact.normal),
+        Vector3<Scalar>::Zero()};
+    point.on_fixed = std::any_of(point.corners.begin(), point.corners.end(), [&](Index v) { return context.fixed(v); });
     // Fixed corners have not been carried along: what the tool has crossed is between it and where it was.
     if (contact.crossed && point.on_fixed) {
         const Vector3<Scalar> came =
@@ -303,8 +299,7 @@ void Press<Scalar>::prevent_tunnelling(Context& context) const noexcept {
     Scalar first = 1;
     for (const auto& triangle : contact.watched) {
         const auto before = kept_triangle(context, triangle.corners);
-        const Scalar time =
-            passing_time<Scalar>(before, surface_triangle(context, triangle.corners), contact.on_axis);
+        const Scalar time = passing_time<Scalar>(before, surface_triangle(context, triangle.corners), contact.on_axis);
         if (time == 1) continue;
         const Scalar room = std::sqrt(closest_point(before, contact.on_axis).squared_distance);
         if (room <= rounding) continue;  // on the tool's axis: its side is not known

@@ -168,8 +168,8 @@ class QuasiStaticSolver {
     PackedVertices<Scalar> packed_;
     StepState<Scalar> state_;
     IndexSet last_prescribed_;
-    IndexSet woken_;                    // since the last step
-    BoundedList<Index> moved_;          // in the last step that advanced, and by how much [m]
+    IndexSet woken_;            // since the last step
+    BoundedList<Index> moved_;  // in the last step that advanced, and by how much [m]
     Points<Scalar> last_displacements_;
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
@@ -484,8 +484,7 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs([[maybe_unused]] con
         }
         for (std::size_t p = begin; p < end && report_.status == StepStatus::advanced; ++p) {
             changed |= finish_update<in_contact>(
-                scene, p,
-                serial ? packed_.template update<in_contact>(p, scene, method_.rule) : packed_.outcome(p));
+                scene, p, serial ? packed_.template update<in_contact>(p, scene, method_.rule) : packed_.outcome(p));
         }
     }
     return changed;
@@ -614,8 +613,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::write_back(const Scene& scene, Po
         active_.stir_neighbours(scene.network, v);
     }
     report_.moved = moved_.items();
-    report_.converged =
-        active_.close() && !progress.constraints_changed && report_.residual <= state_.force_tolerance;
+    report_.converged = active_.close() && !progress.constraints_changed && report_.residual <= state_.force_tolerance;
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
     resume_ = progress.resume;

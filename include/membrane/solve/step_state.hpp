@@ -55,7 +55,7 @@ struct StepState {
     void begin_step() noexcept;  ///< No vertex is loaded, no force acts.
     void end_step() noexcept;    ///< Keeps the contact points of the step that ends for the next one.
     void forget_points() noexcept;
-    void reset() noexcept;                                               ///< As new.
+    void reset() noexcept;                                              ///< As new.
     void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< What is kept, with the body.
 
     /// The first of the previous points whose first corner is `v`, and the next one of the same; or no index.
@@ -129,8 +129,8 @@ struct StepState {
     std::vector<unsigned char> fixed;  // of loaded vertices: pinned or prescribed
 
     BoundedList<ContactPoint<Scalar>> points, previous_points;
-    std::vector<Index> first_previous;        // of each vertex, the last previous point of which it is the first corner
-    std::vector<Index> next_of_same_corner;   // of each previous point
+    std::vector<Index> first_previous;       // of each vertex, the last previous point of which it is the first corner
+    std::vector<Index> next_of_same_corner;  // of each previous point
     std::array<ListRange, max_constraints> point_ranges{}, previous_ranges{};
     ContactPacks<Scalar> packs;
     std::array<ListRange, max_constraints> pack_ranges{}, watched_ranges{};

@@ -33,8 +33,7 @@ bool seed_corners(ConstraintContext<Scalar>& context, const std::array<Index, 3>
 template <Real Scalar>
 void add_point_force(ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners,
                      const Vector3<Scalar>& weights, const Vector3<Scalar>& force) noexcept {
-    for (std::size_t k = 0; k < 3; ++k)
-        context.add_force(corners[k], weights[static_cast<Eigen::Index>(k)] * force);
+    for (std::size_t k = 0; k < 3; ++k) context.add_force(corners[k], weights[static_cast<Eigen::Index>(k)] * force);
 }
 
 /// The weights of the corners that are free to move, zero for the others.

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
 // wrong: Constraint: sound() const noexcept must return bool
-// wrong: Constraint: there must be begin(Region<Scalar>&) const noexcept
-// wrong: Constraint: enforce(Region<Scalar>&) const noexcept must return bool
-// wrong: Constraint: reaction(const Region<Scalar>&) const noexcept must return Vector3<Scalar>
+// wrong: Constraint: there must be begin(ConstraintContext<Scalar>&) const noexcept
+// wrong: Constraint: enforce(ConstraintContext<Scalar>&) const noexcept must return bool
+// wrong: Constraint: reaction(const ConstraintContext<Scalar>&) const noexcept must return Vector3<Scalar>
 // wrong: Constraint: sound() const noexcept must return bool
-// wrong: Constraint: reaction(const Region<Scalar>&) const noexcept must return Vector3<Scalar>
+// wrong: Constraint: reaction(const ConstraintContext<Scalar>&) const noexcept must return Vector3<Scalar>
 #include <type_traits>
 
 #include <membrane/solve/quasi_static.hpp>
 
 struct Magnet {
     std::conditional_t<WRONG == 5, int, bool> sound() const noexcept(WRONG != 1);
-    void begin(membrane::Region<double>&) const noexcept(WRONG != 2);
-    bool enforce(membrane::Region<double>&) const noexcept(WRONG != 3);
+    void begin(membrane::ConstraintContext<double>&) const noexcept(WRONG != 2);
+    bool enforce(membrane::ConstraintContext<double>&) const noexcept(WRONG != 3);
 #if WRONG != 6
-    membrane::Vector3<double> reaction(const membrane::Region<double>&) const noexcept(WRONG != 4);
+    membrane::Vector3<double> reaction(const membrane::ConstraintContext<double>&) const noexcept(WRONG != 4);
 #endif
 };
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/solve/sweeps.hpp>
+#include <membrane/solve/quasi_static.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,6 @@
 #include <membrane/collision/contact_tracker.hpp>
 #include <membrane/mesh/shapes.hpp>
 #include <membrane/solve/press.hpp>
-#include <membrane/solve/quasi_static.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"

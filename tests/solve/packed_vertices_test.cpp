@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/solve/compact_block.hpp>
+#include <membrane/solve/packed_vertices.hpp>
 
 #include <algorithm>
 #include <array>
@@ -25,7 +25,7 @@ using test::same_bits;
 
 namespace {
 
-/// A backing that keeps its springs to itself: its vertices are visited one by one.
+/// A backing that keeps its springs to itself: its vertices are updated one by one.
 template <class Volume>
 struct Opaque {
     Volume volume;
@@ -35,13 +35,13 @@ struct Opaque {
         return volume.pull(v, position, start, dt);
     }
 };
-static_assert(VisitsInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, VirtualVolumeSprings<double>>);
-static_assert(VisitsInLanes<float, SafeStep, MassSpringNetwork<float, LinearSpring>, NoVolumeSprings>);
-static_assert(VisitsInLanes<float, MassStep, MassSpringNetwork<float, LinearSpring>,
-                            MovedVolume<VirtualVolumeSprings<float>, float>>);
+static_assert(UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, VirtualVolumeSprings<double>>);
+static_assert(UpdatesInLanes<float, SafeStep, MassSpringNetwork<float, LinearSpring>, NoVolumeSprings>);
+static_assert(UpdatesInLanes<float, MassStep, MassSpringNetwork<float, LinearSpring>,
+                             MovedVolume<VirtualVolumeSprings<float>, float>>);
 static_assert(
-    !VisitsInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Opaque<VirtualVolumeSprings<double>>>);
-static_assert(!VisitsInLanes<double, BlockStep, MassSpringNetwork<double, ExponentialSpring>, NoVolumeSprings>);
+    !UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Opaque<VirtualVolumeSprings<double>>>);
+static_assert(!UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, ExponentialSpring>, NoVolumeSprings>);
 
 /// A mesh with holes, springs and backing of all kinds, some left out.
 template <Real S>
@@ -160,16 +160,108 @@ void check_same_shared_out(const Rule& rule) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("visits in lanes end in the bits of visits one by one", "[block]", float, double) {
+TEMPLATE_TEST_CASE("updates in lanes end in the bits of updates one by one", "[packed]", float, double) {
     SECTION("block") { check_same<TestType>(BlockStep{}); }
     SECTION("block, over-relaxed") { check_same<TestType>(BlockStep{.omega = 1.3}); }
     SECTION("safe") { check_same<TestType>(SafeStep{}); }
     SECTION("as published") { check_same<TestType>(MassStep{}); }
 }
 
-TEMPLATE_TEST_CASE("it is all the same in what order an executor does its tasks, or in how many threads", "[block]",
+TEMPLATE_TEST_CASE("it is all the same in what order an executor does its tasks, or in how many threads", "[packed]",
                    float, double) {
     SECTION("block") { check_same_shared_out<TestType>(BlockStep{}); }
     SECTION("safe") { check_same_shared_out<TestType>(SafeStep{}); }
     SECTION("as published") { check_same_shared_out<TestType>(MassStep{}); }
+}
+
+TEMPLATE_TEST_CASE("there are as many groups as there is room for, in packs", "[packed]", float, double) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = test::random_surface<S>(random).mesh();
+        const MassSpringNetwork<S, LinearSpring> network(mesh, {}, {.stiffness = S(1)});
+        const Index vertices = mesh.vertex_count(), capacity = random.index(vertices + 1);
+        const Index start = random.index(vertices);
+        PropagationQueue queue(vertices);
+        queue.build(network, {&start, 1}, random.index(6));
+        queue.group(network);
+        IndexSet active(vertices);
+        for (const Index v : queue.vertices()) active.insert(v);
+        for (Index v = 0; v < vertices; ++v) {
+            if (random.chance(0.5)) active.insert(v);
+        }
+        VertexGroups others(vertices);
+        others.add(network, active, queue.vertices().size(), active.items().size());
+        PackedVertices<S> packed(network, capacity);
+        for (int again = 0; again < 2; ++again) {
+            packed.assign(queue.vertices(), queue.group_ends(), network);
+            const std::size_t of_queue = packed.size();
+            const bool is_whole = of_queue == queue.vertices().size();
+            packed.append(active.items(), queue.vertices().size(), others.ends(), network);
+            REQUIRE(packed.size() <= static_cast<std::size_t>(capacity));
+            if (capacity == vertices) REQUIRE(packed.size() == active.items().size());
+            if (!is_whole) REQUIRE(packed.size() == of_queue);
+            std::vector<std::size_t> ends(queue.group_ends().begin(), queue.group_ends().end());
+            if (is_whole) ends.insert(ends.end(), others.ends().begin(), others.ends().end());
+            std::size_t number = 0, pack = 0;
+            IndexSet expected(vertices);
+            for (const std::size_t end : ends) {
+                for (; number < end && pack < packed.count(); ++pack) {
+                    REQUIRE(packed.first_of(pack) == number);
+                    REQUIRE(packed.pack_from(number) == pack);
+                    REQUIRE(packed.vertices(pack).size() == std::min(end - number, Lanes<S>::count));
+                    for (const Index v : packed.vertices(pack)) {
+                        REQUIRE(v == active.items()[number++]);
+                        expected.insert(v);
+                        for (const auto& end_of : network.neighbours(v)) expected.insert(end_of.other);
+                    }
+                }
+            }
+            REQUIRE(pack == packed.count());
+            REQUIRE(number == packed.size());
+            REQUIRE(packed.pack_from(packed.size()) == packed.count());
+            REQUIRE(packed.needed().size() == expected.items().size());
+            for (const Index v : packed.needed()) REQUIRE(expected.contains(v));
+        }
+    }
+}
+
+TEMPLATE_TEST_CASE("the residual forces of packs are those of their vertices, to the bit", "[packed]", float, double) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Membrane<S> membrane(random);
+        const Index vertices = membrane.mesh.vertex_count(), first = random.index(vertices);
+        PropagationQueue queue(vertices);
+        queue.build(membrane.network, {&first, 1}, 4);
+        queue.group(membrane.network);
+        PackedVertices<S> packed(membrane.network);
+        packed.assign(queue.vertices(), queue.group_ends(), membrane.network);
+        const Points<S> start_points = membrane.mesh.positions();
+        const ConstPointsRef<S> start = start_points;
+        StepState<S> state(vertices, 0);
+        state.begin_step();
+        for (Index v = 0; v < vertices; ++v) {
+            state.load(v, start, membrane.network);
+            state.set_position(v, point(start, v) + random.vector(S(-0.1), S(0.1)));
+        }
+        if (!queue.vertices().empty()) {
+            const Index v = queue.vertices()[0];
+            state.row(state.force, v).set(random.vector<S>(), S(0));
+        }
+        const ConstPointsRef<S> now = state.positions();
+        const StepInput<S, decltype(membrane.network), decltype(membrane.backing)> scene{
+            start, now, S(1e-3), membrane.network, membrane.backing, state};
+        packed.begin_step(scene);
+        for (std::size_t p = 0; p < packed.count(); ++p) {
+            packed.evaluate_residual(p, scene);
+            for (const Index v : packed.vertices(p)) {
+                const Vector3<S> force = pull_on(scene, v).force;
+                REQUIRE(state.row(state.residual, v).point() == force);
+                REQUIRE(state.row(state.residual, v).extra() == norm(undamped_force(scene, v, force)));
+            }
+        }
+    }
 }

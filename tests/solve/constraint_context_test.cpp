@@ -1,0 +1,260 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/constraint_context.hpp>
+
+#include <array>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "support/catch.hpp"
+
+using namespace membrane;
+
+namespace {
+
+/// Six points of which number 5 is pinned, and room for three contact points.
+struct SixPoints {
+    bool pinned(Index v) const { return v == pinned_vertex; }
+
+    Index pinned_vertex = 5;
+    Points<double> points = Points<double>::Random(3, 6);
+    ConstPointsRef<double> x{points};
+    StepState<double> work{6, 3};
+
+    SixPoints() { work.begin_step(); }
+};
+
+ContactPoint<double> point_of(Index triangle, int feature, double force = 1) {
+    return {triangle, feature, {0, 1, 2}, {0.2, 0.3, 0.5}, {0, 0, 1}, {0, 0, -force}};
+}
+
+std::vector<Index> as_vector(std::span<const Index> items) { return {items.begin(), items.end()}; }
+
+}  // namespace
+
+TEST_CASE("a context knows its vertices", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    for (Index v = 0; v < 6; ++v) {
+        CHECK(context.check(v));
+        CHECK(context.position(v) == point(scene.points, v));
+    }
+    CHECK_FALSE(scene.work.invalid);
+    for (const Index wrong : {-1, 6, 1000, unlimited}) {
+        scene.work.begin_step();
+        CHECK_FALSE(context.check(wrong));
+        CHECK(scene.work.invalid);  // the step will be refused
+    }
+}
+
+TEST_CASE("what is moved is moved in the step, and the positions of the user stay", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    const Points<double> before = scene.points;
+    context.move(2, {1, 0, 0});
+    context.move(2, {0, 1, 0});
+    context.place(4, {7, 8, 9});
+    CHECK(norm<double>(context.position(2) - point(before, 2) - Vector3<double>(1, 1, 0)) < 1e-15);
+    CHECK(context.position(4) == Vector3<double>(7, 8, 9));
+    CHECK(context.start(4) == point(before, 4));
+    CHECK(as_vector(scene.work.loaded.items()) == std::vector<Index>{2, 4});
+    CHECK(scene.points == before);
+
+    scene.work.begin_step();  // the next step
+    CHECK(scene.work.loaded.empty());
+    CHECK(context.position(2) == point(before, 2));
+}
+
+TEST_CASE("vertices go back to where they were kept, or to where the step began, but fixed ones do not", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    const Vector3<double> by(1, 2, 3);
+    context.move(0, by);
+    context.keep(0);
+    context.move(0, by);
+    context.move(1, by);
+    context.keep_start(2);
+    context.move(2, by);
+    context.prescribe(3, context.start(3) + by);
+    CHECK(context.kept(0) == context.start(0) + by);
+    CHECK(context.kept(1) == context.start(1));
+    CHECK(context.kept(2) == context.start(2));
+    context.keep_start(0);  // it is kept already
+    CHECK(context.kept(0) == context.start(0) + by);
+    context.go_back(0.5);
+    CHECK(norm<double>(context.position(0) - context.start(0) - 1.5 * by) < 1e-15);
+    CHECK(norm<double>(context.position(1) - context.start(1) - 0.5 * by) < 1e-15);
+    CHECK(norm<double>(context.position(2) - context.start(2) - 0.5 * by) < 1e-15);
+    CHECK(norm<double>(context.position(3) - context.start(3) - by) < 1e-15);
+    context.go_back(1);
+    CHECK(context.position(1) == context.start(1));
+}
+
+TEST_CASE("prescribed and pinned vertices are fixed until the step ends, and a pinned one stays", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    const Points<double> before = scene.points;
+    for (const Index v : {0, 1, 5}) scene.work.set_compliance(v, diagonal3(0.5), 0.5);
+    CHECK(context.fixed(5));
+    CHECK_FALSE(context.fixed(1));
+    context.move(1, {1, 1, 1});
+    context.prescribe(1);
+    context.prescribe(2, {1, 2, 3});
+    context.prescribe(5, {1, 2, 3});
+    CHECK(context.fixed(1));
+    CHECK(context.fixed(2));
+    CHECK(context.prescribed(1));
+    CHECK_FALSE(context.prescribed(0));
+    CHECK(context.position(1) == point(before, 1));
+    CHECK(context.position(2) == Vector3<double>(1, 2, 3));
+    CHECK(context.position(5) == point(before, 5));
+    context.prescribe(2);  // without a target it stays
+    CHECK(context.position(2) == Vector3<double>(1, 2, 3));
+    CHECK(context.compliance(0) == 0.5);
+    CHECK(context.compliance(1) == 0);
+    CHECK(context.compliance(5) == 0);
+    CHECK(context.response(0, {2, 0, 0}) == Vector3<double>(1, 0, 0));
+    CHECK(context.response(1, {2, 0, 0}) == Vector3<double>(0, 0, 0));
+    scene.work.begin_step();
+    CHECK_FALSE(context.fixed(1));
+    CHECK_FALSE(context.prescribed(1));
+    CHECK(context.fixed(5));
+}
+
+TEST_CASE("forces add up, and are taken back with the step", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    context.add_force(3, {1, 2, 3});
+    context.add_force(3, {1, 0, 0});
+    context.add_force(0, {0, 0, 5});
+    context.add_stiffness(0, 4);
+    context.add_stiffness(0, -1);
+    const auto force = [&](Index v) { return scene.work.row(scene.work.force, v); };
+    CHECK(force(3).point() == Vector3<double>(2, 2, 3));
+    CHECK(force(0).point() == Vector3<double>(0, 0, 5));
+    CHECK(force(0).extra() == 3);
+    scene.work.begin_step();
+    for (Index v = 0; v < 6; ++v) CHECK(force(v).number == std::array<double, 4>{});
+}
+
+TEST_CASE("a fixed vertex gives way to tools by force over stiffness, a free one does not", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    for (const Index v : {1, 5}) context.set_support(v, 4);
+    for (const Index v : {1, 5}) context.bear(v, {0, 0, 2});
+    CHECK(context.support_displacement(5) == Vector3<double>(0, 0, 0.5));
+    CHECK(context.support_compliance(5) == 0.25);
+    CHECK(context.support_displacement(1) == Vector3<double>(0, 0, 0));
+    CHECK(context.support_compliance(1) == 0);
+    scene.work.begin_step();
+    CHECK(context.support_displacement(5) == Vector3<double>(0, 0, 0));
+    CHECK(context.support_compliance(5) == 0.25);
+}
+
+TEST_CASE("seeds keep their order, and each comes once", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    for (const Index v : {4, 0, 4, 2, 0}) context.seed(v);
+    CHECK(as_vector(scene.work.seeds.items()) == std::vector<Index>{4, 0, 2});
+}
+
+TEST_CASE("each constraint finds the points it had in the step before, and no others", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    const auto begin = [&](std::size_t constraint) {
+        context.select_constraint(constraint);
+        context.begin_points();
+    };
+    begin(0);
+    CHECK(context.cached_point(7, 0, 0) == nullptr);
+    context.add_point(point_of(7, 0, 1));
+    context.add_point(point_of(8, 2, 2));
+    begin(1);
+    context.add_point(point_of(7, 0, 3));
+    CHECK(context.points().size() == 1);
+    CHECK(context.points()[0].force.z() == -3);
+    context.select_constraint(0);
+    CHECK(context.points().size() == 2);
+    CHECK(context.points()[1].triangle == 8);
+    CHECK(context.cached_point(7, 0, 0) == nullptr);  // they are of this step
+    CHECK_FALSE(scene.work.full);
+
+    scene.work.end_step();
+    scene.work.begin_step();
+    begin(0);
+    CHECK(context.points().empty());
+    for (const int round : {1, 2}) {  // in any order, and again
+        CAPTURE(round);
+        REQUIRE(context.cached_point(8, 2, 0) != nullptr);
+        CHECK(context.cached_point(8, 2, 0)->force.z() == -2);
+        REQUIRE(context.cached_point(7, 0, 0) != nullptr);
+        CHECK(context.cached_point(7, 0, 0)->force.z() == -1);
+        CHECK(context.cached_point(8, 0, 0) == nullptr);
+        CHECK(context.cached_point(9, 2, 0) == nullptr);
+    }
+    begin(1);
+    REQUIRE(context.cached_point(7, 0, 0) != nullptr);
+    CHECK(context.cached_point(7, 0, 0)->force.z() == -3);
+    CHECK(context.cached_point(8, 2, 0) == nullptr);
+    begin(2);
+    CHECK(context.cached_point(7, 0, 0) == nullptr);
+
+    scene.work.end_step();  // a step without points
+    scene.work.begin_step();
+    begin(0);
+    CHECK(context.cached_point(7, 0, 0) == nullptr);
+}
+
+TEST_CASE("points can be forgotten, and are refused where there is no room", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    context.select_constraint(0);
+    context.begin_points();
+    for (Index f = 0; f < 3; ++f) context.add_point(point_of(f, 0));
+    CHECK_FALSE(scene.work.full);
+    context.add_point(point_of(3, 0));
+    CHECK(scene.work.full);
+    CHECK(context.points().size() == 3);
+    scene.work.end_step();
+    scene.work.begin_step();
+    CHECK_FALSE(scene.work.full);
+    context.begin_points();
+    CHECK(context.cached_point(1, 0, 0) != nullptr);
+    scene.work.forget_points();
+    CHECK(context.cached_point(1, 0, 0) == nullptr);
+}
+
+TEST_CASE("whether a vertex that is not loaded is pinned is the network's word", "[context]") {
+    SixPoints scene;
+    scene.pinned_vertex = 2;
+    const ConstraintContext<double> context(scene.x, scene.work, scene);
+    CHECK(context.fixed(2));
+    scene.pinned_vertex = 3;
+    CHECK_FALSE(context.fixed(2));
+    CHECK(context.fixed(3));
+}
+
+TEST_CASE("a state is copied with all it holds", "[context]") {
+    auto scene = std::make_unique<SixPoints>();
+    {
+        ConstraintContext<double> context(scene->x, scene->work, *scene);
+        context.select_constraint(0);
+        context.begin_points();
+        context.add_point(point_of(7, 0, 4));
+        scene->work.end_step();
+    }
+    StepState<double> copy = scene->work;
+    Points<double> points = scene->points;
+    scene.reset();
+    const ConstPointsRef<double> x(points);
+    const SixPoints pins;
+    ConstraintContext<double> context(x, copy, pins);
+    copy.begin_step();
+    context.select_constraint(0);
+    context.begin_points();
+    REQUIRE(context.cached_point(7, 0, 0) != nullptr);
+    CHECK(context.cached_point(7, 0, 0)->force.z() == -4);
+    for (Index f = 0; f < 3; ++f) context.add_point(point_of(f, 0));
+    CHECK_FALSE(copy.full);  // the room has come along
+    CHECK(copy.vertex_count() == 6);
+}

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/contact_points.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+struct NonePinned {
+    bool pinned(Index) const { return false; }
+};
+
+/// Triangles that share no vertex, each with contact points of a tool, and a compliance block for every vertex.
+template <class S>
+struct Patch {
+    Patch(Random& random, Index triangles, const Tool<S>& with)
+        : tool(with), x(3, 3 * triangles), state(3 * triangles, 5 * triangles) {
+        for (Index f = 0; f < triangles; ++f) {
+            const Vector3<S> centre = tool.position + random.number(S(0), S(1)) * tool.axis +
+                                      random.number(S(0.5), S(1.5)) * tool.radius * random.unit_vector<S>();
+            for (Index k = 0; k < 3; ++k) x.col(3 * f + k) = centre + random.vector(S(-0.5), S(0.5));
+        }
+        const ConstPointsRef<S> start = x;
+        state.begin_step();
+        for (Index v = 0; v < x.cols(); ++v) {
+            state.load(v, start, NonePinned{});
+            Symmetric3<S> block = diagonal3(random.number(S(0.1), S(1)));
+            block += outer<S>(random.number(S(0), S(2)), random.unit_vector<S>());
+            state.set_compliance(v, block, S(0.1));
+            state.set_internal(v, S(100), S(100));
+            state.forced.insert(v);
+        }
+        for (Index f = 0; f < triangles; ++f) {
+            for (int feature = 0; feature < feature_pairs(tool); ++feature) {
+                const auto nearest = proximity(triangle(f), tool, feature);
+                if (!nearest) continue;
+                points.push_back({f, feature, corners(f), nearest->barycentric,
+                                  direction<S>(nearest->reach, Vector3<S>::UnitZ()), Vector3<S>::Zero()});
+            }
+        }
+        state.packs.append(std::span<const ContactPoint<S>>(points), 0, [](Index) { return false; });
+    }
+    [[nodiscard]] std::array<Index, 3> corners(Index f) const { return {3 * f, 3 * f + 1, 3 * f + 2}; }
+    [[nodiscard]] Triangle<S> triangle(Index f) const { return triangle_at(state.positions(), corners(f)); }
+    [[nodiscard]] ContactTool<S> shape() const { return {tool.position, tool.axis, tool.position, tool.radius}; }
+    [[nodiscard]] std::vector<ContactPoint<S>> unpacked() const {
+        auto found = points;
+        unpack<S>(state.packs.items(), found);
+        return found;
+    }
+
+    Tool<S> tool;
+    Points<S> x;
+    StepState<S> state;
+    std::vector<ContactPoint<S>> points;
+};
+
+template <class S>
+Tool<S> random_tool(Random& random, bool is_capsule) {
+    Tool<S> tool{.position = random.vector<S>(), .radius = random.number(S(0.5), S(1.5))};
+    if (is_capsule) tool.axis = random.number(S(0.5), S(2)) * random.unit_vector<S>();
+    return tool;
+}
+
+/// The rocking stiffness of one point, by its geometric cases.
+template <class S>
+Vector3<S> rocking_of_one(const Triangle<S>& t, const Vector3<S>& weights, S moment) {
+    const Vector3<S> squares(squared_norm<S>(t.c - t.b), squared_norm<S>(t.a - t.c), squared_norm<S>(t.b - t.a));
+    if (weights.minCoeff() > 0) return moment / (4 * squared_norm(area_vector(t))) * squares;
+    Vector3<S> stiffness = Vector3<S>::Zero();
+    if (!(weights.maxCoeff() < 1)) return stiffness;
+    Eigen::Index apart;
+    weights.minCoeff(&apart);
+    stiffness.setConstant(moment / squares[apart]);
+    stiffness[apart] = 0;
+    return stiffness;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("located points are the nearest ones of their features", "[contact]", float, double) {
+    using S = TestType;
+    const S slack = sizeof(S) == 4 ? S(1e-4) : S(1e-12);
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, seed % 2 == 0));
+        patch.tool.position += random.vector(S(-0.1), S(0.1));  // it has gone on since the points were found
+        for (auto& pack : patch.state.packs.items()) {
+            pack.force = S(1);
+            detail::locate(patch.shape(), detail::corners_of(patch.state, pack), pack);
+            for (std::size_t i = 0; i < pack.size; ++i) {
+                const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
+                const auto triangle = patch.triangle(point.triangle);
+                const auto nearest = proximity(triangle, patch.tool, point.feature);
+                REQUIRE((pack.used[i] > 0) == nearest.has_value());
+                REQUIRE(pack.force[i] == (nearest ? 1 : 0));
+                if (!nearest) continue;
+                Vector3<S> weights, stiffness, axis_point;
+                for (std::size_t k = 0; k < 3; ++k) {
+                    const auto row = static_cast<Eigen::Index>(k),
+                               corner = static_cast<Eigen::Index>((k + pack.turn[i]) % 3);
+                    weights[corner] = pack.weights[row][i];
+                    stiffness[corner] = pack.stiffness[row][i];
+                    axis_point[row] = pack.axis_point[row][i];
+                }
+                REQUIRE(norm<S>(weights - nearest->barycentric) <= slack);
+                REQUIRE(norm<S>(axis_point - point_at(triangle, weights) - nearest->reach) <= slack);
+                const Vector3<S> expected = rocking_of_one<S>(triangle, weights, norm(nearest->reach));
+                REQUIRE(norm<S>(stiffness - expected) <= 100 * slack * (1 + norm(expected)));
+            }
+        }
+    }
+}
+
+TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by what pushes them", "[contact]", float,
+                   double) {
+    using S = TestType;
+    const S slack = sizeof(S) == 4 ? S(1e-3) : S(1e-10);
+    int touching = 0;
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, false));
+        auto& state = patch.state;
+        for (int pass = 0; pass < 200; ++pass) solve_contacts(state, patch.shape(), state.packs.items());
+        apply_forces(state, state.packs.items());
+        for (const auto& point : patch.unpacked()) {
+            const S force = -dot(point.force, point.normal);
+            const S gap = norm(proximity(patch.triangle(point.triangle), patch.tool, 0)->reach) - patch.tool.radius;
+            REQUIRE(force >= 0);
+            REQUIRE(norm<S>(point.force + force * point.normal) <= slack);
+            REQUIRE(gap >= -slack);
+            REQUIRE(force * gap <= slack);
+            if (force == 0) continue;
+            ++touching;
+            for (std::size_t k = 0; k < 3; ++k) {
+                const Vector3<S> share = point.weights[static_cast<Eigen::Index>(k)] * point.force;
+                const Vector3<S> row = state.row(state.force, point.corners[k]).point();
+                REQUIRE(norm<S>(row - share) <= slack);
+            }
+        }
+    }
+    CHECK(touching > 0);
+}
+
+TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corners says", "[contact]", float, double) {
+    using S = TestType;
+    const S slack = sizeof(S) == 4 ? S(1e-4) : S(1e-12);
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, false));
+        auto& state = patch.state;
+        const auto pass = solve_contacts(state, patch.shape(), state.packs.items());
+        REQUIRE_FALSE(pass.released);
+        S largest = 0;
+        for (const auto& point : patch.unpacked()) {
+            const S force = -dot(point.force, point.normal);
+            largest = std::max(largest, force);
+            S compliance = 0;
+            for (std::size_t k = 0; k < 3; ++k) {
+                const Index v = point.corners[k];
+                const S weight = point.weights[static_cast<Eigen::Index>(k)];
+                const Vector3<S> by = state.compliance_block(v) * Vector3<S>(weight * point.force);
+                compliance += weight * weight * dot<S>(point.normal, state.compliance_block(v) * point.normal);
+                const Vector3<S> moved = ::point(state.positions(), v) - ::point(patch.x, v);
+                REQUIRE(norm<S>(moved - by) <= slack * (1 + force));
+            }
+            const auto before = triangle_at(patch.x, point.corners);
+            const S gap = norm(proximity(before, patch.tool, 0)->reach) - patch.tool.radius;
+            REQUIRE(std::abs(force - std::max(-gap / compliance, S(0))) <= 100 * slack * (1 + force));
+        }
+        REQUIRE(std::abs(pass.largest - largest) <= slack * (1 + largest));
+    }
+}
+
+TEMPLATE_TEST_CASE("a point that presses far harder than what resists at it is let go", "[contact]", float, double) {
+    using S = TestType;
+    Random random(1);
+    Patch<S> patch(random, 4, random_tool<S>(random, false));
+    auto& state = patch.state;
+    for (Index v = 0; v < patch.x.cols(); ++v) state.set_internal(v, 0, 0);
+    const auto pass = solve_contacts(state, patch.shape(), state.packs.items());
+    CHECK(pass.released);
+    CHECK(pass.largest == 0);
+    for (const auto& point : patch.unpacked()) CHECK(point.force.isZero(0));
+}
+
+TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals", "[contact]", float, double) {
+    using S = TestType;
+    const S slack = sizeof(S) == 4 ? S(1e-5) : S(1e-12);
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, false));
+        bool moves = true;
+        for (int pass = 0; pass < 1000 && moves; ++pass)
+            moves = push_out(patch.state, patch.shape(), patch.state.packs.items());
+        for (const auto& point : patch.points) {
+            const auto now = patch.triangle(point.triangle), before = triangle_at(patch.x, point.corners);
+            const bool was_inside = norm(proximity(before, patch.tool, 0)->reach) < patch.tool.radius - slack;
+            REQUIRE(norm(proximity(now, patch.tool, 0)->reach) >= patch.tool.radius * (1 - 100 * slack) - 10 * slack);
+            if (!was_inside) REQUIRE(norm<S>(now.a - before.a) <= slack);
+        }
+    }
+}
+
+TEST_CASE("the largest move is that of the vertex that has moved farthest from where it was kept", "[contact]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        StepState<double> state(20, 0);
+        std::vector<Index> vertices;
+        double expected = 0;
+        for (Index v = 0; v < 20; ++v) {
+            const Vector3<double> kept = random.vector(), now = random.vector();
+            state.row(state.anchor, v).set(kept);
+            state.set_position(v, now);
+            if (!random.chance(0.5)) continue;
+            vertices.push_back(v);
+            expected = std::max(expected, squared_norm<double>(now - kept));
+        }
+        CHECK(largest_squared_move<double>(state, vertices) == expected);
+    }
+}

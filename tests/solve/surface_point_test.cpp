@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/surface_point.hpp>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+using membrane::ConstPointsRef;
+using membrane::ConstraintContext;
+using membrane::ContactPoint;
+using membrane::Index;
+using membrane::Points;
+using membrane::StepState;
+using membrane::Vector3;
+
+namespace {
+
+constexpr std::array<Index, 3> corners{0, 1, 2};
+
+/// Three vertices, the last of them pinned if asked for.
+struct Membrane {
+    explicit Membrane(test::Random& random, bool last_pinned = false)
+        : network{last_pinned}, x(3, 3), work(3, 8), ref(x), context(ref, work, network) {
+        for (Index v = 0; v < 3; ++v) x.col(v) = random.vector();
+        work.begin_step();
+        context.begin_points();
+        for (Index v = 0; v < 3; ++v) {
+            membrane::Symmetric3<double> compliance = membrane::diagonal3(random.number(0.1, 2.0));
+            compliance += membrane::outer(random.number(0.0, 5.0), random.vector());
+            work.set_compliance(v, compliance, 0.1);
+            context.load(v);
+        }
+    }
+    [[nodiscard]] Vector3<double> at(const Vector3<double>& weights) const {
+        return membrane::point_at(membrane::triangle_of(context, corners), weights);
+    }
+    [[nodiscard]] Vector3<double> force(Index v) const { return work.row(work.force, v).point(); }
+
+    struct Network {
+        bool last_pinned;
+        bool pinned(Index v) const { return last_pinned && v == 2; }
+    } network;
+    Points<double> x;
+    StepState<double> work;
+    ConstPointsRef<double> ref;
+    ConstraintContext<double> context;
+};
+
+}  // namespace
+
+TEST_CASE("a point that is moved goes where it should, and pinned corners stay") {
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane m(random, seed % 2 == 0);
+        const Vector3<double> weights = random.barycentric(), by = random.vector(), before = m.at(weights);
+        membrane::move_point<double>(m.context, corners, weights, by);
+        const bool rigid = membrane::is_rigid(m.context, corners, weights);
+        CAPTURE(seed, weights.transpose());
+        CHECK((m.at(weights) - before - (rigid ? 0 : 1) * by).norm() < 1e-12);
+        if (seed % 2 == 0) CHECK(m.context.position(2) == m.x.col(2));
+        if (seed % 2 == 1) CHECK_FALSE(rigid);
+    }
+}
+
+TEST_CASE("a point on a pinned corner is rigid") {
+    test::Random random(1);
+    Membrane m(random, true);
+    CHECK(membrane::is_rigid<double>(m.context, corners, {0, 0, 1}));
+    CHECK(membrane::is_rigid<double>(m.context, corners, {0.05, 0, 0.95}));
+    CHECK_FALSE(membrane::is_rigid<double>(m.context, corners, {0.2, 0, 0.8}));
+}
+
+TEST_CASE("a force on a point is distributed, and moves it by its compliance") {
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane m(random);
+        const Vector3<double> force = random.vector();
+        ContactPoint<double> touch{0, 0, corners, random.barycentric(), random.unit_vector(), Vector3<double>::Zero()};
+        const Vector3<double> before = m.at(touch.weights);
+        membrane::change_force(m.context, touch, force);
+        const Vector3<double> by = m.at(touch.weights) - before;
+        CAPTURE(seed);
+        CHECK((by - membrane::response_of(m.context, touch, force)).norm() < 1e-12);
+        CHECK((membrane::force_for(m.context, touch, by) - force).norm() < 1e-10);
+        for (Index v = 0; v < 3; ++v) CHECK((m.force(v) - touch.weights[v] * force).norm() < 1e-12);
+        m.context.add_point(touch);
+        CHECK((membrane::reaction_at_points(m.context) + force).norm() < 1e-12);
+        membrane::add_point_force<double>(m.context, corners, touch.weights, -force);
+        for (Index v = 0; v < 3; ++v) CHECK(m.force(v).norm() < 1e-15);
+    }
+}
+
+TEST_CASE("corners become seeds unless one is no vertex") {
+    test::Random random(1);
+    Membrane m(random);
+    CHECK(membrane::seed_corners(m.context, corners));
+    CHECK(m.work.seeds.count() == 3);
+    CHECK_FALSE(m.work.invalid);
+    CHECK_FALSE(membrane::seed_corners<double>(m.context, {0, 3, 1}));
+    CHECK(m.work.invalid);
+}
+
+TEST_CASE("a fixed corner gives way by its share of the force, and stays where it is") {
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane m(random, seed % 2 == 0);
+        const double stiffness = random.number(1.0, 1000.0);
+        m.context.set_support(2, stiffness);
+        const Vector3<double> force = random.vector();
+        const ContactPoint<double> touch{0, 0, corners, random.barycentric(), random.unit_vector(), force, true};
+        membrane::bear(m.context, touch, force);
+        const double weight = seed % 2 == 0 ? touch.weights[2] : 0;  // on what is fixed
+        const Vector3<double> yields = (weight / stiffness) * force;
+        CHECK((m.context.support_displacement(2) - yields).norm() < 1e-12);
+        CHECK((membrane::support_displacement(m.context, touch) - weight * yields).norm() < 1e-12);
+        for (Index v = 0; v < 3; ++v) CHECK(m.context.position(v) == m.x.col(v));
+        membrane::bear<double>(m.context, touch, -force);
+        CHECK(m.context.support_displacement(2).norm() < 1e-14);
+        // And as much as a free corner would where a tool presses the surface in.
+        const Vector3<double> by = random.vector(), before = m.at(touch.weights);
+        membrane::press_in<double>(m.context, corners, touch.weights, by);
+        const double part = 1 - weight * weight / touch.weights.squaredNorm();
+        CHECK((m.at(touch.weights) - before - part * by).norm() < 1e-12);
+        if (seed % 2 == 0) CHECK(m.context.position(2) == m.x.col(2));
+    }
+}
+
+TEST_CASE("a distance that rounding makes nothing of is negligible") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Membrane m(random);
+        const double far = std::pow(10, random.number(0.0, 6.0));
+        const Vector3<double> by = far * random.unit_vector(), none = Vector3<double>::Zero();
+        for (Index v = 0; v < 3; ++v) m.context.move(v, by);
+        const ContactPoint<double> touch{0, 0, corners, random.barycentric(), none, none};
+        const Vector3<double> where = m.at(touch.weights);
+        const double spacing = std::numeric_limits<double>::epsilon() * where.cwiseAbs().maxCoeff();
+        CAPTURE(seed, far);
+        m.work.force_tolerance = 0;
+        CHECK(membrane::negligible_distance(m.context, touch) >= 4 * spacing);
+        CHECK(membrane::negligible_distance(m.context, touch) <= 100 * spacing);
+        m.work.force_tolerance = 1e9;
+        CHECK(membrane::negligible_distance(m.context, 1) == 1e9 * m.context.compliance(1));
+    }
+}
