@@ -110,16 +110,23 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(active.wake(0))&& noexcept(active.grow(network, options)));
         static_assert(noexcept(active.frontier())&& noexcept(active.group_ends()));
     });
-    static_cast<void>([](SpringPacks<S>& packs, const PropagationQueue& queue, const Network& network, PointsRef<S> x) {
-        static_assert(noexcept(packs.follow(queue, network))&& noexcept(packs.load(x))&& noexcept(packs.store(x)));
-        static_assert(noexcept(packs.append(queue.vertices(), 0, queue.group_ends(), network)));
-        static_assert(noexcept(packs.vertices(0))&& noexcept(packs.place_of(0))&& noexcept(packs.pack_from(0)));
-        static_assert(noexcept(packs.move(0, packs.positions(0))));
+    static_cast<void>([](PackedVertices<S>& packed, const PropagationQueue& queue, const Network& network,
+                         const StepInput<S, Network, Volume>& scene, const ExecutorRef& executor) {
+        static_assert(noexcept(packed.assign(queue.vertices(), queue.group_ends(), network)));
+        static_assert(noexcept(packed.append(queue.vertices(), 0, queue.group_ends(), network)));
+        static_assert(noexcept(packed.vertices(0))&& noexcept(packed.first_of(0))&& noexcept(packed.pack_from(0)));
+        static_assert(noexcept(packed.begin_step(scene))&& noexcept(packed.evaluate_residual(0, scene)));
+        static_assert(noexcept(packed.template update<true>(0, scene, BlockStep{})));
+        static_assert(noexcept(packed.template update<false>(0, scene, SafeStep{})));
+        static_assert(noexcept(packed.update(0, 1, scene, BlockStep{}, executor)));
+        static_assert(noexcept(packed.free_count(0))&& noexcept(packed.needed()));
     });
-    static_cast<void>([](CompactBlock<S>& block, const StepInput<S, Network, Volume>& scene, bool (*is_fixed)(Index)) {
-        static_assert(noexcept(block.open(scene, is_fixed))&& noexcept(block.forces(0, scene)));
-        static_assert(noexcept(block.visit(0, scene, BlockStep{}))&& noexcept(block.visit(0, scene, SafeStep{})));
-        static_assert(noexcept(block.compliance(0))&& noexcept(block.free_count(0))&& noexcept(block.packs()));
+    static_cast<void>([](StepState<S>& state, const ContactTool<S>& tool, std::span<ContactPack<S>> packs,
+                         std::span<ContactPoint<S>> points, std::span<const Index> vertices) {
+        static_assert(noexcept(state.begin_step())&& noexcept(state.end_step())&& noexcept(state.reset()));
+        static_assert(noexcept(push_out(state, tool, packs))&& noexcept(solve_contacts(state, tool, packs)));
+        static_assert(noexcept(apply_forces(state, packs))&& noexcept(unpack<S>(packs, points)));
+        static_assert(noexcept(largest_squared_move(state, vertices)));
     });
     static_cast<void>([](Predictor<S, 4>& predictor, std::span<const Lead<S>> leads) {
         static_assert(noexcept(predictor.expect(leads))&& noexcept(predictor.forget()));

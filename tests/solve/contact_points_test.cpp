@@ -173,7 +173,7 @@ TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corn
                 const S weight = point.weights[static_cast<Eigen::Index>(k)];
                 const Vector3<S> by = state.compliance_block(v) * Vector3<S>(weight * point.force);
                 compliance += weight * weight * dot<S>(point.normal, state.compliance_block(v) * point.normal);
-                const Vector3<S> moved = ::point(state.positions(), v) - ::point(patch.x, v);
+                const Vector3<S> moved = membrane::point(state.positions(), v) - membrane::point(patch.x, v);
                 REQUIRE(norm<S>(moved - by) <= slack * (1 + force));
             }
             const auto before = triangle_at(patch.x, point.corners);

@@ -45,7 +45,6 @@ struct Outcome {
     Points<S> x;
     std::array<Vector3<S>, 4> reactions;
     bool settled = true;
-    Index updates = 0;  // of vertices, in all ticks
 
     double distance_to(const Outcome& other) const {
         return static_cast<double>((x - other.x).colwise().norm().maxCoeff());
@@ -97,7 +96,6 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
     const S radius = random.number<S>(S(0.1), S(0.4));
     const Vector3<S> from = direction<S>(S(0.7) * random.vector<S>() - target - place, -target);
     StepReport<S> report;
-    Index updates = 0;
     Points<S> before;
     Tool<S> tool{.radius = units.size * radius};
     const Index ticks = pressing ? 300 : 10;
@@ -108,11 +106,9 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
         report = loop.tick(tool, pull(held, at(target)), load<S>(corners(loaded), weights, force),
                            HeldPoint<S>{grasped, corners(grasped), weights, at(place)});
         REQUIRE(report.status == StepStatus::advanced);
-        updates += report.visits;
     }
     Outcome<S> outcome{(loop.x / units.size).colwise() - units.origin, {}};
     for (std::size_t i = 0; i < 4; ++i) outcome.reactions[i] = report.reactions[i] / k(units.size);
-    outcome.updates = updates;
     // A tool at an edge may rock for good.
     outcome.settled = !pressing || (loop.x - before).cwiseAbs().maxCoeff() <= 100 * rounding * units.size;
     return outcome;
@@ -120,7 +116,7 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
 
 /// How many scenes were compared, and how many of them had come to rest.
 struct Count {
-    int seen = 0, settled = 0, other_updates = 0;
+    int seen = 0, settled = 0, outliers = 0;
 };
 
 /// The scene told in `units` is the one told in none.
@@ -130,10 +126,10 @@ void compare(int seed, const Units<S>& units, Count& count) {
     const auto expected = scene_of<S, Rule>(seed, {}), found = scene_of<S, Rule>(seed, units);
     if (++count.seen; !(expected.settled && found.settled)) return;
     ++count.settled;
-    // Where rounding decides whether a tolerance is met, iterations end earlier in one, and after ten ticks both are on
-    // their way still.
-    if (sizeof(S) == 4 && found.updates != expected.updates) {
-        ++count.other_updates;
+    // Where rounding decides whether a tolerance is met, iterations end earlier in one of the two: after ten ticks one scene
+    // in a hundred is farther apart.
+    if (sizeof(S) == 4 && found.distance_to(expected) >= tolerance) {
+        ++count.outliers;
         tolerance *= 10;
     }
     REQUIRE(found.distance_to(expected) < tolerance);
@@ -164,7 +160,7 @@ TEMPLATE_TEST_CASE(
         }
     }
     CHECK(count.settled >= 0.9 * count.seen);
-    CHECK(count.other_updates <= 0.2 * count.seen);
+    CHECK(count.outliers <= 0.01 * count.seen);
 }
 
 TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same mesh", "[extremes]", double, float) {
@@ -178,7 +174,7 @@ TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same 
         compare<S, BlockStep>(seed, units, count);
     }
     CHECK(count.settled >= 0.9 * count.seen);
-    CHECK(count.other_updates <= 0.2 * count.seen);
+    CHECK(count.outliers <= 0.01 * count.seen);
 }
 
 TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, and too far is refused by name",

@@ -93,7 +93,7 @@ class ErrorBound {
                                  const Volume& volume, const Constraints&... constraints);
 
   private:
-    static constexpr std::size_t most_constraints = Workspace<double>::most_constraints;
+    static constexpr std::size_t most_constraints = StepState<double>::max_constraints;
     static constexpr int most_attempts = 4;
 
     void open(std::size_t constraint_count) noexcept;

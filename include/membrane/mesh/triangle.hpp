@@ -166,7 +166,8 @@ template <bool branches, Number N>
     const auto has_area = whole > Limits::epsilon() * (squared_norm(ab) * squared_norm(ac));
     const auto over_face = finite & has_area & (weight_a >= 0) & (weight_b >= 0) & (weight_c >= 0);
 
-    const N divisor = select<N>(over_face, whole, 1), b = weight_b / divisor, c = weight_c / divisor;
+    const N divisor = select<N>(over_face, whole, 1);  // beside the face, nothing may overflow
+    const N b = select<N>(over_face, weight_b / divisor, 0), c = select<N>(over_face, weight_c / divisor, 0);
     const Vector3<N> in_face(larger<N>(0, 1 - b - c), b, c), offset_in_face = aq - b * ab - c * ac;
     if (branches && all(over_face)) return {in_face, point_at(triangle, in_face), squared_norm(offset_in_face)};
 

@@ -150,7 +150,7 @@ class ConstraintContext {
         }
     }
 
-    /// By how much a fixed vertex gives way to the tools that press on it, as a spring of its support stiffness does [m]; no
+    /// By how much a fixed vertex yields to the tools that press on it, as a spring of its support stiffness does [m]; no
     /// other does.
     [[nodiscard]] Vector3<Scalar> support_displacement(Index v) const noexcept {
         const auto& support = state_.row(state_.support, v);

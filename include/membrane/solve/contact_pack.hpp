@@ -87,15 +87,15 @@ class ContactPacks {
     ContactPacks(Index vertex_count, std::size_t capacity)
         : packs_(capacity),
           colours_(static_cast<std::size_t>(vertex_count), 0),
-          nobody_(numbers_in_point * vertex_count) {}
+          unused_row_(numbers_in_point * vertex_count) {}
 
     void clear() noexcept { packs_.clear(); }
     [[nodiscard]] std::size_t size() const noexcept { return packs_.size(); }
     [[nodiscard]] std::span<ContactPack<Scalar>> items() noexcept { return packs_.items(); }
     [[nodiscard]] std::span<const ContactPack<Scalar>> items() const noexcept { return packs_.items(); }
 
-    /// Appends packs of these points, whose forces are in the rows of forces; the first is number `first` of all. There is room for as many
-    /// packs as for points. Cost: linear in their number.
+    /// Appends packs of these points, whose forces are in the rows of forces; the first is number `first` of all. There is room for as many packs as for
+    /// points. Cost: linear in their number.
     template <class IsFixed>
     void append(std::span<const ContactPoint<Scalar>> points, std::size_t first, IsFixed is_fixed) noexcept;
 
@@ -107,7 +107,7 @@ class ContactPacks {
 
     BoundedList<ContactPack<Scalar>> packs_;
     std::vector<std::uint64_t> colours_;  // of each vertex, those of the points it is a corner of; zero between calls
-    Index nobody_;
+    Index unused_row_;
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
@@ -116,11 +116,11 @@ template <Real Scalar>
 auto ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept -> ContactPack<Scalar>& {
     ContactPack<Scalar> pack;
     const Vector3<Lanes<Scalar>> none(0, 0, 0);
-    pack.weights = Vector3<Lanes<Scalar>>(1, 0, 0);  // of unused lanes: numbers that one can reckon with
+    pack.weights = Vector3<Lanes<Scalar>>(1, 0, 0);  // of unused lanes: valid numbers
     pack.normal = pack.stiffness = pack.axis_point = pack.free = none;
     pack.added_weights = pack.added_normal = pack.added_stiffness = none;
     pack.force = pack.added_force = pack.end = pack.listed = pack.used = Scalar(0);
-    for (auto& begins : pack.corner) begins.fill(nobody_);
+    for (auto& begins : pack.corner) begins.fill(unused_row_);
     pack.point.fill(no_index);
     pack.turn.fill(0);
     pack.kind = kind;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <span>
@@ -16,7 +17,7 @@
 /// Contact points against a tool, several at a time: where they are now, how deep the tool is in, and the force that keeps
 /// it out.
 ///
-///     membrane::push_out(state, tool, packs);                      // the surface gives way before any force is known
+///     membrane::push_out(state, tool, packs);                      // the surface yields before any force is known
 ///     membrane::solve_contacts(state, tool, packs);                // projected Gauss-Seidel, one pass
 ///     membrane::apply_forces(state, packs);
 namespace membrane {
@@ -126,6 +127,7 @@ template <Real Scalar>
         return;
     }
     Vector3<Wide> separation, along;
+    auto exists = pack.listed > 0;
     if (pack.kind == ContactKind::end) {
         pack.axis_point = broadcast(tool.position) + pack.end * broadcast(tool.axis);
         const auto nearest = closest_point_inline<true>(triangle, pack.axis_point);
@@ -138,19 +140,24 @@ template <Real Scalar>
         const Vector3<Wide> start = broadcast(tool.position), axis = broadcast(tool.axis);
         const Vector3<Wide> edge = triangle.b - triangle.a;
         const auto nearest = nearest_on_edge(triangle.a, edge, start, axis);
-        const auto exists = (nearest.along > 0) & (nearest.along < 1);
-        pack.force = select<Wide>(exists, pack.force, 0);
-        pack.used = select<Wide>(exists, pack.listed, 0);
+        exists = exists & (nearest.along > 0) & (nearest.along < 1);
         pack.axis_point = start + nearest.along * axis;
         pack.weights = Vector3<Wide>(1 - nearest.foot, nearest.foot, 0);
         separation = along = pack.axis_point - point_at(triangle, pack.weights);
     }
     // The tool stays on the side of the triangle, or of the edge or corner it is nearest to, where it was found.
+    // So far away that squares overflow, there is no point.
+    const Scalar too_far = std::sqrt((std::numeric_limits<Scalar>::max)()) / 16;
     const Wide length = norm(along);
-    const auto has_length = length > 0;
+    exists = exists & (length < too_far) & (squared_norm(separation) < too_far);
+    pack.used = select<Wide>(exists, 1, 0);
+    pack.force = select<Wide>(exists, pack.force, 0);
+    const auto has_length = exists & (length > 0);
     const Wide divisor = select<Wide>(has_length, length, 1);
     Vector3<Wide> away;
-    for (Eigen::Index k = 0; k < 3; ++k) away[k] = select<Wide>(has_length, along[k] / divisor, pack.normal[k]);
+    for (Eigen::Index k = 0; k < 3; ++k) {
+        away[k] = select<Wide>(has_length, select<Wide>(has_length, along[k], 0) / divisor, pack.normal[k]);
+    }
     const Wide sign = select<Wide>(dot(away, pack.normal) < 0, -1, 1);
     pack.normal = sign * away;
     if (any(pack.force > 0)) {
@@ -183,7 +190,7 @@ template <Real Scalar>
     pack.added_stiffness = pack.stiffness;
 }
 
-/// By how much fixed corners give way to the tool.
+/// By how much fixed corners yield to the tool.
 template <Real Scalar>
 struct SupportOfPack {
     Lanes<Scalar> compliance = 0;            // of all points [m/N]
@@ -210,7 +217,7 @@ template <Real Scalar>
     return sum;
 }
 
-/// How far the tool is from the points of a pack, along their normals; where fixed corners give way, from there [m].
+/// How far the tool is from the points of a pack, along their normals; where fixed corners yield, from there [m].
 template <Real Scalar>
 [[gnu::always_inline, nodiscard]] inline Lanes<Scalar> gap_of(const ContactTool<Scalar>& tool,
                                                               const std::array<PaddedLanes<Scalar>, 3>& corner,
@@ -346,7 +353,7 @@ template <Real Scalar>
     for (auto& pack : packs) {
         auto corner = detail::corners_of(state, pack);
         detail::locate(tool, corner, pack);
-        if (pack.on_fixed) detail::add_forces(state, pack);  // before fixed corners are asked how far they give way
+        if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners yield by the forces up to here
         const auto support = detail::support_of(state, pack);
         const Wide gap = detail::gap_of(tool, corner, pack, support);
         const auto acts = (pack.used > 0) & ((pack.force > 0) | (gap < 0));

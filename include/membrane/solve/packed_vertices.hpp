@@ -89,7 +89,7 @@ class PackedVertices {
 
     enum class Outcome : unsigned char { at_rest, moved, too_far };
 
-    /// Moves the vertices of pack `p` as `rule` says; `in_contact`, constraints act on them, and what they answer with is
+    /// Moves the vertices of pack `p` as `rule` says; `in_contact`, constraints act on them, and their response is
     /// kept. Where the move may be beyond what is stable, it is `too_far`, and nothing moves, unless it is `allowed`.
     template <bool in_contact, class Scene, class Rule>
     Outcome update(std::size_t p, const Scene& scene, const Rule& rule, bool allowed = false) noexcept;
@@ -154,7 +154,7 @@ class PackedVertices {
         return vertices == 0 ? 0 : 2 * vertices / lanes + 64;
     }
 
-    Index nobody_;  // where the row begins that is no vertex's
+    Index unused_row_;  // where the row of unused lanes begins
     BoundedList<Index> members_;
     BoundedList<Pack> packs_;
     std::vector<Terms> terms_;
@@ -172,7 +172,7 @@ class PackedVertices {
 template <Real Scalar>
 template <ElasticNetwork<Scalar> Network>
 PackedVertices<Scalar>::PackedVertices(const Network& network, Index capacity)
-    : nobody_(numbers_in_point * network.vertex_count()),
+    : unused_row_(numbers_in_point * network.vertex_count()),
       members_(static_cast<std::size_t>((std::min)(network.vertex_count(), capacity))),
       packs_(packs_for(members_.room())),
       terms_(packs_.room()),
@@ -238,7 +238,7 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
     for (const Index v : vertices) springs = (std::max)(springs, network.neighbours(v).size());
     if (members_.size() + vertices.size() > members_.room() || slot_count_ + springs > slots_.size()) return false;
     Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}};
-    pack.own.fill(nobody_);
+    pack.own.fill(unused_row_);
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
     if (!packs_.push(pack)) return false;
     const auto slots = std::span(slots_).subspan(slot_count_, springs);
@@ -350,14 +350,16 @@ template <bool in_contact, class Scene, class Rule>
     }
     here.extra = select<Wide>(may_move, move.least, 0);
     if constexpr (in_contact) {
-        const Symmetric3<Wide> block = select<Wide>(may_move, 1, 0) * as_block<Wide>(move.compliance);
+        const Symmetric3<Wide> block = as_block<Wide>(move.compliance);
         const Wide internal = norm<Wide>(vertex.force - of_constraints.point);
         Begins begins;
         for (std::size_t i = 0; i < lanes; ++i) begins[i] = 2 * own[i];
-        scatter_padded<Scalar>({{block.xx, block.yy, block.zz}, block.xy}, rows.response.data(), begins.data());
-        scatter_padded<Scalar>({{block.xz, block.yz, select<Wide>(may_move, internal, 0)},
-                                select<Wide>(may_move, vertex.stiffness - of_constraints.extra, 0)},
-                               rows.response.data() + 1, begins.data());
+        const auto kept = [&](const Wide& number) { return select<Wide>(may_move, number, 0); };
+        scatter_padded<Scalar>({{kept(block.xx), kept(block.yy), kept(block.zz)}, kept(block.xy)}, rows.response.data(),
+                               begins.data());
+        scatter_padded<Scalar>(
+            {{kept(block.xz), kept(block.yz), kept(internal)}, kept(vertex.stiffness - of_constraints.extra)},
+            rows.response.data() + 1, begins.data());
     }
     const auto moves = move.moves & may_move;
     const Vector3<Wide> there = here.point + move.displacement;

@@ -57,7 +57,7 @@ struct Press {
     void add_point(Context& context, const TouchedTriangle& triangle, int feature,
                    const Proximity<Scalar>& nearest) const noexcept;
     void pack_points(Context& context) const noexcept;
-    [[nodiscard]] std::optional<Vector3<Scalar>> way_out_of_support(const Context& context) const noexcept;
+    [[nodiscard]] std::optional<Vector3<Scalar>> direction_out_of_support(const Context& context) const noexcept;
     void touch_support(Context& context, const Vector3<Scalar>& out) const noexcept;
     void prevent_tunnelling(Context& context) const noexcept;
     [[nodiscard]] bool has_new_overlap(const Context& context) const noexcept;
@@ -96,9 +96,13 @@ namespace detail {
 // Points share vertices: until none is inside they are moved out this often at the most.
 inline constexpr int max_push_passes = 8;
 
-// And this often they are solved before the vertices find their balance anew. More passes close the gaps further, but give
-// no other force; beside fixed corners, which do not move, they do.
-inline constexpr int max_contact_passes = 2, max_passes_on_fixed = 8;
+/// And this often they are solved before the vertices find their balance anew. Few points, on a coarse mesh or beside fixed
+/// corners, have each a large part of the force, and more passes give a better one; of many each has little.
+[[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool on_fixed) noexcept {
+    constexpr int least = 2, most = 8, points_of_all_passes = 128;
+    if (on_fixed || points == 0) return most;
+    return std::clamp(points_of_all_passes / static_cast<int>(points), least, most);
+}
 
 }  // namespace detail
 
@@ -106,7 +110,7 @@ template <Real Scalar>
 void Press<Scalar>::begin(Context& context) const noexcept {
     if (!contact.touching() || !seed(context)) return;
     for (const auto& point : context.previous_points()) bear(context, point, point.force);
-    const auto out = way_out_of_support(context);
+    const auto out = direction_out_of_support(context);
     if (contact.crossed && !out) carry_with_tool(context);
     list_watched(context);
     if (!contact.crossed && !out && contact.gap < -negligible_distance(context, contact.corners[0])) {
@@ -140,21 +144,15 @@ bool Press<Scalar>::seed(Context& context) const noexcept {
     return true;
 }
 
-// The vertices that must not pass the tool, each once. Where there is no room for the list, all that are loaded are checked.
+// The vertices that must not pass the tool.
 template <Real Scalar>
 void Press<Scalar>::list_watched(Context& context) const noexcept {
-    auto& state = context.state();
-    auto& range = state.watched_ranges[context.constraint()];
-    range = {state.watched.size(), state.watched.size()};
-    state.marked.clear();
     for (const auto& watched : contact.watched) {
         for (const Index v : watched.corners) {
-            if (!state.marked.insert(v)) continue;
             contact.crossed ? context.keep(v) : context.keep_start(v);
-            if (!state.watched.push(v)) state.full = true;
+            context.state().watched.insert(v);
         }
     }
-    range.end = state.watched.size();
 }
 
 // The tool does not pass the surface: triangles that it crossed since the last tick are carried with it, all the distance or
@@ -186,7 +184,7 @@ void Press<Scalar>::carry_with_tool(Context& context) const noexcept {
     }
 }
 
-// The surface gives way at the contact point first, to where it just touches the tool, if it is not there already.
+// The surface yields at the contact point first, to where it just touches the tool, if it is not there already.
 template <Real Scalar>
 void Press<Scalar>::clear_contact_point(Context& context) const noexcept {
     const Vector3<Scalar> now = point_at(surface_triangle(context, contact.corners), contact.barycentric);
@@ -262,10 +260,10 @@ void Press<Scalar>::pack_points(Context& context) const noexcept {
     range.end = state.packs.size();
 }
 
-// Fixed vertices do not give way to a tool, and one that is deeper in than its radius has its axis behind them. It touches
+// Fixed vertices do not yield to a tool, and one that is deeper in than its radius has its axis behind them. It touches
 // the surface in one point then, the nearest, as it did before: the direction out is given, no other.
 template <Real Scalar>
-std::optional<Vector3<Scalar>> Press<Scalar>::way_out_of_support(const Context& context) const noexcept {
+std::optional<Vector3<Scalar>> Press<Scalar>::direction_out_of_support(const Context& context) const noexcept {
     const Vector3<Scalar> fixed = contact.barycentric - free_weights(context, contact.corners, contact.barycentric);
     if (!(fixed.maxCoeff() > 0)) return std::nullopt;
     Vector3<Scalar> pressed = Vector3<Scalar>::Zero();
@@ -292,8 +290,7 @@ template <Real Scalar>
 void Press<Scalar>::prevent_tunnelling(Context& context) const noexcept {
     if (on_support(context)) return;
     const auto& state = context.state();
-    const auto watched = state.watched_ranges[context.constraint()].of(state.watched.items());
-    const Scalar farthest = largest_squared_move(state, watched);
+    const Scalar farthest = largest_squared_move(state, state.watched.items());
     if (4 * farthest < contact.radius * contact.radius && contact.gap > -contact.radius / 2) return;
     const Scalar rounding = detail::rounding_at(contact.on_axis);
     Scalar first = 1;
@@ -316,7 +313,7 @@ bool Press<Scalar>::enforce(Context& context) const noexcept {
     bool released = false;
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
-    const int most = on_fixed ? detail::max_passes_on_fixed : detail::max_contact_passes;
+    const int most = detail::max_contact_passes(points.size(), on_fixed);
     for (int i = 0; i < most; ++i) {
         const auto pass = solve_contacts(context.state(), shape(), packs(context));
         released = released || pass.released;

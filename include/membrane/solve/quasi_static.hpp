@@ -250,7 +250,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(TimeBudget 
     load_and_pack(scene, progress);
     sweep(scene, acting, progress);
     if (report_.status == StepStatus::advanced && !evaluate_residuals(scene, progress)) {
-        state_.restore(start);  // not finite there either: then the input is not valid
+        state_.forget_points();  // what ran away may be a force from the step before
+        state_.restore(start);   // not finite there either: then the input is not valid
         report_.status = evaluate_residuals(scene, progress) ? StepStatus::unstable : StepStatus::bad_input;
     }
     if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
@@ -446,7 +447,7 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs_beyond(const Scene& 
     bool changed = false;
     std::size_t p = packed_.pack_from(begin);
     const std::size_t last = packed_.pack_from(end);
-    while (p < last && report_.status == StepStatus::advanced) {
+    while (p < last && progress.next == nullptr && report_.status == StepStatus::advanced) {
         if (!progress.budget.has_time_for_batch()) {
             report_.out_of_time = true;
             progress.next = active_.vertices().data() + packed_.first_of(p);

@@ -115,7 +115,7 @@ struct StepState {
         row(response, 2 * v + 1).number[3] = stiffness;
     }
 
-    // One row more than vertices: nobody's, for lanes that are not in use.
+    // One row more than vertices, for lanes that are not in use.
     Rows position;  ///< [m]; the least compliance [m/N]
     Rows force;     ///< of the constraints [N]; the stiffness that contact adds [N/m]
     Rows response;  ///< two rows: compliance xx, yy, zz, xy; xz, yz [m/N], internal force [N], internal stiffness [N/m]
@@ -133,9 +133,8 @@ struct StepState {
     std::vector<Index> next_of_same_corner;  // of each previous point
     std::array<ListRange, max_constraints> point_ranges{}, previous_ranges{};
     ContactPacks<Scalar> packs;
-    std::array<ListRange, max_constraints> pack_ranges{}, watched_ranges{};
-    BoundedList<Index> watched;  // vertices whose way past a tool is checked
-    IndexSet marked;             // scratch of one call
+    std::array<ListRange, max_constraints> pack_ranges{};
+    IndexSet watched;  // vertices that must not pass a tool: they are kept
 
     Scalar force_tolerance = 0;
     bool invalid = false, full = false;
@@ -163,20 +162,17 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       first_previous(static_cast<std::size_t>(vertices), no_index),
       next_of_same_corner(points.room(), no_index),
       packs(vertices, static_cast<std::size_t>(max_contact_points)),
-      watched(2 * static_cast<std::size_t>(vertices)),
-      marked(vertices) {}
+      watched(vertices) {}
 
 template <Real Scalar>
 void StepState<Scalar>::begin_step() noexcept {
     for (const Index v : forced.items()) row(force, v) = {};
     for (const Index v : bearing.items()) row(support, v).set(Vector3<Scalar>::Zero(), row(support, v).extra());
-    for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &bearing, &kept}) set->clear();
+    for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &bearing, &kept, &watched}) set->clear();
     points.clear();
     packs.clear();
-    watched.clear();
     point_ranges = {};
     pack_ranges = {};
-    watched_ranges = {};
     invalid = full = false;
 }
 

@@ -8,7 +8,7 @@
 #include <membrane/mesh/triangle.hpp>
 #include <membrane/solve/constraint_context.hpp>
 
-/// What constraints do to a point of a triangle: they add forces to it or move it by way of the triangle's corners, each in
+/// What constraints do to a point of a triangle: they add forces to it or move it through the triangle's corners, each in
 /// proportion to its barycentric weight.
 namespace membrane {
 
@@ -67,8 +67,8 @@ void move_point(ConstraintContext<Scalar>& context, const std::array<Index, 3>& 
     }
 }
 
-/// Moves the free corners as they move where the point goes by a displacement [m] and fixed corners give way as much as free
-/// ones: a point on fixed corners stays, and nothing jumps on the way there.
+/// Moves the free corners as they move where the point goes by a displacement [m] and fixed corners yield as much as free
+/// ones: a point on fixed corners stays, and nothing jumps in between.
 template <Real Scalar>
 void press_in(ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners, const Vector3<Scalar>& weights,
               const Vector3<Scalar>& by) noexcept {
@@ -143,7 +143,7 @@ void bear(ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
     }
 }
 
-/// How far the fixed corners of the point give way to tools [m].
+/// How far the fixed corners of the point yield to tools [m].
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> support_displacement(const ConstraintContext<Scalar>& context,
                                                    const ContactPoint<Scalar>& point) noexcept {
