@@ -96,11 +96,12 @@ namespace detail {
 // Points share vertices: until none is inside they are moved out this often at the most.
 inline constexpr int max_push_passes = 8;
 
-/// And this often they are solved before the vertices find their balance anew. Few points, on a coarse mesh or beside fixed
-/// corners, have each a large part of the force, and more passes give a better one; of many each has little.
-[[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool on_fixed) noexcept {
+/// And this often they are solved before the vertices find their balance anew. Few points, on a coarse mesh, have each a large
+/// part of the force, and more passes give a better one; of many each has little. Where points are `stiff`, beside fixed
+/// corners or several of a shaft on one triangle, a pass moves each by little.
+[[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool stiff) noexcept {
     constexpr int least = 2, most = 8, points_of_all_passes = 128;
-    if (on_fixed || points == 0) return most;
+    if (stiff || points == 0) return most;
     return std::clamp(points_of_all_passes / static_cast<int>(points), least, most);
 }
 
@@ -313,7 +314,7 @@ bool Press<Scalar>::enforce(Context& context) const noexcept {
     bool released = false;
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
-    const int most = detail::max_contact_passes(points.size(), on_fixed);
+    const int most = detail::max_contact_passes(points.size(), on_fixed || feature_pairs(tool) > 1);
     for (int i = 0; i < most; ++i) {
         const auto pass = solve_contacts(context.state(), shape(), packs(context));
         released = released || pass.released;
