@@ -156,6 +156,28 @@ void store_part(const Part& part, Scalar* to) noexcept {
     std::memcpy(to, &part, sizeof part);
 }
 
+#if defined(__GNUC__)
+/// The four columns of a matrix of eight rows.
+template <class Part>
+[[gnu::always_inline, nodiscard]] inline std::array<Part, 4> eight_columns(const PaddedPoint<float>* rows,
+                                                                           const Index* begins) noexcept {
+    const auto row = [&](std::size_t i) { return rows->number.data() + begins[i]; };
+    using Half __attribute__((vector_size(16))) = float;
+    const auto pair = [&](std::size_t i) {
+        return __builtin_shufflevector(load_part<Half>(row(i)), load_part<Half>(row(i + 4)), 0, 1, 2, 3, 4, 5, 6, 7);
+    };
+    const Part a = pair(0), b = pair(1), c = pair(2), d = pair(3);
+    const Part ab = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
+    const Part cd = __builtin_shufflevector(c, d, 0, 8, 1, 9, 4, 12, 5, 13);
+    const Part ab_z = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
+    const Part cd_z = __builtin_shufflevector(c, d, 2, 10, 3, 11, 6, 14, 7, 15);
+    return {__builtin_shufflevector(ab, cd, 0, 1, 8, 9, 4, 5, 12, 13),
+            __builtin_shufflevector(ab, cd, 2, 3, 10, 11, 6, 7, 14, 15),
+            __builtin_shufflevector(ab_z, cd_z, 0, 1, 8, 9, 4, 5, 12, 13),
+            __builtin_shufflevector(ab_z, cd_z, 2, 3, 10, 11, 6, 7, 14, 15)};
+}
+#endif
+
 /// The four columns of a matrix whose rows begin at these numbers of `rows`; as many as a register holds numbers. What is
 /// not used of them costs nothing.
 template <class Part, Real Scalar>
@@ -181,20 +203,7 @@ template <class Part, Real Scalar>
             __builtin_shufflevector(xy_even, xy_odd, 0, 4, 2, 6), __builtin_shufflevector(xy_even, xy_odd, 1, 5, 3, 7),
             __builtin_shufflevector(zw_even, zw_odd, 0, 4, 2, 6), __builtin_shufflevector(zw_even, zw_odd, 1, 5, 3, 7)};
     } else if constexpr (width == 8) {
-        using Half __attribute__((vector_size(16))) = float;
-        const auto pair = [&](std::size_t i) {
-            return __builtin_shufflevector(load_part<Half>(row(i)), load_part<Half>(row(i + 4)), 0, 1, 2, 3, 4, 5, 6,
-                                           7);
-        };
-        const Part a = pair(0), b = pair(1), c = pair(2), d = pair(3);
-        const Part ab = __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13);
-        const Part cd = __builtin_shufflevector(c, d, 0, 8, 1, 9, 4, 12, 5, 13);
-        const Part ab_z = __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15);
-        const Part cd_z = __builtin_shufflevector(c, d, 2, 10, 3, 11, 6, 14, 7, 15);
-        return {__builtin_shufflevector(ab, cd, 0, 1, 8, 9, 4, 5, 12, 13),
-                __builtin_shufflevector(ab, cd, 2, 3, 10, 11, 6, 7, 14, 15),
-                __builtin_shufflevector(ab_z, cd_z, 0, 1, 8, 9, 4, 5, 12, 13),
-                __builtin_shufflevector(ab_z, cd_z, 2, 3, 10, 11, 6, 7, 14, 15)};
+        return eight_columns<Part>(rows, begins);
     }
 #endif
     std::array<Part, 4> result{};

@@ -103,7 +103,10 @@ class ContactPacks {
     static constexpr std::size_t colour_count = 64;
     static constexpr std::size_t lanes = ContactPack<Scalar>::lanes;
 
-    [[nodiscard]] ContactPack<Scalar>& begin_pack(ContactKind kind) noexcept;
+    void begin_pack(ContactKind kind) noexcept;
+    template <class IsFixed>
+    static void add_lane(ContactPack<Scalar>& pack, const ContactPoint<Scalar>& point, Index number,
+                         const IsFixed& is_fixed) noexcept;
 
     BoundedList<ContactPack<Scalar>> packs_;
     std::vector<std::uint64_t> colours_;  // of each vertex, those of the points it is a corner of; zero between calls
@@ -113,7 +116,7 @@ class ContactPacks {
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
 template <Real Scalar>
-auto ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept -> ContactPack<Scalar>& {
+void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     ContactPack<Scalar> pack;
     const Vector3<Lanes<Scalar>> none(0, 0, 0);
     pack.weights = Vector3<Lanes<Scalar>>(1, 0, 0);  // of unused lanes: valid numbers
@@ -125,14 +128,39 @@ auto ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept -> ContactPack<
     pack.turn.fill(0);
     pack.kind = kind;
     packs_.push(pack);
-    return packs_.items().back();
+}
+
+template <Real Scalar>
+template <class IsFixed>
+void ContactPacks<Scalar>::add_lane(ContactPack<Scalar>& pack, const ContactPoint<Scalar>& point, Index number,
+                                    const IsFixed& is_fixed) noexcept {
+    const std::size_t i = pack.size++;
+    const auto turn = static_cast<unsigned char>(pack.kind == ContactKind::edge ? point.feature - 2 : 0);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t corner = (k + turn) % 3;
+        const auto row = static_cast<Eigen::Index>(k);
+        pack.corner[k][i] = numbers_in_point * point.corners[corner];
+        pack.weights[row].set(i, point.weights[static_cast<Eigen::Index>(corner)]);
+        pack.normal[row].set(i, point.normal[row]);
+        pack.added_weights[row].set(i, pack.weights[row][i]);
+        pack.added_normal[row].set(i, point.normal[row]);
+        pack.free[row].set(i, is_fixed(point.corners[corner]) ? Scalar(0) : Scalar(1));
+    }
+    pack.force.set(i, norm(point.force));
+    pack.added_force.set(i, norm(point.force));
+    pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
+    pack.listed.set(i, 1);
+    pack.used.set(i, 1);
+    pack.point[i] = number;
+    pack.turn[i] = turn;
+    pack.on_fixed = pack.on_fixed || point.on_fixed;
 }
 
 template <Real Scalar>
 template <class IsFixed>
 void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, std::size_t first,
                                   IsFixed is_fixed) noexcept {
-    constexpr std::size_t none = static_cast<std::size_t>(-1);
+    constexpr auto none = static_cast<std::size_t>(-1);
     std::array<std::array<std::size_t, colour_count>, 3> open;  // of each kind and colour, the pack with room
     for (auto& of_kind : open) of_kind.fill(none);
     const auto colours = [this](Index v) -> std::uint64_t& { return colours_[static_cast<std::size_t>(v)]; };
@@ -144,31 +172,14 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
         std::size_t at = colour < colour_count ? open[static_cast<std::size_t>(kind)][colour] : none;
         if (at == none || packs_[at].size == lanes) {
             at = packs_.size();
-            static_cast<void>(begin_pack(kind));
+            begin_pack(kind);
             if (colour < colour_count) open[static_cast<std::size_t>(kind)][colour] = at;
         }
-        ContactPack<Scalar>& pack = packs_.items()[at];
-        const std::size_t i = pack.size++;
-        const unsigned char turn = kind == ContactKind::edge ? static_cast<unsigned char>(point.feature - 2) : 0;
-        for (std::size_t k = 0; k < 3; ++k) {
-            const std::size_t corner = (k + turn) % 3;
-            const auto row = static_cast<Eigen::Index>(k);
-            pack.corner[k][i] = numbers_in_point * v[corner];
-            pack.weights[row].set(i, point.weights[static_cast<Eigen::Index>(corner)]);
-            pack.normal[row].set(i, point.normal[row]);
-            pack.added_weights[row].set(i, pack.weights[row][i]);
-            pack.added_normal[row].set(i, point.normal[row]);
-            pack.free[row].set(i, is_fixed(v[corner]) ? Scalar(0) : Scalar(1));
-            if (colour < colour_count) colours(v[k]) |= std::uint64_t{1} << colour;
+        const auto number = first + static_cast<std::size_t>(&point - points.data());
+        add_lane(packs_.items()[at], point, static_cast<Index>(number), is_fixed);
+        for (const Index corner : v) {
+            if (colour < colour_count) colours(corner) |= std::uint64_t{1} << colour;
         }
-        pack.force.set(i, norm(point.force));
-        pack.added_force.set(i, norm(point.force));
-        pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
-        pack.listed.set(i, 1);
-        pack.used.set(i, 1);
-        pack.point[i] = static_cast<Index>(first + static_cast<std::size_t>(&point - points.data()));
-        pack.turn[i] = turn;
-        pack.on_fixed = pack.on_fixed || point.on_fixed;
     }
     for (const auto& point : points) {
         for (const Index v : point.corners) colours(v) = 0;

@@ -114,6 +114,28 @@ template <Number N>
     return stiffness;
 }
 
+/// The normal of a pack along `along`, as far as there is a point: the tool stays on the side of the triangle, or of the edge
+/// or corner it is nearest to, where it was found. `separation` is from the points to the tool's axis [m].
+template <Real Scalar>
+[[gnu::always_inline]] inline void set_normal(const typename Lanes<Scalar>::Mask& found,
+                                              const Vector3<Lanes<Scalar>>& along,
+                                              const Vector3<Lanes<Scalar>>& separation,
+                                              ContactPack<Scalar>& pack) noexcept {
+    using Wide = Lanes<Scalar>;
+    const Scalar too_far = std::sqrt((std::numeric_limits<Scalar>::max)()) / 16;  // there squares overflow
+    const Wide length = norm(along);
+    const auto exists = found & (length < too_far) & (squared_norm(separation) < too_far);
+    pack.used = select<Wide>(exists, 1, 0);
+    pack.force = select<Wide>(exists, pack.force, 0);
+    const auto has_length = exists & (length > 0);
+    const Wide divisor = select<Wide>(has_length, length, 1);
+    Vector3<Wide> away;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+        away[k] = select<Wide>(has_length, select<Wide>(has_length, along[k], 0) / divisor, pack.normal[k]);
+    }
+    pack.normal = select<Wide>(dot(away, pack.normal) < 0, -1, 1) * away;
+}
+
 /// Brings weights, normal, axis point and stiffness of a pack up to date with the positions, its forces unchanged but for
 /// points that are no more.
 template <Real Scalar>
@@ -145,21 +167,7 @@ template <Real Scalar>
         pack.weights = Vector3<Wide>(1 - nearest.foot, nearest.foot, 0);
         separation = along = pack.axis_point - point_at(triangle, pack.weights);
     }
-    // The tool stays on the side of the triangle, or of the edge or corner it is nearest to, where it was found.
-    // So far away that squares overflow, there is no point.
-    const Scalar too_far = std::sqrt((std::numeric_limits<Scalar>::max)()) / 16;
-    const Wide length = norm(along);
-    exists = exists & (length < too_far) & (squared_norm(separation) < too_far);
-    pack.used = select<Wide>(exists, 1, 0);
-    pack.force = select<Wide>(exists, pack.force, 0);
-    const auto has_length = exists & (length > 0);
-    const Wide divisor = select<Wide>(has_length, length, 1);
-    Vector3<Wide> away;
-    for (Eigen::Index k = 0; k < 3; ++k) {
-        away[k] = select<Wide>(has_length, select<Wide>(has_length, along[k], 0) / divisor, pack.normal[k]);
-    }
-    const Wide sign = select<Wide>(dot(away, pack.normal) < 0, -1, 1);
-    pack.normal = sign * away;
+    set_normal(exists, along, separation, pack);
     if (any(pack.force > 0)) {
         pack.stiffness = rocking_stiffness<Wide>(triangle, pack.weights, pack.force * norm(separation));
     } else {

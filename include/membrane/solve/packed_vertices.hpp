@@ -146,8 +146,14 @@ class PackedVertices {
     }
     template <class Sum, class Scene>
     [[nodiscard]] Sum springs_on(std::size_t p, const Vector3<Wide>& here, const Scene& scene) const noexcept;
+    template <class Rule, class Scene>
+    [[nodiscard]] VertexState<Wide> spring_state(std::size_t p, const Vector3<Wide>& here,
+                                                 const Scene& scene) const noexcept;
     template <bool in_contact, class Scene>
     void add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene, Pull<Wide>& others) const noexcept;
+
+    void keep_response(std::size_t p, const VertexState<Wide>& vertex, const PaddedLanes<Scalar>& of_constraints,
+                       const Symmetric3<Wide>& block, StepState<Scalar>& rows) const noexcept;
 
     // Packs are half empty at the worst that is made room for.
     [[nodiscard]] static std::size_t packs_for(std::size_t vertices) noexcept {
@@ -297,6 +303,23 @@ template <class Sum, class Scene>
     return sum;
 }
 
+// Of the state of the vertices, what their springs do.
+template <Real Scalar>
+template <class Rule, class Scene>
+[[gnu::always_inline]] inline auto PackedVertices<Scalar>::spring_state(std::size_t p, const Vector3<Wide>& here,
+                                                                        const Scene& scene) const noexcept
+    -> VertexState<Wide> {
+    VertexState<Wide> vertex;
+    if constexpr (requires { requires Rule::needs_relief; }) {
+        static_cast<CurvedPull<Wide>&>(vertex) = springs_on<CurvedPull<Wide>>(p, here, scene);
+    } else {
+        const auto sum = springs_on<Pull<Wide>>(p, here, scene);
+        vertex.force = sum.force;
+        vertex.stiffness = sum.stiffness;
+    }
+    return vertex;
+}
+
 // Volume springs and constraints; `others` comes with what the latter do.
 template <Real Scalar>
 template <bool in_contact, class Scene>
@@ -311,6 +334,23 @@ template <bool in_contact, class Scene>
     }
 }
 
+// Compliance, and what resists without constraints; nothing where a vertex may not move.
+template <Real Scalar>
+[[gnu::always_inline]] inline void PackedVertices<Scalar>::keep_response(std::size_t p, const VertexState<Wide>& vertex,
+                                                                         const PaddedLanes<Scalar>& of_constraints,
+                                                                         const Symmetric3<Wide>& block,
+                                                                         StepState<Scalar>& rows) const noexcept {
+    const auto may_move = terms_[p].free != 0;
+    const auto kept = [&](const Wide& number) { return select<Wide>(may_move, number, 0); };
+    Begins begins;
+    for (std::size_t i = 0; i < lanes; ++i) begins[i] = 2 * packs_[p].own[i];
+    scatter_padded<Scalar>({{kept(block.xx), kept(block.yy), kept(block.zz)}, kept(block.xy)}, rows.response.data(),
+                           begins.data());
+    scatter_padded<Scalar>({{kept(block.xz), kept(block.yz), kept(norm<Wide>(vertex.force - of_constraints.point))},
+                            kept(vertex.stiffness - of_constraints.extra)},
+                           rows.response.data() + 1, begins.data());
+}
+
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
 [[gnu::flatten]] auto PackedVertices<Scalar>::update(std::size_t p, const Scene& scene, const Rule& rule,
@@ -318,14 +358,7 @@ template <bool in_contact, class Scene, class Rule>
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     auto here = gather_padded(rows.position.data(), own.data());
-    VertexState<Wide> vertex;
-    if constexpr (requires { requires Rule::needs_relief; }) {
-        static_cast<CurvedPull<Wide>&>(vertex) = springs_on<CurvedPull<Wide>>(p, here.point, scene);
-    } else {
-        const auto sum = springs_on<Pull<Wide>>(p, here.point, scene);
-        vertex.force = sum.force;
-        vertex.stiffness = sum.stiffness;
-    }
+    auto vertex = spring_state<Rule>(p, here.point, scene);
     Pull<Wide> others;
     PaddedLanes<Scalar> of_constraints;
     if constexpr (in_contact) {
@@ -349,18 +382,7 @@ template <bool in_contact, class Scene, class Rule>
         }
     }
     here.extra = select<Wide>(may_move, move.least, 0);
-    if constexpr (in_contact) {
-        const Symmetric3<Wide> block = as_block<Wide>(move.compliance);
-        const Wide internal = norm<Wide>(vertex.force - of_constraints.point);
-        Begins begins;
-        for (std::size_t i = 0; i < lanes; ++i) begins[i] = 2 * own[i];
-        const auto kept = [&](const Wide& number) { return select<Wide>(may_move, number, 0); };
-        scatter_padded<Scalar>({{kept(block.xx), kept(block.yy), kept(block.zz)}, kept(block.xy)}, rows.response.data(),
-                               begins.data());
-        scatter_padded<Scalar>(
-            {{kept(block.xz), kept(block.yz), kept(internal)}, kept(vertex.stiffness - of_constraints.extra)},
-            rows.response.data() + 1, begins.data());
-    }
+    if constexpr (in_contact) keep_response(p, vertex, of_constraints, as_block<Wide>(move.compliance), rows);
     const auto moves = move.moves & may_move;
     const Vector3<Wide> there = here.point + move.displacement;
     for (Eigen::Index k = 0; k < 3; ++k) here.point[k] = select(moves, there[k], here.point[k]);
