@@ -15,10 +15,10 @@ void two_sizes(benchmark::internal::Benchmark* measured) {
 }
 
 BENCHMARK(plain<double>)->Name("plain/double")->Apply(two_sizes);
-BENCHMARK(block<double, membrane::MassStep>)->Name("ours/double/mass")->Apply(two_sizes);
-BENCHMARK(block<double, membrane::SafeStep>)->Name("ours/double/safe")->Apply(two_sizes);
-BENCHMARK(block<float, membrane::MassStep>)->Name("ours/float/mass")->Apply(two_sizes);
-BENCHMARK(block<float, membrane::SafeStep>)->Name("ours/float/safe")->Apply(two_sizes);
+BENCHMARK(packs<double, membrane::MassStep>)->Name("ours/double/mass")->Apply(two_sizes);
+BENCHMARK(packs<double, membrane::SafeStep>)->Name("ours/double/safe")->Apply(two_sizes);
+BENCHMARK(packs<float, membrane::MassStep>)->Name("ours/float/mass")->Apply(two_sizes);
+BENCHMARK(packs<float, membrane::SafeStep>)->Name("ours/float/safe")->Apply(two_sizes);
 
 /// How much longer or shorter than at rest a link is at most.
 btScalar worst_stretch(const btSoftBody& body) {

@@ -59,7 +59,9 @@ struct StepState {
     void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< What is kept, with the body.
 
     /// The first of the previous points whose first corner is `v`, and the next one of the same; or no index.
-    [[nodiscard]] Index previous_at(Index v) const noexcept { return first_previous[static_cast<std::size_t>(v)]; }
+    [[nodiscard]] Index previous_at(Index v) const noexcept {
+        return v >= 0 && v < vertex_count() ? first_previous[static_cast<std::size_t>(v)] : no_index;
+    }
     [[nodiscard]] Index next_previous(Index point) const noexcept {
         return next_of_same_corner[static_cast<std::size_t>(point)];
     }
