@@ -37,8 +37,8 @@ struct ContactPass {
     bool released = false;  ///< whether a point was let go that pressed harder than what resists it
 };
 
-/// Moves corners that are free until no point is inside the tool, or for one pass only; returns whether any had to move.
-/// Brings all points up to date. Online. Cost: linear in the points.
+/// One pass: brings each point up to date with the positions, and moves the free corners of one that is inside the tool until
+/// it is outside. Returns whether any had to move. Online. Cost: linear in the points.
 template <Real Scalar>
 bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs) noexcept;
 
