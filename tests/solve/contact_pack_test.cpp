@@ -42,14 +42,14 @@ void check_packs(const ContactPacks<S>& packs, const std::vector<ContactPoint<S>
             const auto& point = points[number];
             ++seen[number];
             REQUIRE(pack.kind == kind_of(point.feature));
-            REQUIRE(pack.force[i] == norm(point.force));
+            REQUIRE(pack.load.force[i] == norm(point.force));
             REQUIRE(pack.end[i] == (point.feature == 1 ? 1 : 0));
             for (std::size_t k = 0; k < 3; ++k) {
                 const std::size_t corner = (k + pack.turn[i]) % 3;
                 const auto row = static_cast<Eigen::Index>(k);
                 REQUIRE(pack.corner[k][i] == numbers_in_point * point.corners[corner]);
-                REQUIRE(pack.weights[row][i] == point.weights[static_cast<Eigen::Index>(corner)]);
-                REQUIRE(pack.normal[row][i] == point.normal[row]);
+                REQUIRE(pack.load.weights[row][i] == point.weights[static_cast<Eigen::Index>(corner)]);
+                REQUIRE(pack.load.normal[row][i] == point.normal[row]);
                 REQUIRE(pack.free[row][i] == (point.corners[corner] % 5 == 0 ? 0 : 1));
                 corners.push_back(point.corners[corner]);
             }

@@ -96,28 +96,65 @@ TEMPLATE_TEST_CASE("located points are the nearest ones of their features", "[co
         Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, seed % 2 == 0));
         patch.tool.position += random.vector(S(-0.1), S(0.1));  // it has gone on since the points were found
         for (auto& pack : patch.state.packs.items()) {
-            pack.force = S(1);
+            pack.load.force = S(1);
             detail::locate(patch.shape(), detail::corners_of(patch.state, pack), pack);
             for (std::size_t i = 0; i < pack.size; ++i) {
                 const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
                 const auto triangle = patch.triangle(point.triangle);
                 const auto nearest = proximity(triangle, patch.tool, point.feature);
                 REQUIRE((pack.used[i] > 0) == nearest.has_value());
-                REQUIRE(pack.force[i] == (nearest ? 1 : 0));
+                REQUIRE(pack.load.force[i] == (nearest ? 1 : 0));
                 if (!nearest) continue;
-                Vector3<S> weights, stiffness, axis_point;
+                Vector3<S> weights, normal;
                 for (std::size_t k = 0; k < 3; ++k) {
                     const auto row = static_cast<Eigen::Index>(k),
                                corner = static_cast<Eigen::Index>((k + pack.turn[i]) % 3);
-                    weights[corner] = pack.weights[row][i];
-                    stiffness[corner] = pack.stiffness[row][i];
-                    axis_point[row] = pack.axis_point[row][i];
+                    weights[corner] = pack.load.weights[row][i];
+                    normal[row] = pack.load.normal[row][i];
                 }
                 REQUIRE(norm<S>(weights - nearest->barycentric) <= slack);
-                REQUIRE(norm<S>(axis_point - point_at(triangle, weights) - nearest->reach) <= slack);
-                const Vector3<S> expected = rocking_of_one<S>(triangle, weights, norm(nearest->reach));
-                REQUIRE(norm<S>(stiffness - expected) <= 100 * slack * (1 + norm(expected)));
+                REQUIRE(std::abs(norm(normal) - 1) <= slack);
+                REQUIRE(norm<S>(pack.distance[i] * normal - nearest->reach) <= slack);
             }
+        }
+    }
+}
+
+TEMPLATE_TEST_CASE("forces that act add the stiffness of rocking faces, and take it back with them", "[contact]", float,
+                   double) {
+    using S = TestType;
+    const S slack = sizeof(S) == 4 ? S(1e-4) : S(1e-12);
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, seed % 2 == 0));
+        auto& state = patch.state;
+        std::vector<S> expected(static_cast<std::size_t>(patch.x.cols()), 0);
+        for (auto& pack : state.packs.items()) {
+            pack.load.force = S(1);
+            detail::locate(patch.shape(), detail::corners_of(state, pack), pack);
+            for (std::size_t i = 0; i < pack.size; ++i) {
+                const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
+                const auto nearest = proximity(patch.triangle(point.triangle), patch.tool, point.feature);
+                if (!nearest) continue;
+                const Vector3<S> stiffness =
+                    rocking_of_one<S>(patch.triangle(point.triangle), nearest->barycentric, norm(nearest->reach));
+                for (std::size_t k = 0; k < 3; ++k) {
+                    expected[static_cast<std::size_t>(point.corners[k])] += stiffness[static_cast<Eigen::Index>(k)];
+                }
+            }
+        }
+        apply_forces(state, state.packs.items());
+        for (Index v = 0; v < patch.x.cols(); ++v) {
+            const S exact = expected[static_cast<std::size_t>(v)];
+            REQUIRE(std::abs(state.row(state.force, v).extra() - exact) <= 100 * slack * (1 + exact));
+        }
+        for (auto& pack : state.packs.items()) pack.load.force = S(0);
+        apply_forces(state, state.packs.items());
+        for (Index v = 0; v < patch.x.cols(); ++v) {
+            REQUIRE(norm(state.row(state.force, v).point()) <= slack);
+            REQUIRE(std::abs(state.row(state.force, v).extra()) <=
+                    100 * slack * (1 + expected[static_cast<std::size_t>(v)]));
         }
     }
 }

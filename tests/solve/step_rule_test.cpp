@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <type_traits>
@@ -49,6 +50,31 @@ TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", double, float) {
     CHECK(SafeStep{.omega = 1.5}.compliance(vertex) == S(1) / 8);
     CHECK(SafeStep{.omega = 0.5}.compliance(vertex) == S(0.5) / 8);
     STATIC_REQUIRE_FALSE(StepRule<int, S>);
+}
+
+TEMPLATE_TEST_CASE("a contact stiffens a block along its normal alone", "[rule]", double, float) {
+    using S = TestType;
+    const S slack = sizeof(S) == 4 ? S(1e-3) : S(1e-10);
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        VertexState<S> vertex;
+        vertex.stiffness = random.number(S(1), S(10));
+        vertex.size = random.number(S(0.1), S(10));
+        vertex.force = random.vector(S(-1), S(1));
+        for (int i = 0; i < 3; ++i) vertex.relief += outer<S>(vertex.stiffness / 4, random.unit_vector<S>());
+        vertex.touched = true;
+        const auto without = BlockStep{}.compliance(vertex);
+        vertex.contact_stiffness = std::pow(S(10), random.number(S(-2), S(2)));
+        vertex.stiffness += vertex.contact_stiffness;
+        vertex.contact_normal = random.unit_vector<S>();
+        const auto with = BlockStep{}.compliance(vertex);
+        // (H^-1 + ...)^-1 = H + s n n^T: for the force that moves the vertex by `way` with the contact.
+        const Vector3<S> force = random.vector(S(-1), S(1)), way = with * force;
+        const Vector3<S> of_contact =
+            vertex.contact_stiffness * dot(vertex.contact_normal, way) * vertex.contact_normal;
+        REQUIRE(norm<S>(without * Vector3<S>(force - of_contact) - way) <= slack * (1 + norm(way)));
+    }
 }
 
 TEMPLATE_TEST_CASE("a safe step that would not be safe is refused by name", "[rule][bad]", SafeStep, BlockStep) {

@@ -54,12 +54,12 @@ template <Real Scalar>
     return {dot(x, ax), dot(y, ay), dot(z, az), dot(x, ay), dot(x, az), dot(y, az)};
 }
 
-/// @pre positive definite. Cost: one division; half the digits are left where the largest eigenvalue is a cube root of
+/// `s` times the inverse. @pre positive definite. Cost: one division; half the digits are left where the largest eigenvalue is a cube root of
 /// epsilon's inverse times the smallest.
 template <Number Scalar>
-[[nodiscard]] Symmetric3<Scalar> inverse(const Symmetric3<Scalar>& a) noexcept {
+[[nodiscard]] Symmetric3<Scalar> inverse(const Symmetric3<Scalar>& a, Scalar s = 1) noexcept {
     const Scalar xx = a.yy * a.zz - a.yz * a.yz, xy = a.xz * a.yz - a.xy * a.zz, xz = a.xy * a.yz - a.xz * a.yy;
-    const Scalar scale = 1 / ((a.xx * xx + a.xy * xy) + a.xz * xz);
+    const Scalar scale = s / ((a.xx * xx + a.xy * xy) + a.xz * xz);
     return scale * Symmetric3<Scalar>{xx, a.xx * a.zz - a.xz * a.xz, a.xx * a.yy - a.xy * a.xy, xy,
                                       xz, a.xy * a.xz - a.xx * a.yz};
 }

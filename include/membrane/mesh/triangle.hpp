@@ -205,16 +205,34 @@ N squared_distance(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
     return detail::closest_point_inline<Real<N>>(triangle, q).squared_distance;
 }
 
+namespace detail {
+
+/// A point of a segment, and of an edge the point nearest to it.
+template <Number N>
+struct SegmentAndEdge {
+    N along, foot;  ///< of the segment, and of the edge: 0 to 1
+};
+
+/// The nearest points of two lines, each then clamped to its segment in turn [Ericson05] 5.1.9. `offset` is from the start
+/// of the segment to that of the edge.
+template <Number N>
+[[gnu::always_inline, nodiscard]] inline SegmentAndEdge<N> closest_on_edge(const Vector3<N>& segment,
+                                                                           const Vector3<N>& edge,
+                                                                           const Vector3<N>& offset) noexcept {
+    const Vector3<N> common = cross(segment, edge);
+    const N on_line = fraction<N>(dot(cross(offset, edge), common), squared_norm(common));
+    const N foot = fraction<N>(dot<N>(on_line * segment - offset, edge), squared_norm(edge));
+    return {fraction<N>(dot<N>(offset + foot * edge, segment), squared_norm(segment)), foot};
+}
+
+}  // namespace detail
+
 template <Real Scalar>
 SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, int k, const Vector3<Scalar>& p,
                                        const Vector3<Scalar>& q) noexcept {
-    // The nearest points of two lines, each then clamped to its segment in turn [Ericson05] 5.1.9.
     const Vector3<Scalar> segment = q - p, start = detail::corner(triangle, k), offset = start - p;
     const Vector3<Scalar> edge = detail::corner(triangle, k + 1) - start;
-    const Vector3<Scalar> common = cross(segment, edge);
-    Scalar along = detail::fraction(dot(cross(offset, edge), common), squared_norm(common));
-    const Scalar foot = detail::fraction(dot<Scalar>(along * segment - offset, edge), squared_norm(edge));
-    along = detail::fraction(dot<Scalar>(offset + foot * edge, segment), squared_norm(segment));
+    const auto [along, foot] = detail::closest_on_edge(segment, edge, offset);
     const auto squared_distance = squared_norm<Scalar>((offset + foot * edge) - along * segment);
     const Vector3<Scalar> barycentric = detail::on_edge(k, foot);
     return {along, {barycentric, point_at(triangle, barycentric), squared_distance}};

@@ -69,41 +69,75 @@ struct SpringPull {
     Vector3<Scalar> direction;  ///< to the other end, zero without a length
 };
 
-/// What a spring of this stiffness [N/m] and rest length [m] does to the vertex from which it reaches by `reach` [m].
+/// From the vertex at one end of a spring to the other, and how far that is. Of several springs, first all of these and
+/// then the rest: a root and a division take long, and one need not wait for the other's.
+template <Number Scalar>
+struct SpringReach {
+    Vector3<Scalar> reach;  ///< to the other end [m]
+    Scalar length;          ///< [m]
+    Scalar divisor;         ///< the same, 1 instead of 0 [m]
+    Scalar per_length;      ///< [1/m]
+
+    SpringReach() = default;
+    [[gnu::always_inline]] explicit SpringReach(const Vector3<Scalar>& reach) noexcept
+        : reach(reach), length(norm(reach)), divisor(select(length != 0, length, Scalar(1))), per_length(1 / divisor) {}
+};
+
+/// What a spring of this stiffness [N/m] and rest length [m] does to the vertex from which it reaches.
+template <Number Scalar, class Law>
+[[gnu::always_inline, nodiscard]] inline SpringPull<Scalar> pull_of(const Law& law, const SpringReach<Scalar>& to,
+                                                                    const Scalar& stiffness,
+                                                                    const Scalar& rest_length) noexcept {
+    const auto has_length = to.length != 0;
+    const auto answer = law(SpringState<Scalar>{stiffness, rest_length, to.divisor});
+    return {to.reach,
+            to.length,
+            select(has_length, answer.tension, Scalar(0)),
+            select(has_length, answer.stiffness, stiffness),
+            select<Scalar>(has_length, answer.tension * to.per_length, stiffness),
+            to.per_length * to.reach};
+}
 template <Number Scalar, class Law>
 [[gnu::always_inline, nodiscard]] inline SpringPull<Scalar> pull_of(const Law& law, const Vector3<Scalar>& reach,
                                                                     const Scalar& stiffness,
                                                                     const Scalar& rest_length) noexcept {
-    const Scalar length = norm(reach);
-    const auto has_length = length != 0;
-    const Scalar divisor = select(has_length, length, Scalar(1)), per_length = 1 / divisor;
-    const auto answer = law(SpringState<Scalar>{stiffness, rest_length, divisor});
-    return {reach,
-            length,
-            select(has_length, answer.tension, Scalar(0)),
-            select(has_length, answer.stiffness, stiffness),
-            select<Scalar>(has_length, answer.tension * per_length, stiffness),
-            per_length * reach};
+    return pull_of(law, SpringReach<Scalar>(reach), stiffness, rest_length);
 }
 
-/// Adds a spring to what pulls on a vertex; to what is known of the energy around it, see `curved_pull`.
+/// Adds a spring to what pulls on a vertex.
 template <Number Scalar>
 [[gnu::always_inline]] inline void add(Pull<Scalar>& sum, const SpringPull<Scalar>& spring) noexcept {
     sum.force += spring.across * spring.reach;
     sum.stiffness += larger(spring.along, spring.across);
 }
+
+/// The same for `CurvedPull`, in fewer operations: the relief as a sum of dyads, the size as a quotient.
 template <Number Scalar>
-[[gnu::always_inline]] inline void add(CurvedPull<Scalar>& sum, const SpringPull<Scalar>& spring) noexcept {
+struct CurvedSum {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
+    Scalar stiffness = 0;                             ///< [N/m]
+    Symmetric3<Scalar> dyads;                         ///< of what the relief of each spring leaves out, along it [N/m]
+    Scalar size_force = 1, size_stiffness = 0;        ///< the quotient is the smallest size [N], [N/m]
+
+    [[gnu::always_inline, nodiscard]] CurvedPull<Scalar> total() const noexcept {
+        CurvedPull<Scalar> sum{force, stiffness, diagonal3(dyads.trace())};
+        sum.relief += Scalar(-1) * dyads;
+        const auto has_size = size_stiffness > 0;
+        sum.size = select(has_size, size_force / select(has_size, size_stiffness, Scalar(1)), sum.size);
+        return sum;
+    }
+};
+template <Number Scalar>
+[[gnu::always_inline]] inline void add(CurvedSum<Scalar>& sum, const SpringPull<Scalar>& spring) noexcept {
     const Scalar stiffness = larger(spring.along, spring.across);
     const Scalar relief = smaller(stiffness - spring.across, stiffness);
-    const auto relieves = relief > 0;
-    const Scalar part = select(relieves, relief, Scalar(0));
     sum.force += spring.across * spring.reach;
     sum.stiffness += stiffness;
-    sum.relief += diagonal3(part);
-    sum.relief += outer<Scalar>(-part, spring.direction);
-    const Scalar rest_beyond = larger<Scalar>(-spring.tension / select(relieves, stiffness, Scalar(1)), Scalar(0));
-    sum.size = select(relieves, smaller<Scalar>(sum.size, spring.length + rest_beyond), sum.size);
+    sum.dyads += outer<Scalar>(larger(relief, Scalar(0)), spring.direction);
+    const Scalar size_force = stiffness * spring.length + larger<Scalar>(-spring.tension, Scalar(0));
+    const auto is_smaller = (relief > 0) & (size_force * sum.size_stiffness < sum.size_force * stiffness);
+    sum.size_force = select(is_smaller, size_force, sum.size_force);
+    sum.size_stiffness = select(is_smaller, stiffness, sum.size_stiffness);
 }
 
 /// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1): constant once built, no positions in it.
@@ -267,9 +301,9 @@ Pull<Scalar> MassSpringNetwork<Scalar, Law>::pull(Index v, const ConstPointsRef<
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 CurvedPull<Scalar> MassSpringNetwork<Scalar, Law>::curved_pull(Index v,
                                                                const ConstPointsRef<Scalar>& x) const noexcept {
-    CurvedPull<Scalar> sum;
+    CurvedSum<Scalar> sum;
     for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) { add(sum, spring); });
-    return sum;
+    return sum.total();
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>

@@ -69,10 +69,10 @@ class ConstraintContext {
         for (std::size_t k = 0; k < 3; ++k) number[k] += force[static_cast<Eigen::Index>(k)];
     }
 
-    /// Adds to the stiffness of `v` for this step [N/m]: for a force that turns as `v` moves.
+    /// Adds to the stiffness of `v` in all directions for this step [N/m]: for a force that changes as `v` moves.
     void add_stiffness(Index v, Scalar by) noexcept {
         state_.forced.insert(v);
-        state_.row(state_.force, v).number[3] += by;
+        state_.stiffness[static_cast<std::size_t>(v)] += by;
     }
 
     /// How far `v` moves for `force` by the rule of the last update, not at all if it is fixed [m].

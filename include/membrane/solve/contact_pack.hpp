@@ -57,15 +57,16 @@ struct alignas(32) ContactPack {
     using Wide = Lanes<Scalar>;
     static constexpr std::size_t lanes = Wide::count;
 
-    Vector3<Wide> weights, normal;
-    Wide force;                ///< multiplier [N], 0 or more
-    Vector3<Wide> stiffness;   ///< that it adds to each corner [N/m]
-    Vector3<Wide> axis_point;  ///< of the tool, nearest to the point [m]
+    /// What the points act with on their corners.
+    struct Load {
+        Vector3<Wide> weights, normal;
+        Wide force;               ///< multiplier [N], 0 or more
+        Vector3<Wide> stiffness;  ///< that it adds to each corner along the normal [N/m]
+    };
 
-    // What the rows of forces have of it.
-    Vector3<Wide> added_weights, added_normal;
-    Wide added_force;
-    Vector3<Wide> added_stiffness;
+    Load load;      ///< as found by the last pass
+    Load applied;   ///< what the rows of forces have of it
+    Wide distance;  ///< of the tool's axis from the points, along their normals [m]
 
     Vector3<Wide> free;                              ///< 1 for a corner that may move
     Wide end;                                        ///< 0 or 1: which end of the tool's axis
@@ -94,8 +95,8 @@ class ContactPacks {
     [[nodiscard]] std::span<ContactPack<Scalar>> items() noexcept { return packs_.items(); }
     [[nodiscard]] std::span<const ContactPack<Scalar>> items() const noexcept { return packs_.items(); }
 
-    /// Appends packs of these points, whose forces are in the rows of forces; the first is number `first` of all. There is room for as many packs as for
-    /// points. Cost: linear in their number.
+    /// Appends packs of these points, whose forces are in the rows of forces; the first is number `first` of all. There is
+    /// room for as many packs as for points. Cost: linear in their number.
     template <class IsFixed>
     void append(std::span<const ContactPoint<Scalar>> points, std::size_t first, IsFixed is_fixed) noexcept;
 
@@ -119,10 +120,10 @@ template <Real Scalar>
 void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     ContactPack<Scalar> pack;
     const Vector3<Lanes<Scalar>> none(0, 0, 0);
-    pack.weights = Vector3<Lanes<Scalar>>(1, 0, 0);  // of unused lanes: valid numbers
-    pack.normal = pack.stiffness = pack.axis_point = pack.free = none;
-    pack.added_weights = pack.added_normal = pack.added_stiffness = none;
-    pack.force = pack.added_force = pack.end = pack.listed = pack.used = Scalar(0);
+    pack.load = {{1, 0, 0}, none, 0, none};  // of unused lanes: valid numbers
+    pack.applied = {none, none, 0, none};
+    pack.free = none;
+    pack.distance = pack.end = pack.listed = pack.used = Scalar(0);
     for (auto& begins : pack.corner) begins.fill(unused_row_);
     pack.point.fill(no_index);
     pack.turn.fill(0);
@@ -140,20 +141,18 @@ void ContactPacks<Scalar>::add_lane(ContactPack<Scalar>& pack, const ContactPoin
         const std::size_t corner = (k + turn) % 3;
         const auto row = static_cast<Eigen::Index>(k);
         pack.corner[k][i] = numbers_in_point * point.corners[corner];
-        pack.weights[row].set(i, point.weights[static_cast<Eigen::Index>(corner)]);
-        pack.normal[row].set(i, point.normal[row]);
-        pack.added_weights[row].set(i, pack.weights[row][i]);
-        pack.added_normal[row].set(i, point.normal[row]);
+        pack.load.weights[row].set(i, point.weights[static_cast<Eigen::Index>(corner)]);
+        pack.load.normal[row].set(i, point.normal[row]);
         pack.free[row].set(i, is_fixed(point.corners[corner]) ? Scalar(0) : Scalar(1));
     }
-    pack.force.set(i, norm(point.force));
-    pack.added_force.set(i, norm(point.force));
+    pack.load.force.set(i, norm(point.force));
     pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
     pack.listed.set(i, 1);
     pack.used.set(i, 1);
     pack.point[i] = number;
     pack.turn[i] = turn;
     pack.on_fixed = pack.on_fixed || point.on_fixed;
+    pack.applied = pack.load;
 }
 
 template <Real Scalar>

@@ -35,7 +35,11 @@ template <Real Scalar>
 struct ContactPass {
     Scalar largest = 0;     ///< change of a force [N]
     bool released = false;  ///< whether a point was let go that pressed harder than what resists it
+    bool deep = false;      ///< whether the tool was inside a point by more than `deep_overlap` of an edge
 };
+
+/// What the tool may be inside the surface at the end of a tick is a part of an edge: this much [1].
+inline constexpr double deep_overlap = 0.005;
 
 /// One pass: brings each point up to date with the positions, and moves the free corners of one that is inside the tool until
 /// it is outside. Returns whether any had to move. Online. Cost: linear in the points.
@@ -68,24 +72,6 @@ template <Real Scalar>
 
 namespace detail {
 
-/// A point of an edge and the point of a segment nearest to it.
-template <Number N>
-struct EdgePoint {
-    N along;  // the segment, 0 to 1
-    N foot;   // along the edge, 0 to 1
-};
-
-/// The nearest points of two lines, each then clamped to its segment in turn [Ericson05] 5.1.9.
-template <Number N>
-[[nodiscard]] EdgePoint<N> nearest_on_edge(const Vector3<N>& start, const Vector3<N>& edge, const Vector3<N>& p,
-                                           const Vector3<N>& segment) noexcept {
-    const Vector3<N> offset = start - p, common = cross(segment, edge);
-    N along = fraction<N>(dot(cross(offset, edge), common), squared_norm(common));
-    const N foot = fraction<N>(dot<N>(along * segment - offset, edge), squared_norm(edge));
-    along = fraction<N>(dot<N>(offset + foot * edge, segment), squared_norm(segment));
-    return {along, foot};
-}
-
 template <Real Scalar>
 [[nodiscard]] Vector3<Lanes<Scalar>> broadcast(const Vector3<Scalar>& a) noexcept {
     return {a.x(), a.y(), a.z()};
@@ -100,7 +86,7 @@ template <Number N>
     const Vector3<N> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, bc = triangle.c - triangle.b;
     const Vector3<N> squares(squared_norm(bc), squared_norm(ac), squared_norm(ab));  // of the side across from each
     const auto missing = [&](Eigen::Index k) { return !(weights[k] > 0); };
-    const auto in_face = !(missing(0) | missing(1) | missing(2));
+    const auto in_face = smaller(smaller(weights[0], weights[1]), weights[2]) > 0;
     const auto at_corner = larger(larger(weights[0], weights[1]), weights[2]) >= 1;
     const N edge_square = select<N>(missing(0), squares[0], select<N>(missing(1), squares[1], squares[2]));
     const N divisor = select<N>(in_face, squared_norm(cross(ab, ac)), edge_square);
@@ -126,52 +112,44 @@ template <Real Scalar>
     const Wide length = norm(along);
     const auto exists = found & (length < too_far) & (squared_norm(separation) < too_far);
     pack.used = select<Wide>(exists, 1, 0);
-    pack.force = select<Wide>(exists, pack.force, 0);
+    pack.load.force = select<Wide>(exists, pack.load.force, 0);
     const auto has_length = exists & (length > 0);
     const Wide divisor = select<Wide>(has_length, length, 1);
     Vector3<Wide> away;
     for (Eigen::Index k = 0; k < 3; ++k) {
-        away[k] = select<Wide>(has_length, select<Wide>(has_length, along[k], 0) / divisor, pack.normal[k]);
+        away[k] = select<Wide>(has_length, along[k] / divisor, pack.load.normal[k]);
     }
-    pack.normal = select<Wide>(dot(away, pack.normal) < 0, -1, 1) * away;
+    pack.load.normal = select<Wide>(dot(away, pack.load.normal) < 0, -1, 1) * away;
+    pack.distance = select<Wide>(exists, dot(separation, pack.load.normal), 0);
 }
 
-/// Brings weights, normal, axis point and stiffness of a pack up to date with the positions, its forces unchanged but for
-/// points that are no more.
+/// Brings weights, normal and distance of a pack up to date with the positions, its forces unchanged but for points that are
+/// no more.
 template <Real Scalar>
 [[gnu::always_inline]] inline void locate(const ContactTool<Scalar>& tool,
                                           const std::array<PaddedLanes<Scalar>, 3>& corner,
                                           ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const Triangle<Wide> triangle{corner[0].point, corner[1].point, corner[2].point};
+    const auto listed = pack.listed > 0;
     if (pack.kind == ContactKind::fixed) {
-        pack.axis_point = broadcast(tool.axis_point);
-        return;
-    }
-    Vector3<Wide> separation, along;
-    auto exists = pack.listed > 0;
-    if (pack.kind == ContactKind::end) {
-        pack.axis_point = broadcast(tool.position) + pack.end * broadcast(tool.axis);
-        const auto nearest = closest_point_inline<true>(triangle, pack.axis_point);
-        pack.weights = nearest.barycentric;
-        separation = pack.axis_point - nearest.point;
-        const auto in_face = (pack.weights[0] > 0) & (pack.weights[1] > 0) & (pack.weights[2] > 0);
-        const Vector3<Wide> area = area_vector(triangle);
+        const Vector3<Wide> separation = broadcast(tool.axis_point) - point_at(triangle, pack.load.weights);
+        pack.distance = dot(separation, pack.load.normal);
+    } else if (pack.kind == ContactKind::end) {
+        const Vector3<Wide> axis_point = broadcast(tool.position) + pack.end * broadcast(tool.axis);
+        const auto nearest = closest_point_inline<true>(triangle, axis_point);
+        const Vector3<Wide>& weights = pack.load.weights = nearest.barycentric;
+        const Vector3<Wide> separation = axis_point - nearest.point, area = area_vector(triangle);
+        const auto in_face = smaller(smaller(weights[0], weights[1]), weights[2]) > 0;
+        Vector3<Wide> along;
         for (Eigen::Index k = 0; k < 3; ++k) along[k] = select<Wide>(in_face, area[k], separation[k]);
+        set_normal(listed, along, separation, pack);
     } else {
         const Vector3<Wide> start = broadcast(tool.position), axis = broadcast(tool.axis);
-        const Vector3<Wide> edge = triangle.b - triangle.a;
-        const auto nearest = nearest_on_edge(triangle.a, edge, start, axis);
-        exists = exists & (nearest.along > 0) & (nearest.along < 1);
-        pack.axis_point = start + nearest.along * axis;
-        pack.weights = Vector3<Wide>(1 - nearest.foot, nearest.foot, 0);
-        separation = along = pack.axis_point - point_at(triangle, pack.weights);
-    }
-    set_normal(exists, along, separation, pack);
-    if (any(pack.force > 0)) {
-        pack.stiffness = rocking_stiffness<Wide>(triangle, pack.weights, pack.force * norm(separation));
-    } else {
-        pack.stiffness = Vector3<Wide>(0, 0, 0);
+        const auto nearest = closest_on_edge<Wide>(axis, triangle.b - triangle.a, triangle.a - start);
+        pack.load.weights = Vector3<Wide>(1 - nearest.foot, nearest.foot, 0);
+        const Vector3<Wide> separation = (start + nearest.along * axis) - point_at(triangle, pack.load.weights);
+        set_normal(listed & (nearest.along > 0) & (nearest.along < 1), separation, separation, pack);
     }
 }
 
@@ -179,23 +157,21 @@ template <Real Scalar>
 template <Real Scalar>
 [[gnu::always_inline]] inline void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
+    const auto &load = pack.load, &applied = pack.applied;
     for (std::size_t k = 0; k < 3; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
         auto row = gather_padded(state.force.data(), pack.corner[k].data());
-        const Wide now = pack.force * pack.weights[i], before = pack.added_force * pack.added_weights[i];
-        const Vector3<Wide> change = before * pack.added_normal - now * pack.normal;
+        const Wide now = load.force * load.weights[i], before = applied.force * applied.weights[i];
+        const Vector3<Wide> change = before * applied.normal - now * load.normal;
         row.point += change;
-        row.extra += pack.stiffness[i] - pack.added_stiffness[i];
+        row.extra += load.stiffness[i] - applied.stiffness[i];
         scatter_padded(row, state.force.data(), pack.corner[k].data());
         if (!pack.on_fixed) continue;
         auto support = gather_padded(state.support.data(), pack.corner[k].data());
         support.point += (1 - pack.free[i]) * change;
         scatter_padded(support, state.support.data(), pack.corner[k].data());
     }
-    pack.added_weights = pack.weights;
-    pack.added_normal = pack.normal;
-    pack.added_force = pack.force;
-    pack.added_stiffness = pack.stiffness;
+    pack.applied = load;
 }
 
 /// By how much fixed corners yield to the tool.
@@ -217,8 +193,8 @@ template <Real Scalar>
         const auto support = gather_padded(state.support.data(), pack.corner[k].data());
         const auto yields = (support.extra > 0) & (pack.free[i] < 1);
         const Wide compliance = select<Wide>(yields, 1 / select<Wide>(yields, support.extra, 1), 0);
-        sum.compliance += pack.weights[i] * pack.weights[i] * compliance;
-        sum.displacement += pack.weights[i] * (compliance * dot(support.point, pack.normal));
+        sum.compliance += pack.load.weights[i] * pack.load.weights[i] * compliance;
+        sum.displacement += pack.load.weights[i] * (compliance * dot(support.point, pack.load.normal));
         sum.force += (1 - pack.free[i]) * norm(support.point);
         sum.stiffness += (1 - pack.free[i]) * support.extra;
     }
@@ -228,12 +204,9 @@ template <Real Scalar>
 /// How far the tool is from the points of a pack, along their normals; where fixed corners yield, from there [m].
 template <Real Scalar>
 [[gnu::always_inline, nodiscard]] inline Lanes<Scalar> gap_of(const ContactTool<Scalar>& tool,
-                                                              const std::array<PaddedLanes<Scalar>, 3>& corner,
                                                               const ContactPack<Scalar>& pack,
                                                               const SupportOfPack<Scalar>& support) noexcept {
-    const Triangle<Lanes<Scalar>> triangle{corner[0].point, corner[1].point, corner[2].point};
-    const Vector3<Lanes<Scalar>> separation = pack.axis_point - point_at(triangle, pack.weights);
-    return dot(separation, pack.normal) - support.displacement - tool.radius;
+    return pack.distance - support.displacement - tool.radius;
 }
 
 /// A gap that is not worth closing: what a negligible force makes of it, or a few roundings [m].
@@ -245,7 +218,7 @@ template <Real Scalar>
     using Wide = Lanes<Scalar>;
     Wide sum = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-        const Wide& weight = pack.weights[static_cast<Eigen::Index>(k)];
+        const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         sum += weight * weight * corner[k].extra;
     }
     const Wide rounding = 16 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude<Wide>(corner[0].point);
@@ -281,9 +254,9 @@ template <Real Scalar>
         const auto a = gather_padded(state.response.data(), begins.data());
         const auto b = gather_padded(state.response.data() + 1, begins.data());
         const Symmetric3<Wide> block{a.point[0], a.point[1], a.point[2], a.extra, b.point[0], b.point[1]};
-        const Wide& weight = pack.weights[static_cast<Eigen::Index>(k)];
-        response.of_corner[k] = weight * (block * pack.normal);
-        response.compliance += weight * dot(response.of_corner[k], pack.normal);
+        const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
+        response.of_corner[k] = weight * (block * pack.load.normal);
+        response.compliance += weight * dot(response.of_corner[k], pack.load.normal);
         response.internal_force += b.point[2];
         response.internal_stiffness += b.extra;
     }
@@ -301,17 +274,17 @@ template <Real Scalar>
     using Wide = Lanes<Scalar>;
     const auto moves = acts & (response.compliance > 0);
     const Wide divisor = select<Wide>(moves, response.compliance, 1);
-    Wide change = larger<Wide>(-gap / divisor, -pack.force);
+    Wide change = larger<Wide>(-gap / divisor, -pack.load.force);
     // In balance the force is what springs and foundation at the corners resist with, or will once the gap is closed.
     // Points that press much harder, where a tool has jumped to the wrong side of some, press against one another.
     const Wide limit = 8 * (response.internal_force + abs(gap) * response.internal_stiffness);
-    const auto too_hard = moves & (pack.force + change > limit);
-    change = select<Wide>(too_hard, -pack.force, change);
+    const auto too_hard = moves & (pack.load.force + change > limit);
+    change = select<Wide>(too_hard, -pack.load.force, change);
     pass.released = pass.released || any(too_hard);
     const auto counts = moves & (abs(change) * response.compliance > tolerance);
     if (!any(counts)) return 0;
     change = select<Wide>(counts, change, 0);
-    pack.force += change;
+    pack.load.force += change;
     for (std::size_t k = 0; k < 3; ++k) {
         corner[k].point -= change * response.of_corner[k];
         scatter_padded(corner[k], state.position.data(), pack.corner[k].data());
@@ -336,16 +309,16 @@ template <Real Scalar>
     for (auto& pack : packs) {
         auto corner = detail::corners_of(state, pack);
         detail::locate(tool, corner, pack);
-        detail::add_forces(state, pack);
+        if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners yield by the forces up to here
         const auto support = detail::support_of(state, pack);
-        const Wide gap = detail::gap_of(tool, corner, pack, support);
+        const Wide gap = detail::gap_of(tool, pack, support);
         const auto inside = (pack.used > 0) & (-gap > detail::gap_tolerance(state, corner, pack, support));
         if (!any(inside)) continue;
         moved = true;
-        const Wide part = select<Wide>(inside, gap / squared_norm(pack.weights), 0);
+        const Wide part = select<Wide>(inside, gap / squared_norm(pack.load.weights), 0);
         for (std::size_t k = 0; k < 3; ++k) {
             const auto i = static_cast<Eigen::Index>(k);
-            corner[k].point += (part * pack.weights[i] * pack.free[i]) * pack.normal;
+            corner[k].point += (part * pack.load.weights[i] * pack.free[i]) * pack.load.normal;
             scatter_padded(corner[k], state.position.data(), pack.corner[k].data());
         }
     }
@@ -363,9 +336,12 @@ template <Real Scalar>
         detail::locate(tool, corner, pack);
         if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners yield by the forces up to here
         const auto support = detail::support_of(state, pack);
-        const Wide gap = detail::gap_of(tool, corner, pack, support);
-        const auto acts = (pack.used > 0) & ((pack.force > 0) | (gap < 0));
+        const Wide gap = detail::gap_of(tool, pack, support);
+        const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (gap < 0));
         if (!any(acts)) continue;
+        const auto allowed = static_cast<Scalar>(deep_overlap * deep_overlap);
+        const Wide edge_square = squared_norm<Wide>(corner[1].point - corner[0].point);
+        pass.deep = pass.deep || any((pack.used > 0) & (gap < 0) & (gap * gap > allowed * edge_square));
         const auto response = detail::response_of(state, support, pack);
         const Wide tolerance = detail::gap_tolerance(state, corner, pack, support);
         largest = larger<Wide>(largest, detail::solve(state, acts, gap, tolerance, response, corner, pack, pass));
@@ -378,7 +354,16 @@ template <Real Scalar>
 template <Real Scalar>
 [[gnu::flatten]] void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept {
     for (auto& pack : packs) {
-        if (any((pack.force > 0) | (pack.added_force > 0))) detail::add_forces(state, pack);
+        auto& load = pack.load;
+        if (any(load.force > 0)) {
+            const auto corner = detail::corners_of(state, pack);
+            load.stiffness = detail::rocking_stiffness<Lanes<Scalar>>(
+                {corner[0].point, corner[1].point, corner[2].point}, load.weights, load.force * abs(pack.distance));
+            detail::add_forces(state, pack);
+        } else if (any(pack.applied.force > 0)) {
+            load.stiffness = Vector3<Lanes<Scalar>>::Zero();
+            detail::add_forces(state, pack);
+        }
     }
 }
 
@@ -404,10 +389,10 @@ void unpack(std::span<const ContactPack<Scalar>> packs, std::span<ContactPoint<S
             auto& point = points[static_cast<std::size_t>(pack.point[i])];
             for (std::size_t k = 0; k < 3; ++k) {
                 const auto row = static_cast<Eigen::Index>(k);
-                point.weights[static_cast<Eigen::Index>((k + pack.turn[i]) % 3)] = pack.weights[row][i];
-                point.normal[row] = pack.normal[row][i];
+                point.weights[static_cast<Eigen::Index>((k + pack.turn[i]) % 3)] = pack.load.weights[row][i];
+                point.normal[row] = pack.load.normal[row][i];
             }
-            point.force = -pack.force[i] * point.normal;
+            point.force = -pack.load.force[i] * point.normal;
         }
     }
 }

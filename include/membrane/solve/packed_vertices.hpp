@@ -94,15 +94,23 @@ class PackedVertices {
     template <bool in_contact, class Scene, class Rule>
     Outcome update(std::size_t p, const Scene& scene, const Rule& rule, bool allowed = false) noexcept;
 
+    /// The same for pack `p` and, if it is before `end` and no spring joins the two, the next one: their roots and divisions
+    /// overlap. Returns the number of the next pack.
+    template <bool in_contact, class Scene, class Rule>
+    std::size_t update_next(std::size_t p, std::size_t end, const Scene& scene, const Rule& rule) noexcept;
+
     /// The same for packs number `begin` to `end` that no spring joins, some by each thread.
     template <class Scene, class Rule>
     void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule,
                 const ExecutorRef& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
         parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
-            for (std::size_t p = begin + first; p < begin + last; ++p) outcomes_[p] = update<false>(p, scene, rule);
+            for (std::size_t p = begin + first; p < begin + last;) {
+                p = update_next<false>(p, begin + last, scene, rule);
+            }
         });
     }
+    /// Of the last of these two calls.
     [[nodiscard]] Outcome outcome(std::size_t p) const noexcept { return outcomes_[p]; }
 
     /// Leaves the forces on the vertices of pack `p` in the rows of residual forces.
@@ -116,6 +124,7 @@ class PackedVertices {
         std::size_t first, size;  // of the members
         std::size_t slot, slot_count;
         Begins own;
+        bool next_is_of_group = false;
     };
     // One spring of each vertex of a pack. It lies in memory alike for every instruction set.
     struct alignas(32) Slot {
@@ -146,6 +155,16 @@ class PackedVertices {
     }
     template <class Sum, class Scene>
     [[nodiscard]] Sum springs_on(std::size_t p, const Vector3<Wide>& here, const Scene& scene) const noexcept;
+    // Of a pack before it moves.
+    struct PackState {
+        PaddedLanes<Scalar> here, of_constraints;
+        VertexState<Wide> vertex;
+        Pull<Wide> others;
+    };
+    template <bool in_contact, class Rule, class Scene>
+    [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene) const noexcept;
+    template <bool in_contact, class Scene, class Rule>
+    Outcome move(std::size_t p, const PackState& at, const Scene& scene, const Rule& rule, bool allowed) noexcept;
     template <class Rule, class Scene>
     [[nodiscard]] VertexState<Wide> spring_state(std::size_t p, const Vector3<Wide>& here,
                                                  const Scene& scene) const noexcept;
@@ -221,6 +240,7 @@ bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t b
             const std::size_t size = (std::min)(lanes, end - begin);
             if (!append_pack(vertices.subspan(begin, size), network)) return false;
             begin += size;
+            packs_.items().back().next_is_of_group = begin < end;
         }
     }
     return true;
@@ -243,7 +263,7 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
     std::size_t springs = 0;
     for (const Index v : vertices) springs = (std::max)(springs, network.neighbours(v).size());
     if (members_.size() + vertices.size() > members_.room() || slot_count_ + springs > slots_.size()) return false;
-    Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}};
+    Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}, false};
     pack.own.fill(unused_row_);
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
     if (!packs_.push(pack)) return false;
@@ -296,9 +316,17 @@ template <class Sum, class Scene>
                                                                      const Scene& scene) const noexcept {
     Sum sum{};
     const auto* rows = scene.state.position.data();
-    for (const Slot& slot : std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count)) {
-        const Vector3<Wide> edge = gather(rows, slot.other.data()) - here;
-        add(sum, pull_of<Wide>(scene.network.law(), edge, slot.stiffness, slot.rest_length));
+    const auto slots = std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count);
+    constexpr std::size_t at_once = 6;
+    std::array<SpringReach<Wide>, at_once> reaches;
+    for (std::size_t first = 0; first < slots.size(); first += at_once) {
+        const auto some = slots.subspan(first, (std::min)(at_once, slots.size() - first));
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            reaches[i] = SpringReach<Wide>(gather(rows, some[i].other.data()) - here);
+        }
+        for (std::size_t i = 0; i < some.size(); ++i) {
+            add(sum, pull_of<Wide>(scene.network.law(), reaches[i], some[i].stiffness, some[i].rest_length));
+        }
     }
     return sum;
 }
@@ -311,7 +339,7 @@ template <class Rule, class Scene>
     -> VertexState<Wide> {
     VertexState<Wide> vertex;
     if constexpr (requires { requires Rule::needs_relief; }) {
-        static_cast<CurvedPull<Wide>&>(vertex) = springs_on<CurvedPull<Wide>>(p, here, scene);
+        static_cast<CurvedPull<Wide>&>(vertex) = springs_on<CurvedSum<Wide>>(p, here, scene).total();
     } else {
         const auto sum = springs_on<Pull<Wide>>(p, here, scene);
         vertex.force = sum.force;
@@ -351,43 +379,81 @@ template <Real Scalar>
                            rows.response.data() + 1, begins.data());
 }
 
+// What pulls on the vertices of a pack.
 template <Real Scalar>
-template <bool in_contact, class Scene, class Rule>
-[[gnu::flatten]] auto PackedVertices<Scalar>::update(std::size_t p, const Scene& scene, const Rule& rule,
-                                                     [[maybe_unused]] bool allowed) noexcept -> Outcome {
+template <bool in_contact, class Rule, class Scene>
+[[gnu::always_inline]] inline auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene) const noexcept
+    -> PackState {
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
-    auto here = gather_padded(rows.position.data(), own.data());
-    auto vertex = spring_state<Rule>(p, here.point, scene);
-    Pull<Wide> others;
-    PaddedLanes<Scalar> of_constraints;
+    PackState at;
+    at.here = gather_padded(rows.position.data(), own.data());
+    at.vertex = spring_state<Rule>(p, at.here.point, scene);
     if constexpr (in_contact) {
-        of_constraints = gather_padded(rows.force.data(), own.data());
-        of_constraints.extra = larger<Wide>(of_constraints.extra, 0);
-        others = {of_constraints.point, of_constraints.extra};
+        at.of_constraints = gather_padded(rows.force.data(), own.data());
+        at.of_constraints.extra = larger<Wide>(at.of_constraints.extra, 0);
+        const auto in_all_directions = Wide::of(
+            [&](std::size_t i) { return rows.stiffness[static_cast<std::size_t>(own[i] / numbers_in_point)]; });
+        at.others = {at.of_constraints.point, at.of_constraints.extra + in_all_directions};
     }
-    add_others<in_contact>(p, here.point, scene, others);
-    vertex.force += others.force;
-    vertex.stiffness += others.stiffness;
-    vertex.mass = terms_[p].mass;
-    vertex.dt = scene.dt;
-    vertex.touched = in_contact;
+    add_others<in_contact>(p, at.here.point, scene, at.others);
+    at.vertex.force += at.others.force;
+    at.vertex.stiffness += at.others.stiffness;
+    at.vertex.mass = terms_[p].mass;
+    at.vertex.dt = scene.dt;
+    at.vertex.touched = in_contact;
+    if constexpr (in_contact) {
+        at.vertex.contact_stiffness = at.of_constraints.extra;
+        at.vertex.contact_normal = direction_or_zero<Wide>(at.of_constraints.point);
+    }
+    return at;
+}
+
+template <Real Scalar>
+template <bool in_contact, class Scene, class Rule>
+[[gnu::always_inline]] inline auto PackedVertices<Scalar>::move(std::size_t p, const PackState& at, const Scene& scene,
+                                                                const Rule& rule,
+                                                                [[maybe_unused]] bool allowed) noexcept -> Outcome {
+    StepState<Scalar>& rows = scene.state;
+    const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
-    const auto move = move_of(rule, vertex, rows.force_tolerance);
+    const auto move = move_of(rule, at.vertex, rows.force_tolerance);
     if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
         if (!allowed && any(move.may_overshoot & may_move)) {
-            const auto springs = springs_on<CurvedPull<Wide>>(p, here.point, scene);
-            const Wide bound = curvature_bound(springs) + others.stiffness;
+            const auto springs = springs_on<CurvedSum<Wide>>(p, at.here.point, scene).total();
+            const Wide bound = curvature_bound(springs) + at.others.stiffness;
             if (any((move.compliance * bound >= 2) & may_move)) return Outcome::too_far;
         }
     }
-    here.extra = select<Wide>(may_move, move.least, 0);
-    if constexpr (in_contact) keep_response(p, vertex, of_constraints, as_block<Wide>(move.compliance), rows);
+    if constexpr (in_contact) keep_response(p, at.vertex, at.of_constraints, as_block<Wide>(move.compliance), rows);
     const auto moves = move.moves & may_move;
-    const Vector3<Wide> there = here.point + move.displacement;
-    for (Eigen::Index k = 0; k < 3; ++k) here.point[k] = select(moves, there[k], here.point[k]);
-    scatter_padded(here, rows.position.data(), own.data());
+    PaddedLanes<Scalar> there{at.here.point + move.displacement, select<Wide>(may_move, move.least, 0)};
+    for (Eigen::Index k = 0; k < 3; ++k) there.point[k] = select(moves, there.point[k], at.here.point[k]);
+    scatter_padded(there, rows.position.data(), own.data());
     return any(moves) ? Outcome::moved : Outcome::at_rest;
+}
+
+template <Real Scalar>
+template <bool in_contact, class Scene, class Rule>
+[[gnu::flatten]] auto PackedVertices<Scalar>::update(std::size_t p, const Scene& scene, const Rule& rule,
+                                                     bool allowed) noexcept -> Outcome {
+    const auto state = evaluate<in_contact, Rule>(p, scene);
+    return move<in_contact>(p, state, scene, rule, allowed);
+}
+
+template <Real Scalar>
+template <bool in_contact, class Scene, class Rule>
+[[gnu::flatten]] std::size_t PackedVertices<Scalar>::update_next(std::size_t p, std::size_t end, const Scene& scene,
+                                                                 const Rule& rule) noexcept {
+    const auto state = evaluate<in_contact, Rule>(p, scene);
+    if (!packs_[p].next_is_of_group || p + 1 == end) {
+        outcomes_[p] = move<in_contact>(p, state, scene, rule, false);
+        return p + 1;
+    }
+    const auto next = evaluate<in_contact, Rule>(p + 1, scene);
+    outcomes_[p] = move<in_contact>(p, state, scene, rule, false);
+    outcomes_[p + 1] = move<in_contact>(p + 1, next, scene, rule, false);
+    return p + 2;
 }
 
 template <Real Scalar>
@@ -397,8 +463,7 @@ template <class Scene>
     const auto& own = packs_[p].own;
     const Vector3<Wide> here = gather(rows.position.data(), own.data());
     const auto springs = springs_on<Pull<Wide>>(p, here, scene);
-    const auto of_constraints = gather_padded(rows.force.data(), own.data());
-    Pull<Wide> others{of_constraints.point, of_constraints.extra};
+    Pull<Wide> others{gather(rows.force.data(), own.data()), 0};
     add_others<true>(p, here, scene, others);
     const Vector3<Wide> force = springs.force + others.force;
     Vector3<Wide> undamped = force;

@@ -96,13 +96,16 @@ namespace detail {
 // Points share vertices: until none is inside they are moved out this often at the most.
 inline constexpr int max_push_passes = 8;
 
-/// And this often they are solved before the vertices find their balance anew. Few points, on a coarse mesh, have each a large
-/// part of the force, and more passes give a better one; of many each has little. Where points are `stiff`, beside fixed
-/// corners or several of a shaft on one triangle, a pass moves each by little.
+// And this often they are solved at the most before the vertices find their balance anew.
+inline constexpr int all_contact_passes = 8;
+
+/// How often, unless the tool is deep inside. Few points, on a coarse mesh, have each a large part of the force, and more
+/// passes give a better one; of many each has little. Where points are `stiff`, beside fixed corners or several of a shaft
+/// on one triangle, a pass moves each by little.
 [[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool stiff) noexcept {
-    constexpr int least = 2, most = 8, points_of_all_passes = 128;
-    if (stiff || points == 0) return most;
-    return std::clamp(points_of_all_passes / static_cast<int>(points), least, most);
+    constexpr int least = 2, points_of_all_passes = 128;
+    if (stiff || points == 0) return all_contact_passes;
+    return std::clamp(points_of_all_passes / static_cast<int>(points), least, all_contact_passes);
 }
 
 }  // namespace detail
@@ -124,6 +127,7 @@ void Press<Scalar>::begin(Context& context) const noexcept {
     for (int pass = 0; pass < detail::max_push_passes; ++pass) {
         if (!push_out(context.state(), shape(), packs(context))) break;
     }
+    apply_forces(context.state(), packs(context));
     prevent_tunnelling(context);
 }
 
@@ -315,11 +319,12 @@ bool Press<Scalar>::enforce(Context& context) const noexcept {
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
     const int most = detail::max_contact_passes(points.size(), on_fixed || feature_pairs(tool) > 1);
-    for (int i = 0; i < most; ++i) {
+    for (int i = 0; i < detail::all_contact_passes; ++i) {
         const auto pass = solve_contacts(context.state(), shape(), packs(context));
         released = released || pass.released;
         if (i == 0) first = pass.largest;
-        if (!(pass.largest > first / 2)) break;  // the vertices have to find their balance anew
+        // The vertices have to find their balance anew.
+        if (!(i + 1 < most ? pass.largest > first / 2 : pass.deep)) break;
     }
     apply_forces(context.state(), packs(context));
     prevent_tunnelling(context);

@@ -483,9 +483,10 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs([[maybe_unused]] con
         if constexpr (!in_contact) {
             if (!serial) packed_.update(begin, end, scene, method_.rule, ExecutorRef(method_.executor));
         }
-        for (std::size_t p = begin; p < end && report_.status == StepStatus::advanced; ++p) {
-            changed |= finish_update<in_contact>(
-                scene, p, serial ? packed_.template update<in_contact>(p, scene, method_.rule) : packed_.outcome(p));
+        for (std::size_t p = begin; p < end && report_.status == StepStatus::advanced;) {
+            const std::size_t next =
+                serial ? packed_.template update_next<in_contact>(p, end, scene, method_.rule) : p + 1;
+            for (; p < next; ++p) changed |= finish_update<in_contact>(scene, p, packed_.outcome(p));
         }
     }
     return changed;

@@ -24,9 +24,11 @@ template <class C, class Scalar>
 concept Compliance = std::same_as<C, Scalar> || std::same_as<C, Symmetric3<Scalar>>;
 
 /// What a rule knows of the vertex it is asked about: the pull of springs, backing, damping and constraints, and what
-/// follows.
+/// follows. `stiffness` is the sum of all.
 template <Number Scalar>
 struct VertexState : CurvedPull<Scalar> {
+    Scalar contact_stiffness = 0;  ///< the part of `stiffness` that acts along `contact_normal` alone [N/m]
+    Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();
     Scalar mass = 0;       ///< [kg], zero where the network has none
     Each<Scalar> dt = 0;   ///< [s]
     bool touched = false;  ///< a constraint acts on it
@@ -118,7 +120,8 @@ struct SafeStep {
 /// d = omega H^-1 F does not raise it for 0 < omega < 2, if only rho is no shorter than d. No eigenvalue of `relief` is
 /// above half its trace b, so |H^-1 F| <= |F| / (stiffness - b / (1 + rho / size)): the rho that is chosen makes
 /// max(omega, 1) times the right side equal to rho, a quadratic equation. Near rest rho vanishes, and H is the second
-/// derivative of the energy, short springs apart, whose push across is left out.
+/// derivative of the energy, short springs apart, whose push across is left out. Where a contact adds a stiffness s along
+/// a normal n, s n n^T is added to H.
 struct BlockStep {
     static constexpr bool is_safe = true, needs_relief = true;
 
@@ -132,6 +135,14 @@ struct BlockStep {
 };
 
 namespace detail {
+
+/// Makes the inverse of H that of H + stiffness normal normal^T [Sherman50].
+template <Number Scalar>
+[[gnu::always_inline]] inline void stiffen(Symmetric3<Scalar>& compliance, const Scalar& stiffness,
+                                           const Vector3<Scalar>& normal) noexcept {
+    const Vector3<Scalar> along = compliance * normal;
+    compliance += outer<Scalar>(-stiffness / (1 + stiffness * dot(normal, along)), along);
+}
 
 inline void check_omega(std::string_view rule, double omega) {
     if (!is_finite(omega) || !(omega > 0 && omega < 2)) {
@@ -147,26 +158,25 @@ inline void BlockStep::check() const { detail::check_omega("BlockStep", omega); 
 
 template <Number Scalar>
 Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) const noexcept {
-    const auto resists = vertex.stiffness > 0;
-    const Scalar stiffness = select(resists, vertex.stiffness, Scalar(1));
-    // With t = rho / size: (1 + t) push = t (1 + t - part), in units of stiffness and size.
-    const Scalar per_stiffness = 1 / stiffness;
-    const Scalar part = per_stiffness * vertex.relief.trace() / 2;
+    using Limits = std::numeric_limits<Each<Scalar>>;
+    const Scalar all_round = vertex.stiffness - vertex.contact_stiffness;
+    const auto resists = all_round > 0;
+    const Scalar per_stiffness = 1 / select(resists, all_round, Scalar(1));
     const Each<Scalar> relaxation = detail::relaxation(omega, vertex);
-    const Scalar longest = (std::max)(relaxation, Each<Scalar>(1)) * norm(vertex.force);
-    // Beyond 1 / epsilon nothing is left of the relief, however short the spring.
-    const Scalar whole = stiffness * vertex.size, most = 1 / std::numeric_limits<Each<Scalar>>::epsilon();
-    const auto is_short = longest < most * whole;
-    const Scalar push = select<Scalar>(is_short, longest / select(is_short, whole, Scalar(1)), most);
-    const Scalar slack = 1 - part - push, root = root_of<Scalar>(slack * slack + 4 * push);
-    const auto ahead = slack > 0;
-    const Scalar t =
-        select<Scalar>(ahead, 2 * push / select<Scalar>(ahead, slack + root, Scalar(1)), (root - slack) / 2);
+    const Scalar longest = per_stiffness * ((std::max)(relaxation, Each<Scalar>(1)) * norm(vertex.force));
+    // Beyond 1 / epsilon times the move nothing is lost by a smaller size.
+    const Scalar size = smaller<Scalar>(vertex.size, longest / Limits::epsilon() + (Limits::min)());
+    // With b = trace / (2 stiffness): rho^2 + (size (1 - b) - longest) rho = longest size.
+    const Scalar slack = size * (1 - per_stiffness * vertex.relief.trace() / 2) - longest;
+    const Scalar rho = (root_of<Scalar>(slack * slack + 4 * longest * size) - slack) / 2;
     // Nearly flat springs leave H nearly singular: cbrt(epsilon) keeps the determinant out of the rounding.
     const auto flattest = static_cast<Each<Scalar>>(sizeof(Each<Scalar>) == 4 ? 4e-3 : 6e-6);
-    Symmetric3<Scalar> block = (-per_stiffness / (1 + larger<Scalar>(t, flattest))) * vertex.relief;
+    const Scalar part = size / (size + larger<Scalar>(rho, flattest * size));
+    Symmetric3<Scalar> block = (-per_stiffness * part) * vertex.relief;
     block += diagonal3(Scalar(1));
-    return select<Scalar>(resists, relaxation * per_stiffness, Scalar(0)) * inverse(block);
+    Symmetric3<Scalar> compliance = inverse(block, select<Scalar>(resists, relaxation * per_stiffness, Scalar(0)));
+    if (vertex.touched) detail::stiffen(compliance, vertex.contact_stiffness, vertex.contact_normal);
+    return compliance;
 }
 
 }  // namespace membrane

@@ -119,11 +119,12 @@ struct StepState {
 
     // One row more than vertices, for lanes that are not in use.
     Rows position;  ///< [m]; the least compliance [m/N]
-    Rows force;     ///< of the constraints [N]; the stiffness that contact adds [N/m]
+    Rows force;     ///< of the constraints [N]; the stiffness that contact adds along it [N/m]
     Rows response;  ///< two rows: compliance xx, yy, zz, xy; xz, yz [m/N], internal force [N], internal stiffness [N/m]
     Rows support;   ///< of fixed vertices: force of the tools [N]; stiffness to tools, 0 where none has come near [N/m]
     Rows residual;  ///< force at the end of the step [N]; size of that without damping [N]
     Rows anchor;    ///< where `kept` vertices go back to [m]
+    std::vector<Scalar> stiffness;  ///< that constraints add in all directions [N/m]
 
     IndexSet loaded, seeds, prescribed, forced;
     IndexSet bearing;                  // fixed vertices that a tool presses on
@@ -152,6 +153,7 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       support(position),
       residual(position),
       anchor(position),
+      stiffness(position.size(), 0),
       loaded(vertices),
       seeds(vertices),
       prescribed(vertices),
@@ -168,7 +170,10 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
 
 template <Real Scalar>
 void StepState<Scalar>::begin_step() noexcept {
-    for (const Index v : forced.items()) row(force, v) = {};
+    for (const Index v : forced.items()) {
+        row(force, v) = {};
+        stiffness[static_cast<std::size_t>(v)] = 0;
+    }
     for (const Index v : bearing.items()) row(support, v).set(Vector3<Scalar>::Zero(), row(support, v).extra());
     for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &bearing, &kept, &watched}) set->clear();
     points.clear();

@@ -32,6 +32,13 @@ struct StepInput {
     StepState<Scalar>& state;
 };
 
+/// The unit vector along `a`, zero where that is.
+template <Number N>
+[[gnu::always_inline, nodiscard]] inline Vector3<N> direction_or_zero(const Vector3<N>& a) noexcept {
+    const N size = norm(a);
+    return (1 / select<N>(size > 0, size, 1)) * a;
+}
+
 /// What a rule makes of the forces on a vertex, or on several.
 template <Number N, class Compliance>
 struct VertexMove {
@@ -79,10 +86,11 @@ template <class Rule, Number N>
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] Pull<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const auto& of_constraints = scene.state.row(scene.state.force, v);
-    const Scalar contact = (std::max)(of_constraints.extra(), Scalar(0));
-    if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {of_constraints.point(), contact};
+    const Scalar stiffness =
+        (std::max)(of_constraints.extra(), Scalar(0)) + scene.state.stiffness[static_cast<std::size_t>(v)];
+    if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {of_constraints.point(), stiffness};
     const auto foundation = scene.volume.pull(v, point(scene.x, v), point(scene.start, v), scene.dt);
-    return {foundation.force + of_constraints.point(), foundation.stiffness + contact};
+    return {foundation.force + of_constraints.point(), foundation.stiffness + stiffness};
 }
 
 /// All that pulls on it.
@@ -124,6 +132,11 @@ template <class Rule, class Scalar, class Network, class Volume>
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : Scalar(0);
     state.dt = scene.dt;
     state.touched = scene.state.seeds.contains(v);
+    if (state.touched) {
+        const auto& of_constraints = scene.state.row(scene.state.force, v);
+        state.contact_stiffness = (std::max)(of_constraints.extra(), Scalar(0));
+        state.contact_normal = direction_or_zero(of_constraints.point());
+    }
     return state;
 }
 
