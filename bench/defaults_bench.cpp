@@ -18,7 +18,7 @@ template <Real Scalar>
 using Options = membrane::SolverOptions<Scalar>;
 
 constexpr Options<double> defaults;
-static_assert(defaults.layers == 6 && defaults.sweeps == 2 && defaults.contact_visits == 4,
+static_assert(defaults.layers == 6 && defaults.sweeps == 2 && defaults.contact_visits == 3,
               "the plot rings these, and the tables name them");
 static_assert(defaults.order == membrane::VisitOrder::groups && defaults.predict);
 

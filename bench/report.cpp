@@ -198,7 +198,7 @@ const std::vector<Table> all_tables{
     option_table("layers", "Time of a tick, and error of its force in percent, by layers: the default is 6",
                  {1, 2, 3, 4, 6, 8, 12}),
     option_table("sweeps", "The same by sweeps: the default is 2", {1, 2, 3, 4, 6, 8}),
-    option_table("contact_visits", "The same by visits of the contact in a sweep: the default is 4",
+    option_table("contact_visits", "The same by visits of the contact in a sweep: the default is 3",
                  {1, 2, 3, 4, 6, 8}),
     choice_table("slide", "The same with one thing chosen for another: a tool slides", {162, 642, 2562}),
     choice_table("draw_out", "The same: forceps draw out", {642}),
