@@ -303,7 +303,7 @@ bool HeldPoint<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexce
         const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
         if (!(norm<Scalar>(target - now) > negligible_distance(context, point))) continue;
         const Vector3<Scalar> more = force_for<Scalar>(context, point, target - now);
-        if (more.isZero(0)) continue;
+        if (more == Vector3<Scalar>::Zero()) continue;
         change_force(context, point, more);
         changed = true;
     }
