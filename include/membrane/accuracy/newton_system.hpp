@@ -247,7 +247,7 @@ inline double NewtonSystem::change(const ConstraintRow& row, const Eigen::Ref<co
 
 inline bool NewtonSystem::can_change(const ConstraintRow& row) const noexcept {
     for (std::size_t k = 0; k < 3; ++k) {
-        if (is_free(row.vertices[k]) && row.gradient[k] != Vector3<double>::Zero()) return true;
+        if (is_free(row.vertices[k]) && !row.gradient[k].isZero(0)) return true;
     }
     return false;
 }

@@ -52,7 +52,7 @@ struct Proximity {
 /// it with both ends and across its edges.
 template <Real Scalar>
 [[nodiscard]] int feature_pairs(const Tool<Scalar>& tool) noexcept {
-    return tool.axis == Vector3<Scalar>::Zero() ? 1 : 5;
+    return tool.axis.isZero(0) ? 1 : 5;
 }
 
 /// Nearest points of pair `pair`, 0 to `feature_pairs(tool)` - 1: each end of the axis against the triangle, then the

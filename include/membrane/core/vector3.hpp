@@ -150,6 +150,10 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] constexpr N maxCoeff() const noexcept {
         return (std::max)((std::max)(number_[0], number_[1]), number_[2]);
     }
+    /// Whether no number is larger than `most`, whatever its sign.
+    [[nodiscard]] bool isZero(const N& most) const noexcept {
+        return std::abs(number_[0]) <= most && std::abs(number_[1]) <= most && std::abs(number_[2]) <= most;
+    }
     [[nodiscard]] Vector3 cwiseAbs() const noexcept {
         return {std::abs(number_[0]), std::abs(number_[1]), std::abs(number_[2])};
     }

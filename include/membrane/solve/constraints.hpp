@@ -255,7 +255,7 @@ template <Real Scalar>
 
 /// Vertex `v` is held at `target` [m].
 template <class Target>
-[[nodiscard]] HeldVertex<typename Target::Scalar> pull(Index v, const Eigen::MatrixBase<Target>& target) noexcept {
+[[nodiscard]] HeldVertex<typename Target::Scalar> pull(Index v, const Target& target) noexcept {
     return {v, target};
 }
 
@@ -266,6 +266,12 @@ template <class Target>
 template <Real Scalar>
 [[nodiscard]] Load<Scalar> load(const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
                                 const Vector3<Scalar>& force) noexcept {
+    return {corners, barycentric, force};
+}
+template <class Force>
+[[nodiscard]] Load<typename Force::Scalar> load(const std::array<Index, 3>& corners,
+                                                const Vector3<typename Force::Scalar>& barycentric,
+                                                const Eigen::MatrixBase<Force>& force) noexcept {
     return {corners, barycentric, force};
 }
 
@@ -303,7 +309,7 @@ bool HeldPoint<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexce
         const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
         if (!(norm<Scalar>(target - now) > negligible_distance(context, point))) continue;
         const Vector3<Scalar> more = force_for<Scalar>(context, point, target - now);
-        if (more == Vector3<Scalar>::Zero()) continue;
+        if (more.isZero(0)) continue;
         change_force(context, point, more);
         changed = true;
     }

@@ -130,7 +130,7 @@ void change_force(ConstraintContext<Scalar>& context, ContactPoint<Scalar>& poin
         const Vector3<Scalar> part = point.weights[static_cast<Eigen::Index>(k)] * force;
         context.add_force(point.corners[k], part);
         const Vector3<Scalar> by = context.response(point.corners[k], part);
-        if (by != Vector3<Scalar>::Zero()) context.move(point.corners[k], by);
+        if (!by.isZero(0)) context.move(point.corners[k], by);
     }
 }
 
