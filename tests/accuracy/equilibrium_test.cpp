@@ -536,8 +536,7 @@ TEST_CASE("equilibrium takes constraints of one's own", "[equilibrium]") {
     const Sphere sphere;
     const Point by(0, 0, 0.1);
     const auto own = sphere.rest({}, Clamp{3, 17, by});
-    const auto stock =
-        sphere.rest({}, pull(3, sphere.x().col(3) + by), pull(17, sphere.x().col(17) + by));
+    const auto stock = sphere.rest({}, pull(3, sphere.x().col(3) + by), pull(17, sphere.x().col(17) + by));
     REQUIRE(own.converged);
     CHECK(test::same_bits(own.x, stock.x));
     REQUIRE(own.reactions.size() == 1);

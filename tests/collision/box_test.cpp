@@ -113,8 +113,8 @@ TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[box]", floa
         const auto distance_at = [&](long double along) {
             const test::Vector<long double> p =
                 from.eigen().template cast<long double>() + along * (to - from).eigen().template cast<long double>();
-            const test::Vector<long double> nearest =
-                p.cwiseMax(box.low.eigen().template cast<long double>()).cwiseMin(box.high.eigen().template cast<long double>());
+            const test::Vector<long double> nearest = p.cwiseMax(box.low.eigen().template cast<long double>())
+                                                          .cwiseMin(box.high.eigen().template cast<long double>());
             return (p - nearest).norm();
         };
         if (test::least(distance_at) <= radius) {

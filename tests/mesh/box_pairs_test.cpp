@@ -20,7 +20,8 @@ TEST_CASE("boxes that overlap are those of a search through all pairs", "[mesh]"
         const double size = random.number(0.01, 0.5);
         for (Extent& box : boxes) {
             Vector3<double> middle = random.vector<double>();
-            if (random.chance(0.3)) middle = middle.eigen().array().round().matrix();  // many at one place, and touching
+            if (random.chance(0.3))
+                middle = middle.eigen().array().round().matrix();  // many at one place, and touching
             box.include(middle);
             box.include(Vector3<double>(middle + (random.chance(0.2) ? 1.0 : size) * random.vector<double>(0, 1)));
         }

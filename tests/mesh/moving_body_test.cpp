@@ -154,7 +154,8 @@ TEST_CASE("velocities are the pose's, or those of the anchors", "[body]") {
         const double dt = 1e-6, speed = norm(pose.angular_velocity);
         RigidFrame<double> later = pose;
         later.origin += dt * pose.velocity;
-        later.rotation = Eigen::AngleAxisd(speed * dt, (pose.angular_velocity / speed).eigen()).matrix() * pose.rotation;
+        later.rotation =
+            Eigen::AngleAxisd(speed * dt, (pose.angular_velocity / speed).eigen()).matrix() * pose.rotation;
         REQUIRE(by_anchors.move_to(carried(mesh.positions(), pose), 1, x));
         REQUIRE(by_anchors.move_to(carried(mesh.positions(), later), dt, x));
         const Vector3<double> expected = later.velocity_at(place);

@@ -491,7 +491,8 @@ TEMPLATE_TEST_CASE("no finite number gives a NaN, and no number a crash", "[tria
         const auto hit = first_hit(t, p, q);
         (void)touches_box(t, p, q);
         bool sound = (point.barycentric.eigen().array() >= 0).all() && !std::isnan(point.squared_distance);
-        sound &= (pair.on_triangle.barycentric.eigen().array() >= 0).all() && !std::isnan(pair.on_triangle.squared_distance);
+        sound &=
+            (pair.on_triangle.barycentric.eigen().array() >= 0).all() && !std::isnan(pair.on_triangle.squared_distance);
         sound &= pair.along >= 0 && pair.along <= 1;
         if (hit) sound &= (hit->barycentric.eigen().array() >= 0).all() && hit->along >= 0 && hit->along <= 1;
         sound &= std::isinf(point.squared_distance) || !point.point.eigen().hasNaN();

@@ -395,7 +395,8 @@ TEMPLATE_TEST_CASE("what is odd about whole surfaces is reported", "[mesh][bad]"
 
         bad = ball;  // row 35
         bad.add(ball);
-        bad.x.rightCols(ball.vertex_count()) = (S(0.4) * (ball.x.colwise() - middle.eigen())).colwise() + middle.eigen();
+        bad.x.rightCols(ball.vertex_count()) =
+            (S(0.4) * (ball.x.colwise() - middle.eigen())).colwise() + middle.eigen();
         CHECK(finds_only(report_of(bad), {several_components, nested_components}));
         CHECK(concerns(report_of(bad), nested_components, {}, {0, ball.triangle_count()}));
 

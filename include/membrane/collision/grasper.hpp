@@ -85,8 +85,7 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
     grasp_.barycentric = contact.barycentric;
     if (options_.whole_vertex) {
         const auto& weights = contact.barycentric;
-        grasp_.barycentric =
-            Vector3<Scalar>::Unit(std::max_element(weights.begin(), weights.end()) - weights.begin());
+        grasp_.barycentric = Vector3<Scalar>::Unit(std::max_element(weights.begin(), weights.end()) - weights.begin());
     }
     grasp_.offset = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
     grasp_.origin = point_at(triangle_at(origins_, grasp_.corners), grasp_.barycentric);

@@ -59,9 +59,10 @@ class Vector3 : public detail::ThreeByOne<N> {
 
     /// From an expression of three rows and a column.
     template <class Derived>
-        requires(std::same_as<typename Derived::Scalar, N> && Derived::RowsAtCompileTime == 3 &&
+        requires(std::same_as<typename Derived::Scalar, N>&& Derived::RowsAtCompileTime == 3 &&
                  Derived::ColsAtCompileTime == 1)
-    Vector3(const Eigen::MatrixBase<Derived>& column) noexcept {  // NOLINT(google-explicit-constructor)
+    Vector3(const Eigen::MatrixBase<Derived>& column)
+    noexcept {  // NOLINT(google-explicit-constructor)
         const Eigen::Matrix<N, 3, 1> value = column;
         *this = Vector3(value.coeff(0), value.coeff(1), value.coeff(2));
     }
@@ -111,11 +112,12 @@ class Vector3 : public detail::ThreeByOne<N> {
     }
     /// A matrix of three columns times a vector.
     template <class Derived>
-        requires(std::same_as<typename Derived::Scalar, N> && Derived::ColsAtCompileTime == 3)
+        requires(std::same_as<typename Derived::Scalar, N>&& Derived::ColsAtCompileTime == 3)
     [[nodiscard]] friend auto operator*(const Eigen::MatrixBase<Derived>& matrix, const Vector3& a) noexcept {
         return (matrix * a.eigen()).eval();
     }
-    [[nodiscard]] friend Eigen::Matrix<N, 3, 3> operator*(const Vector3& a, const Eigen::Matrix<N, 1, 3>& row) noexcept {
+    [[nodiscard]] friend Eigen::Matrix<N, 3, 3> operator*(const Vector3& a,
+                                                          const Eigen::Matrix<N, 1, 3>& row) noexcept {
         return a.eigen() * row;
     }
     constexpr Vector3& operator+=(const Vector3& b) noexcept { return *this = *this + b; }

@@ -248,7 +248,7 @@ template <class VertexAt>
     scatter<Scalar>({area.x() / length, area.y() / length, area.z() / length}, areas_.data(), begins.data());
     for (std::size_t i = 0; i < vertices.size(); ++i) {
         const Scalar* normal = areas_.front().number.data() + begins[i];
-        values_.col(vertices[i]) << normal[0], normal[1], normal[2];
+        values_.col(vertices[i]) = Vector3<Scalar>(normal[0], normal[1], normal[2]);
     }
 
     Scalar all = places.sum();  // finite only if all that is added is; a vertex is no part of its border

@@ -53,7 +53,9 @@ struct Bounds {
     Vector3<double> low = Vector3<double>::Constant(-std::numeric_limits<double>::infinity());
     Vector3<double> high = Vector3<double>::Constant(std::numeric_limits<double>::infinity());
 
-    [[nodiscard]] Bounds grown(double by) const noexcept { return {low - Vector3<double>::Constant(by), high + Vector3<double>::Constant(by)}; }
+    [[nodiscard]] Bounds grown(double by) const noexcept {
+        return {low - Vector3<double>::Constant(by), high + Vector3<double>::Constant(by)};
+    }
     [[nodiscard]] Bounds within(const Bounds& other) const noexcept {
         return {low.cwiseMax(other.low), high.cwiseMin(other.high)};
     }
