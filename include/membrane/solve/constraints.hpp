@@ -35,7 +35,7 @@ concept Constraint = Real<Scalar> &&
     { constraint.enforce(context) }
     noexcept->std::same_as<bool>;
     { constraint.reaction(done) }
-    noexcept->std::same_as<Vector3<Scalar>>;
+    noexcept->std::convertible_to<Vector3<Scalar>>;
 };
 
 namespace detail {
@@ -63,7 +63,7 @@ consteval bool check_constraint() noexcept {
     static_assert(
         requires(const C& constraint, const ConstraintContext<Scalar>& done) {
             { constraint.reaction(done) }
-            noexcept->std::same_as<Vector3<Scalar>>;
+            noexcept->std::convertible_to<Vector3<Scalar>>;
         },
         "Constraint: reaction(const ConstraintContext<Scalar>&) const noexcept must return Vector3<Scalar>");
     return Constraint<C, Scalar>;
