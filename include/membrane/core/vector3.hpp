@@ -26,6 +26,15 @@ class Vector3;
 
 namespace detail {
 
+/// An expression of Eigen's with three rows and one column.
+template <class Derived, class N>
+concept Column =
+    std::same_as<typename Derived::Scalar, N> && Derived::RowsAtCompileTime == 3 && Derived::ColsAtCompileTime == 1;
+
+/// An expression of Eigen's that a vector can be multiplied by.
+template <class Derived, class N>
+concept ThreeColumns = std::same_as<typename Derived::Scalar, N> && Derived::ColsAtCompileTime == 3;
+
 /// What lets Eigen's matrices take a vector by `=`, `+=` and `-=`.
 template <class N>
 struct ThreeByOne : Eigen::EigenBase<Vector3<N>> {
@@ -57,12 +66,8 @@ class Vector3 : public detail::ThreeByOne<N> {
     Vector3() = default;  ///< Not initialised.
     constexpr Vector3(const N& x, const N& y, const N& z) noexcept : number_{x, y, z} {}
 
-    /// From an expression of three rows and a column.
-    template <class Derived>
-        requires(std::same_as<typename Derived::Scalar, N>&& Derived::RowsAtCompileTime == 3 &&
-                 Derived::ColsAtCompileTime == 1)
-    Vector3(const Eigen::MatrixBase<Derived>& column)
-    noexcept {  // NOLINT(google-explicit-constructor)
+    template <detail::Column<N> Derived>
+    Vector3(const Eigen::MatrixBase<Derived>& column) noexcept {  // NOLINT(google-explicit-constructor)
         const Eigen::Matrix<N, 3, 1> value = column;
         *this = Vector3(value.coeff(0), value.coeff(1), value.coeff(2));
     }
@@ -110,9 +115,7 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] friend constexpr Vector3 operator/(const Vector3& a, const N& s) noexcept {
         return {a.number_[0] / s, a.number_[1] / s, a.number_[2] / s};
     }
-    /// A matrix of three columns times a vector.
-    template <class Derived>
-        requires(std::same_as<typename Derived::Scalar, N>&& Derived::ColsAtCompileTime == 3)
+    template <detail::ThreeColumns<N> Derived>
     [[nodiscard]] friend auto operator*(const Eigen::MatrixBase<Derived>& matrix, const Vector3& a) noexcept {
         return (matrix * a.eigen()).eval();
     }
