@@ -270,7 +270,7 @@ typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::answer(const Tool& 
         }
     }
     const bool held = std::exchange(held_, false);
-    if (held) force.setConstant(none);
+    if (held) force = Force::Constant(none);
     if (!held) warning_ = nullptr;
     force = limiter_(force, tool.time, solves_);
     report_.count(limiter_.acted(), held);

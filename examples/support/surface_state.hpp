@@ -33,7 +33,7 @@ template <class Network, class Volume>
         for (const membrane::Index v : corners) area[v] += (b - a).cross(c - a).norm() / 6;
     }
     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) {
-        const Eigen::Vector3d here = x.col(v);
+        const membrane::Vector3<double> here = x.col(v);
         state.force.col(v) = -network.pull(v, x).force - volume.pull(v, here, here, 1.0).force;
         double sum = 0;
         network.for_each_pull(v, x, [&](const auto& spring) { sum += spring.tension * spring.length; });

@@ -71,7 +71,7 @@ TriangleMesh<double> random_mesh(Random& random) {
         return spherical_cap<double>({.radius = radius, .diameter = 1.7 * radius, .rings = 3 + 2 * level});
     const auto sphere = icosphere<double>({.radius = radius, .subdivisions = level});
     Points<double> x = sphere.positions();
-    if (random.chance(0.3)) x = random.vector<double>(0.7, 1.3).asDiagonal() * x;
+    if (random.chance(0.3)) x = random.vector<double>(0.7, 1.3).eigen().asDiagonal() * x;
     const double edge = radius * std::sqrt(4 * std::numbers::pi / static_cast<double>(x.cols()));
     if (random.chance(0.4)) x = test::jittered(x, 0.1 * edge, random);
     return {x, sphere.triangles()};

@@ -62,7 +62,7 @@ struct Reference {
     }
     Index vertex_at(const Point& place) const {
         Eigen::Index nearest = 0;
-        (mesh.positions().colwise() - radius * place.normalized()).colwise().norm().minCoeff(&nearest);
+        (mesh.positions().colwise() - (radius * place.normalized()).eigen()).colwise().norm().minCoeff(&nearest);
         return static_cast<Index>(nearest);
     }
     HeldVertex<double> hold(Index v, double by) const { return pull(v, ((1 + by) * mesh.positions().col(v)).eval()); }
@@ -320,7 +320,7 @@ TEST_CASE("equilibrium under two tools, against Newton's method of the tests' ow
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Sphere sphere;
-        const Point here = random.unit_vector(), there = (here + 1.2 * here.unitOrthogonal()).normalized();
+        const Point here = random.unit_vector(), there = (here + 1.2 * here.eigen().unitOrthogonal()).normalized();
         const std::vector<Stroke> strokes{random_stroke(here, false, random), random_stroke(there, false, random)};
         const auto rest = sphere.rest({}, press(strokes[0].at(1), strokes[0].contact(sphere)),
                                       press(strokes[1].at(1), strokes[1].contact(sphere)));
@@ -384,7 +384,7 @@ TEST_CASE("equilibrium agrees with the quasi-static solver's loop", "[equilibriu
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Sphere sphere(0.3);
-        const Point here = random.unit_vector(), there = (here + 1.2 * here.unitOrthogonal()).normalized();
+        const Point here = random.unit_vector(), there = (here + 1.2 * here.eigen().unitOrthogonal()).normalized();
         const std::array strokes{random_stroke(here, seed % 2 == 0, random), random_stroke(there, false, random)};
         const Index v = sphere.mesh.triangles()(0, 0);
         QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 16, .negligible_force = 1e-12});
@@ -536,8 +536,7 @@ TEST_CASE("equilibrium takes constraints of one's own", "[equilibrium]") {
     const Sphere sphere;
     const Point by(0, 0, 0.1);
     const auto own = sphere.rest({}, Clamp{3, 17, by});
-    const auto stock =
-        sphere.rest({}, pull(3, (sphere.x().col(3) + by).eval()), pull(17, (sphere.x().col(17) + by).eval()));
+    const auto stock = sphere.rest({}, pull(3, sphere.x().col(3) + by), pull(17, sphere.x().col(17) + by));
     REQUIRE(own.converged);
     CHECK(test::same_bits(own.x, stock.x));
     REQUIRE(own.reactions.size() == 1);
@@ -565,7 +564,7 @@ TEST_CASE("equilibrium of a scene of floats is that of the same numbers in doubl
         const Vector3<float> target = 1.1F * mesh.positions().col(v);
         const auto rest = equilibrium(mesh.positions(), mesh, network, backing, {}, pull(v, target));
         const auto expected =
-            equilibrium(wide.positions(), wide, wide_network, wide_backing, {}, pull(v, target.cast<double>().eval()));
+            equilibrium(wide.positions(), wide, wide_network, wide_backing, {}, pull(v, target.cast<double>()));
         REQUIRE(rest.converged);
         REQUIRE(expected.converged);
         CHECK((rest.x - expected.x).cwiseAbs().maxCoeff() < 1e-15);
@@ -573,8 +572,7 @@ TEST_CASE("equilibrium of a scene of floats is that of the same numbers in doubl
         for (Index w = 0; w < mesh.vertex_count(); ++w) {  // really in balance
             if (w == v) continue;
             const Point here = rest.x.col(w);
-            const auto force =
-                (wide_network.pull(w, rest.x).force + wide_backing.pull(w, here, here, 1.0).force).eval();
+            const auto force = wide_network.pull(w, rest.x).force + wide_backing.pull(w, here, here, 1.0).force;
             REQUIRE(norm<double>(force) < 1e-14);
         }
     }

@@ -43,7 +43,7 @@ struct Disc {
         auto surface = test::surface_of(disc({.radius = radius, .rings = rings}));
         for (Index v = 1; v < surface.vertex_count(); ++v) {  // the middle stays
             const bool inside = surface.x.col(v).norm() < radius - edge / 2;
-            if (inside) surface.x.col(v).head<2>() += 0.2 * edge * random.vector(-1.0, 1.0).head<2>();
+            if (inside) surface.x.col(v).head<2>() += 0.2 * edge * random.vector(-1.0, 1.0).eigen().head<2>();
         }
         return surface.mesh();
     }

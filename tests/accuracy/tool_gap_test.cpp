@@ -19,7 +19,7 @@ using namespace membrane;
 
 namespace {
 
-int corner_count(const ToolGap& gap) { return static_cast<int>((gap.barycentric.array() > 0).count()); }
+int corner_count(const ToolGap& gap) { return static_cast<int>((gap.barycentric.eigen().array() > 0).count()); }
 
 const ToolGap* find(const std::vector<ToolGap>& gaps, const ToolGap& like) {
     for (const auto& gap : gaps) {
@@ -45,7 +45,7 @@ TEST_CASE("gradient and curvature of a gap are the slopes of gap and gradient", 
         Points<double> x(3, 3);
         for (Index k = 0; k < 3; ++k) x.col(k) = random.vector();
         const std::array tools{
-            random_tool(random, x * random.barycentric() + 0.4 * random.unit_vector(), seed % 2 == 0)};
+            random_tool(random, x * random.barycentric().eigen() + 0.4 * random.unit_vector(), seed % 2 == 0)};
         for (const auto& gap : gaps_near(one, x, tools, 10)) {
             const auto curvature = curvature_of(gap, x, tools[gap.tool]);
             for (Index i = 0; i < 9; ++i) {

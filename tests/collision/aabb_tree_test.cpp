@@ -37,7 +37,7 @@ constexpr std::array<Index, 12> thresholds{1, 2, 3, 4, 5, 8, 11, 16, 24, 33, 48,
 
 template <class S>
 test::Vector<Long> exact(const Vector3<S>& p) {
-    return p.template cast<Long>();
+    return p.eigen().template cast<Long>();
 }
 
 /// A surface on the move, and a tree that follows it.
@@ -609,7 +609,9 @@ TEMPLATE_TEST_CASE("positions that are not finite hide their own triangles at mo
         const auto sound = [&](Index f) {
             const auto t = scene.triangle(f);
             const S most = std::sqrt(std::sqrt(Limits::max())) / 4;
-            return (t.a.array().abs() < most && t.b.array().abs() < most && t.c.array().abs() < most).all();
+            return (t.a.eigen().array().abs() < most && t.b.eigen().array().abs() < most &&
+                    t.c.eigen().array().abs() < most)
+                .all();
         };
         for (int i = 0; i < 20; ++i) {
             const Vector3<S> q = point(scene.mesh.positions(), random.index(scene.mesh.vertex_count()));

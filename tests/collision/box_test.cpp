@@ -30,7 +30,7 @@ Box<S> random_box(Random& random) {
 TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[box]", float, double) {
     using S = TestType;
     Box<S> box;
-    CHECK((box.low.array() > box.high.array()).all());
+    CHECK((box.low.eigen().array() > box.high.eigen().array()).all());
     box.include(Vector3<S>(1, 2, 3));
     CHECK(box.low == box.high);
     box.include(Vector3<S>(0, 5, 3));
@@ -87,7 +87,7 @@ TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther t
             CHECK((q - p).cwiseAbs().maxCoeff() <= reach(box, q) * (1 + 2 * std::numeric_limits<S>::epsilon()));
         }
         if (squared_distance(box, q) > 0) continue;
-        CHECK((box.low.array() <= q.array() && q.array() <= box.high.array()).all());
+        CHECK((at_most(box.low, q) && at_most(q, box.high)));
     }
     CHECK(squared_distance(Box<S>{}, Vector3<S>(0, 0, 0)) == std::numeric_limits<S>::infinity());
 }
@@ -112,9 +112,9 @@ TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[box]", floa
         // From the left, the first point of the segment so near to the box: distances along it fall, then rise.
         const auto distance_at = [&](long double along) {
             const test::Vector<long double> p =
-                from.template cast<long double>() + along * (to - from).template cast<long double>();
-            const test::Vector<long double> nearest =
-                p.cwiseMax(box.low.template cast<long double>()).cwiseMin(box.high.template cast<long double>());
+                from.eigen().template cast<long double>() + along * (to - from).eigen().template cast<long double>();
+            const test::Vector<long double> nearest = p.cwiseMax(box.low.eigen().template cast<long double>())
+                                                          .cwiseMin(box.high.eigen().template cast<long double>());
             return (p - nearest).norm();
         };
         if (test::least(distance_at) <= radius) {

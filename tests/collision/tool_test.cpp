@@ -31,7 +31,8 @@ template <class S>
 long double distance_from_axis(const Triangle<S>& triangle, const Tool<S>& tool) {
     using Long = test::Vector<long double>;
     const auto brute = test::brute_triangle<long double>(triangle);
-    const Long from = tool.position.template cast<long double>(), way = tool.axis.template cast<long double>();
+    const Long from = tool.position.eigen().template cast<long double>(),
+               way = tool.axis.eigen().template cast<long double>();
     const auto at = [&](long double along) {
         return std::sqrt(test::squared_distance<long double>(brute, Long(from + along * way)));
     };

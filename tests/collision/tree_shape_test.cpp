@@ -44,7 +44,7 @@ std::set<Index> expected_left(const TriangleMesh<S>& mesh, const std::set<Index>
         high = high.cwiseMax(t.a).cwiseMax(t.b).cwiseMax(t.c);
     }
     int axis = 0;
-    (high - low).maxCoeff(&axis);
+    (high - low).eigen().maxCoeff(&axis);
     std::set<Index> left;
     const S middle = (low[axis] + high[axis]) / 2;
     for (const Index f : set) {

@@ -95,7 +95,8 @@ TEST_CASE("a velocity seen from a frame is how fast the point moves in it", "[co
         const auto place_at = [&](double t) {  // both go on for a time t
             RigidFrame<double> then = now;
             const double speed = norm(now.angular_velocity);
-            then.rotation = Eigen::AngleAxisd(speed * t, now.angular_velocity / speed).matrix() * now.rotation;
+            then.rotation =
+                Eigen::AngleAxisd(speed * t, (now.angular_velocity / speed).eigen()).matrix() * now.rotation;
             then.origin += t * now.velocity;
             return then.point_in(p + t * velocity);
         };

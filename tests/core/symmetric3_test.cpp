@@ -71,8 +71,8 @@ TEMPLATE_TEST_CASE("the inverse of a positive definite matrix", "[symmetric3]", 
         const double size = std::pow(10, random.number(-9.0, 9.0));
         const auto one = [&] { return size * std::pow(static_cast<double>(flattest), random.number()); };
         const Vector3<double> eigenvalues(size, one(), one());
-        const Dense<double> a = turn * eigenvalues.asDiagonal() * turn.transpose();
-        const Dense<double> expected = turn * eigenvalues.cwiseInverse().asDiagonal() * turn.transpose();
+        const Dense<double> a = turn * eigenvalues.eigen().asDiagonal() * turn.transpose();
+        const Dense<double> expected = turn * eigenvalues.eigen().cwiseInverse().asDiagonal() * turn.transpose();
         const Dense<S> found = dense(inverse(packed<S>(a.cast<S>())));
         const double error = (found.template cast<double>() - expected).norm() / expected.norm();
         REQUIRE(error <= 100 * std::cbrt(static_cast<double>(epsilon)));
@@ -103,7 +103,7 @@ TEMPLATE_TEST_CASE("largest eigenvalue of symmetric matrices", "[symmetric3]", d
         check(-u * u.transpose());
         check(u * u.transpose() + w * w.transpose());
         check(Dense<S>(Dense<S>::Identity() + std::numeric_limits<S>::epsilon() * a));
-        check(Dense<S>(random.vector<S>().asDiagonal()));
+        check(Dense<S>(random.vector<S>().eigen().asDiagonal()));
     }
     CHECK(largest_eigenvalue(Symmetric3<S>{}) == 0);
     CHECK(largest_eigenvalue(diagonal3(S(7))) == 7);

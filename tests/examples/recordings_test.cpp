@@ -24,7 +24,7 @@ TEST_CASE("a minute of noise makes a small picture that shows each spike", "[plo
     second.ticks[spike].force = {0, 0, 40};
     second.ticks[7].force.x() = std::numeric_limits<double>::quiet_NaN();
     second.ticks[8].tool.position.x() = std::numeric_limits<double>::infinity();
-    second.ticks[9].force.setConstant(std::numeric_limits<double>::max());
+    second.ticks[9].force = membrane::Vector3<double>::Constant(std::numeric_limits<double>::max());
 
     const auto plot = examples::plot_of(first, second);
     const auto svg = drawn(plot);

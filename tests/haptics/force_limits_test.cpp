@@ -224,7 +224,7 @@ TEST_CASE("a force is shortened along itself, never beyond the limit", "[limits]
         const double most = std::pow(10, random.number(-3.0, 2.0));
         const Vector3<double> force = std::pow(10, random.number(-4.0, 300.0)) * random.unit_vector();
         const Vector3<double> felt = detail::shortened(force, most);
-        const double size = force.stableNorm();
+        const double size = force.eigen().stableNorm();
         const bool good = size <= most ? felt == force
                                        : norm(felt) <= most && norm(felt) >= most * (1 - 1e-14) &&
                                              (felt / most - force / size).norm() < 1e-14;

@@ -204,7 +204,7 @@ TEST_CASE("a force within the limits reaches the device bit for bit", "[openhapt
         answer.force = (0.6 + 0.3 * std::sin(0.01 * i)) * way.normalized();
         ++answer.solves;
         hd.run(1);
-        if (i > settled) REQUIRE(same_bits(hd.force(), answer.force));
+        if (i > settled) REQUIRE(same_bits(hd.force(), answer.force.eigen()));
     }
     device.stop();
     check_closed(hd);
@@ -299,8 +299,8 @@ TEST_CASE("each limit of an adapter can be taken off, but for the peak", "[openh
     CHECK(applied(3, 0, 1) == Force(3, 0, 1));
     CHECK(applied(0, -3.3, 0) == Force(0, -3.3, 0));
     CHECK(applied(least, 0, 0) == Force(least, 0, 0));
-    CHECK(applied(0, 4, 0).isApprox(Force(0, 3.3, 0)));
-    CHECK(applied(most, most, -most).isApprox(3.3 / std::sqrt(3.0) * Force(1, 1, -1)));
+    CHECK(applied(0, 4, 0).isApprox(Force(0, 3.3, 0).eigen()));
+    CHECK(applied(most, most, -most).isApprox((3.3 / std::sqrt(3.0) * Force(1, 1, -1)).eigen()));
     for (const double bad : {infinity, -infinity, nan_value}) CHECK(applied(1, bad, 0).isZero(0));
     device.stop();
     check_closed(hd);

@@ -175,7 +175,7 @@ TEST_CASE("whatever goes wrong in a device's loop, each tick keeps within profil
         if (fault != Fault::none || wild.starts || withdrawn || rushing || stale) clean_since = now;
         if (now - clean_since > 0.2) {
             ++whole;
-            if (!same_bits(hd.force(), wild.asked)) FAIL("not the policy's force");
+            if (!same_bits(hd.force(), wild.asked.eigen())) FAIL("not the policy's force");
         }
         before = size;
         last = now;

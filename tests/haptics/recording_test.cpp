@@ -33,7 +33,7 @@ struct FaultyDevice : NullDevice<S> {
         auto tool = NullDevice<S>::read();
         if (++reads % 97 == 0) tool.position.y() = std::numeric_limits<S>::quiet_NaN();
         if (reads % 89 == 0) tool.radius = S(-1);
-        if (reads % 83 == 0) tool.velocity.setConstant(std::numeric_limits<S>::infinity());
+        if (reads % 83 == 0) tool.velocity = Vector3<S>::Constant(std::numeric_limits<S>::infinity());
         return tool;
     }
     int reads = 0;

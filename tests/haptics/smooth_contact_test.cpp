@@ -177,7 +177,7 @@ TEST_CASE("a body that moves takes its normals along", "[smooth]") {
         const Vector3<double> way = 0.01 * random.unit_vector();
         MovingBody body(mesh);
         Points<double> x = mesh.positions();
-        const Points<double> anchors = (turn * x).colwise() + way;
+        const Points<double> anchors = (turn * x).colwise() + way.eigen();
         REQUIRE((seed % 2 == 0 ? body.move_to(RigidFrame<double>{turn, way}, x) : body.move_to(anchors, 1, x)));
         const Vector3<double> tool = 0.0105 * random.unit_vector();
         const auto contact = touching(AabbTree(mesh).closest_point(mesh.positions(), tool).triangle, tool);

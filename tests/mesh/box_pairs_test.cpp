@@ -20,15 +20,15 @@ TEST_CASE("boxes that overlap are those of a search through all pairs", "[mesh]"
         const double size = random.number(0.01, 0.5);
         for (Extent& box : boxes) {
             Vector3<double> middle = random.vector<double>();
-            if (random.chance(0.3)) middle = middle.array().round();  // many at one place, and touching
+            if (random.chance(0.3))
+                middle = middle.eigen().array().round().matrix();  // many at one place, and touching
             box.include(middle);
             box.include(Vector3<double>(middle + (random.chance(0.2) ? 1.0 : size) * random.vector<double>(0, 1)));
         }
         std::set<std::array<Index, 2>> expected, found;
         for (std::size_t i = 0; i < boxes.size(); ++i) {
             for (std::size_t j = i + 1; j < boxes.size(); ++j) {
-                if (((boxes[i].low.array() <= boxes[j].high.array()) && (boxes[j].low.array() <= boxes[i].high.array()))
-                        .all()) {
+                if (at_most(boxes[i].low, boxes[j].high) && at_most(boxes[j].low, boxes[i].high)) {
                     expected.insert({static_cast<Index>(i), static_cast<Index>(j)});
                 }
             }

@@ -123,7 +123,9 @@ TEST_CASE("distmesh: a torus by one's own function, merged balls and a hollow on
     check_body(united(Ball{.centre = {-0.5, 0, 0}, .radius = 0.8}, Ball{.centre = {0.6, 0, 0}, .radius = 0.7}), 0.15,
                {});
     check_body(difference(Ball{}, Ball{.radius = 0.6}), 0.3, {.euler = 4});  // a hollow organ, its inside too
-    const auto level_set = [](const Point& p) { return p.array().square().square().sum() - 1; };  // far from a distance
+    const auto level_set = [](const Point& p) {
+        return p.eigen().array().square().square().sum() - 1;
+    };  // far from a distance
     check_body(level_set, 0.25, {}, 1, Bounds{{-1.1, -1.1, -1.1}, {1.1, 1.1, 1.1}});
 }
 

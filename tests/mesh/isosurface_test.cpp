@@ -52,7 +52,7 @@ TEST_CASE("random balls become closed surfaces of genus 0, outward, with their v
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             REQUIRE(std::abs(ball(point(mesh.positions(), v))) < 1e-9 * size);
         }
-        const TriangleMesh<double> moved(mesh.positions().colwise() - ball.centre, mesh.triangles());
+        const TriangleMesh<double> moved(mesh.positions().colwise() - ball.centre.eigen(), mesh.triangles());
         const double whole = 4 * std::numbers::pi / 3 * std::pow(ball.radius, 3);
         REQUIRE(volume(moved) < whole);
         REQUIRE(volume(moved) > whole * (1 - 0.8 * std::pow(spacing / ball.radius, 2)));

@@ -102,7 +102,7 @@ TEST_CASE("the pose is the best fit to the anchors, and normals are theirs", "[b
         for (int other = 0; other < 20; ++other) {
             RigidFrame<double> near = pose;
             const double angle = std::pow(10, random.number(-4.0, 0.0));
-            near.rotation = Eigen::AngleAxisd(angle, random.unit_vector()).matrix() * pose.rotation;
+            near.rotation = Eigen::AngleAxisd(angle, random.unit_vector().eigen()).matrix() * pose.rotation;
             REQUIRE(misfit(rest, anchors, near) > misfit(rest, anchors, pose));
             near = pose;
             near.origin += 1e-6 * random.unit_vector();
@@ -154,7 +154,8 @@ TEST_CASE("velocities are the pose's, or those of the anchors", "[body]") {
         const double dt = 1e-6, speed = norm(pose.angular_velocity);
         RigidFrame<double> later = pose;
         later.origin += dt * pose.velocity;
-        later.rotation = Eigen::AngleAxisd(speed * dt, pose.angular_velocity / speed).matrix() * pose.rotation;
+        later.rotation =
+            Eigen::AngleAxisd(speed * dt, (pose.angular_velocity / speed).eigen()).matrix() * pose.rotation;
         REQUIRE(by_anchors.move_to(carried(mesh.positions(), pose), 1, x));
         REQUIRE(by_anchors.move_to(carried(mesh.positions(), later), dt, x));
         const Vector3<double> expected = later.velocity_at(place);
@@ -222,7 +223,7 @@ TEMPLATE_TEST_CASE("a number that is not finite is refused, and nothing has move
     }
     // So far off that what is carried there has no number: refused as well.
     RigidFrame<S> far;
-    far.origin.setConstant((Limits::max)());
+    far.origin = Vector3<S>::Constant((Limits::max)());
     Points<S> off = (Limits::max)() / 2 * Points<S>::Ones(3, x.cols());
     CHECK_FALSE(body.move_to(far, off));
     check_unmoved();

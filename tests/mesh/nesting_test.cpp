@@ -52,7 +52,7 @@ TEST_CASE("balls are nested where their radii and centres say so", "[mesh]") {
                 continue;
             }
             Surface<double> ball = test::surface_of(icosphere({.radius = radius, .subdivisions = 1}));
-            ball.x.colwise() += centre;
+            ball.x.colwise() += centre.eigen();
             balls.add(ball);
             known.emplace_back(centre, radius);
         }

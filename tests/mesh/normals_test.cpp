@@ -66,7 +66,7 @@ TEMPLATE_TEST_CASE("normals of closed forms", "[normals]", double, float) {
     using S = TestType;
     const S epsilon = std::numeric_limits<S>::epsilon();
     const VertexNormals<S> flat(sheet<S>({.columns = 5, .rows = 3}));
-    CHECK(flat.values() == Vector3<S>(0, 0, 1).replicate(1, 24));
+    CHECK(flat.values() == Vector3<S>(0, 0, 1).eigen().replicate(1, 24));
 
     // An icosahedron's stars are regular: each normal is the vertex's own direction.
     const auto icosahedron = icosphere<S>({.radius = 1, .subdivisions = 0});
@@ -372,7 +372,7 @@ TEST_CASE("the pseudo-normal at the nearest point tells inside from outside as C
                 triangle = f;
             }
             if (nearest.squared_distance < 1e-12) continue;
-            const auto zeros = (nearest.barycentric.array() == 0).count();
+            const auto zeros = (nearest.barycentric.eigen().array() == 0).count();
             ++(zeros == 0 ? at_face : zeros == 1 ? at_edge : at_corner);
             const auto normal = pseudo_normal(surface.x, surface.triangles, adjacency, triangle, nearest.barycentric);
             CHECK(norm(normal) == Approx(1));

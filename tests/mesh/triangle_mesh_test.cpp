@@ -273,7 +273,7 @@ TEMPLATE_TEST_CASE("a mesh that is too small or too far away for its numbers is 
         }
         Surface<S> far = surface;
         const S size = (surface.x.rowwise().maxCoeff() - surface.x.rowwise().minCoeff()).maxCoeff();
-        far.x.colwise() += S(0.1) * size / std::numeric_limits<S>::epsilon() * random.unit_vector<S>();
+        far.x.colwise() += S(0.1) * size / std::numeric_limits<S>::epsilon() * random.unit_vector<S>().eigen();
         const std::string message = refusal_of(far);
         CHECK_THAT(message,
                    ContainsSubstring("a hundred times the spacing of numbers at the largest coordinate, got "));
@@ -309,7 +309,7 @@ TEMPLATE_TEST_CASE("meshes of a micrometre to a thousand kilometres are accepted
         const auto mesh = icosphere<S>({.radius = size, .subdivisions = 3});
         CHECK(mesh.vertex_count() == 642);
         Points<S> x = mesh.positions();
-        x.colwise() += Vector3<S>(static_cast<S>(1e6 * size), 0, 0);
+        x.colwise() += Vector3<S>(static_cast<S>(1e6 * size), 0, 0).eigen();
         const bool accepted = test::refusal([&] { TriangleMesh<S> moved(x, mesh.triangles()); }).empty();
         CHECK(accepted == (std::is_same_v<S, double>));
     }
@@ -326,7 +326,7 @@ TEMPLATE_TEST_CASE("a mesh without any area is refused", "[mesh][bad]", double, 
             surface.x.col(v) = start + random.number<S>(-1, 1) * along;
         }
         CHECK(refusal_of(surface) == "TriangleMesh: all vertices of each triangle are on one line, expected a surface");
-        surface.x = start.replicate(1, surface.vertex_count());
+        surface.x = start.eigen().replicate(1, surface.vertex_count());
         CHECK(refusal_of(surface) ==
               "TriangleMesh: all vertices of each triangle are at one point, expected a surface");
         surface.x.setZero();

@@ -29,7 +29,7 @@ constexpr S epsilon = std::numeric_limits<S>::epsilon();
 
 template <class S>
 test::Vector<Long> exact(const Vector3<S>& p) {
-    return p.template cast<Long>();
+    return p.eigen().template cast<Long>();
 }
 
 /// How far from the origin corners and points lie, at most.
@@ -77,12 +77,12 @@ Vector3<S> random_point_near(const Triangle<S>& t, Random& random) {
 
 template <class S>
 void check_weights(const TrianglePoint<S>& found, const Triangle<S>& t) {
-    CHECK((found.barycentric.array() >= 0).all());
+    CHECK((found.barycentric.eigen().array() >= 0).all());
     CHECK(std::abs(found.barycentric.sum() - 1) <= 4 * epsilon<S>);
     const S scale = extent(t);
     CHECK(norm<S>(found.point - point_at(t, found.barycentric)) <= 8 * epsilon<S> * scale);
     for (int k = 0; k < 3; ++k) {
-        if (found.barycentric[k] == 1 && (found.barycentric.array() == 0).count() == 2)
+        if (found.barycentric[k] == 1 && (found.barycentric.eigen().array() == 0).count() == 2)
             CHECK(found.point == std::array{t.a, t.b, t.c}[static_cast<std::size_t>(k)]);
     }
 }
@@ -250,7 +250,7 @@ TEMPLATE_TEST_CASE("where the origin is does not matter beyond the rounding of t
         const auto grid = [&](S size) {  // so that what is moved far away is still the same triangle
             const S fine = 1024;
             const Vector3<S> p = size * random.vector<S>();
-            return Vector3<S>((p * fine).array().round() / fine);
+            return Vector3<S>(((p * fine).eigen().array().round() / fine).matrix());
         };
         const Triangle<S> t{grid(2), grid(2), grid(2)};
         const Vector3<S> q = grid(3), p = grid(3), away = Vector3<S>(4096, -2048, 1024);
@@ -346,7 +346,7 @@ TEMPLATE_TEST_CASE("on a grid, hits are exactly those of integer arithmetic", "[
         ++hits;
         const Vector3<S> at = from.template cast<S>() + hit->along * (to - from).template cast<S>();
         const auto where = point_at(triangle, hit->barycentric);
-        const bool inside = (hit->barycentric.array() >= 0).all() && hit->along >= 0 && hit->along <= 1;
+        const bool inside = (hit->barycentric.eigen().array() >= 0).all() && hit->along >= 0 && hit->along <= 1;
         if (!inside || norm<S>(at - where) > 2048 * epsilon<S>) FAIL_CHECK("seed " << seed << ": " << hit->along);
         if (test::volume(t.a, t.b, t.c, from) != 0 || test::volume(t.a, t.b, t.c, to) != 0) continue;
         ++in_plane;  // nothing of the segment before the hit belongs to the triangle
@@ -400,7 +400,7 @@ TEMPLATE_TEST_CASE("no segment slips through a closed surface", "[triangle]", fl
         auto x = test::jittered(mesh.positions(), S(0.1), random);
         if (seed % 3 == 0) x.row(2) *= static_cast<S>(std::pow(10, random.number(-6.0, 0.0)));  // thin triangles
         x = (random.rotation<S>() * x).eval();
-        x.colwise() += static_cast<S>(std::pow(10, random.number(-2.0, 2.0))) * random.vector<S>();
+        x.colwise() += static_cast<S>(std::pow(10, random.number(-2.0, 2.0))) * random.vector<S>().eigen();
         const auto& triangles = mesh.triangles();
         const Vector3<S> centre = x.rowwise().mean();
         const Index f = random.index(mesh.triangle_count());
@@ -490,12 +490,13 @@ TEMPLATE_TEST_CASE("no finite number gives a NaN, and no number a crash", "[tria
         const auto pair = closest_to_segment(t, p, q);
         const auto hit = first_hit(t, p, q);
         (void)touches_box(t, p, q);
-        bool sound = (point.barycentric.array() >= 0).all() && !std::isnan(point.squared_distance);
-        sound &= (pair.on_triangle.barycentric.array() >= 0).all() && !std::isnan(pair.on_triangle.squared_distance);
+        bool sound = (point.barycentric.eigen().array() >= 0).all() && !std::isnan(point.squared_distance);
+        sound &=
+            (pair.on_triangle.barycentric.eigen().array() >= 0).all() && !std::isnan(pair.on_triangle.squared_distance);
         sound &= pair.along >= 0 && pair.along <= 1;
-        if (hit) sound &= (hit->barycentric.array() >= 0).all() && hit->along >= 0 && hit->along <= 1;
-        sound &= std::isinf(point.squared_distance) || !point.point.hasNaN();
-        if (all_finite) sound &= !point.point.hasNaN() && !pair.on_triangle.point.hasNaN();
+        if (hit) sound &= (hit->barycentric.eigen().array() >= 0).all() && hit->along >= 0 && hit->along <= 1;
+        sound &= std::isinf(point.squared_distance) || !point.point.eigen().hasNaN();
+        if (all_finite) sound &= !point.point.eigen().hasNaN() && !pair.on_triangle.point.eigen().hasNaN();
         if (!sound) FAIL_CHECK("seed " << seed);
     }
 }

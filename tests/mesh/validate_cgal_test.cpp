@@ -60,7 +60,7 @@ Surface<S> random_crossing(Random& random) {
     const S size = (surface.x.rowwise().maxCoeff() - surface.x.rowwise().minCoeff()).maxCoeff();
     if (random.chance(0.5)) {
         Surface<S> other = surface;
-        other.x.colwise() += random.number<S>(0, S(1.5)) * size * random.unit_vector<S>();
+        other.x.colwise() += random.number<S>(0, S(1.5)) * size * random.unit_vector<S>().eigen();
         surface.add(other);
     } else {
         surface.x = test::jittered(surface.x, random.number<S>(0, S(0.4)) * size, random);
@@ -318,7 +318,7 @@ TEST_CASE("a ball in a ball bounds no volume, unless it is turned inward", "[mes
         Surface<double> surface = test::random_closed_surface<double>(random);
         Surface<double> other = surface;
         const Vector3<double> middle = surface.x.rowwise().mean();
-        other.x = (0.4 * (surface.x.colwise() - middle)).colwise() + middle;
+        other.x = (0.4 * (surface.x.colwise() - middle.eigen())).colwise() + middle.eigen();
         surface.add(other);
         CHECK(report_of(surface).count(nested_components) == 1);
         CHECK(!PMP::does_bound_a_volume(mesh_of(surface)));

@@ -203,11 +203,11 @@ TEMPLATE_TEST_CASE("what is odd about the numbers is reported", "[mesh][bad]", d
         bad.x = given.x * Limits::denorm_min();
         CHECK((report_of(bad).count(too_small) + report_of(bad).count(all_at_one_point)) == 1);
         bad = given;
-        bad.x.colwise() += S(0.1) * size_of(given) / Limits::epsilon() * random.unit_vector<S>();
+        bad.x.colwise() += S(0.1) * size_of(given) / Limits::epsilon() * random.unit_vector<S>().eigen();
         CHECK(finds_only(report_of(bad), {too_coarse}));
 
         const Vector3<S> start = random.vector<S>(), along = random.unit_vector<S>();
-        bad.x = start.replicate(1, given.vertex_count());  // row 22
+        bad.x = start.eigen().replicate(1, given.vertex_count());  // row 22
         CHECK(finds_only(report_of(bad), {all_at_one_point}));
         for (Index w = 0; w < given.vertex_count(); ++w) bad.x.col(w) = start + random.number<S>(-1, 1) * along;
         CHECK(finds_only(report_of(bad), {all_on_one_line}));  // row 23
@@ -249,7 +249,7 @@ TEMPLATE_TEST_CASE("what is odd about edges and fans is reported", "[mesh][bad]"
         const Index w = bad.vertex_count() + random.index(other.vertex_count());
         bad.add(other);
         bad.x.rightCols(other.vertex_count()).colwise() +=
-            Vector3<S>(bad.x.col(v) - bad.x.col(w)) + S(0.001) * size_of(given) * random.vector<S>();
+            bad.x.col(v) - bad.x.col(w) + S(0.001) * size_of(given) * random.vector<S>().eigen();
         for (Index& corner : bad.triangles.reshaped()) corner = corner == w ? v : corner;
         const MeshReport joined = report_of(bad);
         CHECK(joined.count(non_manifold_vertex) == 1);
@@ -386,7 +386,7 @@ TEMPLATE_TEST_CASE("what is odd about whole surfaces is reported", "[mesh][bad]"
         Surface<S> other = test::random_surface<S>(random);
         const S apart =
             4 * (size_of(given) + size_of(other)) + given.x.cwiseAbs().maxCoeff() + other.x.cwiseAbs().maxCoeff();
-        other.x.colwise() += apart * random.unit_vector<S>();
+        other.x.colwise() += apart * random.unit_vector<S>().eigen();
         bad.add(other);
         CHECK(report_of(bad).count(several_components) == 1);
         CHECK(report_of(bad).count(nested_components) == 0);
@@ -395,7 +395,8 @@ TEMPLATE_TEST_CASE("what is odd about whole surfaces is reported", "[mesh][bad]"
 
         bad = ball;  // row 35
         bad.add(ball);
-        bad.x.rightCols(ball.vertex_count()) = (S(0.4) * (ball.x.colwise() - middle)).colwise() + middle;
+        bad.x.rightCols(ball.vertex_count()) =
+            (S(0.4) * (ball.x.colwise() - middle.eigen())).colwise() + middle.eigen();
         CHECK(finds_only(report_of(bad), {several_components, nested_components}));
         CHECK(concerns(report_of(bad), nested_components, {}, {0, ball.triangle_count()}));
 
@@ -406,7 +407,7 @@ TEMPLATE_TEST_CASE("what is odd about whole surfaces is reported", "[mesh][bad]"
         CHECK(report_of(bad).sound());
         bad = ball;  // two balls that cross
         bad.add(ball);
-        bad.x.rightCols(ball.vertex_count()).colwise() += S(0.5) * size * random.unit_vector<S>();
+        bad.x.rightCols(ball.vertex_count()).colwise() += S(0.5) * size * random.unit_vector<S>().eigen();
         CHECK(report_of(bad).count(self_intersection) > 0);
         CHECK(report_of(bad).count(nested_components) == 0);
 

@@ -46,7 +46,7 @@ std::pair<double, double> energy_and_area(const Elements<double, Hinge<double>>&
     double energy = 0, area = 0;
     for (const auto& placed : hinges.all()) {
         const auto corners = hinges.where(placed, x);
-        if ((corners[0] + corners[1]).head<2>().norm() / 2 > 3.1) continue;
+        if ((corners[0] + corners[1]).eigen().head<2>().norm() / 2 > 3.1) continue;
         energy += placed.element.energy(corners);
         area += (norm<double>(cross<double>(corners[1] - corners[0], corners[2] - corners[0])) +
                  norm<double>(cross<double>(corners[1] - corners[0], corners[3] - corners[0]))) /

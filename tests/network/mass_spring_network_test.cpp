@@ -139,7 +139,7 @@ TEMPLATE_TEST_CASE("a rigid motion causes no tension", "[network]", double, floa
             const auto network = random_network(mesh, law, random);
             const S size = size_of(surface.x);
             Points<S> x = random.rotation<S>() * surface.x;
-            x.colwise() += (size * random.vector<S>()).eval();
+            x.colwise() += (size * random.vector<S>()).eigen();
             const S error = 16 * std::numeric_limits<S>::epsilon() * size;  // of an elongation
             for (Index s = 0; s < static_cast<Index>(network.springs().size()); ++s) {
                 REQUIRE(std::abs(network.tension(s, x)) <= 100 * error);

@@ -51,7 +51,7 @@ TEMPLATE_TEST_CASE("on a body that moves rigidly every model pulls as at rest, t
         if (seed % 2 == 0) {
             REQUIRE(body.move_to(pose, x));
         } else {
-            REQUIRE(body.move_to(((pose.rotation * x).colwise() + pose.origin).eval(), S(0.1), x));
+            REQUIRE(body.move_to(((pose.rotation * x).colwise() + pose.origin.eigen()).eval(), S(0.1), x));
         }
         const Index v = random.index(42);
         const Vector3<S> position = point(mesh.positions(), v) + S(0.3) * random.vector<S>(),

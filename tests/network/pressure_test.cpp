@@ -67,7 +67,7 @@ TEST_CASE("pressure on a closed surface is the derivative of pressure times volu
             REQUIRE(std::abs(slope / (2e-5 * size) - force[k]) < 1e-7 * scale);
         }
         double change = 0;
-        const Eigen::Vector3d way = random.number(0.0, 0.5) * size * random.unit_vector();
+        const Vector3<double> way = random.number(0.0, 0.5) * size * random.unit_vector();
         pressed.for_each(v, x, [&](const auto& placed, const auto& corners, std::size_t i) {
             change += placed.element.energy_change(corners, i, way).change;
         });

@@ -60,7 +60,7 @@ TriangleMesh<double> irregular_sheet(Index squares, Random& random) {
     const double side = 1.0 / squares;
     for (Index v = 0; v < surface.vertex_count(); ++v) {
         const bool inside = surface.x.col(v).head<2>().cwiseAbs().maxCoeff() < 0.5 - side / 2;
-        if (inside) surface.x.col(v).head<2>() += 0.3 * side * random.vector(-1.0, 1.0).head<2>();
+        if (inside) surface.x.col(v).head<2>() += 0.3 * side * random.vector(-1.0, 1.0).eigen().head<2>();
     }
     return surface.mesh();
 }
@@ -111,7 +111,7 @@ TEST_CASE("a triangular spring stores what a sheet of Saint Venant and Kirchhoff
         const Material material = random_material(random);
         const auto rest = random_triangle(random, size), now = random_triangle(random, size);
         Points<double> x(3, 3);
-        x << rest[0], rest[1], rest[2];
+        x << rest[0].eigen(), rest[1].eigen(), rest[2].eigen();
         const double stretch = random.chance(0.5) ? 1.0 : random.number(0.9, 1.2);
         const auto springs =
             triangular_springs(TriangleMesh<double>(x, Triangles(Eigen::Vector3i(0, 1, 2))), material, stretch);

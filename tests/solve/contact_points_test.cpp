@@ -79,8 +79,8 @@ Vector3<S> rocking_of_one(const Triangle<S>& t, const Vector3<S>& weights, S mom
     Vector3<S> stiffness = Vector3<S>::Zero();
     if (!(weights.maxCoeff() < 1)) return stiffness;
     Eigen::Index apart;
-    weights.minCoeff(&apart);
-    stiffness.setConstant(moment / squares[apart]);
+    weights.eigen().minCoeff(&apart);
+    stiffness = Vector3<S>::Constant(moment / squares[apart]);
     stiffness[apart] = 0;
     return stiffness;
 }

@@ -54,7 +54,8 @@ struct Reference {
     Index vertex_at(const Vector3<double>& place) const {
         const Points<S> directions = mesh.positions().colwise().normalized();
         Eigen::Index nearest = 0;
-        REQUIRE((directions.colwise() - place.normalized().cast<S>()).colwise().norm().minCoeff(&nearest) < S(1e-6));
+        REQUIRE((directions.colwise() - place.normalized().cast<S>().eigen()).colwise().norm().minCoeff(&nearest) <
+                S(1e-6));
         return static_cast<Index>(nearest);
     }
     Vector3<S> raised(Index v, double by) const { return static_cast<S>(1 + by) * point(mesh.positions(), v); }

@@ -67,7 +67,7 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
     const auto k = [&](S stiffness) { return 40 * stiffness * units.stiffness; };
     const auto at = [&](const Vector3<S>& place) { return Vector3<S>(units.size * (units.origin + place)); };
     Points<S> start = unit_sphere<S>().positions();
-    start = units.size * (start.colwise() + units.origin);
+    start = units.size * (start.colwise() + units.origin.eigen());
     std::vector<S> stiffness(120);
     for (S& each : stiffness) each = k(random.number<S>(S(0.5), 2));
     const NetworkOptions<S> springs{.stiffness = stiffness, .mass = k(S(1e-5))};
@@ -107,7 +107,7 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
                            HeldPoint<S>{grasped, corners(grasped), weights, at(place)});
         REQUIRE(report.status == StepStatus::advanced);
     }
-    Outcome<S> outcome{(loop.x / units.size).colwise() - units.origin, {}};
+    Outcome<S> outcome{(loop.x / units.size).colwise() - units.origin.eigen(), {}};
     for (std::size_t i = 0; i < 4; ++i) outcome.reactions[i] = report.reactions[i] / k(units.size);
     // A tool at an edge may rock for good.
     outcome.settled = !pressing || (loop.x - before).cwiseAbs().maxCoeff() <= 100 * rounding * units.size;
@@ -189,7 +189,7 @@ TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, a
         const Units<S> units{.size = tenth_power<S>(-6, 6, random), .origin = far * random.unit_vector<S>()};
         CAPTURE(far, units.size);
         Points<S> x = unit_sphere<S>().positions();
-        x = units.size * (x.colwise() + units.origin);
+        x = units.size * (x.colwise() + units.origin.eigen());
         const std::string message = test::refusal([&] { (void)TriangleMesh<S>(x, unit_sphere<S>().triangles()); });
         if (!message.empty()) {
             ++refused;

@@ -139,7 +139,7 @@ RigidFrame<double> smooth_motion(double time) {
     const double s = std::min(time / 0.5, 1.0), u = s * s * (3 - 2 * s), rate = 6 * s * (1 - s) / 0.5;
     const Vector3<double> axis = Vector3<double>(1, 1, 0.3).normalized(), way(2e-3, 1e-3, -1e-3);
     const double angle = 20 * 3.14159265358979 / 180;
-    return {Eigen::AngleAxisd(angle * u, axis).toRotationMatrix(), u * way, rate * way, rate * angle * axis};
+    return {Eigen::AngleAxisd(angle * u, axis.eigen()).toRotationMatrix(), u * way, rate * way, rate * angle * axis};
 }
 
 }  // namespace

@@ -313,7 +313,7 @@ TEST_CASE("the curvature of a gap is the slope of its gradient", "[press]") {
         test::Random random(static_cast<std::uint64_t>(seed));
         Eigen::Matrix3Xd x(3, 3);
         for (int k = 0; k < 3; ++k) x.col(k) = random.vector<double>();
-        Tool<double> tool{.position = x * random.barycentric() + 0.3 * random.unit_vector()};
+        Tool<double> tool{.position = x * random.barycentric().eigen() + 0.3 * random.unit_vector()};
         if (seed % 2 == 0) tool.axis = random.vector<double>();
         const test::PressedMembrane membrane{Eigen::Vector3i(0, 1, 2), {}, x, 1, {tool}};
         for (const auto& feature : test::features_near(membrane, x, 10)) {

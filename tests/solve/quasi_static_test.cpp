@@ -449,13 +449,13 @@ TEST_CASE("a whole membrane recovers in that time, too, and all the way", "[solv
     const VirtualVolumeSprings backing(mesh, {.stiffness = k, .damping = d});
     const Vector3<double> way(0.03, -0.05, 0.08);
     QuasiStaticSolver solver(network, {.layers = 2, .sweeps = 100, .negligible_force = 1e-12});
-    Points<double> x = mesh.positions().colwise() + way;
+    Points<double> x = mesh.positions().colwise() + way.eigen();
     solver.wake_all();
     double expected = 1;
     for (int tick = 0; tick < 40; ++tick) {
         (void)solver.step(x, dt, network, backing);
         expected /= 1 + k * dt / d;
-        REQUIRE((x - (mesh.positions().colwise() + expected * way)).cwiseAbs().maxCoeff() < 2e-3 * norm(way));
+        REQUIRE((x - (mesh.positions().colwise() + (expected * way).eigen())).cwiseAbs().maxCoeff() < 2e-3 * norm(way));
     }
     const auto report = test::settle(solver, x, dt, network, backing);
     REQUIRE(report.converged);

@@ -127,7 +127,7 @@ bool same(const StepReport<S>& a, const StepReport<S>& b) {
            a.residual == b.residual && a.visits == b.visits &&
            std::equal(a.moved.begin(), a.moved.end(), b.moved.begin(), b.moved.end()) &&
            std::equal(a.reactions.begin(), a.reactions.end(), b.reactions.begin(), b.reactions.end(),
-                      same_bits<Vector3<S>>);
+                      [](const auto& one, const auto& other) { return same_bits(one, other); });
 }
 
 template <Real S>

@@ -165,7 +165,7 @@ TEST_CASE("a tool on fixed corners is pushed out by their stiffness times how de
         const auto corners = scene.mesh().triangles().col(2 * squares + 5);
         Vector3<double> weights = random.barycentric();
         if (seed % 3 == 0) weights = Vector3<double>::UnitX();
-        if (seed % 3 == 1) weights = (Vector3<double>() << 0.5, 0.5, 0).finished();
+        if (seed % 3 == 1) weights = Vector3<double>(0.5, 0.5, 0);
         if (seed % 3 == 2) weights = 0.7 * weights + Vector3<double>::Constant(0.1);
         const Vector3<double> foot = point_at(triangle_at(scene.mesh().positions(), corners), weights);
         const double side = seed % 2 == 0 ? 1 : -1;

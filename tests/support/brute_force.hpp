@@ -26,7 +26,8 @@ struct BruteTriangle {
 
 template <class Number, membrane::Real Scalar>
 BruteTriangle<Number> brute_triangle(const membrane::Triangle<Scalar>& t) {
-    return {t.a.template cast<Number>(), t.b.template cast<Number>(), t.c.template cast<Number>()};
+    return {t.a.eigen().template cast<Number>(), t.b.eigen().template cast<Number>(),
+            t.c.eigen().template cast<Number>()};
 }
 
 template <class Number>

@@ -26,17 +26,17 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
     const double h = 1e-5 * size;
     for (std::size_t i = 0; i < E::corner_count; ++i) {
         const auto pull = element.pull(x, i);
-        const auto moved = [&](const Eigen::Vector3d& way) {
+        const auto moved = [&](const membrane::Vector3<double>& way) {
             auto there = x;
             there[i] += way;
             return there;
         };
         for (Eigen::Index k = 0; k < 3; ++k) {
-            const Eigen::Vector3d by = h * Eigen::Vector3d::Unit(k);
+            const membrane::Vector3<double> by = h * membrane::Vector3<double>::Unit(k);
             const double slope = (element.energy(moved(by)) - element.energy(moved(-by))) / (2 * h);
             REQUIRE(std::abs(pull.force[k] + slope) < 1e-7 * energy / size);
         }
-        const Eigen::Vector3d way = random.number(0.0, 0.3) * size * random.unit_vector();
+        const membrane::Vector3<double> way = random.number(0.0, 0.3) * size * random.unit_vector();
         const auto change = element.energy_change(x, i, way);
         const double difference = element.energy(moved(way)) - element.energy(x);
         REQUIRE(std::abs(change.change - difference) < 1e-12 * energy + 1e-15 * change.size);

@@ -107,7 +107,7 @@ Surface<Scalar> random_closed_surface(Random& random) {
     Surface<Scalar> surface = surface_of(membrane::icosphere<Scalar>({.radius = 1, .subdivisions = random.index(3)}));
     const auto size = static_cast<Scalar>(std::pow(10, random.number(-3.0, 1.0)));
     surface.x = size * (random.rotation<Scalar>() * jittered(surface.x, Scalar(0.03), random));
-    surface.x.colwise() += size * random.vector<Scalar>();
+    surface.x.colwise() += size * random.vector<Scalar>().eigen();
     return shuffled(surface, random);
 }
 
@@ -124,7 +124,7 @@ Surface<Scalar> random_open_surface(Random& random) {
     }
     const auto size = static_cast<Scalar>(std::pow(10, random.number(-3.0, 1.0)));
     surface.x = size * (random.rotation<Scalar>() * jittered(surface.x, Scalar(0.03), random));
-    surface.x.colwise() += size * random.vector<Scalar>();
+    surface.x.colwise() += size * random.vector<Scalar>().eigen();
     return shuffled(surface, random);
 }
 

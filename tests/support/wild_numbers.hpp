@@ -48,7 +48,7 @@ struct Tick {
     membrane::Points<S> x, anchors;
     membrane::RigidFrame<S> pose;
     membrane::Vector3<S> target, force;
-    std::array<Eigen::Matrix<S, 3, 1>, 2> weights;
+    std::array<membrane::Vector3<S>, 2> weights;
     membrane::HeldPoint<S> held;
 };
 

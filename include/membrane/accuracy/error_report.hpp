@@ -28,7 +28,7 @@ struct EnclosedForce {
 
     /// Upper bound of the distance to `force` [N].
     template <class Force>
-    [[nodiscard]] double farthest_from(const Eigen::MatrixBase<Force>& force) const noexcept {
+    [[nodiscard]] double farthest_from(const Force& force) const noexcept {
         return norm<double>(force.template cast<double>() - centre) * (1 + 1e-15) + radius;
     }
 };

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <span>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -40,7 +41,8 @@ class Indentation {
     /// the surface at rest [m]. `mesh` must outlive this.
     /// @throws InvalidInput for a tool that is not sound, has no radius, does not stand outside or does not meet the
     /// surface, and for a way without a direction. Cost: O(F) some ten times.
-    Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool, const Vector3<Scalar>& way, Build build);
+    Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool,
+                const std::type_identity_t<Vector3<Scalar>>& way, Build build);
 
     /// Force of the membrane on the tool at each depth, against its way [N]; none (NaN) from the first depth on where it
     /// was found not to rest. Depths in any order: each is reached from the one above it.
@@ -89,7 +91,7 @@ inline constexpr std::string_view indentation_name = "Indentation";
 
 template <Real Scalar, MembraneBuilder Build>
 Indentation<Scalar, Build>::Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool,
-                                        const Vector3<Scalar>& way, Build build)
+                                        const std::type_identity_t<Vector3<Scalar>>& way, Build build)
     : mesh_(&mesh), tool_(tool), way_(way), build_(std::move(build)), tree_(mesh), tracker_(mesh) {
     constexpr auto name = detail::indentation_name;
     if (!is_sound(tool) || !(tool.radius > 0)) {

@@ -97,8 +97,9 @@ class PressedPlaces {
     void find_near(std::size_t i, const Triangles& triangles, const Points<double>& y, const Tool<double>& tool);
     [[nodiscard]] Vector3<double> take_touch(const ToolGap& touch, const Points<double>& y,
                                              const Tool<double>& tool) noexcept;
+    [[nodiscard]] static Wide wide(const Vector3<double>& a) noexcept { return {a.x(), a.y(), a.z()}; }
     [[nodiscard]] static Wide seen_from(const Tool<double>& tool, const Points<double>& y, Index v) noexcept {
-        return point(y, v).cast<long double>() - tool.position.cast<long double>();
+        return wide(point(y, v)) - wide(tool.position);
     }
     bool mark(const RestProblem& problem, double way) noexcept;
     bool narrow(double way) noexcept;
@@ -156,7 +157,7 @@ inline void PressedPlaces::find_near(std::size_t i, const Triangles& triangles, 
         const auto nearest = closest_to_segment(triangle, tool.position, end);
         const Vector3<double> reach = nearest.on_triangle.point - tool.position - nearest.along * tool.axis;
         const Vector3<double> u = direction<double>(reach, Vector3<double>::Zero());
-        const Wide wide_u = u.cast<long double>(), axis = tool.axis.cast<long double>();
+        const Wide wide_u = wide(u), axis = wide(tool.axis);
         long double distance = std::numeric_limits<long double>::infinity(), size = axis.norm() + tool.radius;
         for (const Index v : corners) {
             const Wide corner = seen_from(tool, y, v);
@@ -182,7 +183,7 @@ inline Vector3<double> PressedPlaces::take_touch(const ToolGap& touch, const Poi
         weights += weight;
     }
     place /= weights;
-    const Wide axis = tool.axis.cast<long double>();
+    const Wide axis = wide(tool.axis);
     const long double length = axis.squaredNorm();
     const long double along = touch.part == 2 && length > 0 ? place.dot(axis) / length : touch.part == 1 ? 1 : 0;
     const Wide reach = along * axis - place;

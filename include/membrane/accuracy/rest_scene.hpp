@@ -214,7 +214,7 @@ inline void RestScene::check(Index v) const {
 inline void RestScene::check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const {
     for (const Index v : corners) check(v);
     // Whoever brings weights of floats, brings their rounding.
-    const bool is_float = (barycentric.cast<float>().cast<double>() - barycentric).isZero(0);
+    const bool is_float = barycentric.cast<float>().cast<double>() == barycentric;
     if (is_float ? detail::is_barycentric<float>(barycentric.cast<float>()) : detail::is_barycentric(barycentric))
         return;
     refuse(detail::equilibrium_name, "barycentric weights of constraint ", constraint_,

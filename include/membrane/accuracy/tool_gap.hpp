@@ -71,8 +71,8 @@ namespace detail {
 [[nodiscard]] inline bool is_far(const Triangle<double>& t, const Tool<double>& tool, double far) noexcept {
     const Vector3<double> end = tool.position + tool.axis;
     const Vector3<double> low = t.a.cwiseMin(t.b).cwiseMin(t.c), high = t.a.cwiseMax(t.b).cwiseMax(t.c);
-    return ((low - tool.position.cwiseMax(end)).array() > far).any() ||
-           ((tool.position.cwiseMin(end) - high).array() > far).any();
+    return (low - tool.position.cwiseMax(end)).maxCoeff() > far ||
+           (tool.position.cwiseMin(end) - high).maxCoeff() > far;
 }
 
 /// Tool, part, corners involved, ascending.

@@ -175,7 +175,7 @@ template <Real Scalar>
 template <class Visit>
 Index AabbTree<Scalar>::touching_box(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& low,
                                      const Vector3<Scalar>& high, Visit&& visit) const noexcept {
-    if (!is_finite(low) || !is_finite(high) || !(low.array() <= high.array()).all()) return 0;
+    if (!is_finite(low) || !is_finite(high) || !at_most(low, high)) return 0;
     const Box<Scalar> asked{low, high};
     return boxes_.search(
         x, [&]<Number N>(const Box<N>& box) { return select<N>(overlap(box, asked), 0, 1); }, Scalar(1),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 
 #include <membrane/collision/contact.hpp>
@@ -83,9 +84,8 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
     grasp_.corners = contact.corners;
     grasp_.barycentric = contact.barycentric;
     if (options_.whole_vertex) {
-        Eigen::Index nearest;
-        contact.barycentric.maxCoeff(&nearest);
-        grasp_.barycentric = Vector3<Scalar>::Unit(nearest);
+        const auto& weights = contact.barycentric;
+        grasp_.barycentric = Vector3<Scalar>::Unit(std::max_element(weights.begin(), weights.end()) - weights.begin());
     }
     grasp_.offset = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
     grasp_.origin = point_at(triangle_at(origins_, grasp_.corners), grasp_.barycentric);

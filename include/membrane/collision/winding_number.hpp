@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <type_traits>
 
 #include <membrane/collision/aabb_tree.hpp>
@@ -44,10 +45,10 @@ int winding_number(const Neighbourhood<Scalar>& surface, const AabbTree<Scalar>&
                    const std::type_identity_t<ConstPointsRef<Scalar>>& x, const Vector3<Scalar>& q) noexcept {
     const Box<Scalar> all = tree.box(0);
     if (!(squared_distance(all, q) == 0)) return 0;
-    Eigen::Index up, down;
-    const Scalar above = (all.high - q).minCoeff(&up), below = (q - all.low).minCoeff(&down);
-    const bool upward = above < below;
-    const auto axis = upward ? up : down;
+    const Vector3<Scalar> above = all.high - q, below = q - all.low;
+    const bool upward = above.minCoeff() < below.minCoeff();
+    const Vector3<Scalar>& way = upward ? above : below;
+    const auto axis = std::min_element(way.begin(), way.end()) - way.begin();
     Vector3<Scalar> low = q, high = q;
     (upward ? high : low)[axis] = (upward ? all.high : all.low)[axis];
 

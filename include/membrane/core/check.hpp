@@ -48,6 +48,8 @@ template <Real Scalar>
 [[nodiscard]] bool is_finite(Scalar value) noexcept;
 
 /// Whether all entries of a vector or matrix are finite.
+template <Real Scalar>
+[[nodiscard]] bool is_finite(const Vector3<Scalar>& vector) noexcept;
 template <class Derived>
 [[nodiscard]] bool is_finite(const Eigen::DenseBase<Derived>& values) noexcept;
 
@@ -121,6 +123,11 @@ bool is_finite(Scalar value) noexcept {
     Bits bits;
     std::memcpy(&bits, &value, sizeof bits);
     return (bits & exponent) != exponent;
+}
+
+template <Real Scalar>
+bool is_finite(const Vector3<Scalar>& vector) noexcept {
+    return is_finite(vector.x()) && is_finite(vector.y()) && is_finite(vector.z());
 }
 
 template <class Derived>

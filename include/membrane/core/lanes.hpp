@@ -256,16 +256,3 @@ template <Number N>
 }
 
 }  // namespace membrane
-
-namespace Eigen {
-
-template <class Scalar>
-struct NumTraits<membrane::Lanes<Scalar>> : GenericNumTraits<membrane::Lanes<Scalar>> {
-    using Real = membrane::Lanes<Scalar>;
-    using NonInteger = Real;
-    using Nested = Real;
-    using Literal = Scalar;
-    enum { IsSigned = 1, RequireInitialization = 0 };  // NOLINT(readability-identifier-naming): Eigen's names
-};
-
-}  // namespace Eigen

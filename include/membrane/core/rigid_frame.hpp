@@ -27,11 +27,10 @@ struct RigidFrame {
 
     /// A force, an axis, a normal: turned, not moved.
     [[nodiscard]] Vector3<Scalar> direction_in(const Vector3<Scalar>& world) const noexcept {
-        return {dot<Scalar>(rotation.col(0), world), dot<Scalar>(rotation.col(1), world),
-                dot<Scalar>(rotation.col(2), world)};
+        return {dot(point(rotation, 0), world), dot(point(rotation, 1), world), dot(point(rotation, 2), world)};
     }
     [[nodiscard]] Vector3<Scalar> direction_out(const Vector3<Scalar>& body) const noexcept {
-        return rotation.col(0) * body.x() + rotation.col(1) * body.y() + rotation.col(2) * body.z();
+        return point(rotation, 0) * body.x() + point(rotation, 1) * body.y() + point(rotation, 2) * body.z();
     }
 
     /// Velocity in the world of what moves with the body and is at `place` [m/s], [m].

@@ -31,7 +31,7 @@ struct HapticState {
 template <class Policy, class Scalar>
 concept ForcePolicy = Real<Scalar> && requires(Policy& policy, const HapticState<Scalar>& state) {
     { policy(state) }
-    noexcept->std::same_as<Vector3<Scalar>>;
+    noexcept->std::convertible_to<Vector3<Scalar>>;
 };
 
 namespace detail {

@@ -112,7 +112,7 @@ Contact<Scalar> RestContact<Scalar>::contact_of(const Vector3<Scalar>& q, Scalar
     const bool inside = dot(reach, outward) < 0 && !surface_.on_border(nearest.triangle, nearest.barycentric);
     const Scalar sign = inside ? Scalar(-1) : Scalar(1);
     contact.gap = sign * norm(reach);
-    const bool on_face = (nearest.barycentric.array() != 0).all();
+    const bool on_face = nearest.barycentric.minCoeff() > 0;
     contact.normal = on_face ? outward : direction<Scalar>(sign * reach, outward);
     return contact;
 }

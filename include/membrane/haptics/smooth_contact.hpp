@@ -117,7 +117,7 @@ Vector3<Scalar> SmoothContact<Scalar>::normal_at(Index f, const Vector3<Scalar>&
         const Vector3<Scalar> weights = detail::weights_below(triangle_at(anchors, triangles_.col(f)), turned, q);
         const Index next = left > 0 ? across(f, weights) : no_index;
         if (next == no_index) {
-            const Vector3<Scalar> within = weights.cwiseMax(Scalar(0));
+            const Vector3<Scalar> within = weights.cwiseMax(Vector3<Scalar>::Zero());
             return point_at<Scalar>(turned, within / within.sum());
         }
         f = next;

@@ -36,7 +36,7 @@ struct Extent {
                other.low[1] <= high[1] && low[2] <= other.high[2] && other.low[2] <= high[2];
     }
     [[nodiscard]] bool contains(const Extent& other) const noexcept {
-        return (low.array() <= other.low.array()).all() && (high.array() >= other.high.array()).all();
+        return at_most(low, other.low) && at_most(other.high, high);
     }
 };
 
@@ -77,8 +77,8 @@ class HalvedBoxes {
             middles.include(middle(i));
         }
         if (count <= 4) return;
-        int axis = 0;
-        (middles.high - middles.low).maxCoeff(&axis);
+        const Vector3<double> size = middles.high - middles.low;
+        const auto axis = std::max_element(size.begin(), size.end()) - size.begin();
         const auto begin = order_.begin() + static_cast<std::ptrdiff_t>(first);
         const std::size_t half = count / 2;
         std::nth_element(begin, begin + static_cast<std::ptrdiff_t>(half), begin + static_cast<std::ptrdiff_t>(count),

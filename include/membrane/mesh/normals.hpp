@@ -157,7 +157,7 @@ template <Real Scalar>
 VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
     : borders_(static_cast<std::size_t>(mesh.vertex_count())),
       values_(3, mesh.vertex_count()),
-      at_rest_(Vector3<Scalar>(0, 0, 1).replicate(1, mesh.vertex_count())),
+      at_rest_(Vector3<Scalar>::UnitZ().eigen().replicate(1, mesh.vertex_count())),
       updated_(mesh.vertex_count()),
       areas_(static_cast<std::size_t>(at_a_time)) {
     const CompressedRows<Index> whole = detail::borders_of(mesh);
@@ -248,7 +248,7 @@ template <class VertexAt>
     scatter<Scalar>({area.x() / length, area.y() / length, area.z() / length}, areas_.data(), begins.data());
     for (std::size_t i = 0; i < vertices.size(); ++i) {
         const Scalar* normal = areas_.front().number.data() + begins[i];
-        values_.col(vertices[i]) << normal[0], normal[1], normal[2];
+        values_.col(vertices[i]) = Vector3<Scalar>(normal[0], normal[1], normal[2]);
     }
 
     Scalar all = places.sum();  // finite only if all that is added is; a vertex is no part of its border
@@ -275,7 +275,7 @@ Vector3<typename Positions::Scalar> pseudo_normal(const Positions& x, const Tria
     const auto face_normal = [&](Index g) {
         return detail::unit_or(area_vector(triangle_at(x, triangles.col(g))), none);
     };
-    const auto zeros = (barycentric.array() == 0).count();
+    const auto zeros = std::count(barycentric.begin(), barycentric.end(), Scalar(0));
     if (zeros == 0) return face_normal(f);
     if (zeros == 1) {
         const Index k = barycentric[0] == 0 ? 0 : barycentric[1] == 0 ? 1 : 2;

@@ -48,7 +48,7 @@ template <Real Scalar>
 Scalar passing_time(const Triangle<Scalar>& from, const Triangle<Scalar>& to, const Vector3<Scalar>& q) noexcept {
     const Vector3<Scalar> low = from.a.cwiseMin(from.b).cwiseMin(from.c).cwiseMin(to.a).cwiseMin(to.b).cwiseMin(to.c);
     const Vector3<Scalar> high = from.a.cwiseMax(from.b).cwiseMax(from.c).cwiseMax(to.a).cwiseMax(to.b).cwiseMax(to.c);
-    if (!((low.array() <= q.array()).all() && (q.array() <= high.array()).all())) return 1;
+    if (!(at_most(low, q) && at_most(q, high))) return 1;
 
     const Triangle<Scalar> begin{from.a - q, from.b - q, from.c - q}, end{to.a - q, to.b - q, to.c - q};
     const auto volume = [](const Vector3<Scalar>& a, const Vector3<Scalar>& b, const Vector3<Scalar>& c) {

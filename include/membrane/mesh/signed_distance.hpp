@@ -53,7 +53,9 @@ struct Bounds {
     Vector3<double> low = Vector3<double>::Constant(-std::numeric_limits<double>::infinity());
     Vector3<double> high = Vector3<double>::Constant(std::numeric_limits<double>::infinity());
 
-    [[nodiscard]] Bounds grown(double by) const noexcept { return {low.array() - by, high.array() + by}; }
+    [[nodiscard]] Bounds grown(double by) const noexcept {
+        return {low - Vector3<double>::Constant(by), high + Vector3<double>::Constant(by)};
+    }
     [[nodiscard]] Bounds within(const Bounds& other) const noexcept {
         return {low.cwiseMax(other.low), high.cwiseMin(other.high)};
     }
@@ -114,7 +116,7 @@ struct Cuboid {
 
     [[nodiscard]] double operator()(const Vector3<double>& p) const {
         const Vector3<double> beyond = (p - centre).cwiseAbs() - half_size;
-        return norm<double>(beyond.cwiseMax(0.0)) + (std::min)(beyond.maxCoeff(), 0.0);
+        return norm<double>(beyond.cwiseMax(Vector3<double>::Zero())) + (std::min)(beyond.maxCoeff(), 0.0);
     }
     [[nodiscard]] Bounds bounds() const { return {centre - half_size, centre + half_size}; }
 };
@@ -219,8 +221,7 @@ inline Vector3<double> Ellipsoid::nearest(const Vector3<double>& p) const {
     // By symmetry in one octant: x_k = r_k^2 y_k / (r_k^2 + t), where t is such that x is on the surface. Counted from the
     // shortest axis, s = r^2 + t, so that no digits are lost close to its middle plane.
     const Vector3<double> y = (p - centre).cwiseAbs();
-    int shortest = 0;
-    radii.minCoeff(&shortest);
+    const auto shortest = std::min_element(radii.begin(), radii.end()) - radii.begin();
     const double least = radii[shortest] * radii[shortest];
     const auto excess = [&](int k) { return radii[k] * radii[k] - least; };
     double s = 0;

@@ -346,7 +346,7 @@ bool touches_box(const Triangle<Scalar>& triangle, const Vector3<Scalar>& low, c
     Scalar size = (std::max)(detail::largest_magnitude(low), detail::largest_magnitude(high));
     for (int k = 0; k < 3; ++k) size = (std::max)(size, detail::largest_magnitude(detail::corner(triangle, k)));
     const Scalar slack = 8 * std::numeric_limits<Scalar>::epsilon() * size;
-    const Vector3<Scalar> centre = (low + high) / 2, half = ((high - low) / 2).array() + slack;
+    const Vector3<Scalar> centre = (low + high) / 2, half = (high - low) / 2 + Vector3<Scalar>::Constant(slack);
     const Vector3<Scalar> corners[] = {triangle.a - centre, triangle.b - centre, triangle.c - centre};
     const auto overlap_along = [&](const Vector3<Scalar>& axis) {
         const Scalar a = dot(axis, corners[0]), b = dot(axis, corners[1]), c = dot(axis, corners[2]);

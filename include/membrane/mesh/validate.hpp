@@ -159,8 +159,8 @@ bool check_t_junctions(const WorkableMesh& mesh, std::span<const std::vector<Hal
             edges.push_back(side);
             Extent box;
             for (const Index v : {side.first, side.second}) {
-                box.include(Vector3<double>(point(mesh.x, v).array() - tolerance));
-                box.include(Vector3<double>(point(mesh.x, v).array() + tolerance));
+                box.include(point(mesh.x, v) - Vector3<double>::Constant(tolerance));
+                box.include(point(mesh.x, v) + Vector3<double>::Constant(tolerance));
             }
             boxes.push_back(box);
         }

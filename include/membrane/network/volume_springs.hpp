@@ -64,7 +64,8 @@ concept CheckedVolumeModel = detail::check_volume_model<Volume, Scalar>();
 /// No body under the membrane: nothing holds it, at no cost.
 struct NoVolumeSprings {
     template <Real Scalar>
-    [[nodiscard]] Pull<Scalar> pull(Index, const Vector3<Scalar>&, const Vector3<Scalar>&, Scalar) const noexcept {
+    [[nodiscard]] Pull<Scalar> pull(Index, const std::type_identity_t<Vector3<Scalar>>&,
+                                    const std::type_identity_t<Vector3<Scalar>>&, Scalar) const noexcept {
         return {Vector3<Scalar>::Zero(), 0};
     }
 };

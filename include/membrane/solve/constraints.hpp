@@ -35,7 +35,7 @@ concept Constraint = Real<Scalar> &&
     { constraint.enforce(context) }
     noexcept->std::same_as<bool>;
     { constraint.reaction(done) }
-    noexcept->std::same_as<Vector3<Scalar>>;
+    noexcept->std::convertible_to<Vector3<Scalar>>;
 };
 
 namespace detail {
@@ -63,7 +63,7 @@ consteval bool check_constraint() noexcept {
     static_assert(
         requires(const C& constraint, const ConstraintContext<Scalar>& done) {
             { constraint.reaction(done) }
-            noexcept->std::same_as<Vector3<Scalar>>;
+            noexcept->std::convertible_to<Vector3<Scalar>>;
         },
         "Constraint: reaction(const ConstraintContext<Scalar>&) const noexcept must return Vector3<Scalar>");
     return Constraint<C, Scalar>;
@@ -255,7 +255,7 @@ template <Real Scalar>
 
 /// Vertex `v` is held at `target` [m].
 template <class Target>
-[[nodiscard]] HeldVertex<typename Target::Scalar> pull(Index v, const Eigen::MatrixBase<Target>& target) noexcept {
+[[nodiscard]] HeldVertex<typename Target::Scalar> pull(Index v, const Target& target) noexcept {
     return {v, target};
 }
 
@@ -266,6 +266,12 @@ template <class Target>
 template <Real Scalar>
 [[nodiscard]] Load<Scalar> load(const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
                                 const Vector3<Scalar>& force) noexcept {
+    return {corners, barycentric, force};
+}
+template <class Force>
+[[nodiscard]] Load<typename Force::Scalar> load(const std::array<Index, 3>& corners,
+                                                const Vector3<typename Force::Scalar>& barycentric,
+                                                const Eigen::MatrixBase<Force>& force) noexcept {
     return {corners, barycentric, force};
 }
 

@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+
+#include <Eigen/Core>
+
+#include <membrane/core/number.hpp>
+
+/// Three numbers: a point, a direction, a force.
+///
+///     const membrane::Vector3<double> a(1, 2, 3), b = x.col(v);       // from three numbers, from any column of Eigen's
+///     const auto middle = (a + b) / 2;                                // a value, not an expression
+///     x.col(v) += dot(a, b) * a;                                      // a column takes it
+///     const Eigen::Vector3d e = rotation * a;                         // so does a vector of Eigen's
+///
+/// Eigen's own dot() and norm() add in an order that depends on the instruction set. These do not, so that every compiler
+/// and processor comes to the same bits as long as it does not contract a * b + c. Nothing is left for a compiler to unfold,
+/// so that a program compiles sooner, and runs faster without optimisation.
+namespace membrane {
+
+template <Number N>
+class Vector3;
+
+namespace detail {
+
+/// An expression of Eigen's with three rows and one column.
+template <class Derived, class N>
+concept Column =
+    std::same_as<typename Derived::Scalar, N> && Derived::RowsAtCompileTime == 3 && Derived::ColsAtCompileTime == 1;
+
+/// An expression of Eigen's that a vector can be multiplied by.
+template <class Derived, class N>
+concept ThreeColumns = std::same_as<typename Derived::Scalar, N> && Derived::ColsAtCompileTime == 3;
+
+/// What lets Eigen's matrices take a vector by `=`, `+=` and `-=`.
+template <class N>
+struct ThreeByOne : Eigen::EigenBase<Vector3<N>> {
+    using Scalar = N;
+    enum { RowsAtCompileTime = 3, ColsAtCompileTime = 1, SizeAtCompileTime = 3 };  // NOLINT: Eigen's names
+
+    [[nodiscard]] static constexpr Eigen::Index rows() noexcept { return 3; }
+    [[nodiscard]] static constexpr Eigen::Index cols() noexcept { return 1; }
+    template <class To>
+    void evalTo(To& to) const {  // NOLINT(readability-identifier-naming): Eigen's
+        for (Eigen::Index k = 0; k < 3; ++k) to.coeffRef(k, 0) = this->derived()[k];
+    }
+    template <class To>
+    void addTo(To& to) const {  // NOLINT(readability-identifier-naming): Eigen's
+        for (Eigen::Index k = 0; k < 3; ++k) to.coeffRef(k, 0) += this->derived()[k];
+    }
+    template <class To>
+    void subTo(To& to) const {  // NOLINT(readability-identifier-naming): Eigen's
+        for (Eigen::Index k = 0; k < 3; ++k) to.coeffRef(k, 0) -= this->derived()[k];
+    }
+};
+
+}  // namespace detail
+
+/// Three numbers, or three packs of `Lanes`: several vectors. Members with capitals are named as Eigen's are.
+template <Number N>
+class Vector3 : public detail::ThreeByOne<N> {
+  public:
+    Vector3() = default;  ///< Not initialised.
+    constexpr Vector3(const N& x, const N& y, const N& z) noexcept : number_{x, y, z} {}
+
+    template <detail::Column<N> Derived>
+    Vector3(const Eigen::MatrixBase<Derived>& column) noexcept {  // NOLINT(google-explicit-constructor)
+        const Eigen::Matrix<N, 3, 1> value = column;
+        *this = Vector3(value.coeff(0), value.coeff(1), value.coeff(2));
+    }
+    [[nodiscard]] Eigen::Matrix<N, 3, 1> eigen() const noexcept { return *this; }
+
+    // NOLINTBEGIN(readability-identifier-naming): Eigen's names
+    [[nodiscard]] static constexpr Vector3 Constant(const N& all) noexcept { return {all, all, all}; }
+    [[nodiscard]] static constexpr Vector3 Zero() noexcept { return {0, 0, 0}; }
+    [[nodiscard]] static constexpr Vector3 Ones() noexcept { return {1, 1, 1}; }
+    [[nodiscard]] static constexpr Vector3 Unit(Eigen::Index k) noexcept {
+        return {N(k == 0 ? 1 : 0), N(k == 1 ? 1 : 0), N(k == 2 ? 1 : 0)};
+    }
+    [[nodiscard]] static constexpr Vector3 UnitX() noexcept { return {1, 0, 0}; }
+    [[nodiscard]] static constexpr Vector3 UnitY() noexcept { return {0, 1, 0}; }
+    [[nodiscard]] static constexpr Vector3 UnitZ() noexcept { return {0, 0, 1}; }
+
+    [[nodiscard]] constexpr N& x() noexcept { return number_[0]; }
+    [[nodiscard]] constexpr N& y() noexcept { return number_[1]; }
+    [[nodiscard]] constexpr N& z() noexcept { return number_[2]; }
+    [[nodiscard]] constexpr const N& x() const noexcept { return number_[0]; }
+    [[nodiscard]] constexpr const N& y() const noexcept { return number_[1]; }
+    [[nodiscard]] constexpr const N& z() const noexcept { return number_[2]; }
+    [[nodiscard]] constexpr N& operator[](std::integral auto k) noexcept { return number_[k]; }
+    [[nodiscard]] constexpr const N& operator[](std::integral auto k) const noexcept { return number_[k]; }
+    [[nodiscard]] constexpr N* data() noexcept { return number_; }
+    [[nodiscard]] constexpr const N* data() const noexcept { return number_; }
+    [[nodiscard]] constexpr const N* begin() const noexcept { return number_; }
+    [[nodiscard]] constexpr const N* end() const noexcept { return number_ + 3; }
+
+    [[nodiscard]] friend constexpr Vector3 operator+(const Vector3& a, const Vector3& b) noexcept {
+        return {a.number_[0] + b.number_[0], a.number_[1] + b.number_[1], a.number_[2] + b.number_[2]};
+    }
+    [[nodiscard]] friend constexpr Vector3 operator-(const Vector3& a, const Vector3& b) noexcept {
+        return {a.number_[0] - b.number_[0], a.number_[1] - b.number_[1], a.number_[2] - b.number_[2]};
+    }
+    [[nodiscard]] friend constexpr Vector3 operator-(const Vector3& a) noexcept {
+        return {-a.number_[0], -a.number_[1], -a.number_[2]};
+    }
+    [[nodiscard]] friend constexpr Vector3 operator*(const N& s, const Vector3& a) noexcept {
+        return {s * a.number_[0], s * a.number_[1], s * a.number_[2]};
+    }
+    [[nodiscard]] friend constexpr Vector3 operator*(const Vector3& a, const N& s) noexcept {
+        return {a.number_[0] * s, a.number_[1] * s, a.number_[2] * s};
+    }
+    [[nodiscard]] friend constexpr Vector3 operator/(const Vector3& a, const N& s) noexcept {
+        return {a.number_[0] / s, a.number_[1] / s, a.number_[2] / s};
+    }
+    template <detail::ThreeColumns<N> Derived>
+    [[nodiscard]] friend auto operator*(const Eigen::MatrixBase<Derived>& matrix, const Vector3& a) noexcept {
+        return (matrix * a.eigen()).eval();
+    }
+    [[nodiscard]] friend Eigen::Matrix<N, 3, 3> operator*(const Vector3& a,
+                                                          const Eigen::Matrix<N, 1, 3>& row) noexcept {
+        return a.eigen() * row;
+    }
+    constexpr Vector3& operator+=(const Vector3& b) noexcept { return *this = *this + b; }
+    constexpr Vector3& operator-=(const Vector3& b) noexcept { return *this = *this - b; }
+    constexpr Vector3& operator*=(const N& s) noexcept { return *this = *this * s; }
+    constexpr Vector3& operator/=(const N& s) noexcept { return *this = *this / s; }
+    constexpr void setZero() noexcept { *this = Zero(); }
+    [[nodiscard]] friend constexpr bool operator==(const Vector3& a, const Vector3& b) noexcept {
+        return a.number_[0] == b.number_[0] && a.number_[1] == b.number_[1] && a.number_[2] == b.number_[2];
+    }
+
+    [[nodiscard]] constexpr N dot(const Vector3& b) const noexcept {
+        return (number_[0] * b.number_[0] + number_[1] * b.number_[1]) + number_[2] * b.number_[2];
+    }
+    [[nodiscard]] constexpr Vector3 cross(const Vector3& b) const noexcept {
+        return {number_[1] * b.number_[2] - number_[2] * b.number_[1],
+                number_[2] * b.number_[0] - number_[0] * b.number_[2],
+                number_[0] * b.number_[1] - number_[1] * b.number_[0]};
+    }
+    [[nodiscard]] constexpr N squaredNorm() const noexcept { return dot(*this); }
+    [[nodiscard]] N norm() const noexcept {
+        using std::sqrt;
+        return sqrt(squaredNorm());
+    }
+    /// @pre not zero
+    [[nodiscard]] Vector3 normalized() const noexcept { return *this / norm(); }
+
+    [[nodiscard]] constexpr N sum() const noexcept { return (number_[0] + number_[1]) + number_[2]; }
+    [[nodiscard]] constexpr N minCoeff() const noexcept {
+        return (std::min)((std::min)(number_[0], number_[1]), number_[2]);
+    }
+    [[nodiscard]] constexpr N maxCoeff() const noexcept {
+        return (std::max)((std::max)(number_[0], number_[1]), number_[2]);
+    }
+    /// Whether no number is larger than `most`, whatever its sign.
+    [[nodiscard]] bool isZero(const N& most) const noexcept {
+        return std::abs(number_[0]) <= most && std::abs(number_[1]) <= most && std::abs(number_[2]) <= most;
+    }
+    [[nodiscard]] Vector3 cwiseAbs() const noexcept {
+        return {std::abs(number_[0]), std::abs(number_[1]), std::abs(number_[2])};
+    }
+    [[nodiscard]] constexpr Vector3 cwiseMin(const Vector3& b) const noexcept {
+        return {(std::min)(number_[0], b.number_[0]), (std::min)(number_[1], b.number_[1]),
+                (std::min)(number_[2], b.number_[2])};
+    }
+    [[nodiscard]] constexpr Vector3 cwiseMax(const Vector3& b) const noexcept {
+        return {(std::max)(number_[0], b.number_[0]), (std::max)(number_[1], b.number_[1]),
+                (std::max)(number_[2], b.number_[2])};
+    }
+    [[nodiscard]] constexpr Vector3 cwiseProduct(const Vector3& b) const noexcept {
+        return {number_[0] * b.number_[0], number_[1] * b.number_[1], number_[2] * b.number_[2]};
+    }
+    [[nodiscard]] constexpr Vector3 cwiseQuotient(const Vector3& b) const noexcept {
+        return {number_[0] / b.number_[0], number_[1] / b.number_[1], number_[2] / b.number_[2]};
+    }
+
+    template <Number To>
+    [[nodiscard]] constexpr Vector3<To> cast() const noexcept {
+        return {static_cast<To>(number_[0]), static_cast<To>(number_[1]), static_cast<To>(number_[2])};
+    }
+    /// A row of Eigen's: for `a * b.transpose()`, and to be printed.
+    [[nodiscard]] Eigen::Matrix<N, 1, 3> transpose() const noexcept { return {number_[0], number_[1], number_[2]}; }
+    // NOLINTEND(readability-identifier-naming)
+
+  private:
+    N number_[3];
+};
+
+template <Number N>
+[[nodiscard]] constexpr N dot(const Vector3<N>& a, const Vector3<N>& b) noexcept {
+    return a.dot(b);
+}
+
+template <Number N>
+[[nodiscard]] constexpr N squared_norm(const Vector3<N>& a) noexcept {
+    return a.dot(a);
+}
+
+template <Number N>
+[[nodiscard]] N norm(const Vector3<N>& a) noexcept {
+    return a.norm();
+}
+
+template <Number N>
+[[nodiscard]] constexpr Vector3<N> cross(const Vector3<N>& a, const Vector3<N>& b) noexcept {
+    return a.cross(b);
+}
+
+/// Whether each number of `a` is at most that of `b`.
+template <Real Scalar>
+[[nodiscard]] constexpr bool at_most(const Vector3<Scalar>& a, const Vector3<Scalar>& b) noexcept {
+    return a.x() <= b.x() && a.y() <= b.y() && a.z() <= b.z();
+}
+
+/// `a` at unit length, or `otherwise` where `a` has no direction.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> direction(const Vector3<Scalar>& a, const Vector3<Scalar>& otherwise) noexcept {
+    const Scalar length = norm(a);
+    return length > 0 ? a / length : otherwise;
+}
+
+}  // namespace membrane
+
+namespace Eigen::internal {
+
+template <class N>
+struct traits<membrane::Vector3<N>> : traits<Matrix<N, 3, 1>> {
+    using StorageKind = membrane::Vector3<N>;
+};
+template <class N>
+struct storage_kind_to_shape<membrane::Vector3<N>> {
+    using Shape = membrane::Vector3<N>;
+};
+
+}  // namespace Eigen::internal
