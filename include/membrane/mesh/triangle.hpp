@@ -168,29 +168,31 @@ template <bool branches, Number N>
 
     const N divisor = select<N>(over_face, whole, 1);  // beside the face, nothing may overflow
     const N b = select<N>(over_face, weight_b / divisor, 0), c = select<N>(over_face, weight_c / divisor, 0);
-    const Vector3<N> in_face(larger<N>(0, 1 - b - c), b, c), offset_in_face = aq - b * ab - c * ac;
-    if (branches && all(over_face)) return {in_face, point_at(triangle, in_face), squared_norm(offset_in_face)};
-
-    // Outside, the nearest point lies on an edge that faces q.
-    N nearest = Limits::infinity();
-    Vector3<N> barycentric(1, 0, 0);
-    const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge)
-        __attribute__((always_inline)) {
-        if (Real<N> && !any(faces)) return;  // of several triangles, which of them count no processor predicts
-        const N along = fraction(dot(offset, edge), squared_norm(edge));
-        const N squared_distance = squared_norm<N>(offset - along * edge);
-        const auto nearer = finite & faces & (squared_distance < nearest);
-        nearest = select<N>(nearer, squared_distance, nearest);
-        const Eigen::Index next = (k + 1) % 3, last = (k + 2) % 3;
-        barycentric[k] = select<N>(nearer, 1 - along, barycentric[k]);
-        barycentric[next] = select<N>(nearer, along, barycentric[next]);
-        barycentric[last] = select<N>(nearer, 0, barycentric[last]);
-    };
-    consider(0, (!has_area) | (weight_c < 0), aq, ab);
-    consider(1, (!has_area) | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
-    consider(2, (!has_area) | (weight_b < 0), q - triangle.c, -ac);
-    for (Eigen::Index k = 0; k < 3; ++k) barycentric[k] = select<N>(over_face, in_face[k], barycentric[k]);
-    return {barycentric, point_at(triangle, barycentric), select<N>(over_face, squared_norm(offset_in_face), nearest)};
+    Vector3<N> barycentric(larger<N>(0, 1 - b - c), b, c);
+    N nearest = squared_norm<N>(aq - b * ab - c * ac);
+    if (!branches || !all(over_face)) {
+        // Outside, the nearest point lies on an edge that faces q.
+        N on_edges = Limits::infinity();
+        Vector3<N> weights(1, 0, 0);
+        const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge)
+            __attribute__((always_inline)) {
+            if (Real<N> && !any(faces)) return;  // of several triangles, which of them count no processor predicts
+            const N along = fraction(dot(offset, edge), squared_norm(edge));
+            const N squared_distance = squared_norm<N>(offset - along * edge);
+            const auto nearer = finite & faces & (squared_distance < on_edges);
+            on_edges = select<N>(nearer, squared_distance, on_edges);
+            const Eigen::Index next = (k + 1) % 3, last = (k + 2) % 3;
+            weights[k] = select<N>(nearer, 1 - along, weights[k]);
+            weights[next] = select<N>(nearer, along, weights[next]);
+            weights[last] = select<N>(nearer, 0, weights[last]);
+        };
+        consider(0, (!has_area) | (weight_c < 0), aq, ab);
+        consider(1, (!has_area) | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
+        consider(2, (!has_area) | (weight_b < 0), q - triangle.c, -ac);
+        for (Eigen::Index k = 0; k < 3; ++k) barycentric[k] = select<N>(over_face, barycentric[k], weights[k]);
+        nearest = select<N>(over_face, nearest, on_edges);
+    }
+    return {barycentric, point_at(triangle, barycentric), nearest};
 }
 
 }  // namespace detail

@@ -78,6 +78,7 @@ struct alignas(32) ContactPack {
     std::size_t size = 0;                            ///< lanes in use
     ContactKind kind = ContactKind::end;
     bool on_fixed = false;  ///< whether a corner of one is fixed
+    bool acts = true;       ///< whether one pressed or was inside in the last pass over all
 };
 
 /// Contact points in packs, for all constraints of a step. A point goes to the first pack of its kind with room that has none
@@ -163,7 +164,7 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
     std::array<std::array<std::size_t, colour_count>, 3> open;  // of each kind and colour, the pack with room
     for (auto& of_kind : open) of_kind.fill(none);
     const auto colours = [this](Index v) -> std::uint64_t& { return colours_[static_cast<std::size_t>(v)]; };
-    for (const auto& point : points) {
+    const auto add = [&](const ContactPoint<Scalar>& point) {
         const auto& v = point.corners;
         const ContactKind kind = kind_of(point.feature);
         // A vertex with so many points that all colours are taken has the next ones in packs of their own.
@@ -179,6 +180,15 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
         for (const Index corner : v) {
             if (colour < colour_count) colours(corner) |= std::uint64_t{1} << colour;
         }
+    };
+    // Those that press first: points that are only near cost less in packs of their own.
+    const auto presses = [](const ContactPoint<Scalar>& point) { return !(point.force == Vector3<Scalar>::Zero()); };
+    for (const auto& point : points) {
+        if (presses(point)) add(point);
+    }
+    for (auto& of_kind : open) of_kind.fill(none);
+    for (const auto& point : points) {
+        if (!presses(point)) add(point);
     }
     for (const auto& point : points) {
         for (const Index v : point.corners) colours(v) = 0;

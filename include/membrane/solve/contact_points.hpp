@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <type_traits>
 
 #include <membrane/collision/contact.hpp>
 #include <membrane/collision/tool.hpp>
@@ -47,10 +48,11 @@ template <Real Scalar>
 bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs) noexcept;
 
 /// One pass of projected Gauss-Seidel: brings each point up to date with the positions, changes its force by what closes
-/// the gap at the compliance of its corners, never below zero, and moves them along. Online. Cost: linear in the points.
+/// the gap at the compliance of its corners, never below zero, and moves them along. A pass that comes `again`, before the
+/// vertices have moved, leaves out packs whose points neither pressed nor were inside. Online. Cost: linear in the points.
 template <Real Scalar>
 ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
-                                   std::span<ContactPack<Scalar>> packs) noexcept;
+                                   std::span<ContactPack<Scalar>> packs, bool again = false) noexcept;
 
 /// Lets the vertices feel the forces that these passes have found.
 template <Real Scalar>
@@ -77,6 +79,14 @@ template <Real Scalar>
     return {a.x(), a.y(), a.z()};
 }
 
+/// Calls `act` with 0, 1 and 2. Written out by hand: compilers leave a long loop rolled up, and what it reads in memory.
+template <class Act>
+[[gnu::always_inline]] inline void each_corner(const Act& act) noexcept {
+    act(std::integral_constant<std::size_t, 0>());
+    act(std::integral_constant<std::size_t, 1>());
+    act(std::integral_constant<std::size_t, 2>());
+}
+
 /// A face that rocks under a tool moves the contact point along itself, and with it the force from corner to corner: for
 /// each corner the stiffness [N/m] that this amounts to. `moment` is the force times the distance from the face to the
 /// tool's axis [N m].
@@ -100,6 +110,18 @@ template <Number N>
     return stiffness;
 }
 
+/// Beyond, squares overflow: half of the range, less a few bits.
+template <Real Scalar>
+inline constexpr Scalar too_far = Scalar(sizeof(Scalar) == 4 ? 1e18 : 1e153);
+
+/// The tool stays on the side where it was found.
+template <Real Scalar>
+[[gnu::always_inline, nodiscard]] inline Vector3<Lanes<Scalar>> on_same_side(const Vector3<Lanes<Scalar>>& normal,
+                                                                             const ContactPack<Scalar>& pack) noexcept {
+    using Wide = Lanes<Scalar>;
+    return select<Wide>(dot(normal, pack.load.normal) < 0, -1, 1) * normal;
+}
+
 /// The normal of a pack along `along`, as far as there is a point: the tool stays on the side of the triangle, or of the edge
 /// or corner it is nearest to, where it was found. `separation` is from the points to the tool's axis [m].
 template <Real Scalar>
@@ -108,19 +130,44 @@ template <Real Scalar>
                                               const Vector3<Lanes<Scalar>>& separation,
                                               ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
-    const Scalar too_far = std::sqrt((std::numeric_limits<Scalar>::max)()) / 16;  // there squares overflow
     const Wide length = norm(along);
-    const auto exists = found & (length < too_far) & (squared_norm(separation) < too_far);
+    const auto exists = found & (length < too_far<Scalar>)&(squared_norm(separation) < too_far<Scalar>);
     pack.used = select<Wide>(exists, 1, 0);
     pack.load.force = select<Wide>(exists, pack.load.force, 0);
     const auto has_length = exists & (length > 0);
-    const Wide divisor = select<Wide>(has_length, length, 1);
+    const Wide per_length = 1 / select<Wide>(has_length, length, 1);
     Vector3<Wide> away;
-    for (Eigen::Index k = 0; k < 3; ++k) {
-        away[k] = select<Wide>(has_length, along[k] / divisor, pack.load.normal[k]);
-    }
-    pack.load.normal = select<Wide>(dot(away, pack.load.normal) < 0, -1, 1) * away;
-    pack.distance = select<Wide>(exists, dot(separation, pack.load.normal), 0);
+    for (Eigen::Index k = 0; k < 3; ++k) away[k] = select<Wide>(has_length, per_length * along[k], pack.load.normal[k]);
+    const Vector3<Wide> normal = on_same_side(away, pack);
+    pack.load.normal = normal;
+    pack.distance = select<Wide>(exists, dot(separation, normal), 0);
+}
+
+/// `locate` where all points lie in the faces of their triangles, the usual case: one root and one division. False, and
+/// nothing is done, if one does not.
+template <Real Scalar>
+[[gnu::always_inline]] inline bool locate_in_faces(const Triangle<Lanes<Scalar>>& triangle,
+                                                   const Vector3<Lanes<Scalar>>& axis_point,
+                                                   ContactPack<Scalar>& pack) noexcept {
+    using Wide = Lanes<Scalar>;
+    using Limits = std::numeric_limits<Scalar>;
+    const Vector3<Wide> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = axis_point - triangle.a;
+    const Vector3<Wide> area = cross(ab, ac);
+    const Wide whole = squared_norm(area), listed = pack.listed;
+    const Wide weight_b = dot(area, cross(aq, ac)), weight_c = dot(area, cross(ab, aq));
+    const auto has_area = (whole > Limits::epsilon() * (squared_norm(ab) * squared_norm(ac))) &
+                          (larger<Wide>(whole, squared_norm(aq)) < too_far<Scalar>);
+    const Wide least = smaller<Wide>(smaller(weight_b, weight_c), whole - weight_b - weight_c);
+    const auto in_face = has_area & (least > 0);
+    if (any((listed > 0) & !in_face)) return false;
+    const Wide per_length = 1 / root_of<Wide>(select<Wide>(in_face, whole, 1)), part = per_length * per_length;
+    const Wide b = part * weight_b, c = part * weight_c;
+    const Vector3<Wide> normal = on_same_side<Scalar>(per_length * area, pack);
+    pack.load.weights = {larger<Wide>(0, 1 - b - c), b, c};
+    pack.load.normal = normal;
+    pack.distance = dot(aq, normal);
+    pack.used = listed;
+    return true;
 }
 
 /// Brings weights, normal and distance of a pack up to date with the positions, its forces unchanged but for points that are
@@ -137,12 +184,14 @@ template <Real Scalar>
         pack.distance = dot(separation, pack.load.normal);
     } else if (pack.kind == ContactKind::end) {
         const Vector3<Wide> axis_point = broadcast(tool.position) + pack.end * broadcast(tool.axis);
-        const auto nearest = closest_point_inline<true>(triangle, axis_point);
-        const Vector3<Wide>& weights = pack.load.weights = nearest.barycentric;
+        if (locate_in_faces(triangle, axis_point, pack)) return;
+        const auto nearest = closest_point_inline<false>(triangle, axis_point);
+        const Vector3<Wide>& weights = nearest.barycentric;
         const Vector3<Wide> separation = axis_point - nearest.point, area = area_vector(triangle);
         const auto in_face = smaller(smaller(weights[0], weights[1]), weights[2]) > 0;
         Vector3<Wide> along;
         for (Eigen::Index k = 0; k < 3; ++k) along[k] = select<Wide>(in_face, area[k], separation[k]);
+        pack.load.weights = weights;
         set_normal(listed, along, separation, pack);
     } else {
         const Vector3<Wide> start = broadcast(tool.position), axis = broadcast(tool.axis);
@@ -158,7 +207,7 @@ template <Real Scalar>
 [[gnu::always_inline]] inline void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const auto &load = pack.load, &applied = pack.applied;
-    for (std::size_t k = 0; k < 3; ++k) {
+    each_corner([&](std::size_t k) {
         const auto i = static_cast<Eigen::Index>(k);
         auto row = gather_padded(state.force.data(), pack.corner[k].data());
         const Wide now = load.force * load.weights[i], before = applied.force * applied.weights[i];
@@ -166,11 +215,11 @@ template <Real Scalar>
         row.point += change;
         row.extra += load.stiffness[i] - applied.stiffness[i];
         scatter_padded(row, state.force.data(), pack.corner[k].data());
-        if (!pack.on_fixed) continue;
+        if (!pack.on_fixed) return;
         auto support = gather_padded(state.support.data(), pack.corner[k].data());
         support.point += (1 - pack.free[i]) * change;
         scatter_padded(support, state.support.data(), pack.corner[k].data());
-    }
+    });
     pack.applied = load;
 }
 
@@ -187,8 +236,7 @@ template <Real Scalar>
                                                const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     SupportOfPack<Scalar> sum;
-    if (!pack.on_fixed) return sum;
-    for (std::size_t k = 0; k < 3; ++k) {
+    for (std::size_t k = 0; pack.on_fixed && k < 3; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
         const auto support = gather_padded(state.support.data(), pack.corner[k].data());
         const auto yields = (support.extra > 0) & (pack.free[i] < 1);
@@ -247,8 +295,11 @@ template <Real Scalar>
                                                                           const SupportOfPack<Scalar>& support,
                                                                           const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
-    PackResponse<Scalar> response{{}, support.compliance, support.force, support.stiffness};
-    for (std::size_t k = 0; k < 3; ++k) {
+    PackResponse<Scalar> response;
+    response.compliance = support.compliance;
+    response.internal_force = support.force;
+    response.internal_stiffness = support.stiffness;
+    each_corner([&](std::size_t k) {
         std::array<Index, Wide::count> begins;
         for (std::size_t i = 0; i < Wide::count; ++i) begins[i] = 2 * pack.corner[k][i];
         const auto a = gather_padded(state.response.data(), begins.data());
@@ -259,7 +310,7 @@ template <Real Scalar>
         response.compliance += weight * dot(response.of_corner[k], pack.load.normal);
         response.internal_force += b.point[2];
         response.internal_stiffness += b.extra;
-    }
+    });
     return response;
 }
 
@@ -285,10 +336,10 @@ template <Real Scalar>
     if (!any(counts)) return 0;
     change = select<Wide>(counts, change, 0);
     pack.load.force += change;
-    for (std::size_t k = 0; k < 3; ++k) {
+    each_corner([&](std::size_t k) {
         corner[k].point -= change * response.of_corner[k];
         scatter_padded(corner[k], state.position.data(), pack.corner[k].data());
-    }
+    });
     return abs(change);
 }
 
@@ -327,18 +378,20 @@ template <Real Scalar>
 
 template <Real Scalar>
 [[gnu::flatten]] ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
-                                                    std::span<ContactPack<Scalar>> packs) noexcept {
+                                                    std::span<ContactPack<Scalar>> packs, bool again) noexcept {
     using Wide = Lanes<Scalar>;
     ContactPass<Scalar> pass;
     Wide largest = 0;
     for (auto& pack : packs) {
+        if (again && !pack.acts) continue;
         auto corner = detail::corners_of(state, pack);
         detail::locate(tool, corner, pack);
         if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners yield by the forces up to here
         const auto support = detail::support_of(state, pack);
         const Wide gap = detail::gap_of(tool, pack, support);
         const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (gap < 0));
-        if (!any(acts)) continue;
+        pack.acts = any(acts);
+        if (!pack.acts) continue;
         const auto allowed = static_cast<Scalar>(deep_overlap * deep_overlap);
         const Wide edge_square = squared_norm<Wide>(corner[1].point - corner[0].point);
         pass.deep = pass.deep || any((pack.used > 0) & (gap < 0) & (gap * gap > allowed * edge_square));

@@ -313,7 +313,7 @@ bool Press<Scalar>::enforce(Context& context) const noexcept {
     const bool stiff = on_fixed || feature_pairs(tool) > 1;
     const int most = stiff ? detail::stiff_contact_passes : detail::contact_passes;
     for (int i = 0; i < detail::deep_contact_passes; ++i) {
-        const auto pass = solve_contacts(context.state(), shape(), packs(context));
+        const auto pass = solve_contacts(context.state(), shape(), packs(context), i > 0);
         released = released || pass.released;
         if (i == 0) first = pass.largest;
         // The vertices have to find their balance anew.
