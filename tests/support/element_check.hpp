@@ -14,10 +14,6 @@
 
 namespace test {
 
-inline Eigen::Matrix3d full(const membrane::Symmetric3<double>& a) {
-    return Eigen::Matrix3d{{a.xx, a.xy, a.xz}, {a.xy, a.yy, a.yz}, {a.xz, a.yz, a.zz}};
-}
-
 /// Force, change of energy and curvature of an element against differences of its energy, which vary over ways of `size`
 /// [m] by some `energy` [J].
 template <class E>
@@ -40,7 +36,7 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
         const auto change = element.energy_change(x, i, way);
         const double difference = element.energy(moved(way)) - element.energy(x);
         REQUIRE(std::abs(change.change - difference) < 1e-12 * energy + 1e-15 * change.size);
-        REQUIRE(eigenvalues_of(full(pull.curvature))[0] > -1e-12 * energy / (size * size));
+        REQUIRE(eigenvalues_of(dense(pull.curvature))[0] > -1e-12 * energy / (size * size));
         membrane::Corners<float, E::corner_count> y;
         for (std::size_t k = 0; k < y.size(); ++k) y[k] = x[k].template cast<float>();
         const auto single = element.pull(y, i);

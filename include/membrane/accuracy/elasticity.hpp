@@ -58,37 +58,11 @@ class Elasticity {
         volume.anchors();
         volume.template curvature<double>(v);
     };
-    static constexpr bool has_elements = requires(const Network& network) {
-        network.for_each_kind([](const auto&) {});
-    };
-
-    [[nodiscard]] const auto& springs() const noexcept {
-        if constexpr (has_elements) {
-            return network_.springs();
-        } else {
-            return network_;
-        }
-    }
-    [[nodiscard]] SpringResponse<double> response(const Spring<Scalar>& spring, double length) const noexcept {
-        using Law = std::remove_cvref_t<decltype(springs().law())>;
-        static_assert(SpringLaw<Law, double>,
-                      "an equilibrium is found in double: the law must take SpringState<double>");
-        const double shortest = (std::numeric_limits<double>::min)();  // a law is asked for no less
-        return springs().law()(SpringState<double>{static_cast<double>(spring.stiffness),
-                                                   static_cast<double>(spring.rest_length),
-                                                   (std::max)(length, shortest)});
-    }
-    /// Calls `act(placed, corners)` for each element.
+    /// Calls `act(placed, corners)` for each spring and each element.
     template <class Act>
-    void for_each_element([[maybe_unused]] const Points<double>& x, [[maybe_unused]] Act act) const {
-        if constexpr (has_elements) {
-            network_.for_each_kind([&](const auto& elements) {
-                for (const auto& placed : elements.all()) act(placed, elements.where(placed, x));
-            });
-        }
+    void for_each_element(const Points<double>& x, Act act) const {
+        network_.for_each_element([&](const auto& placed) { act(placed, placed.where(x)); });
     }
-    void add_elements(ElasticState& state) const;
-    void add_elements(const ElasticState& state, NewtonSystem& system) const;
     void pull_back(ElasticState& state);
     void ask_backing(const Points<double>& x);
     [[nodiscard]] Symmetric3<double> curvature(Index v, Scalar most) const noexcept;
@@ -106,18 +80,14 @@ class Elasticity {
 template <class Network, class Volume>
 ElasticState Elasticity<Network, Volume>::at(const Points<double>& x) {
     ElasticState state{x, Points<double>::Zero(3, x.cols()), Points<double>::Zero(3, x.cols())};
-    for (const auto& spring : springs().springs()) {
-        const Vector3<double> along = reach_of(spring, x);
-        const double length = norm(along);
-        const auto answer = response(spring, length);
-        state.energy += answer.energy;
-        if (length == 0) continue;
-        const Vector3<double> pull = (answer.tension / length) * along;
-        state.springs.col(spring.first) += pull;
-        state.springs.col(spring.second) -= pull;
-        state.largest_force = (std::max)(state.largest_force, std::abs(answer.tension));
-    }
-    add_elements(state);
+    for_each_element(x, [&](const auto& placed, const auto& corners) {
+        state.energy += placed.element.energy(corners);
+        for (std::size_t i = 0; i < corners.size(); ++i) {
+            const Vector3<double> force = placed.element.pull(corners, i).force;
+            state.springs.col(placed.corners[i]) += force;
+            state.largest_force = (std::max)(state.largest_force, norm(force));
+        }
+    });
     pull_back(state);
     return state;
 }
@@ -143,18 +113,6 @@ void Elasticity<Network, Volume>::pull_back(ElasticState& state) {
     for (Index v = 0; v < x.cols(); ++v) {
         state.largest_force = (std::max)(state.largest_force, norm(point(state.backing, v)));
     }
-}
-
-template <class Network, class Volume>
-void Elasticity<Network, Volume>::add_elements(ElasticState& state) const {
-    for_each_element(state.x, [&](const auto& placed, const auto& corners) {
-        state.energy += placed.element.energy(corners);
-        for (std::size_t i = 0; i < corners.size(); ++i) {
-            const Vector3<double> force = placed.element.pull(corners, i).force;
-            state.springs.col(placed.corners[i]) += force;
-            state.largest_force = (std::max)(state.largest_force, norm(force));
-        }
-    });
 }
 
 // Where a float is asked anew its rounding changes the answer: it is not, as long as x hardly moves.
@@ -190,29 +148,6 @@ Symmetric3<double> Elasticity<Network, Volume>::curvature(Index v, Scalar most) 
 
 template <class Network, class Volume>
 void Elasticity<Network, Volume>::add_stiffness(const ElasticState& state, NewtonSystem& system) const {
-    for (const auto& spring : springs().springs()) {
-        const Vector3<double> along = reach_of(spring, state.x);
-        const double length = norm(along);
-        Eigen::Matrix3d block = static_cast<double>(spring.stiffness) * Eigen::Matrix3d::Identity();
-        if (length > 0) {
-            const auto answer = response(spring, length);
-            const double across = answer.tension / length;
-            const Vector3<double> u = along / length;
-            block = across * Eigen::Matrix3d::Identity() + (answer.stiffness - across) * u * u.transpose();
-        }
-        system.add(spring.first, spring.first, block);
-        system.add(spring.second, spring.second, block);
-        system.add(spring.first, spring.second, -block);
-    }
-    add_elements(state, system);
-    for (Index v = 0; v < state.x.cols(); ++v) {
-        const auto& k = backing_stiffness(v);
-        system.add(v, v, Eigen::Matrix3d{{k.xx, k.xy, k.xz}, {k.xy, k.yy, k.yz}, {k.xz, k.yz, k.zz}});
-    }
-}
-
-template <class Network, class Volume>
-void Elasticity<Network, Volume>::add_elements(const ElasticState& state, NewtonSystem& system) const {
     for_each_element(state.x, [&](const auto& placed, const auto& corners) {
         for (std::size_t i = 0; i < corners.size(); ++i) {
             for (std::size_t j = 0; j <= i; ++j) {
@@ -220,14 +155,12 @@ void Elasticity<Network, Volume>::add_elements(const ElasticState& state, Newton
             }
         }
     });
+    for (Index v = 0; v < state.x.cols(); ++v) system.add(v, v, dense(backing_stiffness(v)));
 }
 
 template <class Network, class Volume>
 double Elasticity<Network, Volume>::largest_stiffness(const ElasticState& state) const {
     double largest = 0;
-    for (const auto& spring : springs().springs()) {
-        largest = (std::max)(largest, response(spring, norm(reach_of(spring, state.x))).stiffness);
-    }
     for_each_element(state.x, [&](const auto& placed, const auto& corners) {
         for (std::size_t i = 0; i < corners.size(); ++i) {
             largest = (std::max)(largest, largest_eigenvalue(placed.element.pull(corners, i).curvature));

@@ -131,7 +131,7 @@ RestProblem::RestProblem(const MassSpringNetwork<Scalar, Law>& network)
     take_springs(network.springs());
     std::size_t most = 0;
     for (Index v = 0; v < network.vertex_count(); ++v) most = (std::max)(most, network.springs_of(v).size());
-    // A spring's force is off by 9 units of rounding, half an epsilon each, times k (l + r) at the most; each sum of n
+    // A spring's force is off by 13 units of rounding, half an epsilon each, times k (l + r) at the most; each sum of n
     // adds n of all magnitudes. Loads and backing are two more, and the magnitudes are rounded as well.
     rounding_ = std::numeric_limits<double>::epsilon() * static_cast<double>(8 + most);
 }
@@ -255,13 +255,10 @@ inline void RestProblem::forces(const Points<double>& y, Points<double>& force,
         magnitude[at(v)] = norm(pull) + norm(point(load_, v));
     }
     for (const auto& spring : springs_) {
-        const Vector3<double> reach = reach_of(spring, y);
-        const double length = norm(reach);
-        if (!(length > 0)) continue;
-        const Vector3<double> pull = (spring.stiffness * (1 - spring.rest_length / length)) * reach;
-        force.col(spring.first) += pull;
-        force.col(spring.second) -= pull;
-        const double most = spring.stiffness * (length + spring.rest_length);
+        const auto pull = pull_of(LinearSpring{}, reach_of(spring, y), spring.stiffness, spring.rest_length);
+        force.col(spring.first) += pull.force();
+        force.col(spring.second) -= pull.force();
+        const double most = spring.stiffness * (pull.length + spring.rest_length);
         magnitude[at(spring.first)] += most;
         magnitude[at(spring.second)] += most;
     }

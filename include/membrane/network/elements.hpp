@@ -50,6 +50,21 @@ concept Element = std::copyable<E> && requires(const E& element, const Corners<d
     { element.second_derivative(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
 };
 
+/// An element at its vertices.
+template <class E>
+struct PlacedElement {
+    std::array<Index, E::corner_count> corners;
+    E element;
+
+    /// Where its corners are.
+    template <class Positions>
+    [[nodiscard]] Corners<typename Positions::Scalar, E::corner_count> where(const Positions& x) const noexcept {
+        Corners<typename Positions::Scalar, E::corner_count> places;
+        for (std::size_t i = 0; i < places.size(); ++i) places[i] = point(x, corners[i]);
+        return places;
+    }
+};
+
 namespace detail {
 
 template <class E>
@@ -115,10 +130,7 @@ class Elements {
   public:
     using Scalar = Scalar_;
     static constexpr std::size_t corner_count = Each::corner_count;
-    struct Placed {
-        std::array<Index, corner_count> corners;
-        Each element;
-    };
+    using Placed = PlacedElement<Each>;
 
     /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, and for one that is pulled at
     /// rest by what is not finite: a triangle too thin, or a constant too large, for the scalar. Linear.
@@ -127,21 +139,25 @@ class Elements {
     [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
     [[nodiscard]] std::span<const Placed> all() const noexcept { return all_; }
 
+    /// Calls `act(placed)` for each.
+    template <class Act>
+    void for_each_element(Act act) const {
+        for (const auto& placed : all_) act(placed);
+    }
+
     /// Calls `act(placed, x, corner)` for the elements of vertex `v`: where their corners are, and which of them is `v`.
     template <class Act>
     void for_each(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
         for (const auto& at : corners_of_[v]) {
             const Placed& placed = all_[static_cast<std::size_t>(at.element)];
-            act(placed, where(placed, x), static_cast<std::size_t>(at.corner));
+            act(placed, placed.where(x), static_cast<std::size_t>(at.corner));
         }
     }
 
     /// Where the corners of an element are.
     template <class Positions>
     [[nodiscard]] static auto where(const Placed& placed, const Positions& x) noexcept {
-        Corners<typename Positions::Scalar, corner_count> corners;
-        for (std::size_t i = 0; i < corner_count; ++i) corners[i] = point(x, placed.corners[i]);
-        return corners;
+        return placed.where(x);
     }
 
     /// See `MassSpringNetwork::negligible_force`.
@@ -184,7 +200,7 @@ Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<P
 
 template <Real Scalar, CheckedElement Each>
 Scalar Elements<Scalar, Each>::negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept {
-    const auto corners = where(placed, x);
+    const auto corners = placed.where(x);
     Scalar largest = 0, stiffness = 0, size = 0;
     for (std::size_t i = 0; i < corner_count; ++i) {
         const auto pull = placed.element.pull(corners, i);
