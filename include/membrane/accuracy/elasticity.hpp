@@ -63,18 +63,18 @@ class Elasticity {
     void for_each_element(const Points<double>& x, Act act) const {
         network_.for_each_element([&](const auto& placed) { act(placed, placed.where(x)); });
     }
+    /// What the backing does to a vertex near `place`: its force changes by `stiffness` times the way from there.
+    struct LinearPull {
+        Vector3<double> place, force;  // [m], [N]
+        Symmetric3<double> stiffness;  // [N/m]
+    };
     void pull_back(ElasticState& state);
     void ask_backing(const Points<double>& x);
     [[nodiscard]] Symmetric3<double> curvature(Index v, Scalar most) const noexcept;
-    [[nodiscard]] const Symmetric3<double>& backing_stiffness(Index v) const noexcept {
-        return backing_stiffness_[static_cast<std::size_t>(v)];
-    }
 
     const Network& network_;
     const Volume& volume_;
-    Points<Scalar> asked_;     // where the backing was asked last, 3 x V
-    Points<double> answered_;  // its force there
-    std::vector<Symmetric3<double>> backing_stiffness_;
+    std::vector<LinearPull> backing_;  // of each vertex, where it was asked last
 };
 
 template <class Network, class Volume>
@@ -94,46 +94,37 @@ ElasticState Elasticity<Network, Volume>::at(const Points<double>& x) {
 
 template <class Network, class Volume>
 void Elasticity<Network, Volume>::pull_back(ElasticState& state) {
-    const auto& x = state.x;
-    if constexpr (is_linear) {
-        if (backing_stiffness_.empty()) {
-            for (Index v = 0; v < x.cols(); ++v) backing_stiffness_.push_back(volume_.template curvature<double>(v));
-        }
-        for (Index v = 0; v < x.cols(); ++v) {
-            const Vector3<double> anchor = point(volume_.anchors(), v).template cast<double>();
-            state.backing.col(v) = backing_stiffness(v) * Vector3<double>(anchor - point(x, v));
-        }
-    } else {
-        ask_backing(x);
-        for (Index v = 0; v < x.cols(); ++v) {
-            const Vector3<double> since = point(x, v) - point(asked_, v).template cast<double>();
-            state.backing.col(v) = point(answered_, v) - backing_stiffness(v) * since;
-        }
-    }
-    for (Index v = 0; v < x.cols(); ++v) {
-        state.largest_force = (std::max)(state.largest_force, norm(point(state.backing, v)));
+    if (!is_linear || backing_.empty()) ask_backing(state.x);
+    for (Index v = 0; v < state.x.cols(); ++v) {
+        const auto& pull = backing_[static_cast<std::size_t>(v)];
+        const Vector3<double> way = point(state.x, v) - pull.place;
+        const Vector3<double> force = pull.force - pull.stiffness * way;
+        state.backing.col(v) = force;
+        state.largest_force = (std::max)(state.largest_force, norm(force));
     }
 }
 
-// Where a float is asked anew its rounding changes the answer: it is not, as long as x hardly moves.
+// One that is linear is known from its anchors. Where a float is asked anew its rounding changes the answer: it is not, as
+// long as x hardly moves.
 template <class Network, class Volume>
 void Elasticity<Network, Volume>::ask_backing(const Points<double>& x) {
-    const bool first = asked_.cols() == 0;
-    if (first) {
-        asked_.resize(3, x.cols());
-        answered_.resize(3, x.cols());
-        backing_stiffness_.resize(static_cast<std::size_t>(x.cols()));
-    }
-    constexpr auto endless = std::numeric_limits<Scalar>::infinity();
-    const double spacing = static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * x.cwiseAbs().maxCoeff();
+    const bool first = backing_.empty();
+    backing_.resize(static_cast<std::size_t>(x.cols()));
+    [[maybe_unused]] const double spacing =
+        static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * x.cwiseAbs().maxCoeff();
     for (Index v = 0; v < x.cols(); ++v) {
-        const Vector3<double> here = point(x, v);
-        if (!first && norm<double>(here - point(asked_, v).template cast<double>()) <= 64 * spacing) continue;
-        const Vector3<Scalar> place = here.cast<Scalar>();
-        const auto pull = volume_.pull(v, place, place, endless);
-        asked_.col(v) = place;
-        answered_.col(v) = pull.force.template cast<double>();
-        backing_stiffness_[static_cast<std::size_t>(v)] = curvature(v, pull.stiffness);
+        auto& pull = backing_[static_cast<std::size_t>(v)];
+        if constexpr (is_linear) {
+            const Vector3<double> anchor = point(volume_.anchors(), v).template cast<double>();
+            pull = {anchor, Vector3<double>::Zero(), volume_.template curvature<double>(v)};
+        } else {
+            const Vector3<double> here = point(x, v);
+            if (!first && norm<double>(here - pull.place) <= 64 * spacing) continue;
+            const Vector3<Scalar> place = here.template cast<Scalar>();
+            const auto answer = volume_.pull(v, place, place, std::numeric_limits<Scalar>::infinity());
+            pull = {place.template cast<double>(), answer.force.template cast<double>(),
+                    curvature(v, answer.stiffness)};
+        }
     }
 }
 
@@ -155,7 +146,9 @@ void Elasticity<Network, Volume>::add_stiffness(const ElasticState& state, Newto
             }
         }
     });
-    for (Index v = 0; v < state.x.cols(); ++v) system.add(v, v, dense(backing_stiffness(v)));
+    for (Index v = 0; v < state.x.cols(); ++v) {
+        system.add(v, v, dense(backing_[static_cast<std::size_t>(v)].stiffness));
+    }
 }
 
 template <class Network, class Volume>
@@ -166,7 +159,7 @@ double Elasticity<Network, Volume>::largest_stiffness(const ElasticState& state)
             largest = (std::max)(largest, largest_eigenvalue(placed.element.pull(corners, i).curvature));
         }
     });
-    for (const auto& k : backing_stiffness_) largest = (std::max)(largest, largest_eigenvalue(k));
+    for (const auto& pull : backing_) largest = (std::max)(largest, largest_eigenvalue(pull.stiffness));
     return largest;
 }
 

@@ -55,10 +55,10 @@ class RestProblem {
 
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed_.size()); }
     [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
-    [[nodiscard]] double backing(Index v) const noexcept { return backing_[at(v)]; }
+    [[nodiscard]] double backing(Index v) const noexcept { return backing_[at(v)].stiffness; }
 
     /// The backing's stiffness less what something else takes away of it, until the next `take` [N/m].
-    [[nodiscard]] double support(Index v) const noexcept { return backing_[at(v)] - softening_[at(v)]; }
+    [[nodiscard]] double support(Index v) const noexcept { return backing(v) - softening_[at(v)]; }
     void soften(Index v, double by) noexcept { softening_[at(v)] = by; }
 
     [[nodiscard]] bool fixed(Index v) const noexcept { return fixed_[at(v)] != 0; }
@@ -108,9 +108,10 @@ class RestProblem {
     [[nodiscard]] ProblemStatus check_places() const noexcept;
 
     std::vector<Spring<double>> springs_;
-    std::vector<double> backing_, softening_;
-    std::vector<unsigned char> fixed_;  // by whom, see below
-    Points<double> anchors_, load_, given_, centre_;
+    std::vector<VolumeSpring<double>> backing_;
+    std::vector<double> softening_;
+    std::vector<unsigned char> fixed_;  // by whom
+    Points<double> load_, given_, centre_;
     HeldPlaces places_;
     double rounding_ = 0;
     bool touched_ = false;  // by a tool
@@ -122,10 +123,9 @@ RestProblem::RestProblem(const MassSpringNetwork<Scalar, Law>& network)
       backing_(static_cast<std::size_t>(network.vertex_count())),
       softening_(backing_.size()),
       fixed_(backing_.size()),
-      anchors_(Points<double>::Zero(3, network.vertex_count())),
-      load_(anchors_),
-      given_(anchors_),
-      centre_(anchors_) {
+      load_(Points<double>::Zero(3, network.vertex_count())),
+      given_(load_),
+      centre_(load_) {
     static_assert(std::same_as<Law, LinearSpring>,
                   "the springs must follow LinearSpring: nothing is proven for others");
     take_springs(network.springs());
@@ -169,17 +169,17 @@ void RestProblem::take_springs(const Springs& springs) noexcept {
 template <class Scalar, class Volume>
 bool RestProblem::take_backing(const Volume& volume) noexcept {
     if constexpr (std::same_as<Volume, NoVolumeSprings>) {
-        std::fill(backing_.begin(), backing_.end(), 0.0);
+        std::fill(backing_.begin(), backing_.end(), VolumeSpring<double>());
         return true;
     } else {
         if (volume.anchors().cols() != vertex_count()) return false;
         for (Index v = 0; v < vertex_count(); ++v) {
             const Vector3<Scalar> anchor = point(volume.anchors(), v);
-            const auto at_rest = volume.pull(v, anchor, anchor, std::numeric_limits<Scalar>::infinity());
-            backing_[at(v)] = static_cast<double>(at_rest.stiffness);
-            anchors_.col(v) = anchor.template cast<double>();
+            const auto spring = volume.spring(v, anchor, std::numeric_limits<Scalar>::infinity());
+            if (!is_finite(anchor)) return false;
+            backing_[at(v)] = {anchor.template cast<double>(), static_cast<double>(spring.stiffness)};
         }
-        return is_finite(anchors_);
+        return true;
     }
 }
 
@@ -250,7 +250,7 @@ inline ProblemStatus RestProblem::check_places() const noexcept {
 inline void RestProblem::forces(const Points<double>& y, Points<double>& force,
                                 std::vector<double>& magnitude) const noexcept {
     for (Index v = 0; v < vertex_count(); ++v) {
-        const Vector3<double> pull = backing(v) * (point(anchors_, v) - point(y, v));
+        const Vector3<double> pull = backing_[at(v)].elastic_pull(point(y, v)).force;
         force.col(v) = pull + load_.col(v);
         magnitude[at(v)] = norm(pull) + norm(point(load_, v));
     }
