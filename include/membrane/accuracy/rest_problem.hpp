@@ -13,7 +13,7 @@
 #include <membrane/accuracy/held_places.hpp>
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
-#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/constraint_term.hpp>
 
 /// What has to balance where a membrane of linear springs is at rest.
 ///
@@ -31,9 +31,9 @@ float >> || std::same_as<Volume, MovedVolume<VirtualVolumeSprings<double>, doubl
 
 enum class ProblemStatus {
     sound,
-    bad_input,    ///< a number is not finite, an index names no vertex, counts do not agree
-    contact,      ///< a tool touches; everything else has been taken in
-    unsupported,  ///< a constraint of one's own, or held points with a corner that something else holds too
+    bad_input,  ///< a number is not finite, an index names no vertex, counts do not agree
+    contact,    ///< a tool touches; everything else has been taken in
+    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that something else holds too
 };
 
 /// Springs, backing, loads and what is held, in double whatever the network's scalar. Damping is left out: at rest it
@@ -82,9 +82,9 @@ class RestProblem {
     /// Held points: their places.
     [[nodiscard]] const HeldPlaces& places() const noexcept { return places_; }
 
-    /// Adds to `weights` (V) how the reaction of a constraint is made of the forces on the vertices.
-    template <class C>
-    void share(const C& constraint, std::vector<double>& weights) const noexcept;
+    /// Adds to `weights` (V) how the reaction of what a constraint holds is made of the forces on the vertices; nothing
+    /// for a load or a tool.
+    static void share(const ConstraintTerm& term, std::vector<double>& weights) noexcept;
 
   private:
     static constexpr unsigned char by_network = 1, by_constraint = 2, by_caller = 4;
@@ -97,14 +97,8 @@ class RestProblem {
     bool take_backing(const Volume& volume) noexcept;
     void fix(Index v, unsigned char by) noexcept { fixed_[at(v)] = static_cast<unsigned char>(fixed_[at(v)] | by); }
     template <class C>
-    [[nodiscard]] ProblemStatus act(const C& constraint) noexcept;
-    template <Real Scalar>
-    [[nodiscard]] ProblemStatus act_on(const HeldVertex<Scalar>& held) noexcept;
-    template <Real Scalar>
-    [[nodiscard]] ProblemStatus act_on(const HeldPoint<Scalar>& held) noexcept;
-    template <Real Scalar>
-    [[nodiscard]] ProblemStatus act_on(const Load<Scalar>& load) noexcept;
-    [[nodiscard]] ProblemStatus act_on(const Pinned& pinned) noexcept;
+    [[nodiscard]] ProblemStatus take_constraint(const C& constraint) noexcept;
+    [[nodiscard]] ProblemStatus take_term(const ConstraintTerm& term) noexcept;
     [[nodiscard]] ProblemStatus check_places() const noexcept;
 
     std::vector<Spring<double>> springs_;
@@ -153,7 +147,7 @@ ProblemStatus RestProblem::take(const std::type_identity_t<ConstPointsRef<Scalar
     touched_ = false;
     if (!take_backing<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::bad_input;
     ProblemStatus status = ProblemStatus::sound;
-    ((status = status == ProblemStatus::sound ? act(constraints) : status), ...);
+    ((status = status == ProblemStatus::sound ? take_constraint(constraints) : status), ...);
     if (status == ProblemStatus::sound) status = check_places();
     return status == ProblemStatus::sound && touched_ ? ProblemStatus::contact : status;
 }
@@ -184,53 +178,35 @@ bool RestProblem::take_backing(const Volume& volume) noexcept {
 }
 
 template <class C>
-ProblemStatus RestProblem::act(const C& constraint) noexcept {
+ProblemStatus RestProblem::take_constraint(const C& constraint) noexcept {
     if (!constraint.sound()) return ProblemStatus::bad_input;
-    if constexpr (requires { this->act_on(constraint); }) {
-        return act_on(constraint);
-    } else if constexpr (requires { constraint.contact.touching(); }) {
-        touched_ |= constraint.contact.touching();
+    ProblemStatus status = DescribedConstraint<C> ? ProblemStatus::sound : ProblemStatus::unsupported;
+    for_each_term(constraint, [&](const ConstraintTerm& term) {
+        if (status == ProblemStatus::sound) status = take_term(term);
+    });
+    return status;
+}
+
+inline ProblemStatus RestProblem::take_term(const ConstraintTerm& term) noexcept {
+    using Kind = ConstraintTerm::Kind;
+    if (term.kind == Kind::press) {
+        touched_ |= term.contact.touching();
         return ProblemStatus::sound;
-    } else {
-        return ProblemStatus::unsupported;
     }
-}
-
-template <Real Scalar>
-ProblemStatus RestProblem::act_on(const HeldVertex<Scalar>& held) noexcept {
-    if (!is_vertex(held.vertex)) return ProblemStatus::bad_input;
-    fix(held.vertex, by_constraint);
-    if ((fixed_[at(held.vertex)] & by_network) == 0) centre_.col(held.vertex) = held.target.template cast<double>();
-    return ProblemStatus::sound;
-}
-
-template <Real Scalar>
-ProblemStatus RestProblem::act_on(const HeldPoint<Scalar>& held) noexcept {
-    if (held.triangle == no_index) return ProblemStatus::sound;
-    for (const Index v : held.corners) {
+    for (const Index v : term.corners) {
         if (!is_vertex(v)) return ProblemStatus::bad_input;
     }
-    const bool added =
-        places_.add({held.corners, held.barycentric.template cast<double>(), held.target.template cast<double>()});
-    return added ? ProblemStatus::sound : ProblemStatus::unsupported;
-}
-
-template <Real Scalar>
-ProblemStatus RestProblem::act_on(const Load<Scalar>& load) noexcept {
-    for (std::size_t k = 0; k < 3; ++k) {
-        if (!is_vertex(load.corners[k])) return ProblemStatus::bad_input;
-        const auto weight = static_cast<double>(load.barycentric[static_cast<Eigen::Index>(k)]);
-        load_.col(load.corners[k]) += weight * load.force.template cast<double>();
+    const Index v = term.corners[0];
+    switch (term.kind) {
+        case Kind::hold_vertex:
+            if ((fixed_[at(v)] & by_network) == 0) centre_.col(v) = term.target;
+            [[fallthrough]];
+        case Kind::pin: fix(v, by_constraint); return ProblemStatus::sound;
+        case Kind::load:
+            for (std::size_t k = 0; k < 3; ++k) load_.col(term.corners[k]) += term.weight(k) * term.force;
+            return ProblemStatus::sound;
+        default: return places_.add(term) ? ProblemStatus::sound : ProblemStatus::unsupported;
     }
-    return ProblemStatus::sound;
-}
-
-inline ProblemStatus RestProblem::act_on(const Pinned& pinned) noexcept {
-    for (const Index v : pinned.vertices) {
-        if (!is_vertex(v)) return ProblemStatus::bad_input;
-        fix(v, by_constraint);
-    }
-    return ProblemStatus::sound;
 }
 
 inline ProblemStatus RestProblem::fix_all_but(std::span<const Index> free) noexcept {
@@ -271,19 +247,9 @@ inline void RestProblem::project(Points<double>& f) const noexcept {
     places_.project(f);
 }
 
-template <class C>
-void RestProblem::share(const C& constraint, std::vector<double>& weights) const noexcept {
-    if constexpr (requires { constraint.vertex; }) {
-        weights[at(constraint.vertex)] += 1;
-    } else if constexpr (requires { constraint.vertices; }) {
-        for (const Index v : constraint.vertices) weights[at(v)] += 1;
-    } else if constexpr (requires { constraint.target; }) {
-        if (constraint.triangle == no_index) return;
-        const Vector3<double> barycentric = constraint.barycentric.template cast<double>();
-        for (int k = 0; k < 3; ++k) {
-            weights[at(constraint.corners[static_cast<std::size_t>(k)])] += barycentric[k] / squared_norm(barycentric);
-        }
-    }
+inline void RestProblem::share(const ConstraintTerm& term, std::vector<double>& weights) noexcept {
+    if (!term.holds()) return;
+    for (std::size_t k = 0; k < 3; ++k) weights[at(term.corners[k])] += term.share(k);
 }
 
 }  // namespace membrane
