@@ -11,6 +11,8 @@
 #include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
+#include <membrane/core/lanes.hpp>
+#include <membrane/mesh/triangle.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 #include <membrane/network/elastic_network.hpp>
 
@@ -21,19 +23,20 @@
 namespace membrane {
 
 /// What an element does to one of its corners.
-template <Real Scalar>
+template <Number Scalar>
 struct CornerPull {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
     Symmetric3<Scalar> curvature = {};  ///< of the energy as the corner moves, no eigenvalue below zero [N/m]
 };
 
 /// Where the corners of an element are [m].
-template <Real Scalar, std::size_t count>
+template <Number Scalar, std::size_t count>
 using Corners = std::array<Vector3<Scalar>, count>;
 
 /// One element with its constants, which floats and doubles can be asked. What the compiler cannot see: force, curvature
 /// and change of energy are of the same energy; `second_derivative(x, i, j)` is that by corners i and j [N/m], or so much
-/// of it that Newton's method still finds to rest.
+/// of it that Newton's method still finds to rest. The stock ones take `Lanes` as well, as constants and as positions:
+/// several elements of a kind at once, each to the bits that it comes to alone.
 template <class E>
 concept Element = std::copyable<E> && requires(const E& element, const Corners<double, E::corner_count>& x,
                                                const Corners<float, E::corner_count>& y, std::size_t i) {

@@ -191,7 +191,7 @@ struct SpringElement {
     [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 2>& x, std::size_t i,
                                                 const Vector3<N>& way) const noexcept {
         const Vector3<N> reach = x[1 - i] - x[i];
-        const N length = norm(reach), far = x[i].cwiseAbs().maxCoeff();
+        const N length = norm(reach), far = detail::largest_magnitude(x[i]);
         const auto before = response(length), after = response(norm<N>(reach - way));
         return {after.energy - before.energy, before.energy + std::abs(before.tension) * (length + far)};
     }
