@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
-#include <span>
-#include <type_traits>
 #include <vector>
 
 #include <membrane/accuracy/newton_system.hpp>

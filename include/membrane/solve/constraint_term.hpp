@@ -8,7 +8,7 @@
 #include <membrane/solve/press.hpp>
 
 /// What a constraint asks of a membrane, in the same few words whatever its type, for those who do not step: Newton's
-/// method, the error bound, or a file.
+/// method, the error bound, what judges a trial.
 ///
 ///     for_each_term(constraint, [&](const membrane::ConstraintTerm& term) { ... });
 ///
@@ -27,11 +27,10 @@ struct ConstraintTerm {
     };
 
     Kind kind = Kind::pin;
-    std::array<Index, 3> corners{no_index, no_index,
-                                 no_index};            ///< of the point's triangle; a vertex is all of its own
-    Vector3<double> weights = {1, 0, 0};               ///< of the corners
-    Vector3<double> target = Vector3<double>::Zero();  ///< [m]
-    Vector3<double> force = Vector3<double>::Zero();   ///< [N]
+    std::array<Index, 3> corners{no_index, no_index, no_index};  ///< of the point's triangle; a vertex is all three
+    Vector3<double> weights = {1, 0, 0};                         ///< of the corners
+    Vector3<double> target = Vector3<double>::Zero();            ///< [m]
+    Vector3<double> force = Vector3<double>::Zero();             ///< [N]
     Tool<double> tool = {};
     Contact<double> contact = {};
     std::size_t constraint = 0;  ///< which it is of those handed in, for whoever collects terms
@@ -54,8 +53,8 @@ struct ConstraintTerm {
         return point_at(triangle_at(x, corners), weights);
     }
 
-    /// The part of the force on corner `k` that whoever holds the point feels; of each way of the point, corner `k` goes
-    /// this part if the corners go as little as they can.
+    /// The part of the force on corner `k` that whoever holds the point feels. As the point goes a way, corner `k` goes
+    /// this part of it, if the corners go as little as they can.
     [[nodiscard]] double share(std::size_t k) const noexcept { return weight(k) / squared_norm(weights); }
 };
 
