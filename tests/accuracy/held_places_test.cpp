@@ -12,7 +12,12 @@ using namespace membrane;
 
 namespace {
 
-double off(const HeldPlaces::Place& place, const Points<double>& y) {
+ConstraintTerm hold(const std::array<Index, 3>& corners, const Vector3<double>& weights,
+                    const Vector3<double>& target) {
+    return ConstraintTerm::hold(corners, weights, target);
+}
+
+double off(const ConstraintTerm& place, const Points<double>& y) {
     Vector3<double> sum = -place.target;
     for (int k = 0; k < 3; ++k) sum += place.weights[k] * y.col(place.corners[static_cast<std::size_t>(k)]);
     return norm(sum);
@@ -24,8 +29,8 @@ TEST_CASE("held points are put in their places, and what is projected leaves the
     for (int seed = 1; seed <= cases(50); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
-        const HeldPlaces::Place one{{0, 3, 4}, random.barycentric(), random.vector<double>()};
-        const HeldPlaces::Place two{{5, 6, 7}, random.barycentric(), random.vector<double>()};
+        const auto one = hold({0, 3, 4}, random.barycentric(), random.vector<double>());
+        const auto two = hold({5, 6, 7}, random.barycentric(), random.vector<double>());
         HeldPlaces places;
         CHECK(places.add(one));
         CHECK(places.add(two));
@@ -50,25 +55,25 @@ TEST_CASE("held points are put in their places, and what is projected leaves the
 
 TEST_CASE("places are independent where no corner that counts is held twice", "[held_places]") {
     const Vector3<double> inside(0.5, 0.3, 0.2), side(0.5, 0.5, 0), target(1, 2, 3);
-    const auto independent = [](const std::vector<HeldPlaces::Place>& all, Index fixed) {
+    const auto independent = [](const std::vector<ConstraintTerm>& all, Index fixed) {
         HeldPlaces places;
         for (const auto& place : all) places.add(place);
         return places.independent([&](Index v) { return v == fixed; });
     };
     CHECK(independent({}, 0));
-    CHECK(independent({{{0, 1, 2}, inside, target}}, 3));
-    CHECK_FALSE(independent({{{0, 1, 2}, inside, target}}, 2));
-    CHECK(independent({{{0, 1, 2}, side, target}}, 2));
-    CHECK(independent({{{0, 1, 2}, inside, target}, {{3, 4, 5}, inside, target}}, 6));
-    CHECK_FALSE(independent({{{0, 1, 2}, inside, target}, {{3, 4, 0}, inside, target}}, 6));
-    CHECK(independent({{{0, 1, 2}, inside, target}, {{3, 4, 0}, side, target}}, 6));
-    CHECK_FALSE(independent({{{0, 1, 1}, inside, target}}, 6));
+    CHECK(independent({hold({0, 1, 2}, inside, target)}, 3));
+    CHECK_FALSE(independent({hold({0, 1, 2}, inside, target)}, 2));
+    CHECK(independent({hold({0, 1, 2}, side, target)}, 2));
+    CHECK(independent({hold({0, 1, 2}, inside, target), hold({3, 4, 5}, inside, target)}, 6));
+    CHECK_FALSE(independent({hold({0, 1, 2}, inside, target), hold({3, 4, 0}, inside, target)}, 6));
+    CHECK(independent({hold({0, 1, 2}, inside, target), hold({3, 4, 0}, side, target)}, 6));
+    CHECK_FALSE(independent({hold({0, 1, 1}, inside, target)}, 6));
 }
 
 TEST_CASE("there is room for as many places as a step has constraints", "[held_places]") {
     HeldPlaces places;
-    for (Index i = 0; i < 16; ++i) CHECK(places.add({{3 * i, 3 * i + 1, 3 * i + 2}, {1, 0, 0}, {0, 0, 0}}));
-    CHECK_FALSE(places.add({{90, 91, 92}, {1, 0, 0}, {0, 0, 0}}));
+    for (Index i = 0; i < 16; ++i) CHECK(places.add(hold({3 * i, 3 * i + 1, 3 * i + 2}, {1, 0, 0}, {0, 0, 0})));
+    CHECK_FALSE(places.add(hold({90, 91, 92}, {1, 0, 0}, {0, 0, 0})));
     places.clear();
-    CHECK(places.add({{0, 1, 2}, {1, 0, 0}, {0, 0, 0}}));
+    CHECK(places.add(hold({0, 1, 2}, {1, 0, 0}, {0, 0, 0})));
 }

@@ -109,7 +109,7 @@ TEST_CASE("a reaction is shared out among the vertices it comes from", "[rest_pr
     REQUIRE(scene.take(pull(5, target), pin(pinned), held) == ProblemStatus::sound);
     const auto shares = [&](const auto& constraint) {
         std::vector<double> sum(42);
-        scene.problem.share(constraint, sum);
+        for_each_term(constraint, [&](const ConstraintTerm& term) { RestProblem::share(term, sum); });
         return sum;
     };
     CHECK(shares(pull(5, target))[5] == 1);

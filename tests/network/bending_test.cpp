@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/network/bending.hpp>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -145,4 +146,23 @@ TEST_CASE("rigidity of a plate, refused where there is none", "[bending][bad]") 
           "bending_springs: rigidity must be finite and not negative [N m], got nan");
     CHECK(refusal([] { (void)flexural_rigidity({}); }) ==
           "Material: young_modulus must be finite and positive [Pa], got 0");
+}
+
+TEST_CASE("hinges side by side do what each does alone, to the bit", "[bending]") {
+    using Wide = Lanes<double>;
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        std::array<Hinge<double>, Wide::count> hinges;
+        std::array<Corners<double, 4>, Wide::count> x;
+        for (auto& hinge : hinges) hinge = {random.number(0.1, 2.0), random.number(-3.0, 3.0)};
+        for (auto& corners : x) {
+            for (auto& corner : corners) corner = random.vector();
+        }
+        if (random.chance(0.3)) x[1][2] = x[1][0];  // without an area
+        test::check_lanes(hinges, x, 0.1 * random.vector(), [](const auto& all) {
+            return Hinge<Wide>{Wide::of([&](std::size_t l) { return all[l].stiffness; }),
+                               Wide::of([&](std::size_t l) { return all[l].rest; })};
+        });
+    }
 }

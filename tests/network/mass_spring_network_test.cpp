@@ -6,6 +6,8 @@
 #include <limits>
 #include <memory>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <membrane/mesh/shapes.hpp>
@@ -13,6 +15,8 @@
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/eigenvalues.hpp"
+#include "support/element_check.hpp"
 #include "support/meshes.hpp"
 #include "support/refusal.hpp"
 #include "support/spring_law_check.hpp"
@@ -467,4 +471,80 @@ TEST_CASE("where no spring is pressed together, a curved pull has the curvature 
             REQUIRE(norm<double>(found - expected) < 1e-5 * curved.stiffness);
         }
     }
+}
+
+TEST_CASE("no spring is less stiff than the bound while its ends are near", "[network]") {
+    int known = 0;
+    double tightest = 1;
+    for (int seed = 1; seed <= cases(20'000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Spring<double> spring{0, 1, random.number(0.1, 10.0), random.number(0.0, 2.0)};
+        const Vector3<double> reach = random.number(0.2, 2.0) * random.unit_vector();
+        const double way = std::pow(10, random.number(-6.0, 0.0)) * norm(reach);
+        CAPTURE(spring.stiffness, spring.rest_length, norm(reach), way);
+        const auto bound = least_stiffness(spring, reach, way);
+        if (!bound) continue;
+        ++known;
+        const Eigen::Matrix3d along = bound->direction * bound->direction.transpose();
+        const Eigen::Matrix3d least = bound->along * along + bound->across * (Eigen::Matrix3d::Identity() - along);
+        for (int i = 0; i < 10; ++i) {
+            const double part = i == 0 ? 1 : random.number();
+            const Vector3<double> aside = i == 0 ? Vector3<double>(-bound->direction) : random.unit_vector();
+            const Vector3<double> there = reach + part * way * aside, u = there / norm(there);
+            const double q = spring.rest_length / norm(there);
+            const Eigen::Matrix3d stiffness =
+                spring.stiffness * ((1 - q) * Eigen::Matrix3d::Identity() + q * u * u.transpose());
+            const double above = test::eigenvalues_of(stiffness - least)[0];
+            REQUIRE(above >= -1e-13 * spring.stiffness);
+            tightest = std::min(tightest, above / spring.stiffness);
+            REQUIRE(test::eigenvalues_of(stiffness).cwiseAbs().maxCoeff() <= spring.stiffness * (1 + 1e-12));
+        }
+    }
+    CHECK(known > cases(20'000) / 4);
+    CHECK(tightest < 1e-10);
+}
+
+TEST_CASE("springs that may become too short have no bound", "[network]") {
+    const Spring<double> spring{0, 1, 1, 1};
+    CHECK(least_stiffness(spring, {1, 0, 0}, 0.1));
+    CHECK_FALSE(least_stiffness(spring, {1, 0, 0}, 0.5));
+    CHECK_FALSE(least_stiffness(spring, {0.5, 0, 0}, 0.01));
+    CHECK_FALSE(least_stiffness(spring, {0, 0, 0}, 0));
+    CHECK(least_stiffness(Spring<double>{0, 1, 1, 0}, {1, 0, 0}, 0.4));
+    CHECK_FALSE(least_stiffness(Spring<double>{0, 1, 1, 0}, {1, 0, 0}, 0.6));
+}
+
+TEST_CASE("a spring is an element: force, blocks and changes are of one energy", "[network]") {
+    const auto check = [](const auto& law, Random& random) {
+        const double k = random.number(0.1, 10.0), rest = random.number(0.5, 2.0);
+        const SpringElement<double, std::remove_cvref_t<decltype(law)>> spring{&law, k, rest};
+        const Vector3<double> here = random.vector();
+        const Vector3<double> there = here + rest * random.number(0.4, 1.4) * random.unit_vector();
+        const double energy = 100 * k * rest * rest;
+        test::check_element(spring, {here, there}, 0.1 * rest, energy, random);
+        test::check_second_derivative(spring, {here, there}, 0.1 * rest, energy);
+        const Corners<double, 2> x{here, there};
+        const Vector3<double> reach = there - here;
+        for (const auto& [i, towards] : {std::pair(0, reach), std::pair(1, Vector3<double>(-reach))}) {
+            const auto pull = spring.pull(x, static_cast<std::size_t>(i));
+            REQUIRE(pull.force == pull_of(law, towards, k, rest).force());
+        }
+    };
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        check(LinearSpring{}, random);
+        check(ExponentialSpring{.stiffening = 3}, random);
+    }
+}
+
+TEST_CASE("a spring without a length has no force, and resists alike in all directions", "[network]") {
+    const LinearSpring law;
+    const SpringElement<double, LinearSpring> spring{&law, 3, 2};
+    const Corners<double, 2> x{Vector3<double>(1, 2, 3), Vector3<double>(1, 2, 3)};
+    CHECK(spring.pull(x, 0).force == Vector3<double>(0, 0, 0));
+    CHECK(spring.second_derivative(x, 0, 0) == 3 * Eigen::Matrix3d::Identity());
+    CHECK(spring.second_derivative(x, 1, 0) == -3 * Eigen::Matrix3d::Identity());
+    CHECK(spring.energy(x) == Approx(6));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/network/pressure.hpp>
 
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -162,4 +163,29 @@ TEST_CASE("a pressure that is none, and a network of another mesh, are refused",
     const auto other = MassSpringNetwork(icosphere({.subdivisions = 0}), LinearSpring{}, {.stiffness = 1.0});
     CHECK(refusal([&] { (void)balancing_loads(mesh, other); }) ==
           "balancing_loads: the network must have as many vertices as the mesh, 42, got 12");
+}
+
+TEST_CASE("pressed triangles and loads side by side do what each does alone, to the bit", "[pressure]") {
+    using Wide = Lanes<double>;
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        std::array<PressedTriangle<double>, Wide::count> triangles;
+        std::array<DeadLoad<double>, Wide::count> loads;
+        std::array<Corners<double, 3>, Wide::count> x;
+        std::array<Corners<double, 1>, Wide::count> vertices;
+        for (std::size_t l = 0; l < Wide::count; ++l) {
+            triangles[l] = {random.number(-2.0, 2.0)};
+            loads[l] = {random.vector()};
+            for (auto& corner : x[l]) corner = random.vector();
+            vertices[l] = {x[l][0]};
+        }
+        test::check_lanes(triangles, x, random.vector(), [](const auto& all) {
+            return PressedTriangle<Wide>{Wide::of([&](std::size_t l) { return all[l].pressure; })};
+        });
+        test::check_lanes(loads, vertices, random.vector(), [](const auto& all) {
+            const auto along = [&](int k) { return Wide::of([&](std::size_t l) { return all[l].force[k]; }); };
+            return DeadLoad<Wide>{{along(0), along(1), along(2)}};
+        });
+    }
 }

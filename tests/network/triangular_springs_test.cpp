@@ -2,6 +2,7 @@
 #include <membrane/network/triangular_springs.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -193,4 +194,35 @@ TEST_CASE("triangular springs leave out what has no area and refuse what is no m
           }) == "Material: young_modulus must be finite and positive [Pa], got -1");
     CHECK(refusal([&] { (void)triangular_springs(mesh, material, 0); }) ==
           "triangular_springs: stretch must be finite and positive [1], got 0");
+}
+
+TEST_CASE("triangles side by side do what each does alone, to the bit", "[triangular_springs]") {
+    using Wide = Lanes<double>;
+    const Material material{.young_modulus = 1e5, .poisson_ratio = 0.4, .thickness = 1e-4};
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+        const auto springs = triangular_springs(mesh, material, random.number(0.8, 1.2));
+        std::array<TriangularSpring<double>, Wide::count> triangles;
+        std::array<Corners<double, 3>, Wide::count> x;
+        for (std::size_t l = 0; l < Wide::count; ++l) triangles[l] = springs.all()[l].element;
+        for (auto& corners : x) {
+            for (auto& corner : corners) corner = random.vector();
+        }
+        test::check_lanes(triangles, x, 0.1 * random.vector(), [](const auto& all) {
+            const auto lanes = [&](const auto& number) {
+                return Wide::of([&](std::size_t l) { return number(all[l]); });
+            };
+            return TriangularSpring<Wide>{
+                {lanes([](const auto& t) { return t.stiffness.xx; }),
+                 lanes([](const auto& t) { return t.stiffness.yy; }),
+                 lanes([](const auto& t) { return t.stiffness.zz; }),
+                 lanes([](const auto& t) { return t.stiffness.xy; }),
+                 lanes([](const auto& t) { return t.stiffness.xz; }),
+                 lanes([](const auto& t) { return t.stiffness.yz; })},
+                {lanes([](const auto& t) { return t.rest[0]; }), lanes([](const auto& t) { return t.rest[1]; }),
+                 lanes([](const auto& t) { return t.rest[2]; })}};
+        });
+    }
 }

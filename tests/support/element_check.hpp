@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 
 #include <Eigen/Core>
 
+#include <membrane/core/lanes.hpp>
 #include <membrane/network/elements.hpp>
 
 #include "support/catch.hpp"
@@ -13,10 +15,6 @@
 #include "support/random.hpp"
 
 namespace test {
-
-inline Eigen::Matrix3d full(const membrane::Symmetric3<double>& a) {
-    return Eigen::Matrix3d{{a.xx, a.xy, a.xz}, {a.xy, a.yy, a.yz}, {a.xz, a.yz, a.zz}};
-}
 
 /// Force, change of energy and curvature of an element against differences of its energy, which vary over ways of `size`
 /// [m] by some `energy` [J].
@@ -40,7 +38,7 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
         const auto change = element.energy_change(x, i, way);
         const double difference = element.energy(moved(way)) - element.energy(x);
         REQUIRE(std::abs(change.change - difference) < 1e-12 * energy + 1e-15 * change.size);
-        REQUIRE(eigenvalues_of(full(pull.curvature))[0] > -1e-12 * energy / (size * size));
+        REQUIRE(eigenvalues_of(dense(pull.curvature))[0] > -1e-12 * energy / (size * size));
         membrane::Corners<float, E::corner_count> y;
         for (std::size_t k = 0; k < y.size(); ++k) y[k] = x[k].template cast<float>();
         const auto single = element.pull(y, i);
@@ -63,6 +61,37 @@ void check_second_derivative(const E& element, const membrane::Corners<double, E
                 const Eigen::Vector3d slope = (element.pull(before, i).force - element.pull(after, i).force) / (2 * h);
                 REQUIRE((slope - block.col(k)).norm() < 1e-7 * energy / (size * size));
             }
+        }
+    }
+}
+
+/// Several elements at once against each of them alone, to the bit; `in_lanes(elements)` is their constants side by side.
+template <class E, class InLanes>
+void check_lanes(const std::array<E, membrane::Lanes<double>::count>& elements,
+                 const std::array<membrane::Corners<double, E::corner_count>, membrane::Lanes<double>::count>& x,
+                 const membrane::Vector3<double>& way, const InLanes& in_lanes) {
+    using Wide = membrane::Lanes<double>;
+    const auto together = in_lanes(elements);
+    const auto lanes = [](const auto& number_of) { return Wide::of([&](std::size_t l) { return number_of(l); }); };
+    membrane::Corners<Wide, E::corner_count> places;
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        for (Eigen::Index k = 0; k < 3; ++k) places[i][k] = lanes([&](std::size_t l) { return x[l][i][k]; });
+    }
+    const membrane::Vector3<Wide> ways(way[0], way[1], way[2]);
+    const auto energy = together.energy(places);
+    for (std::size_t i = 0; i < places.size(); ++i) {
+        const auto pull = together.pull(places, i);
+        const auto change = together.energy_change(places, i, ways);
+        for (std::size_t l = 0; l < Wide::count; ++l) {
+            const auto alone = elements[l].pull(x[l], i);
+            for (Eigen::Index k = 0; k < 3; ++k) REQUIRE(pull.force[k][l] == alone.force[k]);
+            const auto& a = pull.curvature;
+            const auto& b = alone.curvature;
+            REQUIRE((a.xx[l] == b.xx && a.yy[l] == b.yy && a.zz[l] == b.zz));
+            REQUIRE((a.xy[l] == b.xy && a.xz[l] == b.xz && a.yz[l] == b.yz));
+            const auto changes = elements[l].energy_change(x[l], i, way);
+            REQUIRE((change.change[l] == changes.change && change.size[l] == changes.size));
+            REQUIRE(energy[l] == elements[l].energy(x[l]));
         }
     }
 }

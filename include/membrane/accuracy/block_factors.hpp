@@ -102,12 +102,6 @@ inline void divide(Eigen::Matrix3d& b, const Eigen::Matrix3d& lower) noexcept {
     }
 }
 
-inline Eigen::Matrix3d dense(const Symmetric3<double>& a) noexcept {
-    Eigen::Matrix3d m;
-    m << a.xx, a.xy, a.xz, a.xy, a.yy, a.yz, a.xz, a.yz, a.zz;
-    return m;
-}
-
 }  // namespace detail
 
 template <class Links>
@@ -187,11 +181,11 @@ inline void BlockFactors::fill(double shift) noexcept {
     const auto n = static_cast<double>(3 * pivots_.size());
     const double rounding = (n + 16) * std::numeric_limits<double>::epsilon() * (size_ + n * std::abs(shift));
     for (std::size_t i = 0; i < pivots_.size(); ++i) {
-        pivots_[i] = detail::dense(diagonal_[i]);
+        pivots_[i] = dense(diagonal_[i]);
         pivots_[i].diagonal().array() -= shift + rounding;
     }
     std::fill(blocks_.begin(), blocks_.end(), Block::Zero());
-    for (std::size_t l = 0; l < linked_.size(); ++l) blocks_[number_[l]] += detail::dense(linked_[l]);
+    for (std::size_t l = 0; l < linked_.size(); ++l) blocks_[number_[l]] += dense(linked_[l]);
 }
 
 inline void BlockFactors::take_columns_before(std::size_t column) noexcept {

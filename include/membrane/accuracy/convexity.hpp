@@ -6,7 +6,6 @@
 #include <concepts>
 #include <cstddef>
 #include <limits>
-#include <optional>
 #include <vector>
 
 #include <membrane/accuracy/rest_problem.hpp>
@@ -46,36 +45,6 @@ consteval bool check_convexity_model() noexcept {
 template <class Model>
 concept CheckedConvexityModel = detail::check_convexity_model<Model>();
 
-/// A lower bound of a spring's stiffness, the second derivative of its energy by the reach from one end to the other:
-/// `along` u u^T + `across` (I - u u^T) [N/m].
-struct SpringBound {
-    double along, across;
-    Vector3<double> u;
-};
-
-[[nodiscard]] inline Symmetric3<double> stiffness_of(const SpringBound& bound) noexcept {
-    Symmetric3<double> stiffness = diagonal3(bound.across);
-    stiffness += outer(bound.along - bound.across, bound.u);
-    return stiffness;
-}
-
-/// Of all reaches that are at most `way` from `reach`; with none of them, then, is the spring stiffer in any direction
-/// than its own stiffness. None where it may get too short for that.
-///
-/// At a reach d of length l and direction u the second derivative of k (|d| - r)^2 / 2 is k I - k r/l (I - u u^T). Let
-/// d' be at most s l away from d. In the plane of d and d', at an angle a from u, it is no shorter than
-/// l' = l (cos a - sqrt(s^2 - sin^2 a)), and with q = r / (l - s l)
-///
-///     r/l' (I - u' u'^T)  <=  q (I - u u^T) + 2 s q u u^T,                                                     (*)
-///
-/// so that the stiffness is at least k (1 - q) across u and k (1 - 2 s q) along u. (*) is plain at right angles to the
-/// plane, where l' >= l - s l. Within it the left side is r/l' n n^T, n at right angles to u', and so (*) says that
-/// r/l' (sin^2 a / (2 s q) + cos^2 a / q) <= 1, or with z = sin^2 a that
-/// sqrt(1 - z) - sqrt(s^2 - z) >= (1 - s) (1 - z + z / (2 s)). At z = 0 both sides are 1 - s; up to z = s^2 the left
-/// one is convex, the right one is a line, and at z = 0 the left one is the steeper by 1 - s.
-[[nodiscard]] inline std::optional<SpringBound> least_stiffness(const Spring<double>& spring,
-                                                                const Vector3<double>& reach, double way) noexcept;
-
 /// A block for each vertex, at no more cost than a few sums of forces.
 ///
 /// The springs that may push take away p (I - u u^T), p > 0, of the difference of their ends a and b; for any weights
@@ -111,17 +80,6 @@ class BlockConvexity {
     double most_ = 0;                               // of the backing
 };
 static_assert(ConvexityModel<BlockConvexity>);
-
-inline std::optional<SpringBound> least_stiffness(const Spring<double>& spring, const Vector3<double>& reach,
-                                                  double way) noexcept {
-    constexpr double rounding = 1e-14;  // more than what is lost here
-    const double length = norm(reach);
-    if (!(2 * way < length)) return std::nullopt;
-    const double q = (1 + rounding) * spring.rest_length / (length - way), s = way / length;
-    if (!(q <= 2 && 2 * s * q <= 1)) return std::nullopt;
-    return SpringBound{spring.stiffness * (1 - rounding - 2 * s * q), spring.stiffness * (1 - rounding - q),
-                       reach / length};
-}
 
 inline BlockConvexity::BlockConvexity(const RestProblem& problem)
     : pushes_(problem.springs().size()),
@@ -162,10 +120,10 @@ inline bool BlockConvexity::gather(const RestProblem& problem, double radius) no
         const auto first = static_cast<std::size_t>(spring.first), second = static_cast<std::size_t>(spring.second);
         if (ends == 1) {
             const std::size_t v = problem.fixed(spring.first) ? second : first;
-            own_[v] += stiffness_of(*least);
+            own_[v] += block_of(*least);
             own_sizes_[v] += 3 * spring.stiffness;
         } else if (least->across < 0) {
-            pushes_[push_count_++] = {first, second, stiffness_of({0, -least->across, least->u})};
+            pushes_[push_count_++] = {first, second, block_of<double>({0, -least->across, least->direction})};
         }
     }
     return true;

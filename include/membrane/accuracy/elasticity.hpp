@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
-#include <span>
-#include <type_traits>
 #include <vector>
 
 #include <membrane/accuracy/newton_system.hpp>
@@ -58,96 +56,29 @@ class Elasticity {
         volume.anchors();
         volume.template curvature<double>(v);
     };
-    static constexpr bool has_elements = requires(const Network& network) {
-        network.for_each_kind([](const auto&) {});
-    };
-
-    [[nodiscard]] const auto& springs() const noexcept {
-        if constexpr (has_elements) {
-            return network_.springs();
-        } else {
-            return network_;
-        }
-    }
-    [[nodiscard]] SpringResponse<double> response(const Spring<Scalar>& spring, double length) const noexcept {
-        using Law = std::remove_cvref_t<decltype(springs().law())>;
-        static_assert(SpringLaw<Law, double>,
-                      "an equilibrium is found in double: the law must take SpringState<double>");
-        const double shortest = (std::numeric_limits<double>::min)();  // a law is asked for no less
-        return springs().law()(SpringState<double>{static_cast<double>(spring.stiffness),
-                                                   static_cast<double>(spring.rest_length),
-                                                   (std::max)(length, shortest)});
-    }
-    /// Calls `act(placed, corners)` for each element.
+    /// Calls `act(placed, corners)` for each spring and each element.
     template <class Act>
-    void for_each_element([[maybe_unused]] const Points<double>& x, [[maybe_unused]] Act act) const {
-        if constexpr (has_elements) {
-            network_.for_each_kind([&](const auto& elements) {
-                for (const auto& placed : elements.all()) act(placed, elements.where(placed, x));
-            });
-        }
+    void for_each_element(const Points<double>& x, Act act) const {
+        network_.for_each_element([&](const auto& placed) { act(placed, placed.where(x)); });
     }
-    void add_elements(ElasticState& state) const;
-    void add_elements(const ElasticState& state, NewtonSystem& system) const;
+    /// What the backing does to a vertex near `place`: its force changes by `stiffness` times the way from there.
+    struct LinearPull {
+        Vector3<double> place, force;  // [m], [N]
+        Symmetric3<double> stiffness;  // [N/m]
+    };
     void pull_back(ElasticState& state);
     void ask_backing(const Points<double>& x);
     [[nodiscard]] Symmetric3<double> curvature(Index v, Scalar most) const noexcept;
-    [[nodiscard]] const Symmetric3<double>& backing_stiffness(Index v) const noexcept {
-        return backing_stiffness_[static_cast<std::size_t>(v)];
-    }
 
     const Network& network_;
     const Volume& volume_;
-    Points<Scalar> asked_;     // where the backing was asked last, 3 x V
-    Points<double> answered_;  // its force there
-    std::vector<Symmetric3<double>> backing_stiffness_;
+    std::vector<LinearPull> backing_;  // of each vertex, where it was asked last
 };
 
 template <class Network, class Volume>
 ElasticState Elasticity<Network, Volume>::at(const Points<double>& x) {
     ElasticState state{x, Points<double>::Zero(3, x.cols()), Points<double>::Zero(3, x.cols())};
-    for (const auto& spring : springs().springs()) {
-        const Vector3<double> along = reach_of(spring, x);
-        const double length = norm(along);
-        const auto answer = response(spring, length);
-        state.energy += answer.energy;
-        if (length == 0) continue;
-        const Vector3<double> pull = (answer.tension / length) * along;
-        state.springs.col(spring.first) += pull;
-        state.springs.col(spring.second) -= pull;
-        state.largest_force = (std::max)(state.largest_force, std::abs(answer.tension));
-    }
-    add_elements(state);
-    pull_back(state);
-    return state;
-}
-
-template <class Network, class Volume>
-void Elasticity<Network, Volume>::pull_back(ElasticState& state) {
-    const auto& x = state.x;
-    if constexpr (is_linear) {
-        if (backing_stiffness_.empty()) {
-            for (Index v = 0; v < x.cols(); ++v) backing_stiffness_.push_back(volume_.template curvature<double>(v));
-        }
-        for (Index v = 0; v < x.cols(); ++v) {
-            const Vector3<double> anchor = point(volume_.anchors(), v).template cast<double>();
-            state.backing.col(v) = backing_stiffness(v) * Vector3<double>(anchor - point(x, v));
-        }
-    } else {
-        ask_backing(x);
-        for (Index v = 0; v < x.cols(); ++v) {
-            const Vector3<double> since = point(x, v) - point(asked_, v).template cast<double>();
-            state.backing.col(v) = point(answered_, v) - backing_stiffness(v) * since;
-        }
-    }
-    for (Index v = 0; v < x.cols(); ++v) {
-        state.largest_force = (std::max)(state.largest_force, norm(point(state.backing, v)));
-    }
-}
-
-template <class Network, class Volume>
-void Elasticity<Network, Volume>::add_elements(ElasticState& state) const {
-    for_each_element(state.x, [&](const auto& placed, const auto& corners) {
+    for_each_element(x, [&](const auto& placed, const auto& corners) {
         state.energy += placed.element.energy(corners);
         for (std::size_t i = 0; i < corners.size(); ++i) {
             const Vector3<double> force = placed.element.pull(corners, i).force;
@@ -155,27 +86,43 @@ void Elasticity<Network, Volume>::add_elements(ElasticState& state) const {
             state.largest_force = (std::max)(state.largest_force, norm(force));
         }
     });
+    pull_back(state);
+    return state;
 }
 
-// Where a float is asked anew its rounding changes the answer: it is not, as long as x hardly moves.
+template <class Network, class Volume>
+void Elasticity<Network, Volume>::pull_back(ElasticState& state) {
+    if (!is_linear || backing_.empty()) ask_backing(state.x);
+    for (Index v = 0; v < state.x.cols(); ++v) {
+        const auto& pull = backing_[static_cast<std::size_t>(v)];
+        const Vector3<double> way = point(state.x, v) - pull.place;
+        const Vector3<double> force = pull.force - pull.stiffness * way;
+        state.backing.col(v) = force;
+        state.largest_force = (std::max)(state.largest_force, norm(force));
+    }
+}
+
+// One that is linear is known from its anchors. Where a float is asked anew its rounding changes the answer: it is not, as
+// long as x hardly moves.
 template <class Network, class Volume>
 void Elasticity<Network, Volume>::ask_backing(const Points<double>& x) {
-    const bool first = asked_.cols() == 0;
-    if (first) {
-        asked_.resize(3, x.cols());
-        answered_.resize(3, x.cols());
-        backing_stiffness_.resize(static_cast<std::size_t>(x.cols()));
-    }
-    constexpr auto endless = std::numeric_limits<Scalar>::infinity();
-    const double spacing = static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * x.cwiseAbs().maxCoeff();
+    const bool first = backing_.empty();
+    backing_.resize(static_cast<std::size_t>(x.cols()));
+    [[maybe_unused]] const double spacing =
+        static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * x.cwiseAbs().maxCoeff();
     for (Index v = 0; v < x.cols(); ++v) {
-        const Vector3<double> here = point(x, v);
-        if (!first && norm<double>(here - point(asked_, v).template cast<double>()) <= 64 * spacing) continue;
-        const Vector3<Scalar> place = here.cast<Scalar>();
-        const auto pull = volume_.pull(v, place, place, endless);
-        asked_.col(v) = place;
-        answered_.col(v) = pull.force.template cast<double>();
-        backing_stiffness_[static_cast<std::size_t>(v)] = curvature(v, pull.stiffness);
+        auto& pull = backing_[static_cast<std::size_t>(v)];
+        if constexpr (is_linear) {
+            const Vector3<double> anchor = point(volume_.anchors(), v).template cast<double>();
+            pull = {anchor, Vector3<double>::Zero(), volume_.template curvature<double>(v)};
+        } else {
+            const Vector3<double> here = point(x, v);
+            if (!first && norm<double>(here - pull.place) <= 64 * spacing) continue;
+            const Vector3<Scalar> place = here.template cast<Scalar>();
+            const auto answer = volume_.pull(v, place, place, std::numeric_limits<Scalar>::infinity());
+            pull = {place.template cast<double>(), answer.force.template cast<double>(),
+                    curvature(v, answer.stiffness)};
+        }
     }
 }
 
@@ -190,29 +137,6 @@ Symmetric3<double> Elasticity<Network, Volume>::curvature(Index v, Scalar most) 
 
 template <class Network, class Volume>
 void Elasticity<Network, Volume>::add_stiffness(const ElasticState& state, NewtonSystem& system) const {
-    for (const auto& spring : springs().springs()) {
-        const Vector3<double> along = reach_of(spring, state.x);
-        const double length = norm(along);
-        Eigen::Matrix3d block = static_cast<double>(spring.stiffness) * Eigen::Matrix3d::Identity();
-        if (length > 0) {
-            const auto answer = response(spring, length);
-            const double across = answer.tension / length;
-            const Vector3<double> u = along / length;
-            block = across * Eigen::Matrix3d::Identity() + (answer.stiffness - across) * u * u.transpose();
-        }
-        system.add(spring.first, spring.first, block);
-        system.add(spring.second, spring.second, block);
-        system.add(spring.first, spring.second, -block);
-    }
-    add_elements(state, system);
-    for (Index v = 0; v < state.x.cols(); ++v) {
-        const auto& k = backing_stiffness(v);
-        system.add(v, v, Eigen::Matrix3d{{k.xx, k.xy, k.xz}, {k.xy, k.yy, k.yz}, {k.xz, k.yz, k.zz}});
-    }
-}
-
-template <class Network, class Volume>
-void Elasticity<Network, Volume>::add_elements(const ElasticState& state, NewtonSystem& system) const {
     for_each_element(state.x, [&](const auto& placed, const auto& corners) {
         for (std::size_t i = 0; i < corners.size(); ++i) {
             for (std::size_t j = 0; j <= i; ++j) {
@@ -220,20 +144,20 @@ void Elasticity<Network, Volume>::add_elements(const ElasticState& state, Newton
             }
         }
     });
+    for (Index v = 0; v < state.x.cols(); ++v) {
+        system.add(v, v, dense(backing_[static_cast<std::size_t>(v)].stiffness));
+    }
 }
 
 template <class Network, class Volume>
 double Elasticity<Network, Volume>::largest_stiffness(const ElasticState& state) const {
     double largest = 0;
-    for (const auto& spring : springs().springs()) {
-        largest = (std::max)(largest, response(spring, norm(reach_of(spring, state.x))).stiffness);
-    }
     for_each_element(state.x, [&](const auto& placed, const auto& corners) {
         for (std::size_t i = 0; i < corners.size(); ++i) {
             largest = (std::max)(largest, largest_eigenvalue(placed.element.pull(corners, i).curvature));
         }
     });
-    for (const auto& k : backing_stiffness_) largest = (std::max)(largest, largest_eigenvalue(k));
+    for (const auto& pull : backing_) largest = (std::max)(largest, largest_eigenvalue(pull.stiffness));
     return largest;
 }
 

@@ -299,12 +299,17 @@ double ErrorBound<Convexity>::enclosure() const noexcept {
 template <CheckedConvexityModel Convexity>
 template <class C>
 EnclosedForce ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::size_t& tool) noexcept {
-    if constexpr (requires { constraint.force; }) return {-constraint.force.template cast<double>(), 0};
     std::fill(weights_.begin(), weights_.end(), 0.0);
-    problem_.share(constraint, weights_);
-    if constexpr (requires { constraint.contact.touching(); }) {
-        if (constraint.contact.touching()) pressed_.share(tool++, weights_);
-    }
+    EnclosedForce result{Vector3<double>::Zero(), 0};
+    bool varies = false;
+    for_each_term(constraint, [&](const ConstraintTerm& term) {
+        if (term.kind == ConstraintTerm::Kind::load) result.centre -= term.force;
+        const bool presses = term.kind == ConstraintTerm::Kind::press && term.contact.touching();
+        if (presses) pressed_.share(tool++, weights_);
+        problem_.share(term, weights_);
+        varies |= presses || term.holds();
+    });
+    if (!varies) return result;
     for (std::size_t v = 0; v < weights_.size(); ++v)
         slopes_[v] = weights_[v] * problem_.backing(static_cast<Index>(v));
     for (const auto& spring : problem_.springs()) {
@@ -313,7 +318,6 @@ EnclosedForce ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::
         slopes_[a] += slope;
         slopes_[b] += slope;
     }
-    EnclosedForce result{Vector3<double>::Zero(), 0};
     double squares = 0, rounding = 0;
     for (Index v = 0; v < problem_.vertex_count(); ++v) {
         const auto i = static_cast<std::size_t>(v);

@@ -17,8 +17,8 @@ enum class BoundStatus {
     not_convex,      ///< the energy could not be shown to be convex as far as the equilibrium seems to be
     did_not_refine,  ///< the equilibrium was not neared enough to say anything
     contact,         ///< a tool touches: it takes the equilibrium to say more
-    unsupported,     ///< a constraint of one's own, or held points with a corner that something else holds too
-    bad_input,       ///< a number is not finite, an index names no vertex, counts do not agree
+    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that something else holds too
+    bad_input,  ///< a number is not finite, an index names no vertex, counts do not agree
 };
 
 /// A force that is not known exactly: within `radius` of `centre` [N].

@@ -59,7 +59,7 @@ inline bool FactoredConvexity::gather(const RestProblem& problem, double radius)
         if (ends == 0) continue;
         const auto least = least_stiffness(spring, reach_of(spring, problem.centre()), ends * radius);
         if (!least) return false;
-        const auto block = stiffness_of(*least);
+        const auto block = block_of(*least);
         for (const Index v : {spring.first, spring.second}) {
             if (!problem.fixed(v)) factors_.add(v, block);
         }

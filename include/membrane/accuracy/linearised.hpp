@@ -75,14 +75,8 @@ inline void Linearised::at(const RestProblem& problem, const Points<double>& y) 
     for (std::size_t v = 0; v < scale_.size(); ++v) scale_[v] = problem.backing(static_cast<Index>(v));
     for (std::size_t s = 0; s < blocks_.size(); ++s) {
         const auto& spring = problem.springs()[s];
-        const Vector3<double> reach = reach_of(spring, y);
-        const double length = norm(reach);
-        blocks_[s] = diagonal3(spring.stiffness);
-        if (length > 0) {
-            const double relief = spring.stiffness * spring.rest_length / length;
-            blocks_[s] += diagonal3(-relief);
-            blocks_[s] += outer<double>(relief, reach / length);
-        }
+        blocks_[s] =
+            block_of<double>(pull_of(LinearSpring{}, reach_of(spring, y), spring.stiffness, spring.rest_length));
         scale_[static_cast<std::size_t>(spring.first)] += spring.stiffness;
         scale_[static_cast<std::size_t>(spring.second)] += spring.stiffness;
     }

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <limits>
@@ -13,7 +12,7 @@
 #include <membrane/accuracy/held_places.hpp>
 #include <membrane/network/mass_spring_network.hpp>
 #include <membrane/network/volume_springs.hpp>
-#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/constraint_term.hpp>
 
 /// What has to balance where a membrane of linear springs is at rest.
 ///
@@ -31,9 +30,9 @@ float >> || std::same_as<Volume, MovedVolume<VirtualVolumeSprings<double>, doubl
 
 enum class ProblemStatus {
     sound,
-    bad_input,    ///< a number is not finite, an index names no vertex, counts do not agree
-    contact,      ///< a tool touches; everything else has been taken in
-    unsupported,  ///< a constraint of one's own, or held points with a corner that something else holds too
+    bad_input,  ///< a number is not finite, an index names no vertex, counts do not agree
+    contact,    ///< a tool touches; everything else has been taken in
+    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that something else holds too
 };
 
 /// Springs, backing, loads and what is held, in double whatever the network's scalar. Damping is left out: at rest it
@@ -55,10 +54,10 @@ class RestProblem {
 
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed_.size()); }
     [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
-    [[nodiscard]] double backing(Index v) const noexcept { return backing_[at(v)]; }
+    [[nodiscard]] double backing(Index v) const noexcept { return backing_[at(v)].stiffness; }
 
     /// The backing's stiffness less what something else takes away of it, until the next `take` [N/m].
-    [[nodiscard]] double support(Index v) const noexcept { return backing_[at(v)] - softening_[at(v)]; }
+    [[nodiscard]] double support(Index v) const noexcept { return backing(v) - softening_[at(v)]; }
     void soften(Index v, double by) noexcept { softening_[at(v)] = by; }
 
     [[nodiscard]] bool fixed(Index v) const noexcept { return fixed_[at(v)] != 0; }
@@ -82,9 +81,9 @@ class RestProblem {
     /// Held points: their places.
     [[nodiscard]] const HeldPlaces& places() const noexcept { return places_; }
 
-    /// Adds to `weights` (V) how the reaction of a constraint is made of the forces on the vertices.
-    template <class C>
-    void share(const C& constraint, std::vector<double>& weights) const noexcept;
+    /// Adds to `weights` (V) how the reaction of what a constraint holds is made of the forces on the vertices; nothing
+    /// for a load or a tool.
+    static void share(const ConstraintTerm& term, std::vector<double>& weights) noexcept;
 
   private:
     static constexpr unsigned char by_network = 1, by_constraint = 2, by_caller = 4;
@@ -97,20 +96,15 @@ class RestProblem {
     bool take_backing(const Volume& volume) noexcept;
     void fix(Index v, unsigned char by) noexcept { fixed_[at(v)] = static_cast<unsigned char>(fixed_[at(v)] | by); }
     template <class C>
-    [[nodiscard]] ProblemStatus act(const C& constraint) noexcept;
-    template <Real Scalar>
-    [[nodiscard]] ProblemStatus act_on(const HeldVertex<Scalar>& held) noexcept;
-    template <Real Scalar>
-    [[nodiscard]] ProblemStatus act_on(const HeldPoint<Scalar>& held) noexcept;
-    template <Real Scalar>
-    [[nodiscard]] ProblemStatus act_on(const Load<Scalar>& load) noexcept;
-    [[nodiscard]] ProblemStatus act_on(const Pinned& pinned) noexcept;
+    [[nodiscard]] ProblemStatus take_constraint(const C& constraint) noexcept;
+    [[nodiscard]] ProblemStatus take_term(const ConstraintTerm& term) noexcept;
     [[nodiscard]] ProblemStatus check_places() const noexcept;
 
     std::vector<Spring<double>> springs_;
-    std::vector<double> backing_, softening_;
-    std::vector<unsigned char> fixed_;  // by whom, see below
-    Points<double> anchors_, load_, given_, centre_;
+    std::vector<VolumeSpring<double>> backing_;
+    std::vector<double> softening_;
+    std::vector<unsigned char> fixed_;  // by whom
+    Points<double> load_, given_, centre_;
     HeldPlaces places_;
     double rounding_ = 0;
     bool touched_ = false;  // by a tool
@@ -122,16 +116,15 @@ RestProblem::RestProblem(const MassSpringNetwork<Scalar, Law>& network)
       backing_(static_cast<std::size_t>(network.vertex_count())),
       softening_(backing_.size()),
       fixed_(backing_.size()),
-      anchors_(Points<double>::Zero(3, network.vertex_count())),
-      load_(anchors_),
-      given_(anchors_),
-      centre_(anchors_) {
+      load_(Points<double>::Zero(3, network.vertex_count())),
+      given_(load_),
+      centre_(load_) {
     static_assert(std::same_as<Law, LinearSpring>,
                   "the springs must follow LinearSpring: nothing is proven for others");
     take_springs(network.springs());
     std::size_t most = 0;
     for (Index v = 0; v < network.vertex_count(); ++v) most = (std::max)(most, network.springs_of(v).size());
-    // A spring's force is off by 9 units of rounding, half an epsilon each, times k (l + r) at the most; each sum of n
+    // A spring's force is off by 13 units of rounding, half an epsilon each, times k (l + r) at the most; each sum of n
     // adds n of all magnitudes. Loads and backing are two more, and the magnitudes are rounded as well.
     rounding_ = std::numeric_limits<double>::epsilon() * static_cast<double>(8 + most);
 }
@@ -153,7 +146,7 @@ ProblemStatus RestProblem::take(const std::type_identity_t<ConstPointsRef<Scalar
     touched_ = false;
     if (!take_backing<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::bad_input;
     ProblemStatus status = ProblemStatus::sound;
-    ((status = status == ProblemStatus::sound ? act(constraints) : status), ...);
+    ((status = status == ProblemStatus::sound ? take_constraint(constraints) : status), ...);
     if (status == ProblemStatus::sound) status = check_places();
     return status == ProblemStatus::sound && touched_ ? ProblemStatus::contact : status;
 }
@@ -169,68 +162,50 @@ void RestProblem::take_springs(const Springs& springs) noexcept {
 template <class Scalar, class Volume>
 bool RestProblem::take_backing(const Volume& volume) noexcept {
     if constexpr (std::same_as<Volume, NoVolumeSprings>) {
-        std::fill(backing_.begin(), backing_.end(), 0.0);
+        std::fill(backing_.begin(), backing_.end(), VolumeSpring<double>());
         return true;
     } else {
         if (volume.anchors().cols() != vertex_count()) return false;
         for (Index v = 0; v < vertex_count(); ++v) {
             const Vector3<Scalar> anchor = point(volume.anchors(), v);
-            const auto at_rest = volume.pull(v, anchor, anchor, std::numeric_limits<Scalar>::infinity());
-            backing_[at(v)] = static_cast<double>(at_rest.stiffness);
-            anchors_.col(v) = anchor.template cast<double>();
+            const auto spring = volume.spring(v, anchor, std::numeric_limits<Scalar>::infinity());
+            if (!is_finite(anchor)) return false;
+            backing_[at(v)] = {anchor.template cast<double>(), static_cast<double>(spring.stiffness)};
         }
-        return is_finite(anchors_);
+        return true;
     }
 }
 
 template <class C>
-ProblemStatus RestProblem::act(const C& constraint) noexcept {
+ProblemStatus RestProblem::take_constraint(const C& constraint) noexcept {
     if (!constraint.sound()) return ProblemStatus::bad_input;
-    if constexpr (requires { this->act_on(constraint); }) {
-        return act_on(constraint);
-    } else if constexpr (requires { constraint.contact.touching(); }) {
-        touched_ |= constraint.contact.touching();
+    ProblemStatus status = DescribedConstraint<C> ? ProblemStatus::sound : ProblemStatus::unsupported;
+    for_each_term(constraint, [&](const ConstraintTerm& term) {
+        if (status == ProblemStatus::sound) status = take_term(term);
+    });
+    return status;
+}
+
+inline ProblemStatus RestProblem::take_term(const ConstraintTerm& term) noexcept {
+    using Kind = ConstraintTerm::Kind;
+    if (term.kind == Kind::press) {
+        touched_ |= term.contact.touching();
         return ProblemStatus::sound;
-    } else {
-        return ProblemStatus::unsupported;
     }
-}
-
-template <Real Scalar>
-ProblemStatus RestProblem::act_on(const HeldVertex<Scalar>& held) noexcept {
-    if (!is_vertex(held.vertex)) return ProblemStatus::bad_input;
-    fix(held.vertex, by_constraint);
-    if ((fixed_[at(held.vertex)] & by_network) == 0) centre_.col(held.vertex) = held.target.template cast<double>();
-    return ProblemStatus::sound;
-}
-
-template <Real Scalar>
-ProblemStatus RestProblem::act_on(const HeldPoint<Scalar>& held) noexcept {
-    if (held.triangle == no_index) return ProblemStatus::sound;
-    for (const Index v : held.corners) {
+    for (const Index v : term.corners) {
         if (!is_vertex(v)) return ProblemStatus::bad_input;
     }
-    const bool added =
-        places_.add({held.corners, held.barycentric.template cast<double>(), held.target.template cast<double>()});
-    return added ? ProblemStatus::sound : ProblemStatus::unsupported;
-}
-
-template <Real Scalar>
-ProblemStatus RestProblem::act_on(const Load<Scalar>& load) noexcept {
-    for (std::size_t k = 0; k < 3; ++k) {
-        if (!is_vertex(load.corners[k])) return ProblemStatus::bad_input;
-        const auto weight = static_cast<double>(load.barycentric[static_cast<Eigen::Index>(k)]);
-        load_.col(load.corners[k]) += weight * load.force.template cast<double>();
+    const Index v = term.corners[0];
+    switch (term.kind) {
+        case Kind::hold_vertex:
+            if ((fixed_[at(v)] & by_network) == 0) centre_.col(v) = term.target;
+            [[fallthrough]];
+        case Kind::pin: fix(v, by_constraint); return ProblemStatus::sound;
+        case Kind::load:
+            for (std::size_t k = 0; k < 3; ++k) load_.col(term.corners[k]) += term.weight(k) * term.force;
+            return ProblemStatus::sound;
+        default: return places_.add(term) ? ProblemStatus::sound : ProblemStatus::unsupported;
     }
-    return ProblemStatus::sound;
-}
-
-inline ProblemStatus RestProblem::act_on(const Pinned& pinned) noexcept {
-    for (const Index v : pinned.vertices) {
-        if (!is_vertex(v)) return ProblemStatus::bad_input;
-        fix(v, by_constraint);
-    }
-    return ProblemStatus::sound;
 }
 
 inline ProblemStatus RestProblem::fix_all_but(std::span<const Index> free) noexcept {
@@ -250,18 +225,15 @@ inline ProblemStatus RestProblem::check_places() const noexcept {
 inline void RestProblem::forces(const Points<double>& y, Points<double>& force,
                                 std::vector<double>& magnitude) const noexcept {
     for (Index v = 0; v < vertex_count(); ++v) {
-        const Vector3<double> pull = backing(v) * (point(anchors_, v) - point(y, v));
+        const Vector3<double> pull = backing_[at(v)].elastic_pull(point(y, v)).force;
         force.col(v) = pull + load_.col(v);
         magnitude[at(v)] = norm(pull) + norm(point(load_, v));
     }
     for (const auto& spring : springs_) {
-        const Vector3<double> reach = reach_of(spring, y);
-        const double length = norm(reach);
-        if (!(length > 0)) continue;
-        const Vector3<double> pull = (spring.stiffness * (1 - spring.rest_length / length)) * reach;
-        force.col(spring.first) += pull;
-        force.col(spring.second) -= pull;
-        const double most = spring.stiffness * (length + spring.rest_length);
+        const auto pull = pull_of(LinearSpring{}, reach_of(spring, y), spring.stiffness, spring.rest_length);
+        force.col(spring.first) += pull.force();
+        force.col(spring.second) -= pull.force();
+        const double most = spring.stiffness * (pull.length + spring.rest_length);
         magnitude[at(spring.first)] += most;
         magnitude[at(spring.second)] += most;
     }
@@ -274,19 +246,9 @@ inline void RestProblem::project(Points<double>& f) const noexcept {
     places_.project(f);
 }
 
-template <class C>
-void RestProblem::share(const C& constraint, std::vector<double>& weights) const noexcept {
-    if constexpr (requires { constraint.vertex; }) {
-        weights[at(constraint.vertex)] += 1;
-    } else if constexpr (requires { constraint.vertices; }) {
-        for (const Index v : constraint.vertices) weights[at(v)] += 1;
-    } else if constexpr (requires { constraint.target; }) {
-        if (constraint.triangle == no_index) return;
-        const Vector3<double> barycentric = constraint.barycentric.template cast<double>();
-        for (int k = 0; k < 3; ++k) {
-            weights[at(constraint.corners[static_cast<std::size_t>(k)])] += barycentric[k] / squared_norm(barycentric);
-        }
-    }
+inline void RestProblem::share(const ConstraintTerm& term, std::vector<double>& weights) noexcept {
+    if (!term.holds()) return;
+    for (std::size_t k = 0; k < 3; ++k) weights[at(term.corners[k])] += term.share(k);
 }
 
 }  // namespace membrane

@@ -8,10 +8,9 @@
 #include <vector>
 
 #include <membrane/accuracy/tool_gap.hpp>
-#include <membrane/solve/constraints.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/solve/constraint_term.hpp>
 
-/// What acts on a membrane at rest, told by the constraints of a step, and by those of one's own:
+/// What acts on a membrane at rest, told by the constraints of a step, and by those of one's own: see `ConstraintTerm`, or
 ///
 ///     void describe(const Clamp& clamp, membrane::RestScene& scene) { scene.hold(clamp.vertex, clamp.target); }
 namespace membrane {
@@ -35,20 +34,6 @@ struct Equilibrium {
     double overlap = 0;                      ///< how deep the surface is in a tool [m]
     Index iterations = 0;                    ///< of Newton's method, in all increments
     bool converged = false;                  ///< forces balance, what is held is in its place, no tool overlaps
-};
-
-/// A point of a triangle that is held.
-struct HeldPlace {
-    std::size_t constraint;
-    std::array<Index, 3> corners;
-    Vector3<double> barycentric, target;  ///< [m]
-};
-
-/// A point of a triangle that something pulls at.
-struct LoadedPlace {
-    std::size_t constraint;
-    std::array<Index, 3> corners;
-    Vector3<double> barycentric, force;  ///< [N]
 };
 
 /// A tool that the surface stays outside of.
@@ -77,20 +62,19 @@ class RestScene {
 
     // For `describe`.
 
-    /// Holds `v` at `target` [m]; a pinned vertex stays where it is. The last one to hold a vertex decides where.
-    void hold(Index v, const Vector3<double>& target);
+    /// A pinned vertex stays where it is, whatever its target; the last one to hold a vertex decides where. A tool that
+    /// does not touch is nothing.
+    void add(const ConstraintTerm& term);
 
-    /// Holds `v` where it is. No force enters there: no vertices move on its account.
-    void hold(Index v);
-
-    /// Holds a point of a triangle at `target` [m].
-    void hold(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& target);
-
-    /// Pulls at a point of a triangle with `force` [N].
-    void load(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& force);
-
-    /// Keeps the surface outside `tool`, which touches it as `contact` says; nothing where it does not.
-    void press(const Tool<double>& tool, const Contact<double>& contact);
+    void hold(Index v, const Vector3<double>& target) { add(ConstraintTerm::hold(v, target)); }
+    void hold(Index v) { add(ConstraintTerm::pin(v)); }
+    void hold(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& target) {
+        add(ConstraintTerm::hold(corners, barycentric, target));
+    }
+    void load(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& force) {
+        add(ConstraintTerm::load(corners, barycentric, force));
+    }
+    void press(const Tool<double>& tool, const Contact<double>& contact) { add(ConstraintTerm::press(tool, contact)); }
 
     // For `equilibrium`.
 
@@ -106,14 +90,17 @@ class RestScene {
 
     /// Constraint and vertex.
     [[nodiscard]] const std::vector<std::pair<std::size_t, Index>>& holds() const noexcept { return holds_; }
-    [[nodiscard]] const std::vector<HeldPlace>& held_places() const noexcept { return held_places_; }
-    [[nodiscard]] const std::vector<LoadedPlace>& loaded_places() const noexcept { return loaded_places_; }
+    [[nodiscard]] const std::vector<ConstraintTerm>& held_places() const noexcept { return held_places_; }
+    [[nodiscard]] const std::vector<ConstraintTerm>& loaded_places() const noexcept { return loaded_places_; }
     [[nodiscard]] const std::vector<PressingTool>& tools() const noexcept { return tools_; }
 
     /// Vertices where a force enters.
     [[nodiscard]] const std::vector<Index>& seeds() const noexcept { return seeds_; }
 
   private:
+    void hold_vertex(const ConstraintTerm& term);
+    void act_on_point(const ConstraintTerm& term);
+    void press(const ConstraintTerm& term);
     void check(Index v) const;
     void check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const;
     void check(const Vector3<double>& vector, std::string_view what, std::string_view unit) const;
@@ -121,50 +108,11 @@ class RestScene {
     Points<double> start_, targets_;
     std::vector<unsigned char> pinned_, held_;
     std::vector<std::pair<std::size_t, Index>> holds_;
-    std::vector<HeldPlace> held_places_;
-    std::vector<LoadedPlace> loaded_places_;
+    std::vector<ConstraintTerm> held_places_, loaded_places_;
     std::vector<PressingTool> tools_;
     std::vector<Index> seeds_;
     std::size_t constraint_ = 0;
 };
-
-template <Real Scalar>
-void describe(const HeldVertex<Scalar>& held, RestScene& scene) {
-    scene.hold(held.vertex, held.target.template cast<double>());
-}
-
-template <Real Scalar>
-void describe(const HeldPoint<Scalar>& held, RestScene& scene) {
-    if (held.triangle == no_index) return;
-    scene.hold(held.corners, held.barycentric.template cast<double>(), held.target.template cast<double>());
-}
-
-inline void describe(const Pinned& pinned, RestScene& scene) {
-    for (const Index v : pinned.vertices) scene.hold(v);
-}
-
-template <Real Scalar>
-void describe(const Load<Scalar>& load, RestScene& scene) {
-    scene.load(load.corners, load.barycentric.template cast<double>(), load.force.template cast<double>());
-}
-
-template <Real Scalar>
-void describe(const Press<Scalar>& press, RestScene& scene) {
-    Tool<double> tool;
-    tool.position = press.tool.position.template cast<double>();
-    tool.axis = press.tool.axis.template cast<double>();
-    tool.radius = press.tool.radius;
-    Contact<double> contact;
-    contact.phase = press.contact.phase;
-    contact.corners = press.contact.corners;
-    contact.point = press.contact.point.template cast<double>();
-    contact.normal = press.contact.normal.template cast<double>();
-    contact.on_axis = press.contact.on_axis.template cast<double>();
-    contact.gap = press.contact.gap;
-    contact.reach = press.contact.reach;
-    contact.radius = press.contact.radius;
-    scene.press(tool, contact);
-}
 
 /// What `describe(constraint, scene)` tells a scene about.
 template <class C>
@@ -229,37 +177,40 @@ inline void RestScene::check(const Vector3<double>& vector, std::string_view wha
     }
 }
 
-inline void RestScene::hold(Index v, const Vector3<double>& target) {
-    check(v);
-    check(target, "target", "m");
-    hold(v);
-    seeds_.push_back(v);
-    if (pinned_[static_cast<std::size_t>(v)] == 0) targets_.col(v) = target;
+inline void RestScene::add(const ConstraintTerm& term) {
+    switch (term.kind) {
+        case ConstraintTerm::Kind::pin:
+        case ConstraintTerm::Kind::hold_vertex: return hold_vertex(term);
+        case ConstraintTerm::Kind::hold_point:
+        case ConstraintTerm::Kind::load: return act_on_point(term);
+        case ConstraintTerm::Kind::press: return press(term);
+    }
 }
 
-inline void RestScene::hold(Index v) {
+inline void RestScene::hold_vertex(const ConstraintTerm& term) {
+    const Index v = term.corners[0];
     check(v);
+    check(term.target, "target", "m");
     held_[static_cast<std::size_t>(v)] = 1;
     holds_.emplace_back(constraint_, v);
+    if (term.kind == ConstraintTerm::Kind::pin) return;
+    seeds_.push_back(v);
+    if (pinned_[static_cast<std::size_t>(v)] == 0) targets_.col(v) = term.target;
 }
 
-inline void RestScene::hold(const std::array<Index, 3>& corners, const Vector3<double>& barycentric,
-                            const Vector3<double>& target) {
-    check(corners, barycentric);
-    check(target, "target", "m");
-    held_places_.push_back({constraint_, corners, barycentric, target});
-    seeds_.insert(seeds_.end(), corners.begin(), corners.end());
+inline void RestScene::act_on_point(const ConstraintTerm& term) {
+    check(term.corners, term.weights);
+    check(term.target, "target", "m");
+    check(term.force, "force", "N");
+    auto& places = term.kind == ConstraintTerm::Kind::load ? loaded_places_ : held_places_;
+    places.push_back(term);
+    places.back().constraint = constraint_;
+    seeds_.insert(seeds_.end(), term.corners.begin(), term.corners.end());
 }
 
-inline void RestScene::load(const std::array<Index, 3>& corners, const Vector3<double>& barycentric,
-                            const Vector3<double>& force) {
-    check(corners, barycentric);
-    check(force, "force", "N");
-    loaded_places_.push_back({constraint_, corners, barycentric, force});
-    seeds_.insert(seeds_.end(), corners.begin(), corners.end());
-}
-
-inline void RestScene::press(const Tool<double>& tool, const Contact<double>& contact) {
+inline void RestScene::press(const ConstraintTerm& term) {
+    const auto& tool = term.tool;
+    const auto& contact = term.contact;
     check(tool.position, "tool's position", "m");
     check(tool.axis, "tool's axis", "m");
     if (!is_finite(tool.radius) || tool.radius < 0) {
@@ -291,12 +242,11 @@ inline RestGoals RestScene::goals(double part) const {
     RestGoals goals{on_the_way(start_, targets_), Points<double>::Zero(3, start_.cols()), {}, {}};
     for (const auto& place : loaded_places_) {
         for (std::size_t k = 0; k < 3; ++k) {
-            goals.loads.col(place.corners[k]) += part * place.barycentric[static_cast<Eigen::Index>(k)] * place.force;
+            goals.loads.col(place.corners[k]) += part * place.weight(k) * place.force;
         }
     }
     for (const auto& place : held_places_) {
-        const Vector3<double> from = point_at(triangle_at(start_, place.corners), place.barycentric);
-        goals.places.push_back(on_the_way(from, place.target));
+        goals.places.push_back(on_the_way(place.point_in(start_), place.target));
     }
     for (const auto& pressing : tools_) {
         goals.tools.push_back(pressing.tool);

@@ -179,7 +179,7 @@ void RestSearch<ElasticModel>::add_rows() {
         for (Eigen::Index c = 0; c < 3; ++c) {
             ConstraintRow row{place.corners, {}, off[c], true, stiffness_};
             for (std::size_t k = 0; k < 3; ++k) {
-                row.gradient[k] = place.barycentric[static_cast<Eigen::Index>(k)] * Vector3<double>::Unit(c);
+                row.gradient[k] = place.weight(k) * Vector3<double>::Unit(c);
             }
             system_.add(row);
         }
@@ -212,7 +212,7 @@ template <class ElasticModel>
 bool RestSearch<ElasticModel>::is_in_place() const {
     for (std::size_t i = 0; i < holding_.size(); ++i) {
         const auto& place = scene_.held_places()[i];
-        if (can_move(place.corners, place.barycentric) && norm(off_target(i)) > negligible_length()) return false;
+        if (can_move(place.corners, place.weights) && norm(off_target(i)) > negligible_length()) return false;
     }
     for (Index v = 0; v < here_.elastic.x.cols(); ++v) {
         if (!is_free(v) && point(here_.elastic.x, v) != point(goals_.targets, v)) return false;
@@ -271,7 +271,7 @@ Points<double> RestSearch<ElasticModel>::unbalanced(const State& state) const {
     for (std::size_t i = 0; i < holding_.size(); ++i) {
         const auto& held = scene_.held_places()[i];
         for (std::size_t k = 0; k < 3; ++k) {
-            forces.col(held.corners[k]) += held.barycentric[static_cast<Eigen::Index>(k)] * holding_[i];
+            forces.col(held.corners[k]) += held.weight(k) * holding_[i];
         }
     }
     return forces;
@@ -309,8 +309,7 @@ bool RestSearch<ElasticModel>::can_move(const std::array<Index, 3>& corners,
 
 template <class ElasticModel>
 Vector3<double> RestSearch<ElasticModel>::off_target(std::size_t i) const noexcept {
-    const auto& place = scene_.held_places()[i];
-    return point_at(triangle_at(here_.elastic.x, place.corners), place.barycentric) - goals_.places[i];
+    return scene_.held_places()[i].point_in(here_.elastic.x) - goals_.places[i];
 }
 
 }  // namespace membrane

@@ -29,8 +29,8 @@ enum class TangentStatus {
     not_stable,     ///< the energy has a direction in which it does not grow: what is free would snap away
     not_converged,  ///< more iterations are needed
     contact,        ///< a tool touches: not treated
-    unsupported,    ///< a constraint of one's own, or held points with a corner that something else holds too
-    bad_input,      ///< a number is not finite, an index names no vertex, counts do not agree
+    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that something else holds too
+    bad_input,  ///< a number is not finite, an index names no vertex, counts do not agree
 };
 
 struct TangentReport {
@@ -128,7 +128,7 @@ TangentReport TangentStiffness::condense(ProblemStatus status, const Held& held)
     if (report_.status != TangentStatus::found) return report_;
     stiffness_.at(problem_, problem_.centre());
     std::fill(shares_.begin(), shares_.end(), 0.0);
-    problem_.share(held, shares_);
+    for_each_term(held, [&](const ConstraintTerm& term) { problem_.share(term, shares_); });
     const Vector3<double> x = answer(0), y = answer(1), z = answer(2);
     report_.stiffness = {x[0], y[1], z[2], (x[1] + y[0]) / 2, (x[2] + z[0]) / 2, (y[2] + z[1]) / 2};
     return report_;

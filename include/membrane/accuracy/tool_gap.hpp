@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <membrane/collision/tool.hpp>
+#include <membrane/mesh/box.hpp>
 
 /// How far a tool is from the corners, edges and insides of triangles, and how that changes as these move.
 ///
@@ -69,10 +70,9 @@ namespace detail {
 
 /// Whether no point of the triangle is nearer than `far` to the tool's axis, at a glance.
 [[nodiscard]] inline bool is_far(const Triangle<double>& t, const Tool<double>& tool, double far) noexcept {
-    const Vector3<double> end = tool.position + tool.axis;
-    const Vector3<double> low = t.a.cwiseMin(t.b).cwiseMin(t.c), high = t.a.cwiseMax(t.b).cwiseMax(t.c);
-    return (low - tool.position.cwiseMax(end)).maxCoeff() > far ||
-           (tool.position.cwiseMin(end) - high).maxCoeff() > far;
+    Box<double> axis{tool.position, tool.position};
+    axis.include(tool.position + tool.axis);
+    return gap_between(bounds(t), axis) > far;
 }
 
 /// Tool, part, corners involved, ascending.

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <chrono>
 #include <cmath>
 #include <concepts>
@@ -151,19 +150,26 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volum
 
 namespace detail {
 
+/// Whether somebody feels the force: not of what only loads and pins.
 template <class C>
-inline constexpr bool is_felt = !std::same_as<C, Pinned>;
-template <Real Scalar>
-inline constexpr bool is_felt<Load<Scalar>> = false;
+[[nodiscard]] bool is_felt(const C& constraint) {
+    bool felt = !DescribedConstraint<C>;
+    for_each_term(constraint, [&](const ConstraintTerm& term) {
+        felt |= term.kind != ConstraintTerm::Kind::pin && term.kind != ConstraintTerm::Kind::load;
+    });
+    return felt;
+}
 
 /// The sum of `square(i)` over the constraints whose force is felt.
-template <class... Each, class Square>
-[[nodiscard]] double sum_of_felt(const std::tuple<Each...>&, Square square) {
-    constexpr std::array<bool, sizeof...(Each)> felt{is_felt<Each>...};
+template <class Constraints, class Square>
+[[nodiscard]] double sum_of_felt(const Constraints& constraints, Square square) {
     double sum = 0;
-    for (std::size_t i = 0; i < felt.size(); ++i) {
-        if (felt[i]) sum += square(i);
-    }
+    std::size_t i = 0;
+    const auto add = [&](const auto& constraint) {
+        if (is_felt(constraint)) sum += square(i);
+        ++i;
+    };
+    std::apply([&](const auto&... each) { (add(each), ...); }, constraints);
     return sum;
 }
 

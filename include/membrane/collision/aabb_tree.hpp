@@ -5,8 +5,8 @@
 #include <span>
 #include <utility>
 
-#include <membrane/collision/box.hpp>
 #include <membrane/collision/box_tree.hpp>
+#include <membrane/mesh/box.hpp>
 #include <membrane/mesh/triangle.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 

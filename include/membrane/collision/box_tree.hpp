@@ -10,12 +10,12 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/collision/box.hpp>
 #include <membrane/collision/tree_shape.hpp>
 #include <membrane/core/compressed_rows.hpp>
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/lane_points.hpp>
 #include <membrane/core/lanes.hpp>
+#include <membrane/mesh/box.hpp>
 #include <membrane/mesh/triangle.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include <membrane/collision/box.hpp>
+#include <membrane/mesh/box.hpp>
 #include <membrane/mesh/triangle.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 

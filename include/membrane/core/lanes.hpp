@@ -245,6 +245,15 @@ template <Number N>
     return sqrt(a);
 }
 
+/// `f` of one number, or of two; of those in every lane.
+template <Number N, class F, class... Rest>
+[[nodiscard]] N lane_by_lane(const F& f, const N& a, const Rest&... rest) noexcept {
+    if constexpr (Real<N>)
+        return f(a, rest...);
+    else
+        return N::of([&](std::size_t i) { return f(a[i], rest[i]...); });
+}
+
 /// std::max and std::min, of every lane.
 template <Number N>
 [[nodiscard]] N larger(const N& a, const N& b) noexcept {

@@ -44,6 +44,12 @@ template <Number Scalar>
     return {x * u[0], y * u[1], z * u[2], x * u[1], x * u[2], y * u[2]};
 }
 
+/// All nine numbers.
+template <Real Scalar>
+[[nodiscard]] Eigen::Matrix<Scalar, 3, 3> dense(const Symmetric3<Scalar>& a) noexcept {
+    return Eigen::Matrix<Scalar, 3, 3>{{a.xx, a.xy, a.xz}, {a.xy, a.yy, a.yz}, {a.xz, a.yz, a.zz}};
+}
+
 /// `a` as it is once everything is turned by `rotation`: R a R^T.
 template <Real Scalar>
 [[nodiscard]] Symmetric3<Scalar> rotated(const Symmetric3<Scalar>& a,

@@ -4,13 +4,12 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <numeric>
 #include <span>
 #include <utility>
 #include <vector>
 
-#include <membrane/core/types.hpp>
+#include <membrane/mesh/box.hpp>
 
 /// Which of many boxes overlap.
 ///
@@ -18,33 +17,11 @@
 ///     const bool all = for_each_overlap(boxes, effort, [&](membrane::Index i, membrane::Index j) { ... });
 namespace membrane {
 
-/// All points between two corners, borders included [m]; empty until something is included.
-struct Extent {
-    Vector3<double> low = Vector3<double>::Constant((std::numeric_limits<double>::max)());
-    Vector3<double> high = Vector3<double>::Constant(std::numeric_limits<double>::lowest());
-
-    void include(const Vector3<double>& p) noexcept {
-        low = low.cwiseMin(p);
-        high = high.cwiseMax(p);
-    }
-    void include(const Extent& other) noexcept {
-        low = low.cwiseMin(other.low);
-        high = high.cwiseMax(other.high);
-    }
-    [[nodiscard]] bool overlaps(const Extent& other) const noexcept {
-        return low[0] <= other.high[0] && other.low[0] <= high[0] && low[1] <= other.high[1] &&
-               other.low[1] <= high[1] && low[2] <= other.high[2] && other.low[2] <= high[2];
-    }
-    [[nodiscard]] bool contains(const Extent& other) const noexcept {
-        return at_most(low, other.low) && at_most(other.high, high);
-    }
-};
-
 /// Calls `visit(i, j)` once for each two boxes that overlap. Each two parts looked at take 1 from `effort`, and `visit`
 /// may take more; the search ends when none is left, and says whether it has seen everything. O(n log n) where boxes
 /// overlap few others.
 template <class Visit>
-[[nodiscard]] bool for_each_overlap(std::span<const Extent> boxes, std::int64_t& effort, Visit visit);
+[[nodiscard]] bool for_each_overlap(std::span<const Box<double>> boxes, std::int64_t& effort, Visit visit);
 
 namespace detail {
 
@@ -52,13 +29,13 @@ namespace detail {
 class HalvedBoxes {
   public:
     struct Node {
-        Extent box;
+        Box<double> box;
         std::size_t first, count;  // of the order
         std::size_t right;         // child; the left one comes next; 0 for a leaf
         [[nodiscard]] bool is_leaf() const noexcept { return right == 0; }
     };
 
-    explicit HalvedBoxes(std::span<const Extent> boxes) : boxes_(boxes), order_(boxes.size()) {
+    explicit HalvedBoxes(std::span<const Box<double>> boxes) : boxes_(boxes), order_(boxes.size()) {
         std::iota(order_.begin(), order_.end(), Index{0});
         if (!boxes.empty()) split(0, boxes.size());
     }
@@ -71,14 +48,13 @@ class HalvedBoxes {
     void split(std::size_t first, std::size_t count) {  // as deep as the logarithm of the count
         const std::size_t n = nodes_.size();
         nodes_.push_back({{}, first, count, 0});
-        Extent middles;
+        Box<double> middles;
         for (const Index i : std::span(order_).subspan(first, count)) {
             nodes_[n].box.include(boxes_[static_cast<std::size_t>(i)]);
             middles.include(middle(i));
         }
         if (count <= 4) return;
-        const Vector3<double> size = middles.high - middles.low;
-        const auto axis = std::max_element(size.begin(), size.end()) - size.begin();
+        const int axis = longest_axis(middles);
         const auto begin = order_.begin() + static_cast<std::ptrdiff_t>(first);
         const std::size_t half = count / 2;
         std::nth_element(begin, begin + static_cast<std::ptrdiff_t>(half), begin + static_cast<std::ptrdiff_t>(count),
@@ -88,11 +64,11 @@ class HalvedBoxes {
         split(first + half, count - half);
     }
     [[nodiscard]] Vector3<double> middle(Index i) const noexcept {
-        const Extent& box = boxes_[static_cast<std::size_t>(i)];
+        const Box<double>& box = boxes_[static_cast<std::size_t>(i)];
         return box.low + box.high;
     }
 
-    std::span<const Extent> boxes_;
+    std::span<const Box<double>> boxes_;
     std::vector<Index> order_;
     std::vector<Node> nodes_;
 };
@@ -100,11 +76,11 @@ class HalvedBoxes {
 }  // namespace detail
 
 template <class Visit>
-bool for_each_overlap(std::span<const Extent> boxes, std::int64_t& effort, Visit visit) {
+bool for_each_overlap(std::span<const Box<double>> boxes, std::int64_t& effort, Visit visit) {
     if (boxes.empty()) return true;
     const detail::HalvedBoxes tree(boxes);
     const auto& nodes = tree.nodes();
-    const auto box = [&](Index i) -> const Extent& { return boxes[static_cast<std::size_t>(i)]; };
+    const auto box = [&](Index i) -> const Box<double>& { return boxes[static_cast<std::size_t>(i)]; };
     std::vector<std::pair<std::size_t, std::size_t>> waiting{{0, 0}};
     while (!waiting.empty()) {
         const auto [m, n] = waiting.back();
@@ -113,15 +89,15 @@ bool for_each_overlap(std::span<const Extent> boxes, std::int64_t& effort, Visit
         const auto &a = nodes[m], &b = nodes[n];
         if (m == n && !a.is_leaf()) {
             waiting.insert(waiting.end(), {{m + 1, m + 1}, {m + 1, a.right}, {a.right, a.right}});
-        } else if (m == n || (a.is_leaf() && b.is_leaf() && a.box.overlaps(b.box))) {
+        } else if (m == n || (a.is_leaf() && b.is_leaf() && overlap(a.box, b.box))) {
             for (const Index i : tree.items(a)) {
                 for (const Index j : tree.items(b)) {
-                    if ((m == n && i >= j) || !box(i).overlaps(box(j))) continue;
+                    if ((m == n && i >= j) || !overlap(box(i), box(j))) continue;
                     if (--effort < 0) return false;
                     visit((std::min)(i, j), (std::max)(i, j));
                 }
             }
-        } else if (a.box.overlaps(b.box)) {
+        } else if (overlap(a.box, b.box)) {
             const bool halve_a = b.is_leaf() || (!a.is_leaf() && a.count >= b.count);
             const std::size_t left = (halve_a ? m : n) + 1, right = halve_a ? a.right : b.right,
                               other = halve_a ? n : m;

@@ -65,7 +65,7 @@ bool for_each_nested(const Points<double>& x, const Triangles& triangles, const 
         for (std::size_t j = i + 1; j < closed.size() && low(closed[j]) <= outer.extent.high[0]; ++j) {
             if (--effort < 0) return false;
             const SurfacePart& inner = part(closed[j]);
-            if (!outer.extent.contains(inner.extent)) continue;
+            if (!contains(outer.extent, inner.extent)) continue;
             effort -= outer.triangle_count;
             const auto q = point(x, triangles(0, inner.first_triangle));
             // A half where they touch.

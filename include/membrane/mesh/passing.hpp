@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include <membrane/mesh/box.hpp>
 #include <membrane/mesh/triangle.hpp>
 
 namespace membrane {
@@ -46,9 +47,9 @@ template <Real Scalar>
 
 template <Real Scalar>
 Scalar passing_time(const Triangle<Scalar>& from, const Triangle<Scalar>& to, const Vector3<Scalar>& q) noexcept {
-    const Vector3<Scalar> low = from.a.cwiseMin(from.b).cwiseMin(from.c).cwiseMin(to.a).cwiseMin(to.b).cwiseMin(to.c);
-    const Vector3<Scalar> high = from.a.cwiseMax(from.b).cwiseMax(from.c).cwiseMax(to.a).cwiseMax(to.b).cwiseMax(to.c);
-    if (!(at_most(low, q) && at_most(q, high))) return 1;
+    Box<Scalar> swept = bounds(from);
+    swept.include(bounds(to));
+    if (!contains(swept, q)) return 1;
 
     const Triangle<Scalar> begin{from.a - q, from.b - q, from.c - q}, end{to.a - q, to.b - q, to.c - q};
     const auto volume = [](const Vector3<Scalar>& a, const Vector3<Scalar>& b, const Vector3<Scalar>& c) {
@@ -62,7 +63,7 @@ Scalar passing_time(const Triangle<Scalar>& from, const Triangle<Scalar>& to, co
     const auto [least, most] = std::minmax_element(volumes.begin(), volumes.end());
     if (*least > 0 || *most < 0) return 1;  // a cubic stays between its coefficients
 
-    const Scalar size = detail::largest_magnitude<Scalar>(high - low);
+    const Scalar size = detail::largest_magnitude<Scalar>(swept.high - swept.low);
     const auto is_behind = [&](Scalar t) { return detail::cubic_at(volumes, t) < 0; };
     const auto meets = [&](Scalar t) {
         const auto corner = [t](const Vector3<Scalar>& a, const Vector3<Scalar>& b) {

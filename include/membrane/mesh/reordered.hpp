@@ -7,6 +7,7 @@
 #include <numeric>
 #include <vector>
 
+#include <membrane/mesh/box.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 
 /// A mesh in an order in which what is near in space is near in memory.
@@ -57,8 +58,9 @@ template <class Key>
 template <Real Scalar>
 ReorderedMesh<Scalar> reordered(const TriangleMesh<Scalar>& mesh) {
     const auto& x = mesh.positions();
-    const Vector3<Scalar> low = x.rowwise().minCoeff();
-    const Vector3<Scalar> size = x.rowwise().maxCoeff() - low;
+    Box<Scalar> all;
+    for (Index v = 0; v < mesh.vertex_count(); ++v) all.include(point(x, v));
+    const Vector3<Scalar> low = all.low, size = all.high - all.low;
     const Scalar cells = Scalar(1 << 21) * (1 - Scalar(1e-6)), per_metre = cells / size.maxCoeff();
     std::vector<std::uint64_t> place;
     for (const auto& p : x.colwise()) {

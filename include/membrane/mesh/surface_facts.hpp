@@ -54,7 +54,7 @@ struct SurfacePart {
     bool closed = true;  ///< Each edge has two triangles, which run along it in opposite directions.
     double area = 0;     ///< [m^2]
     double volume = 0;   ///< If closed [m^3].
-    Extent extent;
+    Box<double> extent;
 };
 
 /// The parts, by their first triangles.
@@ -149,7 +149,7 @@ inline void measure(SurfaceFacts& facts, const Points<double>& x, std::span<cons
                     const std::vector<bool>& measured) {
     facts.shortest_edge = facts.smallest_angle = std::numeric_limits<double>::infinity();
     double sum = 0, count = 0;
-    Extent extent;
+    Box<double> extent;
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
         if (!measured[static_cast<std::size_t>(edge[0].triangle)]) return;
         const auto length = norm<double>(point(x, edge[0].second) - point(x, edge[0].first));

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -35,18 +34,18 @@ namespace membrane {
 /// by the angle a, positive where apexes go inward, instead of the angle at rest, it stores stiffness (a - rest)^2 / 2
 /// [Grinspun03]. Of the second derivative the part is left out that vanishes at rest, and with it all that could be
 /// negative.
-template <Real Scalar>
+template <Number Scalar>
 struct Hinge {
     static constexpr std::size_t corner_count = 4;
 
     Scalar stiffness;  ///< [N m]
     Scalar rest;       ///< [rad]
 
-    template <Real N>
+    template <Number N>
     [[nodiscard]] CornerPull<N> pull(const Corners<N, 4>& x, std::size_t i) const noexcept;
-    template <Real N>
+    template <Number N>
     [[nodiscard]] N energy(const Corners<N, 4>& x) const noexcept;
-    template <Real N>
+    template <Number N>
     [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 4>& x, std::size_t i,
                                                 const Vector3<N>& way) const noexcept;
     [[nodiscard]] Eigen::Matrix3d second_derivative(const Corners<double, 4>& x, std::size_t i,
@@ -63,22 +62,35 @@ template <Real Scalar>
 
 namespace detail {
 
-/// The angle of a hinge, and its derivative by each corner.
-template <Real N>
-struct Fold {
+/// The angle of a hinge, and its derivative by each corner; zero where a triangle has no area.
+template <Number N>
+class Fold {
+  public:
     explicit Fold(const Corners<N, 4>& x) noexcept
         : edge(x[1] - x[0]), left(cross<N>(edge, x[2] - x[0])), right(cross<N>(x[3] - x[0], edge)) {}
 
-    [[nodiscard]] bool is_sound() const noexcept { return squared_norm(left) > 0 && squared_norm(right) > 0; }
+    [[nodiscard]] auto is_sound() const noexcept {
+        const auto on_left = squared_norm(left) > 0, on_right = squared_norm(right) > 0;
+        return on_left & on_right;
+    }
 
     [[nodiscard]] N angle() const noexcept {
-        return std::atan2(dot<N>(cross(left, right), edge) / norm(edge), dot(left, right));
+        const N sine = dot<N>(cross(left, right), edge) / unless_zero(norm(edge)), cosine = dot(left, right);
+        return if_sound(lane_by_lane<N>([](auto y, auto x) { return std::atan2(y, x); }, sine, cosine));
     }
 
     [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
-        const N length = norm(edge), square = length * length;
-        const Vector3<N> by_left = (-length / squared_norm(left)) * left;
-        const Vector3<N> by_right = (-length / squared_norm(right)) * right;
+        const Vector3<N> slope = slope_of_sound(x, i);
+        return {if_sound(slope[0]), if_sound(slope[1]), if_sound(slope[2])};
+    }
+
+    Vector3<N> edge, left, right;
+
+  private:
+    [[nodiscard]] Vector3<N> slope_of_sound(const Corners<N, 4>& x, std::size_t i) const noexcept {
+        const N length = norm(edge), square = unless_zero(length * length);
+        const Vector3<N> by_left = (-length / unless_zero(squared_norm(left))) * left;
+        const Vector3<N> by_right = (-length / unless_zero(squared_norm(right))) * right;
         if (i == 2) return by_left;
         if (i == 3) return by_right;
         // Neither does shifting the hinge change the angle, nor turning it about its edge.
@@ -86,53 +98,52 @@ struct Fold {
         return i == 0 ? Vector3<N>((on_left - 1) * by_left + (on_right - 1) * by_right)
                       : Vector3<N>(-on_left * by_left - on_right * by_right);
     }
-
-    Vector3<N> edge, left, right;
+    [[nodiscard]] N if_sound(const N& number) const noexcept { return select<N>(is_sound(), number, 0); }
+    [[nodiscard]] static N unless_zero(const N& divisor) noexcept { return select<N>(divisor > 0, divisor, 1); }
 };
 
 /// `angle` but for whole turns, between -pi and pi.
-template <Real N>
+template <Number N>
 [[nodiscard]] N within_half_turn(N angle) noexcept {
-    constexpr N turn = 2 * std::numbers::pi_v<N>;
-    return angle - turn * std::round(angle / turn);
+    constexpr Each<N> turn = 2 * std::numbers::pi_v<Each<N>>;
+    return angle - turn * lane_by_lane<N>([](auto turns) { return std::round(turns); }, angle / turn);
 }
 
 }  // namespace detail
 
-template <Real Scalar>
-template <Real N>
+template <Number Scalar>
+template <Number N>
 CornerPull<N> Hinge<Scalar>::pull(const Corners<N, 4>& x, std::size_t i) const noexcept {
     const detail::Fold<N> fold(x);
-    if (!fold.is_sound()) return {};
-    const auto k = static_cast<N>(stiffness);
+    const N k = static_cast<N>(stiffness);
     const Vector3<N> slope = fold.slope(x, i);
     const N moment = k * detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
     return {-moment * slope, outer<N>(k, slope)};
 }
 
-template <Real Scalar>
-template <Real N>
+template <Number Scalar>
+template <Number N>
 N Hinge<Scalar>::energy(const Corners<N, 4>& x) const noexcept {
     const detail::Fold<N> fold(x);
-    if (!fold.is_sound()) return 0;
     const N by = detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
-    return static_cast<N>(stiffness) * by * by / 2;
+    return select<N>(fold.is_sound(), static_cast<N>(stiffness) * by * by / 2, 0);
 }
 
-template <Real Scalar>
-template <Real N>
+template <Number Scalar>
+template <Number N>
 EnergyChange<N> Hinge<Scalar>::energy_change(const Corners<N, 4>& x, std::size_t i,
                                              const Vector3<N>& way) const noexcept {
+    using std::abs;
     auto there = x;
     there[i] += way;
-    const N before = energy(x), after = energy(there);
+    const N k = static_cast<N>(stiffness), before = energy(x), after = energy(there);
     // The angle itself is known to some epsilons.
-    const N noise = static_cast<N>(stiffness) * (1 + std::abs(static_cast<N>(rest))) *
-                    std::sqrt(2 * (before + after) / (std::max)(static_cast<N>(stiffness), N(1e-30)));
+    const N noise =
+        k * (1 + abs(static_cast<N>(rest))) * root_of<N>(2 * (before + after) / larger<N>(k, Each<N>(1e-30)));
     return {after - before, before + after + noise};
 }
 
-template <Real Scalar>
+template <Number Scalar>
 Eigen::Matrix3d Hinge<Scalar>::second_derivative(const Corners<double, 4>& x, std::size_t i,
                                                  std::size_t j) const noexcept {
     const detail::Fold<double> fold(x);

@@ -33,7 +33,7 @@ struct CurvedPull {
 };
 
 /// By how much the energy changes when a vertex moves.
-template <Real Scalar>
+template <Number Scalar>
 struct EnergyChange {
     Scalar change = 0;  ///< [J]
     Scalar size = 0;    ///< of what was added up and taken off again: times epsilon, the rounding [J]

@@ -11,6 +11,8 @@
 #include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
+#include <membrane/core/lanes.hpp>
+#include <membrane/mesh/triangle.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 #include <membrane/network/elastic_network.hpp>
 
@@ -21,19 +23,20 @@
 namespace membrane {
 
 /// What an element does to one of its corners.
-template <Real Scalar>
+template <Number Scalar>
 struct CornerPull {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
     Symmetric3<Scalar> curvature = {};  ///< of the energy as the corner moves, no eigenvalue below zero [N/m]
 };
 
 /// Where the corners of an element are [m].
-template <Real Scalar, std::size_t count>
+template <Number Scalar, std::size_t count>
 using Corners = std::array<Vector3<Scalar>, count>;
 
 /// One element with its constants, which floats and doubles can be asked. What the compiler cannot see: force, curvature
 /// and change of energy are of the same energy; `second_derivative(x, i, j)` is that by corners i and j [N/m], or so much
-/// of it that Newton's method still finds to rest.
+/// of it that Newton's method still finds to rest. The stock ones take `Lanes` as well, as constants and as positions:
+/// several elements of a kind at once, each to the bits that it comes to alone.
 template <class E>
 concept Element = std::copyable<E> && requires(const E& element, const Corners<double, E::corner_count>& x,
                                                const Corners<float, E::corner_count>& y, std::size_t i) {
@@ -48,6 +51,21 @@ concept Element = std::copyable<E> && requires(const E& element, const Corners<d
     { element.energy_change(y, i, y[i]) }
     noexcept->std::same_as<EnergyChange<float>>;
     { element.second_derivative(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
+};
+
+/// An element at its vertices.
+template <class E>
+struct PlacedElement {
+    std::array<Index, E::corner_count> corners;
+    E element;
+
+    /// Where its corners are.
+    template <class Positions>
+    [[nodiscard]] Corners<typename Positions::Scalar, E::corner_count> where(const Positions& x) const noexcept {
+        Corners<typename Positions::Scalar, E::corner_count> places;
+        for (std::size_t i = 0; i < places.size(); ++i) places[i] = point(x, corners[i]);
+        return places;
+    }
 };
 
 namespace detail {
@@ -115,10 +133,7 @@ class Elements {
   public:
     using Scalar = Scalar_;
     static constexpr std::size_t corner_count = Each::corner_count;
-    struct Placed {
-        std::array<Index, corner_count> corners;
-        Each element;
-    };
+    using Placed = PlacedElement<Each>;
 
     /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, and for one that is pulled at
     /// rest by what is not finite: a triangle too thin, or a constant too large, for the scalar. Linear.
@@ -127,21 +142,25 @@ class Elements {
     [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
     [[nodiscard]] std::span<const Placed> all() const noexcept { return all_; }
 
+    /// Calls `act(placed)` for each.
+    template <class Act>
+    void for_each_element(Act act) const {
+        for (const auto& placed : all_) act(placed);
+    }
+
     /// Calls `act(placed, x, corner)` for the elements of vertex `v`: where their corners are, and which of them is `v`.
     template <class Act>
     void for_each(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
         for (const auto& at : corners_of_[v]) {
             const Placed& placed = all_[static_cast<std::size_t>(at.element)];
-            act(placed, where(placed, x), static_cast<std::size_t>(at.corner));
+            act(placed, placed.where(x), static_cast<std::size_t>(at.corner));
         }
     }
 
     /// Where the corners of an element are.
     template <class Positions>
     [[nodiscard]] static auto where(const Placed& placed, const Positions& x) noexcept {
-        Corners<typename Positions::Scalar, corner_count> corners;
-        for (std::size_t i = 0; i < corner_count; ++i) corners[i] = point(x, placed.corners[i]);
-        return corners;
+        return placed.where(x);
     }
 
     /// See `MassSpringNetwork::negligible_force`.
@@ -184,7 +203,7 @@ Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<P
 
 template <Real Scalar, CheckedElement Each>
 Scalar Elements<Scalar, Each>::negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept {
-    const auto corners = where(placed, x);
+    const auto corners = placed.where(x);
     Scalar largest = 0, stiffness = 0, size = 0;
     for (std::size_t i = 0; i < corner_count; ++i) {
         const auto pull = placed.element.pull(corners, i);

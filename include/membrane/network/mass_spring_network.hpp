@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <type_traits>
@@ -14,6 +15,7 @@
 #include <membrane/mesh/adjacency.hpp>
 #include <membrane/mesh/triangle_mesh.hpp>
 #include <membrane/network/elastic_network.hpp>
+#include <membrane/network/elements.hpp>
 #include <membrane/network/spring_law.hpp>
 
 /// The membrane as masses joined by springs, one along each edge of the mesh.
@@ -58,15 +60,23 @@ template <Real Scalar, class Positions>
     return point(x, spring.second) - point(x, spring.first);
 }
 
+/// The second derivative of a spring's energy by its reach, or a bound of it: along u u^T + across (I - u u^T), u the
+/// direction [N/m].
+template <Number Scalar>
+struct SpringStiffness {
+    Scalar along, across;
+    Vector3<Scalar> direction;  ///< to the other end, zero without a length
+};
+
 /// What one spring does to the vertex at one end. One of length zero has no direction and no force: it curves the energy
 /// alike in all directions.
 template <Number Scalar>
-struct SpringPull {
-    Vector3<Scalar> reach;      ///< to the other end [m]
-    Scalar length;              ///< [m]
-    Scalar tension;             ///< [N]
-    Scalar along, across;       ///< curvature of the energy along the spring, and at right angles to it [N/m]
-    Vector3<Scalar> direction;  ///< to the other end, zero without a length
+struct SpringPull : SpringStiffness<Scalar> {
+    Vector3<Scalar> reach;  ///< to the other end [m]
+    Scalar length;          ///< [m]
+    Scalar tension;         ///< [N]
+
+    [[nodiscard]] Vector3<Scalar> force() const noexcept { return this->across * reach; }  ///< [N]
 };
 
 /// From the vertex at one end of a spring to the other, and how far that is. Of several springs, first all of these and
@@ -90,12 +100,11 @@ template <Number Scalar, class Law>
                                                                     const Scalar& rest_length) noexcept {
     const auto has_length = to.length != 0;
     const auto answer = law(SpringState<Scalar>{stiffness, rest_length, to.divisor});
-    return {to.reach,
+    return {{select(has_length, answer.stiffness, stiffness),
+             select<Scalar>(has_length, answer.tension * to.per_length, stiffness), to.per_length * to.reach},
+            to.reach,
             to.length,
-            select(has_length, answer.tension, Scalar(0)),
-            select(has_length, answer.stiffness, stiffness),
-            select<Scalar>(has_length, answer.tension * to.per_length, stiffness),
-            to.per_length * to.reach};
+            select(has_length, answer.tension, Scalar(0))};
 }
 template <Number Scalar, class Law>
 [[gnu::always_inline, nodiscard]] inline SpringPull<Scalar> pull_of(const Law& law, const Vector3<Scalar>& reach,
@@ -107,7 +116,7 @@ template <Number Scalar, class Law>
 /// Adds a spring to what pulls on a vertex.
 template <Number Scalar>
 [[gnu::always_inline]] inline void add(Pull<Scalar>& sum, const SpringPull<Scalar>& spring) noexcept {
-    sum.force += spring.across * spring.reach;
+    sum.force += spring.force();
     sum.stiffness += larger(spring.along, spring.across);
 }
 
@@ -131,7 +140,7 @@ template <Number Scalar>
 [[gnu::always_inline]] inline void add(CurvedSum<Scalar>& sum, const SpringPull<Scalar>& spring) noexcept {
     const Scalar stiffness = larger(spring.along, spring.across);
     const Scalar relief = smaller(stiffness - spring.across, stiffness);
-    sum.force += spring.across * spring.reach;
+    sum.force += spring.force();
     sum.stiffness += stiffness;
     sum.dyads += outer<Scalar>(larger(relief, Scalar(0)), spring.direction);
     const Scalar size_force = stiffness * spring.length + larger<Scalar>(-spring.tension, Scalar(0));
@@ -139,6 +148,94 @@ template <Number Scalar>
     sum.size_force = select(is_smaller, size_force, sum.size_force);
     sum.size_stiffness = select(is_smaller, stiffness, sum.size_stiffness);
 }
+
+/// Adds a spring's stiffness to a block.
+template <Number Scalar>
+inline void add(Symmetric3<Scalar>& sum, const SpringStiffness<Scalar>& spring) noexcept {
+    sum += diagonal3(spring.across);
+    sum += outer<Scalar>(spring.along - spring.across, spring.direction);
+}
+template <Number Scalar>
+[[nodiscard]] Symmetric3<Scalar> block_of(const SpringStiffness<Scalar>& spring) noexcept {
+    Symmetric3<Scalar> block;
+    add(block, spring);
+    return block;
+}
+
+/// Bound of the stiffness, from below, of a linear spring at all reaches that are at most `way` from `reach`; with none of
+/// them, then, is it stiffer in any direction than its own stiffness. None where it may get too short for that.
+///
+/// At a reach d of length l and direction u the second derivative of k (|d| - r)^2 / 2 is k I - k r/l (I - u u^T). Let
+/// d' be at most s l away from d. In the plane of d and d', at an angle a from u, it is no shorter than
+/// l' = l (cos a - sqrt(s^2 - sin^2 a)), and with q = r / (l - s l)
+///
+///     r/l' (I - u' u'^T)  <=  q (I - u u^T) + 2 s q u u^T,                                                     (*)
+///
+/// so that the stiffness is at least k (1 - q) across u and k (1 - 2 s q) along u. (*) is plain at right angles to the
+/// plane, where l' >= l - s l. Within it the left side is r/l' n n^T, n at right angles to u', and so (*) says that
+/// r/l' (sin^2 a / (2 s q) + cos^2 a / q) <= 1, or with z = sin^2 a that
+/// sqrt(1 - z) - sqrt(s^2 - z) >= (1 - s) (1 - z + z / (2 s)). At z = 0 both sides are 1 - s; up to z = s^2 the left
+/// one is convex, the right one is a line, and at z = 0 the left one is the steeper by 1 - s.
+[[nodiscard]] inline std::optional<SpringStiffness<double>> least_stiffness(const Spring<double>& spring,
+                                                                            const Vector3<double>& reach,
+                                                                            double way) noexcept {
+    constexpr double rounding = 1e-14;  // more than what is lost here
+    const double length = norm(reach);
+    if (!(2 * way < length)) return std::nullopt;
+    const double q = (1 + rounding) * spring.rest_length / (length - way), s = way / length;
+    if (!(q <= 2 && 2 * s * q <= 1)) return std::nullopt;
+    return SpringStiffness<double>{spring.stiffness * (1 - rounding - 2 * s * q), spring.stiffness * (1 - rounding - q),
+                                   reach / length};
+}
+
+/// A spring as an `Element`, between its two ends.
+template <Real Scalar, class Law>
+struct SpringElement {
+    static constexpr std::size_t corner_count = 2;
+
+    const Law* law;      ///< must outlive this
+    Scalar stiffness;    ///< [N/m]
+    Scalar rest_length;  ///< [m]
+
+    template <Real N>
+    [[nodiscard]] SpringPull<N> pull_towards(const Vector3<N>& reach) const noexcept {
+        static_assert(SpringLaw<Law, N>,
+                      "a law must take SpringState of the scalar it is asked in: an equilibrium is found in double");
+        return pull_of<N>(*law, reach, static_cast<N>(stiffness), static_cast<N>(rest_length));
+    }
+    template <Real N>
+    [[nodiscard]] SpringResponse<N> response(N length) const noexcept {
+        constexpr N shortest = (std::numeric_limits<N>::min)();  // a law is asked for no less
+        return (*law)(
+            SpringState<N>{static_cast<N>(stiffness), static_cast<N>(rest_length), (std::max)(length, shortest)});
+    }
+
+    template <Real N>
+    [[nodiscard]] CornerPull<N> pull(const Corners<N, 2>& x, std::size_t i) const noexcept {
+        const auto spring = pull_towards<N>(x[1 - i] - x[i]);
+        const SpringStiffness<N> most{(std::max)(spring.along, N(0)), (std::max)(spring.across, N(0)),
+                                      spring.direction};
+        return {spring.force(), block_of(most)};
+    }
+    template <Real N>
+    [[nodiscard]] N energy(const Corners<N, 2>& x) const noexcept {
+        return response(norm<N>(x[1] - x[0])).energy;
+    }
+    template <Real N>
+    [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 2>& x, std::size_t i,
+                                                const Vector3<N>& way) const noexcept {
+        const Vector3<N> reach = x[1 - i] - x[i];
+        const N length = norm(reach), far = detail::largest_magnitude(x[i]);
+        const auto before = response(length), after = response(norm<N>(reach - way));
+        return {after.energy - before.energy, before.energy + std::abs(before.tension) * (length + far)};
+    }
+    [[nodiscard]] Eigen::Matrix3d second_derivative(const Corners<double, 2>& x, std::size_t i,
+                                                    std::size_t j) const noexcept {
+        const auto block = block_of<double>(pull_towards<double>(x[1] - x[0]));
+        return dense(i == j ? block : -1.0 * block);
+    }
+};
+static_assert(Element<SpringElement<float, LinearSpring>> && Element<SpringElement<double, ExponentialSpring>>);
 
 /// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1): constant once built, no positions in it.
 template <Real Scalar_, CheckedSpringLaw<Scalar_> Law>
@@ -157,6 +254,12 @@ class MassSpringNetwork {
 
     /// The springs of vertex `v`, by ascending vertex at the other end.
     [[nodiscard]] std::span<const SpringEnd<Scalar>> springs_of(Index v) const noexcept { return ends_[v]; }
+
+    /// Calls `act(placed)` for each spring: `PlacedElement<SpringElement>`.
+    template <class Act>
+    void for_each_element(Act act) const {
+        for (const auto& spring : springs_) act(placed(spring));
+    }
 
     [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const noexcept { return ends_[v]; }
 
@@ -194,7 +297,8 @@ class MassSpringNetwork {
 
     /// Tension of spring `s` [N].
     [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
-        return response(springs_[static_cast<std::size_t>(s)], x).tension;
+        const auto& spring = springs_[static_cast<std::size_t>(s)];
+        return placed(spring).element.response(norm(reach_of(spring, x))).tension;
     }
 
     /// Energy stored in all springs [J]. Cost: O(springs).
@@ -205,9 +309,8 @@ class MassSpringNetwork {
     [[nodiscard]] Scalar negligible_force() const noexcept { return negligible_force_; }
 
   private:
-    [[nodiscard]] SpringResponse<Scalar> response(const Spring<Scalar>& s,
-                                                  const ConstPointsRef<Scalar>& x) const noexcept {
-        return law_(SpringState<Scalar>{s.stiffness, s.rest_length, norm(reach_of(s, x))});
+    [[nodiscard]] PlacedElement<SpringElement<Scalar, Law>> placed(const Spring<Scalar>& spring) const noexcept {
+        return {{spring.first, spring.second}, {&law_, spring.stiffness, spring.rest_length}};
     }
     void build_springs(const Adjacency& adjacency, const Points<Scalar>& x, const NetworkOptions<Scalar>& options);
 
@@ -309,27 +412,17 @@ CurvedPull<Scalar> MassSpringNetwork<Scalar, Law>::curved_pull(Index v,
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
     Symmetric3<Scalar> block;
-    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) {
-        block += diagonal3(spring.across);
-        block += outer<Scalar>(spring.along - spring.across, spring.direction);
-    });
+    for_each_pull(v, x, [&](const SpringPull<Scalar>& spring) { add(block, spring); });
     return block;
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 EnergyChange<Scalar> MassSpringNetwork<Scalar, Law>::energy_change(Index v, const Vector3<Scalar>& way,
                                                                    const ConstPointsRef<Scalar>& x) const noexcept {
-    const Vector3<Scalar> here = point(x, v);
-    const Scalar far = here.cwiseAbs().maxCoeff();
     EnergyChange<Scalar> sum;
     for (const auto& end : springs_of(v)) {
-        const auto response_at = [&](Scalar length) {
-            return law_(SpringState<Scalar>{end.stiffness, end.rest_length, length});
-        };
-        const Vector3<Scalar> reach = point(x, end.other) - here;
-        const Scalar length = norm(reach);
-        const auto before = response_at(length), after = response_at(norm<Scalar>(reach - way));
-        sum += {after.energy - before.energy, before.energy + std::abs(before.tension) * (length + far)};
+        const SpringElement<Scalar, Law> spring{&law_, end.stiffness, end.rest_length};
+        sum += spring.template energy_change<Scalar>({point(x, v), point(x, end.other)}, 0, way);
     }
     return sum;
 }
@@ -337,7 +430,7 @@ EnergyChange<Scalar> MassSpringNetwork<Scalar, Law>::energy_change(Index v, cons
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 Scalar MassSpringNetwork<Scalar, Law>::energy(const ConstPointsRef<Scalar>& x) const noexcept {
     Scalar sum = 0;
-    for (const auto& s : springs_) sum += response(s, x).energy;
+    for_each_element([&](const auto& spring) { sum += spring.element.energy(spring.where(x)); });
     return sum;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -22,51 +21,51 @@ namespace membrane {
 
 /// A constant pressure on one triangle, along its normal, a third at each corner. On closed surfaces, and wherever the border is
 /// pinned, all of them together have an energy, less pressure times volume.
-template <Real Scalar>
+template <Number Scalar>
 struct PressedTriangle {
     static constexpr std::size_t corner_count = 3;
 
     Scalar pressure;  ///< [Pa], from inside where positive
 
-    template <Real N>
+    template <Number N>
     [[nodiscard]] CornerPull<N> pull(const Corners<N, 3>& x, std::size_t i) const noexcept {
         const Vector3<N>&next = x[(i + 1) % 3], &last = x[(i + 2) % 3];
         return {static_cast<N>(pressure) / 6 * cross<N>(next - x[i], last - x[i])};
     }
-    template <Real N>
+    template <Number N>
     [[nodiscard]] N energy(const Corners<N, 3>& x) const noexcept {
         return -static_cast<N>(pressure) / 6 * dot<N>(x[0], cross(x[1], x[2]));
     }
-    template <Real N>
+    template <Number N>
     [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 3>& x, std::size_t i,
                                                 const Vector3<N>& way) const noexcept {
         const Vector3<N> force = pull(x, i).force;
-        return {-dot(force, way), norm(force) * x[i].cwiseAbs().maxCoeff()};
+        return {-dot(force, way), norm(force) * detail::largest_magnitude(x[i])};
     }
     [[nodiscard]] Eigen::Matrix3d second_derivative(const Corners<double, 3>& x, std::size_t i,
                                                     std::size_t j) const noexcept;
 };
 
 /// A constant force on one vertex.
-template <Real Scalar>
+template <Number Scalar>
 struct DeadLoad {
     static constexpr std::size_t corner_count = 1;
 
     Vector3<Scalar> force;  ///< [N]
 
-    template <Real N>
+    template <Number N>
     [[nodiscard]] CornerPull<N> pull(const Corners<N, 1>&, std::size_t) const noexcept {
         return {force.template cast<N>()};
     }
-    template <Real N>
+    template <Number N>
     [[nodiscard]] N energy(const Corners<N, 1>& x) const noexcept {
         return -dot<N>(force.template cast<N>(), x[0]);
     }
-    template <Real N>
+    template <Number N>
     [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 1>& x, std::size_t,
                                                 const Vector3<N>& way) const noexcept {
         const Vector3<N> f = force.template cast<N>();
-        return {-dot(f, way), norm(f) * x[0].cwiseAbs().maxCoeff()};
+        return {-dot(f, way), norm(f) * detail::largest_magnitude(x[0])};
     }
     [[nodiscard]] Eigen::Matrix3d second_derivative(const Corners<double, 1>&, std::size_t,
                                                     std::size_t) const noexcept {
@@ -88,7 +87,7 @@ template <Real Scalar, ElasticNetwork<Scalar> Network>
 
 // The force on corner i is p / 6 x_j x x_k but for terms that the triangles around i take off each other, as do those that
 // come from where the origin is, here the middle of the edge.
-template <Real Scalar>
+template <Number Scalar>
 Eigen::Matrix3d PressedTriangle<Scalar>::second_derivative(const Corners<double, 3>& x, std::size_t i,
                                                            std::size_t j) const noexcept {
     if (i == j) return Eigen::Matrix3d::Zero();

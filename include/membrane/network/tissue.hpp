@@ -40,6 +40,13 @@ class Tissue {
         std::apply([&](const auto&... kinds) { (act(kinds), ...); }, kinds_);
     }
 
+    /// Calls `act(placed)` for each spring and each element: `PlacedElement`.
+    template <class Act>
+    void for_each_element(Act act) const {
+        springs_.for_each_element(act);
+        for_each_kind([&](const auto& elements) { elements.for_each_element(act); });
+    }
+
     /// A vertex whose place changes the pull on another.
     struct Joined {
         Index other;

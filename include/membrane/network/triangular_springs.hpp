@@ -21,25 +21,25 @@ namespace membrane {
 /// d_k = l_k^2 - L_k^2: springs along its edges, and three that join two edges each. That is exactly the energy of a
 /// linear triangle of Saint Venant's and Kirchhoff's material in plane stress: what it comes to converges with the size of
 /// the triangles, whatever their shape. Like that material it gives way where it is squeezed to less than some 60 %.
-template <Real Scalar>
+template <Number Scalar>
 struct TriangularSpring {
     static constexpr std::size_t corner_count = 3;
 
     Symmetric3<Scalar> stiffness;  ///< K [N/m^3]
     Vector3<Scalar> rest;          ///< L_k^2, edge k is opposite of corner k [m^2]
 
-    template <Real N>
+    template <Number N>
     [[nodiscard]] CornerPull<N> pull(const Corners<N, 3>& x, std::size_t i) const noexcept;
-    template <Real N>
+    template <Number N>
     [[nodiscard]] N energy(const Corners<N, 3>& x) const noexcept;
-    template <Real N>
+    template <Number N>
     [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 3>& x, std::size_t i,
                                                 const Vector3<N>& way) const noexcept;
     [[nodiscard]] Eigen::Matrix3d second_derivative(const Corners<double, 3>& x, std::size_t i,
                                                     std::size_t j) const noexcept;
 
     /// Mean of the two principal tensions, a force for each width as it is now [N/m].
-    template <Real N>
+    template <Number N>
     [[nodiscard]] N mean_tension(const Corners<N, 3>& x) const noexcept;
 };
 
@@ -58,24 +58,24 @@ struct OtherCorners {
     std::size_t next, last;
 };
 
-template <Real N>
+template <Number N>
 [[nodiscard]] Vector3<N> squares_of_edges(const Corners<N, 3>& x) noexcept {
     return {squared_norm<N>(x[2] - x[1]), squared_norm<N>(x[0] - x[2]), squared_norm<N>(x[1] - x[0])};
 }
 
 // K d: half of the derivative of the energy by the squares is along the edges [N/m].
-template <Real N, Real Scalar>
+template <Number N, Number Scalar>
 [[nodiscard]] Vector3<N> times(const Symmetric3<Scalar>& k, const Vector3<N>& d) noexcept {
-    const auto cast = [](Scalar number) { return static_cast<N>(number); };
+    const auto cast = [](const Scalar& number) { return static_cast<N>(number); };
     return Symmetric3<N>{cast(k.xx), cast(k.yy), cast(k.zz), cast(k.xy), cast(k.xz), cast(k.yz)} * d;
 }
 
-template <Real N, Real Scalar>
+template <Number N, Number Scalar>
 [[nodiscard]] Vector3<N> stretch(const TriangularSpring<Scalar>& spring, const Corners<N, 3>& x) noexcept {
     return squares_of_edges(x) - spring.rest.template cast<N>();
 }
 
-template <Real Scalar>
+template <Number Scalar>
 [[nodiscard]] Scalar entry(const Symmetric3<Scalar>& k, std::size_t i, std::size_t j) noexcept {
     if (i == j) return i == 0 ? k.xx : i == 1 ? k.yy : k.zz;
     return i + j == 1 ? k.xy : i + j == 2 ? k.xz : k.yz;
@@ -101,8 +101,8 @@ template <Real Scalar>
 
 }  // namespace detail
 
-template <Real Scalar>
-template <Real N>
+template <Number Scalar>
+template <Number N>
 CornerPull<N> TriangularSpring<Scalar>::pull(const Corners<N, 3>& x, std::size_t i) const noexcept {
     const detail::OtherCorners other(i);
     const Vector3<N> tensions = detail::times(stiffness, detail::stretch(*this, x));
@@ -116,32 +116,34 @@ CornerPull<N> TriangularSpring<Scalar>::pull(const Corners<N, 3>& x, std::size_t
     CornerPull<N> answer{to_next * next + to_last * last, outer<N>(4 * (along_next - both), next)};
     answer.curvature += outer<N>(4 * (along_last - both), last);
     answer.curvature += outer<N>(4 * both, next + last);
-    answer.curvature += diagonal3((std::max)(to_next + to_last, N(0)));  // a push across is left out
+    answer.curvature += diagonal3(larger<N>(to_next + to_last, N(0)));  // a push across is left out
     return answer;
 }
 
-template <Real Scalar>
-template <Real N>
+template <Number Scalar>
+template <Number N>
 N TriangularSpring<Scalar>::energy(const Corners<N, 3>& x) const noexcept {
     const Vector3<N> d = detail::stretch(*this, x);
     return dot<N>(d, detail::times(stiffness, d)) / 2;
 }
 
-template <Real Scalar>
-template <Real N>
+template <Number Scalar>
+template <Number N>
 EnergyChange<N> TriangularSpring<Scalar>::energy_change(const Corners<N, 3>& x, std::size_t i,
                                                         const Vector3<N>& way) const noexcept {
     const detail::OtherCorners other(i);
     const Vector3<N> before = detail::stretch(*this, x), tensions = detail::times(stiffness, before);
     Vector3<N> by = Vector3<N>::Zero();
-    by[static_cast<Eigen::Index>(other.last)] = dot<N>(way, way + 2 * (x[i] - x[other.next]));
-    by[static_cast<Eigen::Index>(other.next)] = dot<N>(way, way + 2 * (x[i] - x[other.last]));
-    const N far = x[i].cwiseAbs().maxCoeff(), edge = std::sqrt(detail::squares_of_edges(x).maxCoeff());
-    return {dot<N>(by, tensions + detail::times(stiffness, by) / 2),
-            2 * tensions.cwiseAbs().sum() * edge * (edge + far)};
+    by[static_cast<Eigen::Index>(other.last)] = dot<N>(way, way + N(2) * (x[i] - x[other.next]));
+    by[static_cast<Eigen::Index>(other.next)] = dot<N>(way, way + N(2) * (x[i] - x[other.last]));
+    using std::abs;
+    const Vector3<N> squares = detail::squares_of_edges(x);
+    const N far = detail::largest_magnitude(x[i]), edge = root_of(larger(larger(squares[0], squares[1]), squares[2]));
+    const N tension = abs(tensions[0]) + (abs(tensions[1]) + abs(tensions[2]));
+    return {dot<N>(by, tensions + detail::times(stiffness, by) / N(2)), 2 * tension * edge * (edge + far)};
 }
 
-template <Real Scalar>
+template <Number Scalar>
 Eigen::Matrix3d TriangularSpring<Scalar>::second_derivative(const Corners<double, 3>& x, std::size_t i,
                                                             std::size_t j) const noexcept {
     const Vector3<double> tensions = detail::times(stiffness, detail::stretch(*this, x));
@@ -163,8 +165,8 @@ Eigen::Matrix3d TriangularSpring<Scalar>::second_derivative(const Corners<double
 
 // Scaled by 1 + s, the triangle stores s times the sum of all tensions times its area, twice the mean, and as d changes by
 // 2 s l^2: the tensions are had from the squares of the edges.
-template <Real Scalar>
-template <Real N>
+template <Number Scalar>
+template <Number N>
 N TriangularSpring<Scalar>::mean_tension(const Corners<N, 3>& x) const noexcept {
     const N twice_area = norm<N>(cross<N>(x[1] - x[0], x[2] - x[0]));
     const Vector3<N> tensions = detail::times(stiffness, detail::stretch(*this, x));

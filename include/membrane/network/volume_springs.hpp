@@ -83,6 +83,11 @@ struct VolumeSpring {
         return {-stiffness * (position - anchor), stiffness + rate};
     }
 
+    /// Energy stored [J].
+    [[nodiscard]] Scalar energy(const Vector3<Scalar>& position) const noexcept {
+        return stiffness * squared_norm<Scalar>(position - anchor) / 2;
+    }
+
     /// The drag. The velocity along the spring in (5) is by how much its length has changed
     /// over the tick: how often a solver visits the vertex within the tick does not change the damping, and
     /// the damping force, like that of a spring, has an energy: k'_d (change of length)^2 / (2 dt).
@@ -139,7 +144,7 @@ class VirtualVolumeSprings {
 
     /// Energy stored in the spring of vertex `v` at `position` [J].
     [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept {
-        return stiffness(v) * squared_norm<Scalar>(position - point(anchors_, v)) / 2;
+        return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.energy(position);
     }
 
   private:

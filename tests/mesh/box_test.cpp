@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/collision/box.hpp>
+#include <membrane/mesh/box.hpp>
 
 #include <algorithm>
 #include <array>
@@ -171,4 +171,31 @@ TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[box][la
             }
         }
     }
+}
+
+TEST_CASE("boxes lie within others, overlap, or have a gap between them", "[box]") {
+    const auto inside = [](const Box<double>& a, const Box<double>& b) {
+        bool all = true;
+        for (Index k = 0; k < 3; ++k) all &= a.low[k] <= b.low[k] && b.high[k] <= a.high[k];
+        return all;
+    };
+    int within = 0, apart = 0;
+    for (int seed = 1; seed <= cases(2'000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Box<double> a, b;
+        for (Box<double>* box : {&a, &b}) {
+            for (int i = 0; i < 2 + random.index(6); ++i) box->include(random.vector<double>());
+        }
+        REQUIRE(contains(a, b) == inside(a, b));
+        REQUIRE(contains(a, a.low));
+        REQUIRE(contains(a, b.low) == (squared_distance(a, b.low) == 0));
+        REQUIRE((gap_between(a, b) <= 0) == bool(overlap(a, b)));
+        REQUIRE(gap_between(a, b) == gap_between(b, a));
+        within += contains(a, b) ? 1 : 0;
+        apart += gap_between(a, b) > 0 ? 1 : 0;
+    }
+    CHECK(within > 0);
+    CHECK(apart > 0);
+    CHECK(gap_between(Box<double>{{0, 0, 0}, {1, 1, 1}}, Box<double>{{0, 3, 1}, {1, 4, 2}}) == 2);
 }

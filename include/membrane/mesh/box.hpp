@@ -38,6 +38,16 @@ template <Real Scalar>
 template <Number N>
 [[nodiscard]] auto overlap(const Box<N>& a, const Box<Each<N>>& b) noexcept;
 
+/// How far apart they are along the axis where that is most [m]; not positive where they overlap.
+template <Real Scalar>
+[[nodiscard]] Scalar gap_between(const Box<Scalar>& a, const Box<Scalar>& b) noexcept;
+
+/// Whether the point, or another box that is not empty, lies within.
+template <Real Scalar>
+[[nodiscard]] bool contains(const Box<Scalar>& box, const Vector3<Scalar>& p) noexcept;
+template <Real Scalar>
+[[nodiscard]] bool contains(const Box<Scalar>& box, const Box<Scalar>& other) noexcept;
+
 /// From `q` to the nearest point of the box, 0 inside [m^2].
 template <Number N>
 [[nodiscard]] N squared_distance(const Box<N>& box, const Vector3<Each<N>>& q) noexcept;
@@ -105,6 +115,26 @@ auto overlap(const Box<N>& a, const Box<Each<N>>& b) noexcept {
     };
     const auto x = along(0), y = along(1), z = along(2);
     return x & y & z;
+}
+
+template <Real Scalar>
+Scalar gap_between(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
+    Scalar most = std::numeric_limits<Scalar>::lowest();
+    for (int k = 0; k < 3; ++k) most = (std::max)(most, (std::max)(a.low[k] - b.high[k], b.low[k] - a.high[k]));
+    return most;
+}
+
+template <Real Scalar>
+bool contains(const Box<Scalar>& box, const Vector3<Scalar>& p) noexcept {
+    for (int k = 0; k < 3; ++k) {
+        if (!(box.low[k] <= p[k] && p[k] <= box.high[k])) return false;
+    }
+    return true;
+}
+
+template <Real Scalar>
+bool contains(const Box<Scalar>& box, const Box<Scalar>& other) noexcept {
+    return contains(box, other.low) && contains(box, other.high);
 }
 
 template <Number N>

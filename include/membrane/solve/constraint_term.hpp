@@ -1,0 +1,153 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/press.hpp>
+
+/// What a constraint asks of a membrane, in the same few words whatever its type, for those who do not step: Newton's
+/// method, the error bound, what judges a trial.
+///
+///     for_each_term(constraint, [&](const membrane::ConstraintTerm& term) { ... });
+///
+///     template <class Terms>                                                        // of a constraint of one's own
+///     void describe(const Clamp& clamp, Terms& terms) { terms.add(membrane::ConstraintTerm::hold(clamp.vertex, clamp.target)); }
+namespace membrane {
+
+/// A point of the membrane that is held or pulled at, or a tool that the surface stays outside of. In double.
+struct ConstraintTerm {
+    enum class Kind : unsigned char {
+        pin,          ///< the vertex stays where it is; no force enters there
+        hold_vertex,  ///< it is at `target`
+        hold_point,   ///< the point of a triangle is at `target`
+        load,         ///< `force` acts on it
+        press,        ///< the surface stays outside `tool`, which touches it as `contact` says
+    };
+
+    Kind kind = Kind::pin;
+    std::array<Index, 3> corners{no_index, no_index, no_index};  ///< of the point's triangle; a vertex is all three
+    Vector3<double> weights = {1, 0, 0};                         ///< of the corners
+    Vector3<double> target = Vector3<double>::Zero();            ///< [m]
+    Vector3<double> force = Vector3<double>::Zero();             ///< [N]
+    Tool<double> tool = {};
+    Contact<double> contact = {};
+    std::size_t constraint = 0;  ///< which it is of those handed in, for whoever collects terms
+
+    [[nodiscard]] static ConstraintTerm pin(Index v) noexcept;
+    [[nodiscard]] static ConstraintTerm hold(Index v, const Vector3<double>& target) noexcept;
+    [[nodiscard]] static ConstraintTerm hold(const std::array<Index, 3>& corners, const Vector3<double>& weights,
+                                             const Vector3<double>& target) noexcept;
+    [[nodiscard]] static ConstraintTerm load(const std::array<Index, 3>& corners, const Vector3<double>& weights,
+                                             const Vector3<double>& force) noexcept;
+    [[nodiscard]] static ConstraintTerm press(const Tool<double>& tool, const Contact<double>& contact) noexcept;
+
+    /// Whether there is a point that is held.
+    [[nodiscard]] bool holds() const noexcept { return kind != Kind::load && kind != Kind::press; }
+
+    [[nodiscard]] double weight(std::size_t k) const noexcept { return weights[static_cast<Eigen::Index>(k)]; }
+
+    /// The point's place where the vertices are at `x` (3 x V [m]); of anything else that vertices have, its value there.
+    [[nodiscard]] Vector3<double> point_in(const Points<double>& x) const noexcept {
+        return point_at(triangle_at(x, corners), weights);
+    }
+
+    /// The part of the force on corner `k` that whoever holds the point feels. As the point goes a way, corner `k` goes
+    /// this part of it, if the corners go as little as they can.
+    [[nodiscard]] double share(std::size_t k) const noexcept { return weight(k) / squared_norm(weights); }
+};
+
+template <Real Scalar, class Terms>
+void describe(const HeldVertex<Scalar>& held, Terms& terms) {
+    terms.add(ConstraintTerm::hold(held.vertex, held.target.template cast<double>()));
+}
+
+template <Real Scalar, class Terms>
+void describe(const HeldPoint<Scalar>& held, Terms& terms) {
+    if (held.triangle == no_index) return;
+    terms.add(ConstraintTerm::hold(held.corners, held.barycentric.template cast<double>(),
+                                   held.target.template cast<double>()));
+}
+
+template <class Terms>
+void describe(const Pinned& pinned, Terms& terms) {
+    for (const Index v : pinned.vertices) terms.add(ConstraintTerm::pin(v));
+}
+
+template <Real Scalar, class Terms>
+void describe(const Load<Scalar>& load, Terms& terms) {
+    terms.add(ConstraintTerm::load(load.corners, load.barycentric.template cast<double>(),
+                                   load.force.template cast<double>()));
+}
+
+template <Real Scalar, class Terms>
+void describe(const Press<Scalar>& press, Terms& terms) {
+    Tool<double> tool;
+    tool.position = press.tool.position.template cast<double>();
+    tool.axis = press.tool.axis.template cast<double>();
+    tool.radius = press.tool.radius;
+    Contact<double> contact;
+    contact.phase = press.contact.phase;
+    contact.corners = press.contact.corners;
+    contact.point = press.contact.point.template cast<double>();
+    contact.normal = press.contact.normal.template cast<double>();
+    contact.on_axis = press.contact.on_axis.template cast<double>();
+    contact.gap = press.contact.gap;
+    contact.reach = press.contact.reach;
+    contact.radius = press.contact.radius;
+    terms.add(ConstraintTerm::press(tool, contact));
+}
+
+namespace detail {
+
+/// Takes terms by calling a function.
+template <class Act>
+struct EachTerm {
+    void add(const ConstraintTerm& term) { act(term); }
+    Act act;
+};
+struct IgnoreTerm {
+    void operator()(const ConstraintTerm&) const noexcept {}
+};
+
+}  // namespace detail
+
+/// What `describe(constraint, terms)` tells anybody about who has `terms.add(ConstraintTerm)`.
+template <class C>
+concept DescribedConstraint = requires(const C& constraint, detail::EachTerm<detail::IgnoreTerm>& terms) {
+    describe(constraint, terms);
+};
+static_assert(DescribedConstraint<HeldVertex<float>> && DescribedConstraint<HeldPoint<double>>);
+static_assert(DescribedConstraint<Pinned> && DescribedConstraint<Load<float>> && DescribedConstraint<Press<double>>);
+
+/// Calls `act(term)` for each term of the constraint; of one that does not describe itself, none is known.
+template <class C, class Act>
+void for_each_term(const C& constraint, Act act) {
+    if constexpr (DescribedConstraint<C>) {
+        detail::EachTerm<Act> terms{act};
+        describe(constraint, terms);
+    }
+}
+
+inline ConstraintTerm ConstraintTerm::pin(Index v) noexcept { return {.kind = Kind::pin, .corners = {v, v, v}}; }
+
+inline ConstraintTerm ConstraintTerm::hold(Index v, const Vector3<double>& target) noexcept {
+    return {.kind = Kind::hold_vertex, .corners = {v, v, v}, .target = target};
+}
+
+inline ConstraintTerm ConstraintTerm::hold(const std::array<Index, 3>& corners, const Vector3<double>& weights,
+                                           const Vector3<double>& target) noexcept {
+    return {.kind = Kind::hold_point, .corners = corners, .weights = weights, .target = target};
+}
+
+inline ConstraintTerm ConstraintTerm::load(const std::array<Index, 3>& corners, const Vector3<double>& weights,
+                                           const Vector3<double>& force) noexcept {
+    return {.kind = Kind::load, .corners = corners, .weights = weights, .force = force};
+}
+
+inline ConstraintTerm ConstraintTerm::press(const Tool<double>& tool, const Contact<double>& contact) noexcept {
+    return {.kind = Kind::press, .tool = tool, .contact = contact};
+}
+
+}  // namespace membrane
