@@ -14,6 +14,7 @@ struct Throws {
     void operator()(Index, int) const;
 };
 static_assert(!Executor<Throws>);
+static_assert(Executor<ExecutorRef>);
 static_assert(Executor<decltype([](Index, const auto& task) { task(0); })>);
 
 }  // namespace

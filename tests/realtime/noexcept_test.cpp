@@ -105,8 +105,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
                          const SolverOptions<S>& options, bool (*is_balanced)(Index)) {
         static_assert(noexcept(active.arrange(network, vertices, options))&& noexcept(active.vertices()));
         static_assert(noexcept(active.touched())&& noexcept(active.beyond())&& noexcept(active.queue()));
-        static_assert(noexcept(active.settle(is_balanced))&& noexcept(active.stir_neighbours(network, 0)));
-        static_assert(noexcept(active.close())&& noexcept(active.cancel(network))&& noexcept(active.clear()));
+        static_assert(noexcept(active.finish(network, is_balanced, {}))&& noexcept(active.clear()));
         static_assert(noexcept(active.wake(0))&& noexcept(active.grow(network, options)));
         static_assert(noexcept(active.frontier())&& noexcept(active.group_ends()));
     });

@@ -50,30 +50,24 @@ TEST_CASE("visits go through the queue, then to what an earlier contact has left
     CHECK(list_of(active.vertices()) == List{1, 0, 2});
     CHECK(list_of(active.touched()) == List{1});
     CHECK(list_of(active.beyond()) == List{0, 2});
-    active.settle(balanced);
-    CHECK(active.close());
+    CHECK(active.finish(chain.network, balanced, {}));
 
     // The contact moves on: who was in the queue and is no longer is visited once more.
     active.arrange(chain.network, List{4}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5, 1, 0, 2});
-    active.settle([](Index v) { return v != 2; });
-    CHECK_FALSE(active.close());
+    CHECK_FALSE(active.finish(chain.network, [](Index v) { return v != 2; }, {}));
     active.arrange(chain.network, List{4}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5, 2});
-    active.settle(balanced);
-    active.stir_neighbours(chain.network, 2);  // 3 is being visited, 1 is not
-    CHECK_FALSE(active.close());
+    CHECK_FALSE(active.finish(chain.network, balanced, List{2}));  // 3 is being visited, 1 is not
     active.arrange(chain.network, List{4}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5, 1});
-    active.settle(balanced);
-    CHECK(active.close());
+    CHECK(active.finish(chain.network, balanced, {}));
 
     // Nothing left of the contact: once all is at rest there is nothing to do.
     active.arrange(chain.network, List{}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5});
     CHECK(active.touched().empty());
-    active.settle(balanced);
-    CHECK(active.close());
+    CHECK(active.finish(chain.network, balanced, {}));
     active.arrange(chain.network, List{}, Options{.layers = 1});
     CHECK(active.vertices().empty());
 }
@@ -86,8 +80,7 @@ TEST_CASE("in groups, what is beyond the queue is ordered so that no two that ar
     active.arrange(chain.network, List{0}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{0, 1, 2, 4, 3, 5});
     CHECK(std::ranges::equal(active.group_ends(), std::vector<std::size_t>{4, 6}));
-    active.settle(unbalanced);
-    CHECK_FALSE(active.close());
+    CHECK_FALSE(active.finish(chain.network, unbalanced, {}));
     active.arrange(chain.network, List{0}, Options{.layers = 1, .order = VisitOrder::arrival});
     CHECK(active.group_ends().empty());
 }
@@ -98,9 +91,7 @@ TEST_CASE("beyond the layers nobody is stirred, however far the frontier moves",
     for (int i = 0; i < 3; ++i) {
         active.arrange(chain.network, List{0}, Options{.layers = 2});
         CHECK(list_of(active.vertices()) == List{0, 1, 2});
-        active.settle(balanced);
-        for (const Index v : {0, 1, 2}) active.stir_neighbours(chain.network, v);
-        CHECK(active.close());
+        CHECK(active.finish(chain.network, balanced, List{0, 1, 2}));
     }
 }
 
@@ -111,13 +102,10 @@ TEST_CASE("who is woken is visited until balanced, and feels its neighbours from
     for (int i = 0; i < 3; ++i) {
         active.arrange(chain.network, List{0}, Options{.layers = 0});
         CHECK(list_of(active.vertices()) == List{0, 3});
-        active.settle([&](Index v) { return v != 3 || i == 2; });
-        CHECK(active.close() == (i == 2));
+        CHECK(active.finish(chain.network, [&](Index v) { return v != 3 || i == 2; }, {}) == (i == 2));
     }
     active.arrange(chain.network, List{2}, Options{.layers = 0});
-    active.settle(balanced);
-    active.stir_neighbours(chain.network, 2);
-    CHECK_FALSE(active.close());
+    CHECK_FALSE(active.finish(chain.network, balanced, List{2}));
     active.arrange(chain.network, List{2}, Options{.layers = 0});
     CHECK(list_of(active.vertices()) == List{2, 3});
 
@@ -128,22 +116,20 @@ TEST_CASE("who is woken is visited until balanced, and feels its neighbours from
     CHECK(active.vertices().empty());
 }
 
-TEST_CASE("a step that is cancelled was never arranged", "[active]") {
+TEST_CASE("a step that is not finished was never arranged", "[active]") {
     const Chain chain;
     ActiveVertices active(12);
     active.wake(5);
     active.arrange(chain.network, List{0}, Options{.layers = 1});
-    active.settle(unbalanced);
-    CHECK_FALSE(active.close());
+    CHECK_FALSE(active.finish(chain.network, unbalanced, {}));
     ActiveVertices spared = active;
     for (const List& seeds : {List{3}, List{}, List{0}, List{0, 3}}) {
         active.arrange(chain.network, seeds, Options{.layers = 1});
-        active.cancel(chain.network);
-        CHECK(list_of(active.queue().vertices()) == list_of(spared.queue().vertices()));
         ActiveVertices other = active, like = spared;
         other.arrange(chain.network, List{2}, Options{.layers = 1});
         like.arrange(chain.network, List{2}, Options{.layers = 1});
         CHECK(list_of(other.vertices()) == list_of(like.vertices()));
+        CHECK(list_of(other.queue().vertices()) == list_of(like.queue().vertices()));
     }
 }
 
@@ -157,28 +143,24 @@ TEST_CASE("layers as needed: one after the other, and nothing stands still", "[a
     active.grow(chain.network, options);
     CHECK(list_of(active.vertices()) == List{1, 0, 2});
     CHECK(list_of(active.frontier()) == List{3});
-    active.settle([](Index v) { return v != 0; });
-    for (const Index v : {1, 0, 2}) active.stir_neighbours(chain.network, v);  // all of them are looked at
-    CHECK_FALSE(active.close());
+    CHECK_FALSE(active.finish(
+        chain.network, [](Index v) { return v != 0; }, List{1, 0, 2}));  // all of them are looked at
 
     // What was not in balance is visited, and the seed that is none any more; the layers begin anew.
     active.arrange(chain.network, List{4}, options);
     CHECK(list_of(active.vertices()) == List{4, 0, 1});
     CHECK(list_of(active.frontier()) == List{3, 5});
-    active.settle([](Index v) { return v != 5; });
-    active.stir_neighbours(chain.network, 1);  // 2 has not been seen
-    CHECK_FALSE(active.close());
+    CHECK_FALSE(active.finish(
+        chain.network, [](Index v) { return v != 5; }, List{1}));  // 2 has not been seen
     ActiveVertices spared = active;
     active.arrange(chain.network, List{2}, options);
     active.grow(chain.network, options);
-    active.cancel(chain.network);
-    CHECK(list_of(active.queue().vertices()) == list_of(spared.queue().vertices()));
-    CHECK(active.frontier().empty());
     active.arrange(chain.network, List{}, options);
+    spared.arrange(chain.network, List{}, options);
+    CHECK(list_of(active.queue().vertices()) == list_of(spared.queue().vertices()));
     CHECK(list_of(active.vertices()) == List{5, 2, 4});
     CHECK(active.frontier().empty());
-    active.settle(balanced);
-    CHECK(active.close());
+    CHECK(active.finish(chain.network, balanced, {}));
 
     // Up to the threshold, and to the end of what the springs join.
     for (const Index layers : {0, 1, 2, 9}) {
@@ -186,8 +168,7 @@ TEST_CASE("layers as needed: one after the other, and nothing stands still", "[a
         active.arrange(chain.network, List{0}, few);
         while (!active.frontier().empty()) active.grow(chain.network, few);
         CHECK(active.vertices().size() == static_cast<std::size_t>(std::min(layers, 5) + 1));
-        active.settle(balanced);
-        CHECK(active.close());
+        CHECK(active.finish(chain.network, balanced, {}));
     }
 }
 
@@ -205,9 +186,8 @@ TEST_CASE("layers as needed: who there is no room for keeps a turn", "[active]")
             while (!active.frontier().empty()) active.grow(network, options);
             REQUIRE(static_cast<Index>(active.vertices().size()) <= 1 + std::max((most - 2) / 4, 1));
             seen.insert(active.vertices().begin(), active.vertices().end());
-            active.settle([&](Index v) { return i > 0 && v != 3; });
-            for (const Index v : active.vertices()) active.stir_neighbours(network, v);
-            REQUIRE_FALSE(active.close());
+            REQUIRE_FALSE(active.finish(
+                network, [&](Index v) { return i > 0 && v != 3; }, active.vertices()));
         }
         if (most >= 30) REQUIRE(seen.size() == 162);
     }
@@ -229,8 +209,7 @@ TEST_CASE("with little room layer 0 comes first, and the restless keep a turn", 
         const Index spare = std::max((options.most_visits - own) / (options.sweeps + 1), 1);
         const std::size_t room = layer0.size() + static_cast<std::size_t>(spare);
         active.arrange(network, seeds, options);
-        active.settle(unbalanced);
-        (void)active.close();
+        (void)active.finish(network, unbalanced, {});
         std::set<Index> left;
         while (left.size() < 20) left.insert(random.index(162));
         for (const Index v : left) active.wake(v);
@@ -245,8 +224,7 @@ TEST_CASE("with little room layer 0 comes first, and the restless keep a turn", 
             REQUIRE(std::set<Index>(visits.begin(), visits.end()).size() == visits.size());
             for (const Index v : active.touched()) REQUIRE(layer0.count(v) == 1);
             seen.insert(visits.begin(), visits.end());
-            active.settle(unbalanced);
-            REQUIRE_FALSE(active.close());
+            REQUIRE_FALSE(active.finish(network, unbalanced, {}));
         }
         for (const Index v : left) REQUIRE(seen.count(v) == 1);
     }

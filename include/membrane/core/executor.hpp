@@ -55,10 +55,20 @@ struct OneThread {
 
 static_assert(Executor<OneThread>);
 
+class ExecutorRef;
+
+namespace detail {
+
+// To ask whether a reference is an executor must not ask whether a reference can be made of it.
+template <class E>
+concept ReferredExecutor = !std::same_as<E, ExecutorRef> && Executor<E>;
+
+}  // namespace detail
+
 /// An executor of any type, which must outlive this: what hands it tasks depends on no type of executor.
 class ExecutorRef {
   public:
-    template <Executor E>
+    template <detail::ReferredExecutor E>
     explicit ExecutorRef(const E& executor) noexcept
         : executor_(&executor), run_(&run<E>), is_serial_(std::same_as<E, OneThread>) {}
 

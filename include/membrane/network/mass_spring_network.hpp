@@ -89,8 +89,8 @@ struct SpringReach {
     Scalar per_length;      ///< [1/m]
 
     SpringReach() = default;
-    [[gnu::always_inline]] explicit SpringReach(const Vector3<Scalar>& reach) noexcept
-        : reach(reach), length(norm(reach)), divisor(select(length != 0, length, Scalar(1))), per_length(1 / divisor) {}
+    [[gnu::always_inline]] explicit SpringReach(const Vector3<Scalar>& to) noexcept
+        : reach(to), length(norm(to)), divisor(select(length != 0, length, Scalar(1))), per_length(1 / divisor) {}
 };
 
 /// What a spring of this stiffness [N/m] and rest length [m] does to the vertex from which it reaches.

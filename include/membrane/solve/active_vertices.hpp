@@ -16,8 +16,7 @@
 ///
 ///     active.arrange(network, seeds, options);
 ///     for (const membrane::Index v : active.vertices()) { ... }                    // visits, nearest to the contact first
-///     active.settle(is_balanced);
-///     const bool nothing_left = active.close();
+///     const bool at_rest = active.finish(network, is_balanced, moved);
 namespace membrane {
 
 /// The vertices at work: the propagation queue, and outside it the restless ones, which a contact that has moved on or
@@ -32,8 +31,8 @@ class ActiveVertices {
 
     /// Begins a step: builds the queue where the seeds are others than before, and lines up what is to be visited: the
     /// queue, then the restless, then what the queue has left behind, as many as `options` leaves room for, layer 0 and
-    /// one more in any case. Vertices of the queue for which there is no room are visited in later steps. To be followed
-    /// by `settle` and `close`, or by `cancel`. Online.
+    /// one more in any case. Vertices of the queue for which there is no room are visited in later steps. What the last
+    /// call has arranged counts for nothing unless `finish` came after it. Online.
     template <class Network, class Options>
     void arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept;
 
@@ -71,24 +70,19 @@ class ActiveVertices {
     }
 
     /// Ends a step: who of the visited and the frontier is not balanced, `is_balanced(v)`, and who was not visited, is
-    /// restless now.
-    template <class IsBalanced>
-    void settle(IsBalanced is_balanced) noexcept;
-
-    /// After `settle`: `v` has moved far enough for its neighbours to feel it.
-    template <class Network>
-    void stir_neighbours(const Network& network, Index v) noexcept;
-
-    /// After all stirring: whether everyone is at rest.
-    [[nodiscard]] bool close() noexcept;
-
-    /// As if `arrange` had not been called.
-    template <class Network>
-    void cancel(const Network& network) noexcept;
+    /// restless now; so are the neighbours of those that `moved` far enough to be felt. Returns whether everyone is at rest.
+    template <class Network, class IsBalanced>
+    [[nodiscard]] bool finish(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept;
 
     void clear() noexcept;
 
   private:
+    template <class Network>
+    void drop(const Network& network) noexcept;
+    template <class IsBalanced>
+    void settle(IsBalanced is_balanced) noexcept;
+    template <class Network>
+    void stir_neighbours(const Network& network, Index v) noexcept;
     [[nodiscard]] std::span<const Index> layer_0() const noexcept {
         return queue_.layer_count() > 0 ? queue_.layer(0) : std::span<const Index>();
     }
@@ -117,6 +111,7 @@ class ActiveVertices {
     bool has_new_queue_ = false;
     bool queue_fits_ = true, truncated_ = false;
     bool queue_at_rest_ = true;
+    bool is_open_ = false;  // something is arranged, and not finished
 };
 
 inline ActiveVertices::ActiveVertices(Index vertex_count)
@@ -132,6 +127,7 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
 
 template <class Network, class Options>
 void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
+    if (std::exchange(is_open_, true)) drop(network);
     as_needed_ = options.layers_as_needed;
     order_ = as_needed_ ? VisitOrder::arrival : options.order;
     if (order_ == VisitOrder::colours && options.most_visits != unlimited)
@@ -215,6 +211,17 @@ void ActiveVertices::extend(const Network& network, const Options& options) noex
     truncated_ = true;
 }
 
+template <class Network, class IsBalanced>
+bool ActiveVertices::finish(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept {
+    settle(is_balanced);
+    for (const Index v : moved) stir_neighbours(network, v);
+    std::swap(seeds_, next_seeds_);
+    std::swap(restless_, next_restless_);
+    if (restless_.empty() && seeds_.empty()) stirred_.clear();
+    is_open_ = false;
+    return queue_at_rest_ && restless_.empty();
+}
+
 template <class IsBalanced>
 void ActiveVertices::settle(IsBalanced is_balanced) noexcept {
     next_restless_.clear();
@@ -247,15 +254,9 @@ void ActiveVertices::stir_neighbours(const Network& network, Index v) noexcept {
     }
 }
 
-inline bool ActiveVertices::close() noexcept {
-    std::swap(seeds_, next_seeds_);
-    std::swap(restless_, next_restless_);
-    if (restless_.empty() && seeds_.empty()) stirred_.clear();
-    return queue_at_rest_ && restless_.empty();
-}
-
+// Back to what the last step that was finished has left.
 template <class Network>
-void ActiveVertices::cancel(const Network& network) noexcept {
+void ActiveVertices::drop(const Network& network) noexcept {
     build_queue(network, seeds_.items(), layers_before_);
     queue_fits_ = true;
     has_frontier_ = false;
@@ -264,6 +265,7 @@ void ActiveVertices::cancel(const Network& network) noexcept {
 inline void ActiveVertices::clear() noexcept {
     queue_.clear();
     has_new_queue_ = queue_fits_ = true;
+    is_open_ = false;
     for (IndexSet* set : {&seeds_, &restless_, &left_, &visited_, &stirred_}) set->clear();
 }
 

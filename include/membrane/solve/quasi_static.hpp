@@ -255,10 +255,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(TimeBudget 
         report_.status = evaluate_residuals(scene, progress) ? StepStatus::unstable : StepStatus::bad_input;
     }
     if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
-    if (report_.status != StepStatus::advanced) {
-        active_.cancel(network);
-        return refuse_step(report_.status);
-    }
+    if (report_.status != StepStatus::advanced) return refuse_step(report_.status);
     write_back(scene, x, progress);
     progress.budget.end();
     return report_;
@@ -603,19 +600,19 @@ template <class Scene>
 void QuasiStaticSolver<Scalar, Rule, Threads>::write_back(const Scene& scene, PointsRef<Scalar>& x,
                                                           const Progress& progress) noexcept {
     moved_.clear();
-    active_.settle([&](Index v) {
-        return state_.is_fixed(v) || state_.row(state_.residual, v).extra() <= state_.force_tolerance;
-    });
     for (const Index v : state_.loaded.items()) {
         const Vector3<Scalar> now = state_.row(state_.position, v).point(), before = point(x, v);
         if (now == before) continue;
         moved_.push(v);
         if (method_.options.predict) last_displacements_.col(v) = now - before;
         x.col(v) = now;
-        active_.stir_neighbours(scene.network, v);
     }
     report_.moved = moved_.items();
-    report_.converged = active_.close() && !progress.constraints_changed && report_.residual <= state_.force_tolerance;
+    const auto is_balanced = [&](Index v) {
+        return state_.is_fixed(v) || state_.row(state_.residual, v).extra() <= state_.force_tolerance;
+    };
+    report_.converged = active_.finish(scene.network, is_balanced, report_.moved) && !progress.constraints_changed &&
+                        report_.residual <= state_.force_tolerance;
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
     resume_ = progress.resume;
