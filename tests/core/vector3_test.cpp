@@ -159,6 +159,10 @@ TEMPLATE_TEST_CASE("Eigen's columns become vectors, and take them", "[core]", do
     CHECK(x.col(3) == 2 * a);
     x.col(3) -= 3 * a;
     CHECK(x.col(3) == -a);
+    Eigen::Matrix<S, 3, Eigen::Dynamic> listed(3, 4);
+    listed << x.template leftCols<2>(), a, b;
+    CHECK(listed.col(2) == a);
+    CHECK(listed.col(3) == b);
     const Eigen::Matrix<S, 3, 1> e = a, f(a);
     CHECK((e == f && e == a.eigen()));
     const Matrix turn{{S(0.6), S(-0.8), 0}, {S(0.8), S(0.6), 0}, {0, 0, 1}};

@@ -123,6 +123,15 @@ class Vector3 : public detail::ThreeByOne<N> {
                                                           const Eigen::Matrix<N, 1, 3>& row) noexcept {
         return a.eigen() * row;
     }
+    /// In a list, `x << columns, a, b`.
+    template <class Matrix>
+    friend Eigen::CommaInitializer<Matrix>& operator,(Eigen::CommaInitializer<Matrix>& list, const Vector3& a) {
+        return list, a.eigen();
+    }
+    template <class Matrix>
+    friend Eigen::CommaInitializer<Matrix>& operator,(Eigen::CommaInitializer<Matrix>&& list, const Vector3& a) {
+        return list, a.eigen();
+    }
     constexpr Vector3& operator+=(const Vector3& b) noexcept { return *this = *this + b; }
     constexpr Vector3& operator-=(const Vector3& b) noexcept { return *this = *this - b; }
     constexpr Vector3& operator*=(const N& s) noexcept { return *this = *this * s; }
