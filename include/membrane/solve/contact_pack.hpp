@@ -30,11 +30,13 @@ struct ContactPoint {
     Vector3<Scalar> normal;   ///< from the surface to the tool
     Vector3<Scalar> force;    ///< on the membrane [N]
     bool on_fixed = false;    ///< whether a corner is fixed, and bears part of the force
+    bool by_plane = false;    ///< whether the tool stays on its side of the triangle's plane, there and beside it
 };
 
 /// How a contact point follows the tool.
 enum class ContactKind : unsigned char {
     end,    ///< the point of the triangle nearest to an end of the tool's axis
+    plane,  ///< the same, but the normal is the triangle's, even where an edge or a corner is nearest
     edge,   ///< the point of the edge from corner 0 to corner 1 nearest to the axis
     fixed,  ///< weights and normal stay as they are through a step
 };
@@ -43,9 +45,11 @@ enum class ContactKind : unsigned char {
 inline constexpr int fixed_feature = -1;
 
 /// Features are numbered as `proximity` has its pairs.
-[[nodiscard]] constexpr ContactKind kind_of(int feature) noexcept {
-    if (feature == fixed_feature) return ContactKind::fixed;
-    return feature < 2 ? ContactKind::end : ContactKind::edge;
+template <Real Scalar>
+[[nodiscard]] constexpr ContactKind kind_of(const ContactPoint<Scalar>& point) noexcept {
+    if (point.feature == fixed_feature) return ContactKind::fixed;
+    if (point.feature >= 2) return ContactKind::edge;
+    return point.by_plane ? ContactKind::plane : ContactKind::end;
 }
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
@@ -161,12 +165,12 @@ template <class IsFixed>
 void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, std::size_t first,
                                   IsFixed is_fixed) noexcept {
     constexpr auto none = static_cast<std::size_t>(-1);
-    std::array<std::array<std::size_t, colour_count>, 3> open;  // of each kind and colour, the pack with room
+    std::array<std::array<std::size_t, colour_count>, 4> open;  // of each kind and colour, the pack with room
     for (auto& of_kind : open) of_kind.fill(none);
     const auto colours = [this](Index v) -> std::uint64_t& { return colours_[static_cast<std::size_t>(v)]; };
     for (const auto& point : points) {
         const auto& v = point.corners;
-        const ContactKind kind = kind_of(point.feature);
+        const ContactKind kind = kind_of(point);
         // A vertex with so many points that all colours are taken has the next ones in packs of their own.
         const auto colour = static_cast<std::size_t>(std::countr_one(colours(v[0]) | colours(v[1]) | colours(v[2])));
         std::size_t at = colour < colour_count ? open[static_cast<std::size_t>(kind)][colour] : none;

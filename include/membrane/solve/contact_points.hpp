@@ -150,14 +150,16 @@ template <Real Scalar>
     }
     Vector3<Wide> separation, along;
     auto exists = pack.listed > 0;
-    if (pack.kind == ContactKind::end) {
+    if (pack.kind != ContactKind::edge) {
         pack.axis_point = broadcast(tool.position) + pack.end * broadcast(tool.axis);
         const auto nearest = closest_point_inline<true>(triangle, pack.axis_point);
         pack.weights = nearest.barycentric;
         separation = pack.axis_point - nearest.point;
-        const auto in_face = (pack.weights[0] > 0) & (pack.weights[1] > 0) & (pack.weights[2] > 0);
-        const Vector3<Wide> area = area_vector(triangle);
-        for (Eigen::Index k = 0; k < 3; ++k) along[k] = select<Wide>(in_face, area[k], separation[k]);
+        along = area_vector(triangle);
+        if (pack.kind == ContactKind::end) {
+            const auto in_face = (pack.weights[0] > 0) & (pack.weights[1] > 0) & (pack.weights[2] > 0);
+            for (Eigen::Index k = 0; k < 3; ++k) along[k] = select<Wide>(in_face, along[k], separation[k]);
+        }
     } else {
         const Vector3<Wide> start = broadcast(tool.position), axis = broadcast(tool.axis);
         const Vector3<Wide> edge = triangle.b - triangle.a;

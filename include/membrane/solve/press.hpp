@@ -56,6 +56,7 @@ struct Press {
     void find_points_of_sphere(Context& context) const noexcept;
     void add_point(Context& context, const TouchedTriangle& triangle, int feature,
                    const Proximity<Scalar>& nearest) const noexcept;
+    void stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept;
     void pack_points(Context& context) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> direction_out_of_support(const Context& context) const noexcept;
     void touch_support(Context& context, const Vector3<Scalar>& out) const noexcept;
@@ -241,8 +242,22 @@ void Press<Scalar>::add_point(Context& context, const TouchedTriangle& triangle,
             contact.before - contact.on_axis + nearest.reach - support_displacement(context, point);
         if (dot(came, point.normal) < 0) point.normal = -point.normal;
     }
+    stay_on_side(context, point);
     if (before != nullptr) point.force = -norm(before->force) * point.normal;
     context.add_point(point);
+}
+
+// Vertices move by more than the radius of a tiny tool while the step balances them, and a nearest edge or corner says nothing
+// of the side then. So the tool stays in front of the planes of the triangles that it is in front of, all through the step: at
+// a convex edge this is too far out, by less than the radius.
+template <Real Scalar>
+void Press<Scalar>::stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept {
+    constexpr Scalar tiny = Scalar(2e-5);  // squared radius by area: a tool of less than a 300th of an edge
+    if (point.feature != 0 || feature_pairs(tool) > 1) return;
+    const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
+    if (!(contact.radius * contact.radius < tiny * norm(area))) return;
+    point.by_plane = contact.side * dot(point.normal, area) > 0;
+    if (point.by_plane) point.normal = direction<Scalar>(contact.side * area, point.normal);
 }
 
 // The points' forces act from here on.
