@@ -31,6 +31,7 @@ struct ContactPoint {
     Vector3<Scalar> force;    ///< on the membrane [N]
     bool on_fixed = false;    ///< whether a corner is fixed, and bears part of the force
     bool by_plane = false;    ///< whether the tool stays on its side of the triangle's plane, there and beside it
+    Scalar side = 0;  ///< of the triangle that the tool is on where it is over its inside, 1 or -1; 0: as before
 };
 
 /// How a contact point follows the tool.
@@ -72,6 +73,7 @@ struct alignas(32) ContactPack {
     Vector3<Wide> added_stiffness;
 
     Vector3<Wide> free;                              ///< 1 for a corner that may move
+    Wide side;                                       ///< as of the points
     Wide end;                                        ///< 0 or 1: which end of the tool's axis
     Wide listed;                                     ///< 1 for lanes in use
     Wide used;                                       ///< the same, but 0 where the tool's axis is nearest with an end
@@ -80,7 +82,8 @@ struct alignas(32) ContactPack {
     std::array<unsigned char, lanes> turn;           ///< which corner of the point is corner 0 here
     std::size_t size = 0;                            ///< lanes in use
     ContactKind kind = ContactKind::end;
-    bool on_fixed = false;  ///< whether a corner of one is fixed
+    bool on_fixed = false;   ///< whether a corner of one is fixed
+    bool has_sides = false;  ///< whether the side of one is known
 };
 
 /// Contact points in packs, for all constraints of a step. A point goes to the first pack of its kind with room that has none
@@ -126,7 +129,7 @@ void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     pack.weights = Vector3<Lanes<Scalar>>(1, 0, 0);  // of unused lanes: valid numbers
     pack.normal = pack.stiffness = pack.axis_point = pack.free = none;
     pack.added_weights = pack.added_normal = pack.added_stiffness = none;
-    pack.force = pack.added_force = pack.end = pack.listed = pack.used = Scalar(0);
+    pack.force = pack.added_force = pack.end = pack.side = pack.listed = pack.used = Scalar(0);
     for (auto& begins : pack.corner) begins.fill(unused_row_);
     pack.point.fill(no_index);
     pack.turn.fill(0);
@@ -153,6 +156,8 @@ void ContactPacks<Scalar>::add_lane(ContactPack<Scalar>& pack, const ContactPoin
     pack.force.set(i, norm(point.force));
     pack.added_force.set(i, norm(point.force));
     pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
+    pack.side.set(i, point.side);
+    pack.has_sides = pack.has_sides || point.side != 0;
     pack.listed.set(i, 1);
     pack.used.set(i, 1);
     pack.point[i] = number;

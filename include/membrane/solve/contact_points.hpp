@@ -158,7 +158,11 @@ template <Real Scalar>
         along = area_vector(triangle);
         if (pack.kind == ContactKind::end) {
             const auto in_face = (pack.weights[0] > 0) & (pack.weights[1] > 0) & (pack.weights[2] > 0);
-            for (Eigen::Index k = 0; k < 3; ++k) along[k] = select<Wide>(in_face, along[k], separation[k]);
+            const auto known = in_face & (pack.side != Wide(0));
+            for (Eigen::Index k = 0; k < 3; ++k) {
+                if (pack.has_sides) pack.normal[k] = select<Wide>(known, pack.side * along[k], pack.normal[k]);
+                along[k] = select<Wide>(in_face, along[k], separation[k]);
+            }
         }
     } else {
         const Vector3<Wide> start = broadcast(tool.position), axis = broadcast(tool.axis);
