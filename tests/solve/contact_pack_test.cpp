@@ -41,7 +41,7 @@ void check_packs(const ContactPacks<S>& packs, const std::vector<ContactPoint<S>
             REQUIRE(number < points.size());
             const auto& point = points[number];
             ++seen[number];
-            REQUIRE(pack.kind == kind_of(point.feature));
+            REQUIRE(pack.kind == kind_of(point));
             REQUIRE(pack.load.force[i] == norm(point.force));
             REQUIRE(pack.end[i] == (point.feature == 1 ? 1 : 0));
             for (std::size_t k = 0; k < 3; ++k) {

@@ -46,6 +46,7 @@ struct Contact {
     // Valid until the tracker's next update.
     std::span<const TouchedTriangle> touched;  ///< what the tool touches, and what is around the active triangle
     std::span<const TouchedTriangle> watched;  ///< these first, then what is around them
+    bool closed = false;                       ///< whether the surface is: what is behind it is inside
 
     [[nodiscard]] static Contact none() noexcept { return {}; }
     [[nodiscard]] bool touching() const noexcept {

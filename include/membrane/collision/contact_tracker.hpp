@@ -462,6 +462,7 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
     watch_rings(lively_ticks_ > 0 ? rings_after_crossing : rings_watched);
     listed_.clear();
     for (const Index f : watched_.items()) listed_.push({f, surface_.corners(f)});
+    contact.closed = surface_.closed();
     contact.radius = scene.radius;
     contact.reach = scene.reach;
     contact.watched = listed_.items();

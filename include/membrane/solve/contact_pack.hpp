@@ -30,11 +30,14 @@ struct ContactPoint {
     Vector3<Scalar> normal;   ///< from the surface to the tool
     Vector3<Scalar> force;    ///< on the membrane [N]
     bool on_fixed = false;    ///< whether a corner is fixed, and bears part of the force
+    bool by_plane = false;    ///< whether the tool stays on its side of the triangle's plane, there and beside it
+    Scalar side = 0;  ///< of the triangle that the tool is on where it is over its inside, 1 or -1; 0: as before
 };
 
 /// How a contact point follows the tool.
 enum class ContactKind : unsigned char {
     end,    ///< the point of the triangle nearest to an end of the tool's axis
+    plane,  ///< the same, but the normal is the triangle's, even where an edge or a corner is nearest
     edge,   ///< the point of the edge from corner 0 to corner 1 nearest to the axis
     fixed,  ///< weights and normal stay as they are through a step
 };
@@ -43,9 +46,11 @@ enum class ContactKind : unsigned char {
 inline constexpr int fixed_feature = -1;
 
 /// Features are numbered as `proximity` has its pairs.
-[[nodiscard]] constexpr ContactKind kind_of(int feature) noexcept {
-    if (feature == fixed_feature) return ContactKind::fixed;
-    return feature < 2 ? ContactKind::end : ContactKind::edge;
+template <Real Scalar>
+[[nodiscard]] constexpr ContactKind kind_of(const ContactPoint<Scalar>& point) noexcept {
+    if (point.feature == fixed_feature) return ContactKind::fixed;
+    if (point.feature >= 2) return ContactKind::edge;
+    return point.by_plane ? ContactKind::plane : ContactKind::end;
 }
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
@@ -69,6 +74,7 @@ struct alignas(32) ContactPack {
     Wide distance;  ///< of the tool's axis from the points, along their normals [m]
 
     Vector3<Wide> free;                              ///< 1 for a corner that may move
+    Wide side;                                       ///< as of the points
     Wide end;                                        ///< 0 or 1: which end of the tool's axis
     Wide listed;                                     ///< 1 for lanes in use
     Wide used;                                       ///< the same, but 0 where the tool's axis is nearest with an end
@@ -77,8 +83,9 @@ struct alignas(32) ContactPack {
     std::array<unsigned char, lanes> turn;           ///< which corner of the point is corner 0 here
     std::size_t size = 0;                            ///< lanes in use
     ContactKind kind = ContactKind::end;
-    bool on_fixed = false;  ///< whether a corner of one is fixed
-    bool acts = true;       ///< whether one pressed or was inside in the last pass over all
+    bool on_fixed = false;   ///< whether a corner of one is fixed
+    bool has_sides = false;  ///< whether the side of one is known
+    bool acts = true;        ///< whether one pressed or was inside in the last pass over all
 };
 
 /// Contact points in packs, for all constraints of a step. A point goes to the first pack of its kind with room that has none
@@ -124,7 +131,7 @@ void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     pack.load = {{1, 0, 0}, none, 0, none};  // of unused lanes: valid numbers
     pack.applied = {none, none, 0, none};
     pack.free = none;
-    pack.distance = pack.end = pack.listed = pack.used = Scalar(0);
+    pack.distance = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
     for (auto& begins : pack.corner) begins.fill(unused_row_);
     pack.point.fill(no_index);
     pack.turn.fill(0);
@@ -148,6 +155,8 @@ void ContactPacks<Scalar>::add_lane(ContactPack<Scalar>& pack, const ContactPoin
     }
     pack.load.force.set(i, norm(point.force));
     pack.end.set(i, point.feature == 1 ? Scalar(1) : Scalar(0));
+    pack.side.set(i, point.side);
+    pack.has_sides = pack.has_sides || point.side != 0;
     pack.listed.set(i, 1);
     pack.used.set(i, 1);
     pack.point[i] = number;
@@ -161,12 +170,12 @@ template <class IsFixed>
 void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, std::size_t first,
                                   IsFixed is_fixed) noexcept {
     constexpr auto none = static_cast<std::size_t>(-1);
-    std::array<std::array<std::size_t, colour_count>, 3> open;  // of each kind and colour, the pack with room
+    std::array<std::array<std::size_t, colour_count>, 4> open;  // of each kind and colour, the pack with room
     for (auto& of_kind : open) of_kind.fill(none);
     const auto colours = [this](Index v) -> std::uint64_t& { return colours_[static_cast<std::size_t>(v)]; };
     const auto add = [&](const ContactPoint<Scalar>& point) {
         const auto& v = point.corners;
-        const ContactKind kind = kind_of(point.feature);
+        const ContactKind kind = kind_of(point);
         // A vertex with so many points that all colours are taken has the next ones in packs of their own.
         const auto colour = static_cast<std::size_t>(std::countr_one(colours(v[0]) | colours(v[1]) | colours(v[2])));
         std::size_t at = colour < colour_count ? open[static_cast<std::size_t>(kind)][colour] : none;

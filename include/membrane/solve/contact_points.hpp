@@ -143,6 +143,17 @@ template <Real Scalar>
     pack.distance = select<Wide>(exists, dot(separation, normal), 0);
 }
 
+/// Over the inside of a triangle the tool is on the side that is known; elsewhere, where it was found.
+template <Real Scalar>
+[[gnu::always_inline]] inline void keep_side(const typename Lanes<Scalar>::Mask& in_face,
+                                             const Vector3<Lanes<Scalar>>& area, ContactPack<Scalar>& pack) noexcept {
+    using Wide = Lanes<Scalar>;
+    if (!pack.has_sides) return;
+    const auto known = in_face & (pack.side != Wide(0));
+    Vector3<Wide>& normal = pack.load.normal;
+    for (Eigen::Index k = 0; k < 3; ++k) normal[k] = select<Wide>(known, pack.side * area[k], normal[k]);
+}
+
 /// `locate` where all points lie in the faces of their triangles, the usual case: one root and one division. False, and
 /// nothing is done, if one does not.
 template <Real Scalar>
@@ -162,7 +173,9 @@ template <Real Scalar>
     if (any((listed > 0) & !in_face)) return false;
     const Wide per_length = 1 / root_of<Wide>(select<Wide>(in_face, whole, 1)), part = per_length * per_length;
     const Wide b = part * weight_b, c = part * weight_c;
-    const Vector3<Wide> normal = on_same_side<Scalar>(per_length * area, pack);
+    Vector3<Wide> normal = per_length * area;
+    keep_side(in_face, normal, pack);
+    normal = on_same_side(normal, pack);
     pack.load.weights = {larger<Wide>(0, 1 - b - c), b, c};
     pack.load.normal = normal;
     pack.distance = dot(aq, normal);
@@ -182,15 +195,18 @@ template <Real Scalar>
     if (pack.kind == ContactKind::fixed) {
         const Vector3<Wide> separation = broadcast(tool.axis_point) - point_at(triangle, pack.load.weights);
         pack.distance = dot(separation, pack.load.normal);
-    } else if (pack.kind == ContactKind::end) {
+    } else if (pack.kind != ContactKind::edge) {
         const Vector3<Wide> axis_point = broadcast(tool.position) + pack.end * broadcast(tool.axis);
         if (locate_in_faces(triangle, axis_point, pack)) return;
         const auto nearest = closest_point_inline<false>(triangle, axis_point);
         const Vector3<Wide>& weights = nearest.barycentric;
         const Vector3<Wide> separation = axis_point - nearest.point, area = area_vector(triangle);
         const auto in_face = smaller(smaller(weights[0], weights[1]), weights[2]) > 0;
-        Vector3<Wide> along;
-        for (Eigen::Index k = 0; k < 3; ++k) along[k] = select<Wide>(in_face, area[k], separation[k]);
+        keep_side(in_face, area, pack);
+        Vector3<Wide> along = area;
+        if (pack.kind == ContactKind::end) {
+            for (Eigen::Index k = 0; k < 3; ++k) along[k] = select<Wide>(in_face, area[k], separation[k]);
+        }
         pack.load.weights = weights;
         set_normal(listed, along, separation, pack);
     } else {

@@ -56,9 +56,11 @@ struct Press {
     void find_points_of_sphere(Context& context) const noexcept;
     void add_point(Context& context, const TouchedTriangle& triangle, int feature,
                    const Proximity<Scalar>& nearest) const noexcept;
+    void stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept;
     void pack_points(Context& context) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> direction_out_of_support(const Context& context) const noexcept;
     void touch_support(Context& context, const Vector3<Scalar>& out) const noexcept;
+    [[nodiscard]] bool comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept;
     void prevent_tunnelling(Context& context) const noexcept;
     [[nodiscard]] bool has_new_overlap(const Context& context) const noexcept;
 
@@ -237,8 +239,27 @@ void Press<Scalar>::add_point(Context& context, const TouchedTriangle& triangle,
             contact.before - contact.on_axis + nearest.reach - support_displacement(context, point);
         if (dot(came, point.normal) < 0) point.normal = -point.normal;
     }
+    stay_on_side(context, point);
     if (before != nullptr) point.force = -norm(before->force) * point.normal;
     context.add_point(point);
+}
+
+// Vertices move by more than the radius of a tiny tool while the step balances them, and a nearest edge or corner says nothing
+// of the side then. So the tool stays in front of the planes of the triangles that it is in front of, all through the step: at
+// a convex edge this is too far out, by less than the radius. The end of a thin shaft may be thrown as far, past edges that turn
+// its direction round; over the inside of a triangle of a closed surface it is on the side where the step began.
+template <Real Scalar>
+void Press<Scalar>::stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept {
+    constexpr Scalar tiny = Scalar(2e-5);  // squared radius by area: a tool of less than a 300th of an edge
+    if (point.feature < 0 || point.feature > 1) return;
+    const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
+    if (feature_pairs(tool) > 1) {
+        if (contact.closed) point.side = dot(point.normal, area) < 0 ? Scalar(-1) : Scalar(1);
+        return;
+    }
+    if (!(contact.radius * contact.radius < tiny * norm(area))) return;
+    point.by_plane = contact.side * dot(point.normal, area) > 0;
+    if (point.by_plane) point.normal = direction<Scalar>(contact.side * area, point.normal);
 }
 
 // The points' forces act from here on.
@@ -281,6 +302,15 @@ void Press<Scalar>::touch_support(Context& context, const Vector3<Scalar>& out) 
     context.add_point({contact.triangle, fixed_feature, contact.corners, contact.barycentric, out, force, true});
 }
 
+// Whether a shaft's axis point is on a triangle or behind, but for rounding, and in front after the triangle has moved.
+template <Real Scalar>
+bool Press<Scalar>::comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept {
+    if (feature_pairs(tool) == 1) return false;
+    const Vector3<Scalar> front = contact.side * area_vector(before), front_now = contact.side * area_vector(now);
+    return dot<Scalar>(contact.on_axis - before.a, front) < contact.radius / 1000 * norm(front) &&
+           dot<Scalar>(contact.on_axis - now.a, front_now) > 0;
+}
+
 // However far vertices have jumped, the surface has not passed the tool: if it would have, all go back to before the earliest
 // time of impact, with some clearance.
 template <Real Scalar>
@@ -293,8 +323,9 @@ void Press<Scalar>::prevent_tunnelling(Context& context) const noexcept {
     Scalar first = 1;
     for (const auto& triangle : contact.watched) {
         const auto before = kept_triangle(context, triangle.corners);
-        const Scalar time = passing_time<Scalar>(before, surface_triangle(context, triangle.corners), contact.on_axis);
-        if (time == 1) continue;
+        const auto now = surface_triangle(context, triangle.corners);
+        const Scalar time = passing_time<Scalar>(before, now, contact.on_axis);
+        if (time == 1 || comes_out(before, now)) continue;
         const Scalar room = std::sqrt(closest_point(before, contact.on_axis).squared_distance);
         if (room <= rounding) continue;  // on the tool's axis: its side is not known
         const Scalar part = room > contact.radius / 2 ? 1 - contact.radius / (4 * room) : Scalar(0.1);
