@@ -275,11 +275,12 @@ TEST_CASE("with a tool in contact the equilibrium is no farther than the bound",
     std::sort(positions.begin(), positions.end());
     std::sort(forces.begin(), forces.end());
     REQUIRE(6 * positions.size() > static_cast<std::size_t>(counts[0].all + counts[1].all + counts[2].all));
-    const double position = positions[positions.size() * 9 / 10], force = forces[forces.size() * 9 / 10];
-    table << "bound by error, in nine of ten at most " << position << " (positions), " << force << " (forces)";
+    // A force may be right by chance, however far off the positions are: some ratios are as large as one likes.
+    const double position = positions[positions.size() * 9 / 10], force = forces[forces.size() * 3 / 4];
+    table << "bound by error: positions, in nine of ten at most " << position << "; forces, in three of four " << force;
     WARN(table.str());
     CHECK(position <= 5);
-    CHECK(force <= 30);
+    CHECK(force <= 5);
     CHECK(counts[2].certified >= counts[2].all * 8 / 10);
 }
 

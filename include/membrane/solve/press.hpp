@@ -98,9 +98,18 @@ namespace detail {
 // Points share vertices: until none is inside they are moved out this often at the most.
 inline constexpr int max_push_passes = 8;
 
-// And this often they are solved before the vertices find their balance anew: as a rule, where a pass moves them by little,
-// beside fixed corners or several of a shaft on one triangle, and while the tool is deep inside.
-inline constexpr int contact_passes = 2, stiff_contact_passes = 8, deep_contact_passes = 16;
+// And this often they are solved at the most before the vertices find their balance anew: as a rule, and while the tool is deep
+// inside.
+inline constexpr int all_contact_passes = 8, deep_contact_passes = 16;
+
+/// As a rule. Few points, on a coarse mesh, have each a large part of the force, and more passes give a better one; of many
+/// each has little. Where points are `stiff`, beside fixed corners or several of a shaft on one triangle, a pass moves each
+/// by little.
+[[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool stiff) noexcept {
+    constexpr int least = 2, points_of_all_passes = 32;
+    if (stiff || points == 0) return all_contact_passes;
+    return std::clamp(points_of_all_passes / static_cast<int>(points), least, all_contact_passes);
+}
 
 }  // namespace detail
 
@@ -341,8 +350,7 @@ bool Press<Scalar>::enforce(Context& context) const noexcept {
     bool released = false;
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
-    const bool stiff = on_fixed || feature_pairs(tool) > 1;
-    const int most = stiff ? detail::stiff_contact_passes : detail::contact_passes;
+    const int most = detail::max_contact_passes(points.size(), on_fixed || feature_pairs(tool) > 1);
     for (int i = 0; i < detail::deep_contact_passes; ++i) {
         const auto pass = solve_contacts(context.state(), shape(), packs(context), i > 0);
         released = released || pass.released;
