@@ -68,10 +68,15 @@ membrane::VertexState<S> bare_state(const SceneOf<membrane::NoVolumeSprings>& sc
     state.stiffness = springs.stiffness;
     const auto& of_constraints = scene.state.row(scene.state.force, v);
     state.force += of_constraints.point();
-    state.stiffness += (std::max)(of_constraints.extra(), S(0));
+    state.stiffness +=
+        (std::max)(of_constraints.extra(), S(0)) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : S(0);
     state.dt = scene.dt;
     state.touched = scene.state.seeds.contains(v);
+    if (state.touched) {
+        state.contact_stiffness = (std::max)(of_constraints.extra(), S(0));
+        state.contact_normal = membrane::direction_or_zero(of_constraints.point());
+    }
     return state;
 }
 

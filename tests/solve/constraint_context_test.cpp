@@ -133,10 +133,10 @@ TEST_CASE("forces add up, and are taken back with the step", "[context]") {
     CHECK(force(3).point() == Vector3<double>(2, 2, 3));
     CHECK(force(0).point() == Vector3<double>(0, 0, 5));
     CHECK(force(0).extra() == 0);
-    CHECK(scene.work.stiffness[0] == 3);
+    CHECK(scene.work.added_stiffness[0] == 3);
     scene.work.begin_step();
     for (Index v = 0; v < 6; ++v) CHECK(force(v).number == std::array<double, 4>{});
-    CHECK(scene.work.stiffness == std::vector<double>(7, 0.0));
+    CHECK(scene.work.added_stiffness == std::vector<double>(7, 0.0));
 }
 
 TEST_CASE("a fixed vertex gives way to tools by force over stiffness, a free one does not", "[context]") {

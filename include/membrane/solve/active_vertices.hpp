@@ -48,8 +48,8 @@ class ActiveVertices {
     /// Where in `vertices` the groups end that those beyond the queue are in, if they are visited in groups.
     [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return groups_.ends(); }
 
-    /// Whether the queue is another one than at the last call.
-    [[nodiscard]] bool has_new_queue() noexcept { return std::exchange(has_new_queue_, false); }
+    /// Whether the queue is another one than at the last call of this.
+    [[nodiscard]] bool take_new_queue() noexcept { return std::exchange(has_new_queue_, false); }
 
     /// The layer that is looked at, but not visited yet: the first beyond the queue, if it may `grow`.
     [[nodiscard]] std::span<const Index> frontier() const noexcept {

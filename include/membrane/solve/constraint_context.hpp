@@ -72,10 +72,10 @@ class ConstraintContext {
     /// Adds to the stiffness of `v` in all directions for this step [N/m]: for a force that changes as `v` moves.
     void add_stiffness(Index v, Scalar by) noexcept {
         state_.forced.insert(v);
-        state_.stiffness[static_cast<std::size_t>(v)] += by;
+        state_.added_stiffness[static_cast<std::size_t>(v)] += by;
     }
 
-    /// How far `v` moves for `force` by the rule of the last update, not at all if it is fixed [m].
+    /// How far a vertex of layer 0 moves for `force` by the rule of its last update, not at all if it is fixed [m].
     [[nodiscard]] Vector3<Scalar> response(Index v, const Vector3<Scalar>& force) const noexcept {
         return fixed(v) ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : state_.compliance_block(v) * force;
     }
@@ -146,7 +146,7 @@ class ConstraintContext {
     /// All that this step moves goes back to where it was kept, part of the distance or all of it.
     void go_back(Scalar part) noexcept {
         for (const Index v : state_.loaded.items()) {
-            if (!state_.is_fixed(v)) state_.set_position(v, (1 - part) * position(v) + part * kept(v));
+            if (!state_.is_fixed(v)) move(v, part * (kept(v) - position(v)));
         }
     }
 

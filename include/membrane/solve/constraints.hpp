@@ -21,8 +21,8 @@
 namespace membrane {
 
 /// Something that acts on the membrane during one step. `begin` names all vertices where its force enters, and puts in
-/// place what it holds; `enforce` is called in every sweep once layer 0 has moved, and once more at the end; it mends
-/// what they broke and says whether there was anything to mend; `reaction` is the force of the membrane on whoever acts
+/// place what it holds; `enforce` is called after each update of layer 0, and once more at the end where vertices have
+/// moved since; it restores what they broke and says whether there was anything to restore; `reaction` is the force of the membrane on whoever acts
 /// [N]. One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it. One
 /// that holds vertices may do so in `hold(context)`, which is called before any `begin`.
 template <class C, class Scalar>

@@ -167,7 +167,7 @@ template <Real Scalar>
     const Wide whole = squared_norm(area), listed = pack.listed;
     const Wide weight_b = dot(area, cross(aq, ac)), weight_c = dot(area, cross(ab, aq));
     const auto has_area = (whole > Limits::epsilon() * (squared_norm(ab) * squared_norm(ac))) &
-                          (larger<Wide>(whole, squared_norm(aq)) < too_far<Scalar>);
+                          (whole > 16 * (Limits::min)()) & (larger<Wide>(whole, squared_norm(aq)) < too_far<Scalar>);
     const Wide least = smaller<Wide>(smaller(weight_b, weight_c), whole - weight_b - weight_c);
     const auto in_face = has_area & (least > 0);
     if (any((listed > 0) & !in_face)) return false;

@@ -393,7 +393,7 @@ template <bool in_contact, class Rule, class Scene>
         at.of_constraints = gather_padded(rows.force.data(), own.data());
         at.of_constraints.extra = larger<Wide>(at.of_constraints.extra, 0);
         const auto in_all_directions = Wide::of(
-            [&](std::size_t i) { return rows.stiffness[static_cast<std::size_t>(own[i] / numbers_in_point)]; });
+            [&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(own[i] / numbers_in_point)]; });
         at.others = {at.of_constraints.point, at.of_constraints.extra + in_all_directions};
     }
     add_others<in_contact>(p, at.here.point, scene, at.others);

@@ -34,7 +34,7 @@ namespace membrane {
 
 namespace detail {
 
-// A solver that is copied is no network that lacks something.
+// Keeps the constructor from a network out of the way of the copy constructor.
 template <class Network, class Scalar>
 concept NetworkOfSolver = !requires(Network & solver) {
     solver.wake_all();
@@ -46,15 +46,15 @@ concept NetworkOfSolver = !requires(Network & solver) {
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The quasi-static solver, [Liu07] 2.2: every step is taken to be at rest, and the vertices of the propagation queue
-/// move one after the other, nearest to the contact first, by (4) or another rule, each seeing those that have moved.
+/// move one after the other, nearest to the contact first, by the step rule, each seeing those that have moved.
 ///
-/// Beyond the paper: a step starts from an extrapolation of the last one, if what acts goes on; it may sweep the queue
+/// Beyond the paper: a step starts from an extrapolation of the last one, if the tools move on as they did; it may sweep the queue
 /// several times; what a contact leaves behind stays at work until it is at rest, and then costs nothing; constraints keep
 /// their forces from step to step, so that a sweep ends with forces that balance. A step that is refused leaves the
 /// positions as they were, to the bit: it works on a copy of those that it loads, and writes back what has moved.
 ///
 /// Positions, network and volume springs are arguments of each step, always those of one membrane; what is remembered
-/// (queue, vertices awake, contact forces) is a cache. One thread at a time for each solver.
+/// (queue, vertices awake, packed springs, contact forces) is a cache: `reset` it where constants of the network have changed. One thread at a time for each solver.
 template <Real Scalar, CheckedStepRule<Scalar> Rule = BlockStep, CheckedExecutor Threads = OneThread>
 class QuasiStaticSolver {
   public:
@@ -98,7 +98,7 @@ class QuasiStaticSolver {
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return active_.queue(); }
 
   private:
-    // What the membrane is on may have moved: `on(body, volume)`.
+    // Whether the volume springs are on a body that may move, see `on`.
     template <class Volume>
     static constexpr bool moves = requires(const Volume& volume) {
         volume.body();
@@ -114,9 +114,9 @@ class QuasiStaticSolver {
     // How far a step has come.
     struct Progress {
         TimeBudget budget;
-        bool in_lanes = false;             // packs hold the vertices at work, the first ones or all
+        bool in_lanes = false;             // packs hold the vertices at work, as many of the first as there is room for
         bool constraints_hold = false;     // when they were last enforced, and nothing has moved since
-        bool constraints_changed = false;  // at the very end, or may have
+        bool constraints_changed = false;  // by the last enforcement, or that had no time
         std::size_t resume = 0;            // where the next step is to begin beyond layer 0
         const Index* next = nullptr;       // the vertex beyond layer 0 at which time ran out
     };
@@ -174,10 +174,10 @@ class QuasiStaticSolver {
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
-    bool complete_ = false;    // the last step updated all that were at work, as often as it should
-    RigidFrame<Scalar> pose_;  // of the body, and how often it was deformed, at the last step
-    std::uint64_t deformations_ = 0;
-    std::size_t resume_ = 0;  // the number beyond layer 0 of the vertex at which the last sweep ran out of time
+    bool complete_ = false;           // the last step updated all that were at work, as often as it should
+    RigidFrame<Scalar> pose_;         // of the body at the last step
+    std::uint64_t deformations_ = 0;  // of the body by then
+    std::size_t resume_ = 0;          // the number beyond layer 0 of the vertex at which the last sweep ran out of time
     StepCosts costs_;
 };
 
@@ -191,7 +191,7 @@ QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>&
 
 namespace detail {
 
-// Nothing where updates cannot be in lanes whatever the volume model.
+// Room for packed vertices: none where no volume model allows updates in lanes.
 template <class Scalar, class Rule, class Network>
 [[nodiscard]] Index most_in_lanes(const SolverOptions<Scalar>& options) noexcept {
     constexpr bool possible = UpdatesInLanes<Scalar, Rule, Network, NoVolumeSprings>;
@@ -230,10 +230,11 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(TimeBudget 
     MEMBRANE_ASSERT(x.cols() == state_.vertex_count() && network.vertex_count() == state_.vertex_count());
     detail::require_made<QuasiStaticSolver>();
     begin_report(constraints.size());
-    follow_body(volume);
-    state_.begin_step();
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
+    follow_body(volume);  // with what the last step has loaded
+    state_.begin_step();
 
+    // Views: nothing writes to `x` before the step is over, and `now` shows each move.
     const ConstPointsRef<Scalar> start = x, now = state_.positions();
     ConstraintContext<Scalar> context(start, state_, network);
     const ConstraintList<Scalar> acting(context, constraints);
@@ -331,7 +332,7 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::load_and_pack(const Scene& scene,
     std::size_t packed = 0;
     if constexpr (can_use_lanes<Scene>) {
         const auto& queue = active_.queue();
-        if (active_.has_new_queue()) packed_.assign(queue.vertices(), queue.group_ends(), scene.network);
+        if (active_.take_new_queue()) packed_.assign(queue.vertices(), queue.group_ends(), scene.network);
         const auto forced = state_.forced.items();
         progress.in_lanes =
             active_.from_queue() == queue.vertices().size() &&
@@ -489,7 +490,7 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs([[maybe_unused]] con
     return changed;
 }
 
-// Where the stiffness bound does not prove that a move is stable, its eigenvalues decide.
+// Where the stiffness bound does not prove that a move is stable, the largest eigenvalue of the block does or does not.
 template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
 template <bool in_contact, class Scene>
 bool QuasiStaticSolver<Scalar, Rule, Threads>::finish_update(

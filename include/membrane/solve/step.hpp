@@ -28,7 +28,7 @@ struct SolverOptions {
     Index layers = 6;               ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
     bool layers_as_needed = false;  ///< a layer, up to `layers`, only while a force on it is not negligible
     Index sweeps = 2;               ///< passes over the queue in each step
-    Index contact_visits = 3;       ///< visits of layer 0 in each sweep: what touches the tool settles last
+    Index contact_visits = 3;       ///< visits of layer 0 in each sweep at most: what touches the tool settles last
     VisitOrder order = VisitOrder::groups;
     bool predict = true;  ///< a step starts from the last displacements again, if the last step was not cut short
     Index most_visits =

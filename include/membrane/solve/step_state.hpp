@@ -33,8 +33,8 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// and written several at a time. The user's positions are read when a vertex is loaded, and written when the step is over:
 /// until then they are where the vertices were when it began.
 ///
-/// A row is up to date where the vertex has been loaded in this step; `response` and the number beside a position are those
-/// of the vertex's last update, in whatever step that was.
+/// A row is up to date where the vertex has been loaded in this step. The number beside a position is that of the vertex's last
+/// update, in whatever step that was; `response` that of its last update in layer 0.
 template <Real Scalar>
 struct StepState {
     /// The largest number of constraints of one step.
@@ -75,11 +75,12 @@ struct StepState {
         row(position, v).number[2] = x(2, v);
         fixed[static_cast<std::size_t>(v)] = network.pinned(v) ? 1 : 0;
     }
-    /// Takes all loaded positions from `x` again, but for prescribed ones.
+    /// Takes all loaded positions from `x` again, but for prescribed ones; no force of a constraint acts any more.
     void restore(const ConstPointsRef<Scalar>& x) noexcept {
         for (const Index v : loaded.items()) {
             if (!prescribed.contains(v)) set_position(v, point(x, v));
         }
+        for (const Index v : forced.items()) row(force, v) = {};
     }
     [[nodiscard]] bool is_fixed(Index v) const noexcept { return fixed[static_cast<std::size_t>(v)] != 0; }
 
@@ -94,8 +95,8 @@ struct StepState {
         for (std::size_t k = 0; k < 3; ++k) number[k] = p[static_cast<Eigen::Index>(k)];
     }
 
-    /// What the last update of `v` has found: by how much it moves for each newton, and without constraints its force and
-    /// stiffness.
+    /// What the last update of `v` in layer 0 has found: by how much it moves for each newton, and its force and stiffness but
+    /// for those of contacts.
     [[nodiscard]] Symmetric3<Scalar> compliance_block(Index v) const noexcept {
         const auto& a = row(response, 2 * v).number;
         const auto& b = row(response, 2 * v + 1).number;
@@ -124,7 +125,7 @@ struct StepState {
     Rows support;   ///< of fixed vertices: force of the tools [N]; stiffness to tools, 0 where none has come near [N/m]
     Rows residual;  ///< force at the end of the step [N]; size of that without damping [N]
     Rows anchor;    ///< where `kept` vertices go back to [m]
-    std::vector<Scalar> stiffness;  ///< that constraints add in all directions [N/m]
+    std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
 
     IndexSet loaded, seeds, prescribed, forced;
     IndexSet bearing;                  // fixed vertices that a tool presses on
@@ -153,7 +154,7 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       support(position),
       residual(position),
       anchor(position),
-      stiffness(position.size(), 0),
+      added_stiffness(position.size(), 0),
       loaded(vertices),
       seeds(vertices),
       prescribed(vertices),
@@ -172,7 +173,7 @@ template <Real Scalar>
 void StepState<Scalar>::begin_step() noexcept {
     for (const Index v : forced.items()) {
         row(force, v) = {};
-        stiffness[static_cast<std::size_t>(v)] = 0;
+        added_stiffness[static_cast<std::size_t>(v)] = 0;
     }
     for (const Index v : bearing.items()) row(support, v).set(Vector3<Scalar>::Zero(), row(support, v).extra());
     for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &bearing, &kept, &watched}) set->clear();

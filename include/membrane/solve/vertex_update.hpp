@@ -87,7 +87,7 @@ template <class Scalar, class Network, class Volume>
 [[nodiscard]] Pull<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const auto& of_constraints = scene.state.row(scene.state.force, v);
     const Scalar stiffness =
-        (std::max)(of_constraints.extra(), Scalar(0)) + scene.state.stiffness[static_cast<std::size_t>(v)];
+        (std::max)(of_constraints.extra(), Scalar(0)) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
     if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {of_constraints.point(), stiffness};
     const auto foundation = scene.volume.pull(v, point(scene.x, v), point(scene.start, v), scene.dt);
     return {foundation.force + of_constraints.point(), foundation.stiffness + stiffness};
