@@ -146,7 +146,8 @@ class ConstraintContext {
     /// All that this step moves goes back to where it was kept, part of the distance or all of it.
     void go_back(Scalar part) noexcept {
         for (const Index v : state_.loaded.items()) {
-            if (!state_.is_fixed(v)) move(v, part * (kept(v) - position(v)));
+            const Vector3<Scalar> now = position(v), before = kept(v);
+            if (now != before && !state_.is_fixed(v)) state_.set_position(v, (1 - part) * now + part * before);
         }
     }
 
