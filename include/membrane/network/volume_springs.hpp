@@ -133,6 +133,7 @@ class VirtualVolumeSprings {
     }
     [[nodiscard]] Pull<Scalar> pull(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                     Scalar dt) const noexcept {
+        if (damping(v) == 0) return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.elastic_pull(position);
         return spring(v, start, dt).pull(position);
     }
 
