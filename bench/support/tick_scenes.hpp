@@ -174,7 +174,7 @@ struct TurningBody : OnMovingBody {
     void aim(Index t) {
         constexpr double rate = 1;  // [rad/s]
         OnMovingBody::aim(t);
-        pose.rotation = Eigen::AngleAxisd(rate * tick * t, Slide::along()).toRotationMatrix();
+        pose.rotation = Eigen::AngleAxisd(rate * tick * t, Slide::along().eigen()).toRotationMatrix();
         pose.angular_velocity = rate * Slide::along();
     }
 
