@@ -93,7 +93,7 @@ const bool added = [] {
                     for (const std::string rule : {"published", "safe", "block"}) {
                         for (const bool predicted : {false, true}) {
                             for (const Index layers : {1, 3, 6, 12}) {
-                                for (const Index visits : {1, 4}) {
+                                for (const Index visits : {1, 3}) {
                                     for (const Index sweeps : {1, 2, 4, 8, 16}) {
                                         settings.push_back(
                                             {{scene, vertices, part}, rule, scalar, predicted, layers, sweeps, visits});

@@ -33,10 +33,10 @@ do for [vertices in '162 642'] {
          rows(here . all_by('safe', 1)) using (1e6 * $10):(100 * $11) with points pt 7 ps 0.2 lc '#2471a3' notitle, \
          rows(here . all_by('block', 1)) using (1e6 * $10):(100 * $11) with points pt 7 ps 0.2 lc '#1a1a1a' notitle, \
          by_sweeps(here . by('published', 0, 1)) using (1e6 * $10):(100 * $11) title '(4) as published' lc '#7f8c8d' lw 1.8 pt 7, \
-         by_sweeps(here . by('published', 1, 4)) using (1e6 * $10):(100 * $11) title '(4), contact 4 x, predicted' lc '#d68910' lw 1.8 pt 7, \
-         by_sweeps(here . by('safe', 1, 4)) using (1e6 * $10):(100 * $11) title 'safe step' lc '#2471a3' lw 1.8 pt 7, \
-         by_sweeps(here . by('block', 0, 4)) using (1e6 * $10):(100 * $11) title 'block step, not predicted' lc '#1a1a1a' dt 2 lw 1.4 pt 6, \
-         by_sweeps(here . by('block', 1, 4)) using (1e6 * $10):(100 * $11) title 'block step, the default' lc '#1a1a1a' lw 2.6 pt 7
+         by_sweeps(here . by('published', 1, 3)) using (1e6 * $10):(100 * $11) title '(4), contact 3 x, predicted' lc '#d68910' lw 1.8 pt 7, \
+         by_sweeps(here . by('safe', 1, 3)) using (1e6 * $10):(100 * $11) title 'safe step' lc '#2471a3' lw 1.8 pt 7, \
+         by_sweeps(here . by('block', 0, 3)) using (1e6 * $10):(100 * $11) title 'block step, not predicted' lc '#1a1a1a' dt 2 lw 1.4 pt 6, \
+         by_sweeps(here . by('block', 1, 3)) using (1e6 * $10):(100 * $11) title 'block step, the default' lc '#1a1a1a' lw 2.6 pt 7
     unset key
 }
 
