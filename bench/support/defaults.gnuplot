@@ -76,9 +76,9 @@ unset logscale
 set title 'order: time by arrival over time by groups'
 set xlabel 'vertices'
 set xrange [0.4:4.6]
-set yrange [0:1.6]
+set yrange [0:2.2]
 set xtics nomirror ('162' 1, '642' 2, '2562' 3, '642, forceps' 4)
-set ytics nomirror 0, 0.2, 1.4
+set ytics nomirror 0, 0.5, 2
 place(file) = file eq word(tables, 2) ? 4 : column(0) + 1
 part(other, default) = column(other) / column(default)
 plot for [file in tables] file using (place(file) - 0.18):(part('order of arrival', 'default')):(0.32):(hue(file)) \
