@@ -92,8 +92,9 @@ void packs(benchmark::State& state) {
     require(packed.size() == static_cast<std::size_t>(state.range(0)), "all vertices have room in the packs");
     packed.begin_step(scene);
     for (auto _ : state) {
-        for (std::size_t p = 0; p < packed.count(); ++p) {
-            benchmark::DoNotOptimize(packed.template update<false>(p, scene, Rule{}, true));
+        for (std::size_t p = 0; p < packed.count();) {
+            p = packed.template update_next<false>(p, packed.count(), scene, Rule{});
+            benchmark::DoNotOptimize(p);
         }
     }
     require(membrane::is_finite(membrane::Points<Scalar>(now)), "the sweep must not diverge");
