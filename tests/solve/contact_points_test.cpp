@@ -71,6 +71,19 @@ Tool<S> random_tool(Random& random, bool is_capsule) {
     return tool;
 }
 
+/// Presses with each point by 1 N where it is now: `act(pack, lane, point, nearest)`, the last by one triangle after another.
+template <class S, class Act>
+void for_each_located(Patch<S>& patch, Act act) {
+    for (auto& pack : patch.state.packs.items()) {
+        pack.load.force = S(1);
+        detail::locate(patch.shape(), detail::corners_of(patch.state, pack), pack);
+        for (std::size_t i = 0; i < pack.size; ++i) {
+            const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
+            act(pack, i, point, proximity(patch.triangle(point.triangle), patch.tool, point.feature));
+        }
+    }
+}
+
 /// The rocking stiffness of one point, by its geometric cases.
 template <class S>
 Vector3<S> rocking_of_one(const Triangle<S>& t, const Vector3<S>& weights, S moment) {
@@ -95,28 +108,21 @@ TEMPLATE_TEST_CASE("located points are the nearest ones of their features", "[co
         Random random(static_cast<std::uint64_t>(seed));
         Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, seed % 2 == 0));
         patch.tool.position += random.vector(S(-0.1), S(0.1));  // it has gone on since the points were found
-        for (auto& pack : patch.state.packs.items()) {
-            pack.load.force = S(1);
-            detail::locate(patch.shape(), detail::corners_of(patch.state, pack), pack);
-            for (std::size_t i = 0; i < pack.size; ++i) {
-                const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
-                const auto triangle = patch.triangle(point.triangle);
-                const auto nearest = proximity(triangle, patch.tool, point.feature);
-                REQUIRE((pack.used[i] > 0) == nearest.has_value());
-                REQUIRE(pack.load.force[i] == (nearest ? 1 : 0));
-                if (!nearest) continue;
-                Vector3<S> weights, normal;
-                for (std::size_t k = 0; k < 3; ++k) {
-                    const auto row = static_cast<Eigen::Index>(k),
-                               corner = static_cast<Eigen::Index>((k + pack.turn[i]) % 3);
-                    weights[corner] = pack.load.weights[row][i];
-                    normal[row] = pack.load.normal[row][i];
-                }
-                REQUIRE(norm<S>(weights - nearest->barycentric) <= slack);
-                REQUIRE(std::abs(norm(normal) - 1) <= slack);
-                REQUIRE(norm<S>(pack.distance[i] * normal - nearest->reach) <= slack);
+        for_each_located(patch, [&](const auto& pack, std::size_t i, const auto&, const auto& nearest) {
+            REQUIRE((pack.used[i] > 0) == nearest.has_value());
+            REQUIRE(pack.load.force[i] == (nearest ? 1 : 0));
+            if (!nearest) return;
+            Vector3<S> weights, normal;
+            for (std::size_t k = 0; k < 3; ++k) {
+                const auto row = static_cast<Eigen::Index>(k),
+                           corner = static_cast<Eigen::Index>((k + pack.turn[i]) % 3);
+                weights[corner] = pack.load.weights[row][i];
+                normal[row] = pack.load.normal[row][i];
             }
-        }
+            REQUIRE(norm<S>(weights - nearest->barycentric) <= slack);
+            REQUIRE(std::abs(norm(normal) - 1) <= slack);
+            REQUIRE(norm<S>(pack.distance[i] * normal - nearest->reach) <= slack);
+        });
     }
 }
 
@@ -130,20 +136,14 @@ TEMPLATE_TEST_CASE("forces that act add the stiffness of rocking faces, and take
         Patch<S> patch(random, 1 + random.index(9), random_tool<S>(random, seed % 2 == 0));
         auto& state = patch.state;
         std::vector<S> expected(static_cast<std::size_t>(patch.x.cols()), 0);
-        for (auto& pack : state.packs.items()) {
-            pack.load.force = S(1);
-            detail::locate(patch.shape(), detail::corners_of(state, pack), pack);
-            for (std::size_t i = 0; i < pack.size; ++i) {
-                const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
-                const auto nearest = proximity(patch.triangle(point.triangle), patch.tool, point.feature);
-                if (!nearest) continue;
-                const Vector3<S> stiffness =
-                    rocking_of_one<S>(patch.triangle(point.triangle), nearest->barycentric, norm(nearest->reach));
-                for (std::size_t k = 0; k < 3; ++k) {
-                    expected[static_cast<std::size_t>(point.corners[k])] += stiffness[static_cast<Eigen::Index>(k)];
-                }
+        for_each_located(patch, [&](const auto&, std::size_t, const auto& point, const auto& nearest) {
+            if (!nearest) return;
+            const Vector3<S> stiffness =
+                rocking_of_one<S>(patch.triangle(point.triangle), nearest->barycentric, norm(nearest->reach));
+            for (std::size_t k = 0; k < 3; ++k) {
+                expected[static_cast<std::size_t>(point.corners[k])] += stiffness[static_cast<Eigen::Index>(k)];
             }
-        }
+        });
         apply_forces(state, state.packs.items());
         for (Index v = 0; v < patch.x.cols(); ++v) {
             const S exact = expected[static_cast<std::size_t>(v)];

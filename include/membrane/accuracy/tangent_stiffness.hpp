@@ -29,8 +29,8 @@ enum class TangentStatus {
     not_stable,     ///< the energy has a direction in which it does not grow: what is free would snap away
     not_converged,  ///< more iterations are needed
     contact,        ///< a tool touches: not treated
-    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that something else holds too
-    bad_input,  ///< a number is not finite, an index names no vertex, counts do not agree
+    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that is held otherwise
+    bad_input,    ///< a number is not finite, an index names no vertex, counts do not agree
 };
 
 struct TangentReport {

@@ -60,8 +60,8 @@ template <Real Scalar>
     return {dot(x, ax), dot(y, ay), dot(z, az), dot(x, ay), dot(x, az), dot(y, az)};
 }
 
-/// `s` times the inverse. @pre positive definite. Cost: one division; half the digits are left where the largest eigenvalue is a cube root of
-/// epsilon's inverse times the smallest.
+/// `s` times the inverse. @pre positive definite. Cost: one division; half the digits are left where the largest eigenvalue
+/// is a cube root of epsilon's inverse times the smallest.
 template <Number Scalar>
 [[nodiscard]] Symmetric3<Scalar> inverse(const Symmetric3<Scalar>& a, Scalar s = 1) noexcept {
     const Scalar xx = a.yy * a.zz - a.yz * a.yz, xy = a.xz * a.yz - a.xy * a.zz, xz = a.xy * a.yz - a.xz * a.yy;

@@ -126,10 +126,7 @@ Scalar gap_between(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
 
 template <Real Scalar>
 bool contains(const Box<Scalar>& box, const Vector3<Scalar>& p) noexcept {
-    for (int k = 0; k < 3; ++k) {
-        if (!(box.low[k] <= p[k] && p[k] <= box.high[k])) return false;
-    }
-    return true;
+    return at_most(box.low, p) && at_most(p, box.high);
 }
 
 template <Real Scalar>
