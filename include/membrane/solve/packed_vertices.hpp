@@ -110,7 +110,7 @@ class PackedVertices {
             }
         });
     }
-    /// Of the last of these two calls.
+    /// What `update_next`, or the call for several packs, has done with pack `p`.
     [[nodiscard]] Outcome outcome(std::size_t p) const noexcept { return outcomes_[p]; }
 
     /// Leaves the forces on the vertices of pack `p` in the rows of residual forces.
