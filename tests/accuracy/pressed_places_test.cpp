@@ -58,6 +58,8 @@ struct Pressed {
         }
         touched.assign(contact.touched.begin(), contact.touched.end());
         watched.assign(contact.watched.begin(), contact.watched.end());
+        points.assign(contact.points.begin(), contact.points.end());
+        contact.points = points;
         contact.touched = touched;
         contact.watched = watched;
     }
@@ -74,6 +76,7 @@ struct Pressed {
     Tool<double> tool;
     Contact<double> contact;
     std::vector<TouchedTriangle> touched, watched;
+    std::vector<ContactPoint<double>> points;
     Points<double> x = mesh.positions();
     Vector3<double> force = Vector3<double>::Zero();
 };

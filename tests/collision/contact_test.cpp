@@ -15,6 +15,7 @@ TEMPLATE_TEST_CASE("no contact touches nothing", "[contact]", double, float) {
     CHECK(contact.triangle == no_index);
     CHECK(contact.corners == std::array<Index, 3>{no_index, no_index, no_index});
     CHECK(contact.touched.empty());
+    CHECK(contact.points.empty());
     CHECK(contact.depth == 0);
     CHECK(contact.normal == Vector3<S>(0, 0, 0));
     STATIC_REQUIRE(noexcept(Contact<S>::none()));

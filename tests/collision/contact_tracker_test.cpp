@@ -369,6 +369,93 @@ TEST_CASE("tracker options out of range are refused") {
     }
     CHECK(test::refusal([&] { ContactTracker<double>(mesh, {.check_every = 0}); }) ==
           "ContactTracker: check_every must be at least 1, got 0");
+    CHECK(test::refusal([&] { ContactTracker<double>(mesh, {.most_points = 0}); }) ==
+          "ContactTracker: most_points must be at least 1, got 0");
+}
+
+namespace {
+
+/// All contact points within the reach of `contact`, or of what it touches, found one by one.
+template <class S>
+std::vector<membrane::ContactPoint<S>> points_of(const TriangleMesh<S>& mesh, const Contact<S>& contact,
+                                                 const Tool<S>& tool) {
+    std::vector<membrane::ContactPoint<S>> points;
+    const auto& all = mesh.triangles();
+    for (Index f = 0; f < mesh.triangle_count(); ++f) {
+        const bool touched = std::any_of(contact.touched.begin(), contact.touched.end(),
+                                         [f](const auto& listed) { return listed.triangle == f; });
+        const std::array<Index, 3> corners{all(0, f), all(1, f), all(2, f)};
+        const auto triangle = membrane::triangle_at(mesh.positions(), corners);
+        for (int feature = 0; feature < membrane::feature_pairs(tool); ++feature) {
+            const auto point = membrane::contact_point(f, corners, triangle, tool, feature, contact.radius);
+            if (!point || !(contact.crossed ? touched : point->gap + contact.radius <= contact.reach)) continue;
+            points.push_back(*point);
+        }
+    }
+    return points;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("the contact points are those of all triangles within reach, each with its gap", "[tracker]", double,
+                   float) {
+    using S = TestType;
+    const auto mesh = membrane::icosphere<S>({.radius = 1, .subdivisions = 3});
+    const AabbTree<S> tree(mesh);
+    const S rounding = 100 * std::numeric_limits<S>::epsilon();
+    int found_points = 0, crossed = 0;
+    for (int seed = 1; seed <= cases(400); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Tool<S> tool{.radius = static_cast<S>(random.number(0.0, 0.2))};
+        tool.position = static_cast<S>(random.number(0.9, 1.1)) * random.unit_vector().cast<S>();
+        if (seed % 2 == 0) tool.axis = static_cast<S>(random.number(0.1, 1.5)) * random.unit_vector().cast<S>();
+        ContactTracker<S> tracker(mesh);
+        const auto contact = tracker.update(tree, mesh.positions(), tool);
+        if (!contact.touching()) continue;
+        crossed += contact.crossed ? 1 : 0;
+        REQUIRE(contact.has_all_points);
+        auto expected = points_of(mesh, contact, tool);
+        std::vector<membrane::ContactPoint<S>> found(contact.points.begin(), contact.points.end());
+        const auto in_order = [](const auto& p, const auto& q) {
+            return std::pair(p.triangle, p.feature) < std::pair(q.triangle, q.feature);
+        };
+        std::sort(found.begin(), found.end(), in_order);
+        REQUIRE(found.size() == expected.size());
+        for (std::size_t i = 0; i < found.size(); ++i) {
+            REQUIRE(found[i].triangle == expected[i].triangle);
+            REQUIRE(found[i].feature == expected[i].feature);
+            CHECK(std::abs(found[i].gap - expected[i].gap) <= rounding);
+            CHECK(membrane::norm<S>(found[i].weights - expected[i].weights) <= rounding);
+            CHECK(membrane::norm<S>(found[i].normal - expected[i].normal) <= rounding);
+            CHECK(found[i].force == Vector3<S>(0, 0, 0));
+        }
+        found_points += static_cast<int>(found.size());
+    }
+    CHECK(found_points > cases(400));
+    CHECK(crossed > 0);
+}
+
+TEST_CASE("a contact with more points than there is room for says so, and is refused by a step") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
+    const AabbTree<double> tree(mesh);
+    const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = 1.0});
+    for (const bool is_shaft : {false, true}) {
+        Tool<double> tool{.position = {0, 0, 1.1}, .radius = 0.2};
+        if (is_shaft) tool.axis = {0.1, 0, 0};
+        ContactTracker<double> few(mesh, {.most_points = 3}), enough(mesh);
+        const auto contact = few.update(tree, mesh.positions(), tool),
+                   all = enough.update(tree, mesh.positions(), tool);
+        REQUIRE(all.points.size() > 3);
+        CHECK(all.has_all_points);
+        CHECK(contact.points.size() == 3);
+        CHECK_FALSE(contact.has_all_points);
+        membrane::QuasiStaticSolver solver(network);
+        Points<double> x = mesh.positions();
+        const auto report = solver.step(x, 1e-3, network, membrane::NoVolumeSprings(), press(tool, contact));
+        CHECK(report.status == membrane::StepStatus::too_many_touches);
+        CHECK(x == mesh.positions());
+    }
 }
 
 TEST_CASE("a tool first seen with its centre on the surface is on its outer side") {

@@ -600,6 +600,8 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
     const std::vector<TouchedTriangle> elsewhere{{0, {0, 1, 162}}};
     CHECK(refused_with([&](auto& c) { c.touched = elsewhere; }));
     CHECK(refused_with([&](auto& c) { c.watched = elsewhere; }));
+    const std::vector<ContactPoint<S>> points_elsewhere{{0, 0, {0, 1, 162}}};
+    CHECK(refused_with([&](auto& c) { c.points = points_elsewhere; }));
     Contact<S> made_up;
     made_up.phase = ContactPhase::ongoing;
     CHECK(refused(press(tool, made_up)));

@@ -115,10 +115,14 @@ struct Loop {
 template <Real S>
 bool same(const Contact<S>& a, const Contact<S>& b) {
     const auto listed = [](const TouchedTriangle& f, const TouchedTriangle& g) { return f.triangle == g.triangle; };
+    const auto same_point = [](const ContactPoint<S>& p, const ContactPoint<S>& q) {
+        return p.triangle == q.triangle && p.feature == q.feature && p.gap == q.gap && same_bits(p.normal, q.normal);
+    };
     return a.phase == b.phase && a.triangle == b.triangle && a.gap == b.gap && a.depth == b.depth &&
            a.crossed == b.crossed && same_bits(a.point, b.point) && same_bits(a.normal, b.normal) &&
            std::equal(a.touched.begin(), a.touched.end(), b.touched.begin(), b.touched.end(), listed) &&
-           std::equal(a.watched.begin(), a.watched.end(), b.watched.begin(), b.watched.end(), listed);
+           std::equal(a.watched.begin(), a.watched.end(), b.watched.begin(), b.watched.end(), listed) &&
+           std::equal(a.points.begin(), a.points.end(), b.points.begin(), b.points.end(), same_point);
 }
 
 template <Real S>

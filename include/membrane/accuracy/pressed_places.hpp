@@ -11,7 +11,7 @@
 
 #include <membrane/accuracy/rest_problem.hpp>
 #include <membrane/accuracy/rest_scene.hpp>
-#include <membrane/accuracy/tool_gap.hpp>
+#include <membrane/accuracy/tool_points.hpp>
 
 /// What tools may press on in a neighbourhood of a state, how hard, and what that takes away of the stiffness.
 ///
@@ -25,8 +25,8 @@ namespace membrane {
 /// A tool of radius R keeps every point p of the surface, a mean of three corners by weights b, at least R away from each
 /// point c of its axis: h = |p - c| - R >= 0. Each h is a convex function of the corners, and where the distance is d it
 /// does not curve by more than 1/d times the square of the way of p, which is no more than the mean of the squares of
-/// the corners' ways. So a pressure l curves the energy by no more than l/d times that: all of them together take
-/// away from the stiffness, at each vertex, the pressure that its corners bear over d.
+/// the corners' ways. So a multiplier l curves the energy by no more than l/d times that: all of them together take
+/// away from the stiffness, at each vertex, the multipliers that its corners bear over d.
 ///
 /// What a vertex may bear: let u be the unit vector between the nearest points of axis and triangle at y, g their
 /// distance. As the two are convex, no pair of points is nearer along u. So where, in the neighbourhood, a pair has the
@@ -45,7 +45,7 @@ class PressedPlaces {
     /// The tools of a scene, and the pressures that are thought to balance the membrane at `y` (3 x V [m]). Offline.
     /// @pre the touches are of these tools
     void take(const RestProblem& problem, const Triangles& triangles, const Points<double>& y,
-              std::span<const PressingTool> tools, std::span<const ToolGap> touches);
+              std::span<const PressingTool> tools, std::span<const ToolPoint> touches);
 
     /// Finds what is below for all states within `way` [m] of y, where the membrane acts on its vertices with `force`,
     /// made of numbers of this `magnitude` [N]. False where a tool may touch a vertex that is fixed or that another tool
@@ -95,7 +95,7 @@ class PressedPlaces {
     };
     [[nodiscard]] static std::size_t at(Index v) noexcept { return static_cast<std::size_t>(v); }
     void find_near(std::size_t i, const Triangles& triangles, const Points<double>& y, const Tool<double>& tool);
-    [[nodiscard]] Vector3<double> take_touch(const ToolGap& touch, const Points<double>& y,
+    [[nodiscard]] Vector3<double> take_touch(const ToolPoint& touch, const Points<double>& y,
                                              const Tool<double>& tool) noexcept;
     [[nodiscard]] static Wide wide(const Vector3<double>& a) noexcept { return {a.x(), a.y(), a.z()}; }
     [[nodiscard]] static Wide seen_from(const Tool<double>& tool, const Points<double>& y, Index v) noexcept {
@@ -107,9 +107,9 @@ class PressedPlaces {
 
     std::vector<double> radii_;  // of the tools [m]
     std::vector<Near> near_;
-    std::vector<ToolGap> touches_;
+    std::vector<ToolPoint> touches_;
     std::vector<Mark> marks_;
-    std::vector<double> borne_, stiffness_;         // of vertices: pressure at y [N], most stiffness [N/m]
+    std::vector<double> borne_, stiffness_;         // of vertices: multipliers at y [N], most stiffness [N/m]
     double overlap_ = 0, work_ = 0, rounding_ = 0;  // at y
     double most_pressure_ = 0, clearance_ = 0, most_radius_ = std::numeric_limits<double>::infinity();
 };
@@ -124,7 +124,7 @@ inline void PressedPlaces::clear() noexcept {
 }
 
 inline void PressedPlaces::take(const RestProblem& problem, const Triangles& triangles, const Points<double>& y,
-                                std::span<const PressingTool> tools, std::span<const ToolGap> touches) {
+                                std::span<const PressingTool> tools, std::span<const ToolPoint> touches) {
     clear();
     for (std::size_t i = 0; i < tools.size(); ++i) {
         radii_.push_back(tools[i].tool.radius);
@@ -133,9 +133,9 @@ inline void PressedPlaces::take(const RestProblem& problem, const Triangles& tri
     std::fill(borne_.begin(), borne_.end(), 0.0);
     for (const auto& touch : touches) {
         touches_.push_back(touch);
-        touches_.back().reach = take_touch(touch, y, tools[touch.tool].tool);
+        touches_.back().normal = take_touch(touch, y, tools[touch.tool].tool);
         for (std::size_t k = 0; k < 3; ++k) {
-            borne_[at(touch.corners[k])] += touch.pressure * touch.barycentric[static_cast<Eigen::Index>(k)];
+            borne_[at(touch.corners[k])] += touch.multiplier * touch.weight(k);
         }
     }
     for (Index v = 0; v < problem.vertex_count(); ++v) stiffness_[at(v)] = problem.backing(v);
@@ -172,24 +172,24 @@ inline void PressedPlaces::find_near(std::size_t i, const Triangles& triangles, 
     }
 }
 
-// The reach from the touched point to the axis; the gap there goes into the work.
-inline Vector3<double> PressedPlaces::take_touch(const ToolGap& touch, const Points<double>& y,
+// The normal at the contact point, where `y` is; the gap there goes into the work.
+inline Vector3<double> PressedPlaces::take_touch(const ToolPoint& touch, const Points<double>& y,
                                                  const Tool<double>& tool) noexcept {
     Wide place = Wide::Zero();
     long double weights = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-        const long double weight = touch.barycentric[static_cast<Eigen::Index>(k)];
+        const long double weight = touch.weight(k);
         place += weight * seen_from(tool, y, touch.corners[k]);
         weights += weight;
     }
     place /= weights;
     const Wide axis = wide(tool.axis);
     const long double length = axis.squaredNorm();
-    const long double along = touch.part == 2 && length > 0 ? place.dot(axis) / length : touch.part == 1 ? 1 : 0;
+    const long double along = touch.part() == 2 && length > 0 ? place.dot(axis) / length : touch.part() == 1 ? 1 : 0;
     const Wide reach = along * axis - place;
     const auto gap = static_cast<double>(reach.norm() - tool.radius);
-    work_ += touch.pressure * ((std::max)(gap, 0.0) + rounding_);
-    return reach.cast<double>();
+    work_ += touch.multiplier * ((std::max)(gap, 0.0) + rounding_);
+    return direction<double>(reach.cast<double>(), touch.normal);
 }
 
 inline bool PressedPlaces::around(const RestProblem& problem, const Points<double>& force,
@@ -231,7 +231,7 @@ inline bool PressedPlaces::mark(const RestProblem& problem, double way) noexcept
         }
     }
     for (auto& mark : marks_) mark.middle = direction<double>(mark.middle, Vector3<double>::Zero());
-    return std::all_of(touches_.begin(), touches_.end(), [&](const ToolGap& touch) {
+    return std::all_of(touches_.begin(), touches_.end(), [&](const ToolPoint& touch) {
         return std::all_of(touch.corners.begin(), touch.corners.end(),
                            [&](Index v) { return marks_[at(v)].tool == touch.tool; });
     });
@@ -260,7 +260,7 @@ inline void PressedPlaces::push(Points<double>& force, std::vector<double>& magn
     for (const auto& touch : touches_) {
         for (std::size_t k = 0; k < 3; ++k) {
             const Index v = touch.corners[k];
-            const Vector3<double> part = touch.pressure * touch.gradient(k);
+            const Vector3<double> part = touch.multiplier * touch.gradient(k);
             force.col(v) += part;
             magnitude[at(v)] += norm(part);
         }

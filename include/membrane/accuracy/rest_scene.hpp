@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/accuracy/tool_gap.hpp>
+#include <membrane/accuracy/tool_points.hpp>
 #include <membrane/solve/constraint_term.hpp>
 
 /// What acts on a membrane at rest, told by the constraints of a step, and by those of one's own: see `ConstraintTerm`, or
@@ -29,7 +29,7 @@ struct EquilibriumOptions {
 struct Equilibrium {
     Points<double> x;                        ///< 3 x V [m]
     std::vector<Vector3<double>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]
-    std::vector<ToolGap> touches;            ///< what tools press on; tools are counted from 0, those that touch
+    std::vector<ToolPoint> touches;          ///< what tools press on; tools are counted from 0, those that touch
     double residual = 0;                     ///< largest unbalanced force on a free vertex [N]
     double overlap = 0;                      ///< how deep the surface is in a tool [m]
     Index iterations = 0;                    ///< of Newton's method, in all increments

@@ -13,7 +13,7 @@
 #include <membrane/accuracy/elasticity.hpp>
 #include <membrane/accuracy/newton_system.hpp>
 #include <membrane/accuracy/rest_scene.hpp>
-#include <membrane/accuracy/tool_gap.hpp>
+#include <membrane/accuracy/tool_points.hpp>
 
 namespace membrane {
 
@@ -34,7 +34,7 @@ class RestSearch {
   private:
     struct State {
         ElasticState elastic;
-        std::vector<ToolGap> gaps;
+        std::vector<ToolPoint> contacts;
         double overlap = 0;
     };
 
@@ -114,8 +114,9 @@ Equilibrium RestSearch<ElasticModel>::run(std::size_t constraint_count) {
     }
     rest.x = here_.elastic.x;
     rest.reactions = reactions(constraint_count);
-    std::copy_if(here_.gaps.begin(), here_.gaps.end(), std::back_inserter(rest.touches),
-                 [](const ToolGap& gap) { return gap.pressure > 0; });
+    std::copy_if(here_.contacts.begin(), here_.contacts.end(), std::back_inserter(rest.touches),
+                 [](const ToolPoint& point) { return point.multiplier > 0; });
+    for (auto& point : rest.touches) point.force = -point.multiplier * point.normal;
     rest.residual = residual(here_);
     rest.overlap = here_.overlap;
     rest.iterations = iterations_;
@@ -136,12 +137,12 @@ bool RestSearch<ElasticModel>::settle() {
 
 template <class ElasticModel>
 auto RestSearch<ElasticModel>::state_at(const Points<double>& x) -> State {
-    State state{elasticity_.at(x), gaps_near(triangles_, x, goals_.tools, edge_ / 2)};
-    std::erase_if(state.gaps, [&](const ToolGap& gap) { return !can_move(gap.corners, gap.barycentric); });
-    for (auto& gap : state.gaps) {
-        state.overlap = (std::max)(state.overlap, -gap.value);
-        const auto before = std::lower_bound(here_.gaps.begin(), here_.gaps.end(), gap, is_before);
-        if (before != here_.gaps.end() && !is_before(gap, *before)) gap.pressure = before->pressure;
+    State state{elasticity_.at(x), tool_points(triangles_, x, goals_.tools, edge_ / 2)};
+    std::erase_if(state.contacts, [&](const ToolPoint& point) { return !can_move(point.corners, point.weights); });
+    for (auto& point : state.contacts) {
+        state.overlap = (std::max)(state.overlap, -point.gap);
+        const auto before = std::lower_bound(here_.contacts.begin(), here_.contacts.end(), point, is_before);
+        if (before != here_.contacts.end() && !is_before(point, *before)) point.multiplier = before->multiplier;
     }
     for (const auto& tool : goals_.tools) {
         if (is_pierced(triangles_, x, tool, fixed_)) state.overlap = (std::max)(state.overlap, tool.radius);
@@ -165,7 +166,7 @@ Points<double> RestSearch<ElasticModel>::newton_step() {
         force = solution.multipliers.segment<3>(row);
         row += 3;
     }
-    for (auto& gap : here_.gaps) gap.pressure = solution.multipliers[row++];
+    for (auto& point : here_.contacts) point.multiplier = solution.multipliers[row++];
     return solution.step;
 }
 
@@ -184,16 +185,16 @@ void RestSearch<ElasticModel>::add_rows() {
             system_.add(row);
         }
     }
-    for (const auto& gap : here_.gaps) {
-        const auto& v = gap.corners;
-        const double stiffening = gap.pressure > 0 ? stiffness_ : 0;
-        system_.add({v, {gap.gradient(0), gap.gradient(1), gap.gradient(2)}, gap.value, false, stiffening});
-        if (gap.pressure == 0) continue;
-        const Eigen::Matrix<double, 9, 9> curvature = curvature_of(gap, here_.elastic.x, goals_.tools[gap.tool]);
+    for (const auto& point : here_.contacts) {
+        const auto& v = point.corners;
+        const double stiffening = point.multiplier > 0 ? stiffness_ : 0;
+        system_.add({v, {point.gradient(0), point.gradient(1), point.gradient(2)}, point.gap, false, stiffening});
+        if (point.multiplier == 0) continue;
+        const Eigen::Matrix<double, 9, 9> hessian = gap_hessian(point, here_.elastic.x, goals_.tools[point.tool]);
         for (std::size_t k = 0; k < 3; ++k) {
             for (std::size_t l = 0; l <= k; ++l) {
                 const auto i = static_cast<Eigen::Index>(3 * k), j = static_cast<Eigen::Index>(3 * l);
-                system_.add(v[k], v[l], -gap.pressure * curvature.block<3, 3>(i, j));
+                system_.add(v[k], v[l], -point.multiplier * hessian.block<3, 3>(i, j));
             }
         }
     }
@@ -203,9 +204,9 @@ template <class ElasticModel>
 bool RestSearch<ElasticModel>::is_at_rest() const {
     const double largest = (std::max)(here_.elastic.largest_force, goals_.loads.colwise().norm().maxCoeff());
     if (!(residual(here_) <= (std::max)(options_.tolerance * largest, stiffness_ * spacing_))) return false;
-    const auto touches = [&](const ToolGap& gap) { return gap.pressure == 0 || gap.value <= negligible_length(); };
+    const auto touches = [&](const ToolPoint& p) { return p.multiplier == 0 || p.gap <= negligible_length(); };
     return is_in_place() && here_.overlap <= negligible_length() &&
-           std::all_of(here_.gaps.begin(), here_.gaps.end(), touches);
+           std::all_of(here_.contacts.begin(), here_.contacts.end(), touches);
 }
 
 template <class ElasticModel>
@@ -236,9 +237,9 @@ void RestSearch<ElasticModel>::advance(const Points<double>& step) {
     double part = safe_part(triangles_, here_.elastic.x, step, goals_.tools);
     State there = after(part);
     if (is_in_place()) {
-        double pressures = 0;
-        for (const auto& gap : here_.gaps) pressures += gap.pressure;
-        penalty_ = (std::max)(penalty_, 2 * pressures);
+        double multipliers = 0;
+        for (const auto& point : here_.contacts) multipliers += point.multiplier;
+        penalty_ = (std::max)(penalty_, 2 * multipliers);
         const double slope = -applied(here_).cwiseProduct(step).sum() - penalty_ * here_.overlap;
         const auto helps = [&] {
             const double work = goals_.loads.cwiseProduct(there.elastic.x - here_.elastic.x).sum();
@@ -265,8 +266,8 @@ Points<double> RestSearch<ElasticModel>::applied(const State& state) const {
 template <class ElasticModel>
 Points<double> RestSearch<ElasticModel>::unbalanced(const State& state) const {
     Points<double> forces = applied(state);
-    for (const auto& gap : state.gaps) {
-        for (std::size_t k = 0; k < 3; ++k) forces.col(gap.corners[k]) += gap.pressure * gap.gradient(k);
+    for (const auto& point : state.contacts) {
+        for (std::size_t k = 0; k < 3; ++k) forces.col(point.corners[k]) += point.multiplier * point.gradient(k);
     }
     for (std::size_t i = 0; i < holding_.size(); ++i) {
         const auto& held = scene_.held_places()[i];
@@ -294,7 +295,8 @@ std::vector<Vector3<double>> RestSearch<ElasticModel>::reactions(std::size_t cou
     for (const auto& [constraint, v] : scene_.holds()) sums[constraint] += forces.col(v);
     for (const auto& place : scene_.loaded_places()) sums[place.constraint] -= place.force;
     for (std::size_t i = 0; i < holding_.size(); ++i) sums[scene_.held_places()[i].constraint] -= holding_[i];
-    for (const auto& gap : here_.gaps) sums[scene_.tools()[gap.tool].constraint] += gap.pressure * gap.normal();
+    for (const auto& point : here_.contacts)
+        sums[scene_.tools()[point.tool].constraint] += point.multiplier * point.normal;
     return sums;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <span>
 
+#include <membrane/collision/contact_point.hpp>
 #include <membrane/core/check.hpp>
 
 namespace membrane {
@@ -44,9 +45,11 @@ struct Contact {
     bool crossed = false;  ///< the tool's way since the last tick led through the surface at `point`
 
     // Valid until the tracker's next update.
-    std::span<const TouchedTriangle> touched;  ///< what the tool touches, and what is around the active triangle
-    std::span<const TouchedTriangle> watched;  ///< these first, then what is around them
-    bool closed = false;                       ///< whether the surface is: what is behind it is inside
+    std::span<const ContactPoint<Scalar>> points;  ///< one for each triangle and feature of the tool within `reach`
+    std::span<const TouchedTriangle> touched;      ///< what the tool touches, and what is around the active triangle
+    std::span<const TouchedTriangle> watched;      ///< these first, then what is around them
+    bool has_all_points = true;  ///< false where there was no room for all: a step with this contact is refused
+    bool closed = false;         ///< whether the surface is: what is behind it is inside
 
     [[nodiscard]] static Contact none() noexcept { return {}; }
     [[nodiscard]] bool touching() const noexcept {

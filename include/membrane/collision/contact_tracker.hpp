@@ -30,6 +30,7 @@ class MovingBody;  // of moving_body.hpp
 struct TrackerOptions {
     double margin = 0.01;  ///< what is this near counts as touched, and a point as a sphere of this radius [mean edges]
     Index check_every = 128;  ///< ticks in contact after which the tree is asked whether something else is touched too
+    Index most_points = 16384;  ///< room for contact points; it decides the memory, not the time
 };
 
 /// Finds the contact with the tree while there is none, and follows it over the neighbours of the triangles touched
@@ -108,6 +109,10 @@ class ContactTracker {
     void examine(const Scene& scene, std::span<const Index> some) noexcept;
     void watch_rings(int rings) noexcept;
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    void find_points(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    template <class List>
+    void find_points_of_sphere(const Scene& scene, std::span<const TouchedTriangle> touched,
+                               const List& list) const noexcept;
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] bool leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
@@ -130,6 +135,7 @@ class ContactTracker {
     IndexSet watched_;     // those near and the ones around them
     IndexSet expanded_;    // vertices whose triangles are all watched
     BoundedList<TouchedTriangle> listed_;
+    BoundedList<ContactPoint<Scalar>> points_;
     Contact<Scalar> last_;
     std::optional<Tool<Scalar>> last_tool_;
     RigidFrame<Scalar> pose_;  // of the body then
@@ -151,11 +157,13 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
       candidates_(near_),
       watched_(near_),
       expanded_(mesh.vertex_count()),
-      listed_(static_cast<std::size_t>(mesh.triangle_count())) {
+      listed_(static_cast<std::size_t>(mesh.triangle_count())),
+      points_(static_cast<std::size_t>(std::clamp(options.most_points, Index(0), 5 * mesh.triangle_count()))) {
     if (!is_finite(options.margin) || !(options.margin > 0 && options.margin <= 1)) {
         refuse("ContactTracker", "margin must be above 0 and at most 1 [mean edges], got ", options.margin);
     }
     if (options.check_every < 1) refuse("ContactTracker", "check_every must be at least 1, got ", options.check_every);
+    if (options.most_points < 1) refuse("ContactTracker", "most_points must be at least 1, got ", options.most_points);
 }
 
 template <Real Scalar>
@@ -467,6 +475,54 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
     contact.reach = scene.reach;
     contact.watched = listed_.items();
     contact.touched = contact.watched.first(near_.items().size());
+    find_points(scene, contact);
+    contact.points = points_.items();
+}
+
+// The points within reach, of what the tool has crossed all: where the surface comes to is not known.
+template <Real Scalar>
+void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    points_.clear();
+    const auto list = [&](const ContactPoint<Scalar>& point) {
+        if (!contact.crossed && point.gap + scene.radius > scene.reach) return;
+        if (!points_.push(point)) contact.has_all_points = false;
+    };
+    const int features = feature_pairs(scene.tool);
+    if (features == 1) return find_points_of_sphere(scene, contact.touched, list);
+    for (const auto& [f, corners] : contact.touched) {
+        const auto triangle = triangle_at(scene.x, corners);
+        for (int feature = 0; feature < features; ++feature) {
+            const auto point = contact_point(f, corners, triangle, scene.tool, feature, scene.radius);
+            if (point) list(*point);
+        }
+    }
+}
+
+// The same, several triangles at a time.
+template <Real Scalar>
+template <class List>
+void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span<const TouchedTriangle> touched,
+                                                   const List& list) const noexcept {
+    using Wide = Lanes<Scalar>;
+    const Vector3<Scalar>& centre = scene.tool.position;
+    std::array<Index, Wide::count> triangles;
+    for (std::size_t first = 0; first < touched.size(); first += triangles.size()) {
+        for (std::size_t i = 0; i < triangles.size(); ++i) {
+            triangles[i] = touched[(std::min)(first + i, touched.size() - 1)].triangle;
+        }
+        const auto nearest = surface_.closest_points(scene.x, triangles, centre);
+        const Vector3<Wide> separation = Vector3<Wide>(centre.x(), centre.y(), centre.z()) - nearest.point;
+        const Wide distance = norm(separation);
+        const Wide per_length = select<Wide>(distance > 0, 1 / select<Wide>(distance > 0, distance, 1), 0);
+        const Vector3<Wide> normal = per_length * separation;
+        for (std::size_t i = 0; i < (std::min)(triangles.size(), touched.size() - first); ++i) {
+            const auto of_lane = [i](const Vector3<Wide>& a) { return Vector3<Scalar>(a[0][i], a[1][i], a[2][i]); };
+            const auto& [f, corners] = touched[first + i];
+            ContactPoint<Scalar> point{f, 0, corners, of_lane(nearest.barycentric), of_lane(normal)};
+            point.gap = distance[i] - scene.radius;
+            list(point);
+        }
+    }
 }
 
 // Watches what is near and so many rings around it. The triangles of a vertex are one fan: where they are not all watched,

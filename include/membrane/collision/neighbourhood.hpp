@@ -76,7 +76,13 @@ class Neighbourhood {
     [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Several& some,
                                                   const Tool<Scalar>& tool) const noexcept;
 
+    /// In lane i the point of triangle `some[i]` nearest to `q`.
+    [[nodiscard]] TrianglePoint<Lanes<Scalar>> closest_points(const ConstPointsRef<Scalar>& x, const Several& some,
+                                                              const Vector3<Scalar>& q) const noexcept;
+
   private:
+    [[nodiscard]] Triangle<Lanes<Scalar>> gather(const ConstPointsRef<Scalar>& x, const Several& some) const noexcept;
+
     Triangles triangles_;
     Adjacency adjacency_;
     std::vector<unsigned char> border_;  // vertices on it
@@ -172,11 +178,8 @@ SegmentPair<Scalar> Neighbourhood<Scalar>::nearest(const ConstPointsRef<Scalar>&
 }
 
 template <Real Scalar>
-Lanes<Scalar> Neighbourhood<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Several& some,
-                                                       const Vector3<Scalar>& q) const noexcept {
-    if constexpr (Lanes<Scalar>::parts > 1) {  // registers of half the lanes, without a blend: slower than one by one
-        return Lanes<Scalar>::of([&](std::size_t i) { return squared_distance(triangle(x, some[i]), q); });
-    }
+Triangle<Lanes<Scalar>> Neighbourhood<Scalar>::gather(const ConstPointsRef<Scalar>& x,
+                                                      const Several& some) const noexcept {
     const auto corner = [&](Eigen::Index k) {
         std::array<const Scalar*, Lanes<Scalar>::count> p;
         for (std::size_t i = 0; i < p.size(); ++i) p[i] = x.data() + triangles_(k, some[i]) * x.outerStride();
@@ -185,8 +188,22 @@ Lanes<Scalar> Neighbourhood<Scalar>::squared_distances(const ConstPointsRef<Scal
         };
         return Vector3<Lanes<Scalar>>(along(0), along(1), along(2));
     };
-    const Triangle<Lanes<Scalar>> triangles{corner(0), corner(1), corner(2)};
-    return squared_distance(triangles, Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));
+    return {corner(0), corner(1), corner(2)};
+}
+
+template <Real Scalar>
+TrianglePoint<Lanes<Scalar>> Neighbourhood<Scalar>::closest_points(const ConstPointsRef<Scalar>& x, const Several& some,
+                                                                   const Vector3<Scalar>& q) const noexcept {
+    return closest_point<Lanes<Scalar>>(gather(x, some), Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));
+}
+
+template <Real Scalar>
+Lanes<Scalar> Neighbourhood<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Several& some,
+                                                       const Vector3<Scalar>& q) const noexcept {
+    if constexpr (Lanes<Scalar>::parts > 1) {  // registers of half the lanes, without a blend: slower than one by one
+        return Lanes<Scalar>::of([&](std::size_t i) { return squared_distance(triangle(x, some[i]), q); });
+    }
+    return squared_distance(gather(x, some), Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));
 }
 
 template <Real Scalar>

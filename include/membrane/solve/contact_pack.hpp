@@ -8,31 +8,15 @@
 #include <span>
 #include <vector>
 
+#include <membrane/collision/contact_point.hpp>
 #include <membrane/core/bounded_list.hpp>
 #include <membrane/core/lane_points.hpp>
 
-/// Contact points, one by one and in packs.
+/// Contact points in packs.
 ///
 ///     state.packs.append(points, 0, [&](Index v) { return context.fixed(v); });
 ///     for (auto& pack : state.packs.items()) { ... }
 namespace membrane {
-
-/// A point of the surface that a constraint acts on, and the force it acts with.
-///
-///     context.add_point({triangle, 0, corners, weights, normal, force});
-///     const auto* before = context.cached_point(triangle, 0, corners[0]);   // of the step before, or null
-template <Real Scalar>
-struct ContactPoint {
-    Index triangle;  ///< with `feature`, what identifies the point from step to step
-    int feature;     ///< of the tool, see `feature_pairs`; an own constraint numbers its points as it likes
-    std::array<Index, 3> corners;
-    Vector3<Scalar> weights;  ///< of the corners: barycentric
-    Vector3<Scalar> normal;   ///< from the surface to the tool
-    Vector3<Scalar> force;    ///< on the membrane [N]
-    bool on_fixed = false;    ///< whether a corner is fixed, and bears part of the force
-    bool by_plane = false;    ///< whether the tool stays on its side of the triangle's plane, there and beside it
-    Scalar side = 0;  ///< of the triangle that the tool is on where it is over its inside, 1 or -1; 0: as before
-};
 
 /// How a contact point follows the tool.
 enum class ContactKind : unsigned char {

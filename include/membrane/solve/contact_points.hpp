@@ -58,12 +58,6 @@ ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<S
 template <Real Scalar>
 void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept;
 
-/// The points nearest to `q` of as many triangles as there are lanes; of fewer, the last one again.
-template <Real Scalar>
-[[nodiscard]] TrianglePoint<Lanes<Scalar>> closest_points(const StepState<Scalar>& state,
-                                                          std::span<const TouchedTriangle> triangles,
-                                                          const Vector3<Scalar>& q) noexcept;
-
 /// Brings weights, normal and force of the contact points up to date with their packs. Online. Cost: linear in the points.
 template <Real Scalar>
 void unpack(std::span<const ContactPack<Scalar>> packs, std::span<ContactPoint<Scalar>> points) noexcept;
@@ -434,21 +428,6 @@ template <Real Scalar>
             detail::add_forces(state, pack);
         }
     }
-}
-
-template <Real Scalar>
-[[gnu::flatten]] TrianglePoint<Lanes<Scalar>> closest_points(const StepState<Scalar>& state,
-                                                             std::span<const TouchedTriangle> triangles,
-                                                             const Vector3<Scalar>& q) noexcept {
-    std::array<std::array<Index, Lanes<Scalar>::count>, 3> begins;
-    for (std::size_t i = 0; i < Lanes<Scalar>::count; ++i) {
-        const auto& corners = triangles[(std::min)(i, triangles.size() - 1)].corners;
-        for (std::size_t k = 0; k < 3; ++k) begins[k][i] = numbers_in_point * corners[k];
-    }
-    const auto* rows = state.position.data();
-    return closest_point<Lanes<Scalar>>(
-        {gather(rows, begins[0].data()), gather(rows, begins[1].data()), gather(rows, begins[2].data())},
-        detail::broadcast(q));
 }
 
 template <Real Scalar>

@@ -53,9 +53,7 @@ struct Press {
     void carry_with_tool(Context& context) const noexcept;
     void clear_contact_point(Context& context) const noexcept;
     void find_points(Context& context) const noexcept;
-    void find_points_of_sphere(Context& context) const noexcept;
-    void add_point(Context& context, const TouchedTriangle& triangle, int feature,
-                   const Proximity<Scalar>& nearest) const noexcept;
+    void add_point(Context& context, ContactPoint<Scalar> point) const noexcept;
     void stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept;
     void pack_points(Context& context) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> direction_out_of_support(const Context& context) const noexcept;
@@ -116,6 +114,10 @@ inline constexpr int all_contact_passes = 8, deep_contact_passes = 16;
 template <Real Scalar>
 void Press<Scalar>::begin(Context& context) const noexcept {
     if (!contact.touching() || !seed(context)) return;
+    if (!contact.has_all_points) {
+        context.state().full = true;
+        return;
+    }
     for (const auto& point : context.previous_points()) bear(context, point, point.force);
     const auto out = direction_out_of_support(context);
     if (contact.crossed && !out) carry_with_tool(context);
@@ -141,11 +143,11 @@ bool Press<Scalar>::seed(Context& context) const noexcept {
         return std::all_of(corners.begin(), corners.end(), [&](Index v) { return context.check(v); });
     };
     if (!are_vertices(contact.corners)) return false;
-    for (const auto triangles : {contact.touched, contact.watched}) {
-        for (const auto& triangle : triangles) {
-            if (!are_vertices(triangle.corners)) return false;
-        }
-    }
+    const auto all_are_vertices = [&](const auto& items) {
+        return std::all_of(items.begin(), items.end(), [&](const auto& item) { return are_vertices(item.corners); });
+    };
+    if (!all_are_vertices(contact.touched) || !all_are_vertices(contact.watched) || !all_are_vertices(contact.points))
+        return false;
     for (const auto& touched : contact.touched) {
         for (const Index v : touched.corners) context.seed(v);
     }
@@ -200,52 +202,35 @@ void Press<Scalar>::clear_contact_point(Context& context) const noexcept {
     if (dot(by, contact.normal) < 0) press_in<Scalar>(context, contact.corners, contact.barycentric, by);
 }
 
+// The tracker has found the points on the surface as the last step left it. Those of a shaft, and what a tool has crossed, are
+// found anew where the surface is expected now: there they may be on the other side.
 template <Real Scalar>
 void Press<Scalar>::find_points(Context& context) const noexcept {
-    const int features = feature_pairs(tool);
-    if (features == 1) return find_points_of_sphere(context);
-    for (const auto& touched : contact.touched) {
-        const auto triangle = triangle_of(context, touched.corners);
-        for (int feature = 0; feature < features; ++feature) {
-            const auto nearest = proximity(triangle, tool, feature);
-            if (nearest) add_point(context, touched, feature, *nearest);
+    const bool as_found = feature_pairs(tool) == 1 && !contact.crossed;
+    for (const auto& found : contact.points) {
+        if (as_found) {
+            add_point(context, found);
+            continue;
         }
-    }
-}
-
-// The same, several triangles at a time.
-template <Real Scalar>
-void Press<Scalar>::find_points_of_sphere(Context& context) const noexcept {
-    constexpr std::size_t lanes = Lanes<Scalar>::count;
-    for (std::size_t first = 0; first < contact.touched.size(); first += lanes) {
-        const auto touched = contact.touched.subspan(first, (std::min)(lanes, contact.touched.size() - first));
-        const auto nearest = closest_points(context.state(), touched, tool.position);
-        for (std::size_t i = 0; i < touched.size(); ++i) {
-            const auto of_lane = [i](const Vector3<Lanes<Scalar>>& a) {
-                return Vector3<Scalar>(a[0][i], a[1][i], a[2][i]);
-            };
-            add_point(context, touched[i], 0, {of_lane(nearest.barycentric), tool.position - of_lane(nearest.point)});
-        }
+        const auto point = contact_point(found.triangle, found.corners, triangle_of(context, found.corners), tool,
+                                         found.feature, contact.radius);
+        if (point) add_point(context, *point);
     }
 }
 
 // A point that was there in the last step goes on with its force; another one joins if it is near enough.
 template <Real Scalar>
-void Press<Scalar>::add_point(Context& context, const TouchedTriangle& triangle, int feature,
-                              const Proximity<Scalar>& nearest) const noexcept {
-    const auto* before = context.cached_point(triangle.triangle, feature, triangle.corners[0]);
-    const Scalar distance = norm(nearest.reach);
+void Press<Scalar>::add_point(Context& context, ContactPoint<Scalar> point) const noexcept {
+    const auto* before = context.cached_point(point.triangle, point.feature, point.corners[0]);
+    const Scalar distance = point.gap + contact.radius;
     if (before == nullptr && distance > contact.reach) return;
     const bool apart = distance > contact.radius / 1000;
-    const Vector3<Scalar> towards = apart ? nearest.reach : Vector3<Scalar>(contact.before - contact.on_axis);
-    ContactPoint<Scalar> point{
-        triangle.triangle,      feature, triangle.corners, nearest.barycentric, direction(towards, contact.normal),
-        Vector3<Scalar>::Zero()};
+    point.normal = direction(apart ? point.normal : Vector3<Scalar>(contact.before - contact.on_axis), contact.normal);
     point.on_fixed = std::any_of(point.corners.begin(), point.corners.end(), [&](Index v) { return context.fixed(v); });
     // Fixed corners have not been carried along: what the tool has crossed is between it and where it was.
     if (contact.crossed && point.on_fixed) {
         const Vector3<Scalar> came =
-            contact.before - contact.on_axis + nearest.reach - support_displacement(context, point);
+            contact.before - contact.on_axis + distance * point.normal - support_displacement(context, point);
         if (dot(came, point.normal) < 0) point.normal = -point.normal;
     }
     stay_on_side(context, point);

@@ -94,6 +94,13 @@ class QuasiStaticSolver {
     /// what a new solver does is done, to the bit. Cost: O(V).
     void reset() noexcept;
 
+    /// The contact points of constraint number `i` in the last step that advanced, with the force on each [N]: how its reaction
+    /// is distributed. None for a constraint that has none. Valid until the next step.
+    [[nodiscard]] std::span<const ContactPoint<Scalar>> contact_points(std::size_t i) const noexcept {
+        if (i >= state_.previous_ranges.size()) return {};
+        return state_.previous_ranges[i].of(state_.previous_points.items());
+    }
+
     /// The propagation queue of the last step.
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return active_.queue(); }
 
