@@ -149,7 +149,7 @@ TEST_CASE("pressures do no more work on the way to any state than is said", "[er
             double done = 0, allowed = handed.places.work();
             for (const auto& touch : handed.rest.touches) {
                 for (std::size_t k = 0; k < 3; ++k) {
-                    done += touch.pressure * dot<double>(touch.gradient(k), point(d, touch.corners[k]));
+                    done += touch.multiplier * dot<double>(touch.gradient(k), point(d, touch.corners[k]));
                 }
             }
             for (Index v = 0; v < x.cols(); ++v) {
@@ -316,7 +316,7 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     CHECK(bound.of(rest, membrane.x, other, membrane.network, membrane.backing, pressing).status ==
           BoundStatus::bad_input);
     wrong = rest;
-    for (auto& touch : wrong.touches) touch.pressure *= 3;
+    for (auto& touch : wrong.touches) touch.multiplier *= 3;
     const auto far = of(wrong, pressing);
     if (far.certified()) CHECK(far.position > 3 * of(rest, pressing).position);
 
