@@ -121,12 +121,26 @@ TEMPLATE_TEST_CASE(
                 const Outcome outcome = play<S>(membrane, stroke, {.layers = layers, .sweeps = sweeps});
                 REQUIRE(outcome.advanced);
                 REQUIRE(outcome.at_rest);
-                // Half the effort, with a shaft as deep as 11 edges of 0.18 mm.
-                const bool hard = subdivisions > 5 && sweeps == 1 && stroke.shape == Shape::shaft;
-                REQUIRE(outcome.overlap <= (hard ? 0.016 : 0.0105));
+                REQUIRE(outcome.overlap <= 0.01 + (sizeof(S) == 4 ? 1e-5 : 1e-9));  // rounding of positions
                 // What holds a point that is dragged several edges deep is a fold, and any number of folds is at rest.
                 if (stroke.shape != Shape::point) REQUIRE(outcome.force <= 2 * exact);
             }
         }
+    }
+}
+
+// Its end is beside triangles far smaller than it, which turn over.
+TEMPLATE_TEST_CASE("a shaft dragged through a mesh much finer than itself stays outside", "[strokes]", double, float) {
+    using S = TestType;
+    const Membrane<S> membrane(cases_are_slow ? 5 : 6);
+    for (const auto& [depth, speed] : {std::pair{1.5e-3, 0.1}, {2e-3, 0.05}}) {
+        CAPTURE(depth, speed);
+        const Stroke stroke{Shape::shaft, depth, speed};
+        const double exact = play<S>(membrane, stroke, {.layers = 12, .sweeps = 6, .contact_visits = 8}).force;
+        const Outcome outcome = play<S>(membrane, stroke, {.layers = 6, .sweeps = 2});
+        CHECK(outcome.advanced);
+        CHECK(outcome.at_rest);
+        CHECK(outcome.overlap <= 0.01);
+        CHECK(outcome.force <= 2 * exact);
     }
 }

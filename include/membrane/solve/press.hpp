@@ -240,18 +240,20 @@ void Press<Scalar>::add_point(Context& context, ContactPoint<Scalar> point) cons
 
 // Vertices move by more than the radius of a tiny tool while the step balances them, and a nearest edge or corner says nothing
 // of the side then. So the tool stays in front of the planes of the triangles that it is in front of, all through the step: at
-// a convex edge this is too far out, by less than the radius. The end of a thin shaft may be thrown as far, past edges that turn
-// its direction round; over the inside of a triangle of a closed surface it is on the side where the step began.
+// a convex edge this is too far out, by less than the radius. The end of a shaft thinner than an edge may be thrown as far, past
+// edges that turn its direction round; over the inside of a triangle of a closed surface it is on the side where the step began.
+// Under a thick one triangles are small enough to turn over, and have no such side.
 template <Real Scalar>
 void Press<Scalar>::stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept {
     constexpr Scalar tiny = Scalar(2e-5);  // squared radius by area: a tool of less than a 300th of an edge
     if (point.feature < 0 || point.feature > 1) return;
     const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
+    const Scalar size = norm(area), square = contact.radius * contact.radius;
     if (feature_pairs(tool) > 1) {
-        if (contact.closed) point.side = dot(point.normal, area) < 0 ? Scalar(-1) : Scalar(1);
+        if (contact.closed && square < size) point.side = dot(point.normal, area) < 0 ? Scalar(-1) : Scalar(1);
         return;
     }
-    if (!(contact.radius * contact.radius < tiny * norm(area))) return;
+    if (!(square < tiny * size)) return;
     point.by_plane = contact.side * dot(point.normal, area) > 0;
     if (point.by_plane) point.normal = direction<Scalar>(contact.side * area, point.normal);
 }
@@ -336,13 +338,16 @@ bool Press<Scalar>::enforce(Context& context) const noexcept {
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
     const int most = detail::max_contact_passes(points.size(), on_fixed || feature_pairs(tool) > 1);
+    bool deep = false;
     for (int i = 0; i < detail::deep_contact_passes; ++i) {
         const auto pass = solve_contacts(context.state(), shape(), packs(context), i > 0);
+        deep = pass.deep;
         released = released || pass.released;
         if (i == 0) first = pass.largest;
         // The vertices have to find their balance anew.
         if (!(i + 1 < most ? pass.largest > first / 2 : pass.deep)) break;
     }
+    for (int i = 0; deep && i < detail::max_push_passes; ++i) deep = push_out(context.state(), shape(), packs(context));
     apply_forces(context.state(), packs(context));
     prevent_tunnelling(context);
     return first > 0 || released || has_new_overlap(context);
