@@ -110,7 +110,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(active.frontier())&& noexcept(active.group_ends()));
     });
     static_cast<void>([](PackedVertices<S>& packed, const PropagationQueue& queue, const Network& network,
-                         const StepInput<S, Network, Volume>& scene, const ExecutorRef& executor) {
+                         const StepInput<S, Network, Volume>& scene, const AnyExecutor& executor) {
         static_assert(noexcept(packed.assign(queue.vertices(), queue.group_ends(), network)));
         static_assert(noexcept(packed.append(queue.vertices(), 0, queue.group_ends(), network)));
         static_assert(noexcept(packed.vertices(0))&& noexcept(packed.first_of(0))&& noexcept(packed.pack_from(0)));

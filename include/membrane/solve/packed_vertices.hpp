@@ -102,7 +102,7 @@ class PackedVertices {
     /// The same for packs number `begin` to `end` that no spring joins, some by each thread.
     template <class Scene, class Rule>
     void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule,
-                const ExecutorRef& executor) noexcept {
+                const AnyExecutor& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
         parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
             for (std::size_t p = begin + first; p < begin + last;) {
