@@ -259,8 +259,8 @@ TEMPLATE_TEST_CASE("the residual forces of packs are those of their vertices, to
             packed.evaluate_residual(p, scene);
             for (const Index v : packed.vertices(p)) {
                 const Vector3<S> force = pull_on(scene, v).force;
-                REQUIRE(state.row(state.residual, v).point() == force);
-                REQUIRE(state.row(state.residual, v).extra() == norm(undamped_force(scene, v, force)));
+                REQUIRE(state.residual_force(v) == force);
+                REQUIRE(state.unbalanced_force(v) == norm(undamped_force(scene, v, force)));
             }
         }
     }

@@ -228,8 +228,9 @@ template <Real Scalar>
         auto row = gather_padded(state.force.data(), pack.corner[k].data());
         const Wide now = load.force * load.weights[i], before = applied.force * applied.weights[i];
         const Vector3<Wide> change = before * applied.normal - now * load.normal;
+        Wide& contact_stiffness = row.extra;
         row.point += change;
-        row.extra += load.stiffness[i] - applied.stiffness[i];
+        contact_stiffness += load.stiffness[i] - applied.stiffness[i];
         scatter_padded(row, state.force.data(), pack.corner[k].data());
         if (!pack.on_fixed) return;
         auto support = gather_padded(state.support.data(), pack.corner[k].data());
@@ -255,12 +256,13 @@ template <Real Scalar>
     for (std::size_t k = 0; pack.on_fixed && k < 3; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
         const auto support = gather_padded(state.support.data(), pack.corner[k].data());
-        const auto yields = (support.extra > 0) & (pack.free[i] < 1);
-        const Wide compliance = select<Wide>(yields, 1 / select<Wide>(yields, support.extra, 1), 0);
+        const Wide& stiffness = support.extra;
+        const auto yields = (stiffness > 0) & (pack.free[i] < 1);
+        const Wide compliance = select<Wide>(yields, 1 / select<Wide>(yields, stiffness, 1), 0);
         sum.compliance += pack.load.weights[i] * pack.load.weights[i] * compliance;
         sum.displacement += pack.load.weights[i] * (compliance * dot(support.point, pack.load.normal));
         sum.force += (1 - pack.free[i]) * norm(support.point);
-        sum.stiffness += (1 - pack.free[i]) * support.extra;
+        sum.stiffness += (1 - pack.free[i]) * stiffness;
     }
     return sum;
 }
@@ -283,7 +285,8 @@ template <Real Scalar>
     Wide sum = 0;
     for (std::size_t k = 0; k < 3; ++k) {
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
-        sum += weight * weight * corner[k].extra;
+        const Wide& compliance = corner[k].extra;
+        sum += weight * weight * compliance;
     }
     const Wide rounding = 16 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude<Wide>(corner[0].point);
     const Wide tolerance = state.force_tolerance;
@@ -321,11 +324,12 @@ template <Real Scalar>
         const auto a = gather_padded(state.response.data(), begins.data());
         const auto b = gather_padded(state.response.data() + 1, begins.data());
         const Symmetric3<Wide> block{a.point[0], a.point[1], a.point[2], a.extra, b.point[0], b.point[1]};
+        const Wide &internal_force = b.point[2], &internal_stiffness = b.extra;
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         response.of_corner[k] = weight * (block * pack.load.normal);
         response.compliance += weight * dot(response.of_corner[k], pack.load.normal);
-        response.internal_force += b.point[2];
-        response.internal_stiffness += b.extra;
+        response.internal_force += internal_force;
+        response.internal_stiffness += internal_stiffness;
     });
     return response;
 }

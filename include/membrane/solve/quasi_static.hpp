@@ -552,9 +552,8 @@ bool QuasiStaticSolver<Scalar, Rule>::update(const Scene& scene, Index v) noexce
     }
     state_.set_compliance(v, as_block<Scalar>(move.compliance), move.least);
     if (vertex.touched) {
-        const auto& of_constraints = state_.row(state_.force, v);
-        state_.set_internal(v, norm<Scalar>(vertex.force - of_constraints.point()),
-                            vertex.stiffness - (std::max)(of_constraints.extra(), Scalar(0)));
+        state_.set_internal(v, norm<Scalar>(vertex.force - state_.constraint_force(v)),
+                            vertex.stiffness - vertex.contact_stiffness);
     }
     if (!move.moves) return false;
     state_.set_position(v, point(scene.x, v) + backtracked<Rule>(scene, v, move.displacement));
@@ -567,14 +566,14 @@ template <class Scene>
 bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene, const Progress& progress) noexcept {
     bool finite = true;
     const auto count = [&](Index v) {
-        const Vector3<Scalar> force = state_.row(state_.residual, v).point();
+        const Vector3<Scalar> force = state_.residual_force(v);
         ++report_.visits;
         if (!state_.is_fixed(v)) report_.residual = (std::max)(report_.residual, norm(force));
         finite &= is_finite(force);
     };
     const auto evaluate = [&](Index v) {
         const Vector3<Scalar> force = pull_on(scene, v).force;
-        state_.row(state_.residual, v).set(force, norm(undamped_force(scene, v, force)));
+        state_.set_residual(v, force, norm(undamped_force(scene, v, force)));
         count(v);
     };
     std::size_t packed = 0;
@@ -603,7 +602,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(const Scene& scene, PointsRef<S
                                                  const Progress& progress) noexcept {
     moved_.clear();
     for (const Index v : state_.loaded.items()) {
-        const Vector3<Scalar> now = state_.row(state_.position, v).point(), before = point(x, v);
+        const Vector3<Scalar> now = state_.position_of(v), before = point(x, v);
         if (now == before) continue;
         moved_.push(v);
         if (options_.predict) last_displacements_.col(v) = now - before;
@@ -611,7 +610,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(const Scene& scene, PointsRef<S
     }
     report_.moved = moved_.items();
     const auto is_balanced = [&](Index v) {
-        return state_.is_fixed(v) || state_.row(state_.residual, v).extra() <= state_.force_tolerance;
+        return state_.is_fixed(v) || state_.unbalanced_force(v) <= state_.force_tolerance;
     };
     report_.converged = active_.finish(scene.network, is_balanced, report_.moved) && !progress.constraints_changed &&
                         report_.residual <= state_.force_tolerance;
