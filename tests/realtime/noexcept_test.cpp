@@ -124,7 +124,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
                          std::span<ContactPoint<S>> points, std::span<const Index> vertices) {
         static_assert(noexcept(state.begin_step())&& noexcept(state.end_step())&& noexcept(state.reset()));
         static_assert(noexcept(push_out(state, tool, packs))&& noexcept(solve_contacts(state, tool, packs)));
-        static_assert(noexcept(apply_forces(state, packs))&& noexcept(unpack<S>(packs, points)));
+        static_assert(noexcept(apply_forces(state, packs))&& noexcept(state.packs.unpack(points)));
         static_assert(noexcept(largest_squared_move(state, vertices)));
     });
     static_cast<void>([](Predictor<S, 4>& predictor, std::span<const Lead<S>> leads) {

@@ -54,7 +54,7 @@ struct Patch {
     [[nodiscard]] ContactTool<S> shape() const { return {tool.position, tool.axis, tool.position, tool.radius}; }
     [[nodiscard]] std::vector<ContactPoint<S>> unpacked() const {
         auto found = points;
-        unpack<S>(state.packs.items(), found);
+        state.packs.unpack(found);
         return found;
     }
 

@@ -110,7 +110,8 @@ class ConstraintContext {
 
     // For the solver and `Press`.
 
-    [[nodiscard]] StepState<Scalar>& state() const noexcept { return state_; }
+    [[nodiscard]] StepState<Scalar>& state() noexcept { return state_; }
+    [[nodiscard]] const StepState<Scalar>& state() const noexcept { return state_; }
     void select_constraint(std::size_t constraint) noexcept { constraint_ = constraint; }
     [[nodiscard]] std::size_t constraint() const noexcept { return constraint_; }
 

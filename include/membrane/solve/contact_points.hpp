@@ -64,10 +64,6 @@ template <Real Scalar>
                                                           std::span<const TouchedTriangle> triangles,
                                                           const Vector3<Scalar>& q) noexcept;
 
-/// Brings weights, normal and force of the contact points up to date with their packs. Online. Cost: linear in the points.
-template <Real Scalar>
-void unpack(std::span<const ContactPack<Scalar>> packs, std::span<ContactPoint<Scalar>> points) noexcept;
-
 /// How far one of these vertices has moved from its `anchor` at most, squared [m^2]. @pre they are kept
 template <Real Scalar>
 [[nodiscard]] Scalar largest_squared_move(const StepState<Scalar>& state, std::span<const Index> vertices) noexcept;
@@ -453,21 +449,6 @@ template <Real Scalar>
     return closest_point<Lanes<Scalar>>(
         {gather(rows, begins[0].data()), gather(rows, begins[1].data()), gather(rows, begins[2].data())},
         detail::broadcast(q));
-}
-
-template <Real Scalar>
-void unpack(std::span<const ContactPack<Scalar>> packs, std::span<ContactPoint<Scalar>> points) noexcept {
-    for (const auto& pack : packs) {
-        for (std::size_t i = 0; i < pack.size; ++i) {
-            auto& point = points[static_cast<std::size_t>(pack.point[i])];
-            for (std::size_t k = 0; k < 3; ++k) {
-                const auto row = static_cast<Eigen::Index>(k);
-                point.weights[static_cast<Eigen::Index>((k + pack.turn[i]) % 3)] = pack.load.weights[row][i];
-                point.normal[row] = pack.load.normal[row][i];
-            }
-            point.force = -pack.load.force[i] * point.normal;
-        }
-    }
 }
 
 template <Real Scalar>
