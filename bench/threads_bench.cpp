@@ -11,8 +11,8 @@ namespace {
 using namespace bench;
 using membrane::VisitOrder;
 
-template <membrane::Real Scalar, class Threads>
-void step(benchmark::State& state, VisitOrder order, const Threads& executor) {
+template <membrane::Real Scalar>
+void step(benchmark::State& state, VisitOrder order, const membrane::AnyExecutor& executor) {
     const auto mesh = sphere_of<Scalar>(state.range(0));
     const auto network =
         membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>(mesh, {}, {.stiffness = Scalar(stiffness)});
@@ -22,7 +22,7 @@ void step(benchmark::State& state, VisitOrder order, const Threads& executor) {
                                                   .order = order,
                                                   .predict = false,
                                                   .most_in_groups = membrane::unlimited};
-    membrane::QuasiStaticSolver<Scalar, membrane::BlockStep, Threads> solver(network, options, {}, executor);
+    membrane::QuasiStaticSolver<Scalar> solver(network, options, {}, executor);
     auto x = mesh.positions();
     const membrane::Vector3<Scalar> out = Scalar(1.3) * membrane::point(x, 0);
     double visits = 0, residual = 0;
@@ -44,15 +44,15 @@ void sizes_of_whole(benchmark::internal::Benchmark* measured) {
 
 template <membrane::Real Scalar>
 void arrival(benchmark::State& state) {
-    step<Scalar>(state, VisitOrder::arrival, membrane::OneThread{});
+    step<Scalar>(state, VisitOrder::arrival, {});
 }
 template <membrane::Real Scalar>
 void groups(benchmark::State& state) {
-    step<Scalar>(state, VisitOrder::groups, membrane::OneThread{});
+    step<Scalar>(state, VisitOrder::groups, {});
 }
 template <membrane::Real Scalar>
 void colours(benchmark::State& state) {
-    step<Scalar>(state, VisitOrder::colours, membrane::OneThread{});
+    step<Scalar>(state, VisitOrder::colours, {});
 }
 template <membrane::Real Scalar>
 void threads(benchmark::State& state) {

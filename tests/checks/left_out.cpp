@@ -66,16 +66,14 @@ membrane::VertexState<S> bare_state(const SceneOf<membrane::NoVolumeSprings>& sc
     const auto springs = scene.network.pull(v, scene.x);
     state.force = springs.force;
     state.stiffness = springs.stiffness;
-    const auto& of_constraints = scene.state.row(scene.state.force, v);
-    state.force += of_constraints.point();
-    state.stiffness +=
-        (std::max)(of_constraints.extra(), S(0)) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
+    state.force += scene.state.constraint_force(v);
+    state.stiffness += scene.state.contact_stiffness(v) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : S(0);
     state.dt = scene.dt;
     state.touched = scene.state.seeds.contains(v);
     if (state.touched) {
-        state.contact_stiffness = (std::max)(of_constraints.extra(), S(0));
-        state.contact_normal = membrane::direction_or_zero(of_constraints.point());
+        state.contact_stiffness = scene.state.contact_stiffness(v);
+        state.contact_normal = membrane::direction_or_zero(scene.state.constraint_force(v));
     }
     return state;
 }

@@ -14,7 +14,7 @@ struct Throws {
     void operator()(Index, int) const;
 };
 static_assert(!Executor<Throws>);
-static_assert(Executor<ExecutorRef>);
+static_assert(Executor<AnyExecutor>);
 static_assert(Executor<decltype([](Index, const auto& task) { task(0); })>);
 
 }  // namespace
@@ -54,16 +54,25 @@ TEST_CASE("what is distributed is done once, so many in each task at the most", 
     }
 }
 
-TEST_CASE("a reference to an executor does what the executor does", "[executor]") {
+TEST_CASE("an executor of any type does what the one does that it was made of, and outlives that", "[executor]") {
     std::vector<Index> order;
-    const auto backwards = [](Index count, const auto& task) {
-        for (Index i = count; i-- > 0;) task(i);
-    };
-    const ExecutorRef serial{OneThread{}}, other{backwards};
+    const auto note = [&](Index i) { order.push_back(i); };
+    AnyExecutor serial, also_serial = OneThread{}, other;
+    {
+        const auto backwards = [shift = std::vector<Index>{10}](Index count, const auto& task) {
+            for (Index i = count; i-- > 0;) task(shift[0] + i);
+        };
+        other = backwards;
+    }
     CHECK(serial.is_serial());
+    CHECK(also_serial.is_serial());
     CHECK_FALSE(other.is_serial());
-    serial(3, [&](Index i) { order.push_back(i); });
-    other(3, [&](Index i) { order.push_back(i); });
-    serial(0, [&](Index i) { order.push_back(i); });
-    CHECK(order == std::vector<Index>{0, 1, 2, 2, 1, 0});
+    serial(3, note);
+    const AnyExecutor copy = other;
+    other = serial;
+    copy(3, note);
+    AnyExecutor{copy}(2, note);
+    serial(0, note);
+    copy(0, note);
+    CHECK(order == std::vector<Index>{0, 1, 2, 12, 11, 10, 11, 10});
 }

@@ -110,7 +110,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(active.frontier())&& noexcept(active.group_ends()));
     });
     static_cast<void>([](PackedVertices<S>& packed, const PropagationQueue& queue, const Network& network,
-                         const StepInput<S, Network, Volume>& scene, const ExecutorRef& executor) {
+                         const StepInput<S, Network, Volume>& scene, const AnyExecutor& executor) {
         static_assert(noexcept(packed.assign(queue.vertices(), queue.group_ends(), network)));
         static_assert(noexcept(packed.append(queue.vertices(), 0, queue.group_ends(), network)));
         static_assert(noexcept(packed.vertices(0))&& noexcept(packed.first_of(0))&& noexcept(packed.pack_from(0)));
@@ -124,7 +124,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
                          std::span<ContactPoint<S>> points, std::span<const Index> vertices) {
         static_assert(noexcept(state.begin_step())&& noexcept(state.end_step())&& noexcept(state.reset()));
         static_assert(noexcept(push_out(state, tool, packs))&& noexcept(solve_contacts(state, tool, packs)));
-        static_assert(noexcept(apply_forces(state, packs))&& noexcept(unpack<S>(packs, points)));
+        static_assert(noexcept(apply_forces(state, packs))&& noexcept(state.packs.unpack(points)));
         static_assert(noexcept(largest_squared_move(state, vertices)));
     });
     static_cast<void>([](Predictor<S, 4>& predictor, std::span<const Lead<S>> leads) {

@@ -82,12 +82,12 @@ struct AnyOrder {
 };
 
 /// Ten ticks in which a vertex is pulled about, another held, a third loaded; what the steps said is added to `log`.
-template <Real S, class Rule, class Volume, class Threads = OneThread>
+template <Real S, class Rule, class Volume>
 Points<S> play(const Membrane<S>& membrane, const Rule& rule, const Volume& volume, const SolverOptions<S>& options,
-               int seed, std::vector<double>& log, const Threads& executor = {}) {
+               int seed, std::vector<double>& log, const AnyExecutor& executor = {}) {
     Random random(static_cast<std::uint64_t>(seed));
     const Index vertices = membrane.mesh.vertex_count();
-    QuasiStaticSolver<S, Rule, Threads> solver(membrane.network, options, rule, executor);
+    QuasiStaticSolver<S, Rule> solver(membrane.network, options, rule, executor);
     Points<S> x = membrane.mesh.positions();
     Index v = random.index(vertices);
     const Index still = random.index(vertices), f = random.index(membrane.mesh.triangle_count());
@@ -259,8 +259,8 @@ TEMPLATE_TEST_CASE("the residual forces of packs are those of their vertices, to
             packed.evaluate_residual(p, scene);
             for (const Index v : packed.vertices(p)) {
                 const Vector3<S> force = pull_on(scene, v).force;
-                REQUIRE(state.row(state.residual, v).point() == force);
-                REQUIRE(state.row(state.residual, v).extra() == norm(undamped_force(scene, v, force)));
+                REQUIRE(state.residual_force(v) == force);
+                REQUIRE(state.unbalanced_force(v) == norm(undamped_force(scene, v, force)));
             }
         }
     }

@@ -29,6 +29,10 @@ using test::same_bits;
 
 namespace {
 
+// A rule that has nothing to remember takes no room.
+static_assert(sizeof(QuasiStaticSolver<double, MassStep>) + sizeof(double) ==
+              sizeof(QuasiStaticSolver<double, SafeStep>));
+
 template <class S>
 using Linear = MassSpringNetwork<S, LinearSpring>;
 

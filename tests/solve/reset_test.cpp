@@ -41,11 +41,12 @@ struct Sphere {
 };
 
 /// A sphere in a user's loop.
-template <Real S, class Rule, class Threads>
+template <Real S, class Rule>
 struct Loop {
     static inline const Sphere<S> sphere;
 
-    explicit Loop(const SolverOptions<S>& options) : solver(sphere.network, options) {}
+    Loop(const SolverOptions<S>& options, const AnyExecutor& executor)
+        : solver(sphere.network, options, Rule{}, executor) {}
 
     /// One tick of what `random` thinks of, and what came of it.
     struct Outcome {
@@ -101,7 +102,7 @@ struct Loop {
         tool = {.radius = S(0.1)};
     }
 
-    QuasiStaticSolver<S, Rule, Threads> solver;
+    QuasiStaticSolver<S, Rule> solver;
     AabbTree<S> tree{sphere.mesh};
     ContactTracker<S> tracker{sphere.mesh, {.check_every = 3}};
     Grasper<S> grasper{sphere.mesh};
@@ -144,14 +145,14 @@ SolverOptions<S> some_options(Random& random) {
             .most_visits = random.chance(0.3) ? 100 + random.index(300) : unlimited};
 }
 
-template <Real S, class Rule, class Threads>
-void check_resets() {
+template <Real S, class Rule>
+void check_resets(const AnyExecutor& executor = {}) {
     int touching = 0, holding = 0, refused = 0, late = 0;
     for (int seed = 1; seed <= cases(30); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const auto options = some_options<S>(random);
-        Loop<S, Rule, Threads> used(options), fresh(options);
+        Loop<S, Rule> used(options, executor), fresh(options, executor);
         for (int tick = random.index(100); tick > 0; --tick) static_cast<void>(used.tick(random));
         used.reset();
         const Index checks = used.tracker.tree_checks();
@@ -179,9 +180,9 @@ void check_resets() {
 }  // namespace
 
 TEMPLATE_TEST_CASE("what is reset does what is new does, to the bit", "[reset]", double, float) {
-    SECTION("block") { check_resets<TestType, BlockStep, OneThread>(); }
-    SECTION("safe") { check_resets<TestType, SafeStep, OneThread>(); }
-    SECTION("as published") { check_resets<TestType, MassStep, OneThread>(); }
-    SECTION("block, shared out") { check_resets<TestType, BlockStep, LastFirst>(); }
-    SECTION("as published, shared out") { check_resets<TestType, MassStep, LastFirst>(); }
+    SECTION("block") { check_resets<TestType, BlockStep>(); }
+    SECTION("safe") { check_resets<TestType, SafeStep>(); }
+    SECTION("as published") { check_resets<TestType, MassStep>(); }
+    SECTION("block, shared out") { check_resets<TestType, BlockStep>(LastFirst{}); }
+    SECTION("as published, shared out") { check_resets<TestType, MassStep>(LastFirst{}); }
 }

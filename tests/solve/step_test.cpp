@@ -3,18 +3,10 @@
 
 #include <limits>
 
-#include <membrane/solve/step_rule.hpp>
-
 #include "support/catch.hpp"
 #include "support/refusal.hpp"
 
-using membrane::Method;
-using membrane::OneThread;
 using membrane::SolverOptions;
-
-// What has nothing to remember takes no room.
-static_assert(sizeof(Method<membrane::MassStep, double, OneThread>) == sizeof(SolverOptions<double>));
-static_assert(sizeof(Method<membrane::MassStep, float, OneThread>) == sizeof(SolverOptions<float>));
 
 TEST_CASE("solver options out of range are refused by name") {
     const auto refused = [](SolverOptions<double> options) { return test::refusal([&] { options.check(); }); };

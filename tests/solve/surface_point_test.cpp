@@ -39,7 +39,7 @@ struct Membrane {
     [[nodiscard]] Vector3<double> at(const Vector3<double>& weights) const {
         return membrane::point_at(membrane::triangle_of(context, corners), weights);
     }
-    [[nodiscard]] Vector3<double> force(Index v) const { return work.row(work.force, v).point(); }
+    [[nodiscard]] Vector3<double> force(Index v) const { return work.constraint_force(v); }
 
     struct Network {
         bool last_pinned;

@@ -3,6 +3,7 @@
 
 #include <concepts>
 #include <cstddef>
+#include <memory>
 
 #include <membrane/core/types.hpp>
 
@@ -55,30 +56,40 @@ struct OneThread {
 
 static_assert(Executor<OneThread>);
 
-class ExecutorRef;
+class AnyExecutor;
 
 namespace detail {
 
-// To ask whether a reference is an executor must not ask whether a reference can be made of it.
+// To ask whether an executor of any type is an executor must not ask whether one can be made of it.
 template <class E>
-concept ReferredExecutor = !std::same_as<E, ExecutorRef> && Executor<E>;
+concept OtherExecutor = !std::same_as<E, AnyExecutor> && CheckedExecutor<E>;
 
 }  // namespace detail
 
-/// An executor of any type, which must outlive this: what hands it tasks depends on no type of executor.
-class ExecutorRef {
+/// An executor of any type: what gives it tasks depends on no type of executor. Copies share the executor it was made of,
+/// which lives as long as they do; what that refers to (a pool of threads) is its owner's to keep.
+class AnyExecutor {
   public:
-    template <detail::ReferredExecutor E>
-    explicit ExecutorRef(const E& executor) noexcept
-        : executor_(&executor), run_(&run<E>), is_serial_(std::same_as<E, OneThread>) {}
+    AnyExecutor() = default;  ///< One thread.
+
+    /// Allocates, but for `OneThread`.
+    template <detail::OtherExecutor E>
+    AnyExecutor(const E& executor) {
+        if constexpr (std::same_as<E, OneThread>) return;
+        executor_ = std::make_shared<const E>(executor);
+        run_ = [](const void* of, Index count, const TaskRef& task) noexcept {
+            (*static_cast<const E*>(of))(count, task);
+        };
+    }
 
     /// Whether it is known that one thread does all tasks in order.
-    [[nodiscard]] bool is_serial() const noexcept { return is_serial_; }
+    [[nodiscard]] bool is_serial() const noexcept { return executor_ == nullptr; }
 
     template <class Task>
     void operator()(Index count, const Task& task) const noexcept {
-        const TaskRef ref{&task, [](const void* of, Index i) noexcept { (*static_cast<const Task*>(of))(i); }};
-        run_(executor_, count, ref);
+        if (is_serial()) return OneThread{}(count, task);
+        run_(executor_.get(), count,
+             {&task, [](const void* of, Index i) noexcept { (*static_cast<const Task*>(of))(i); }});
     }
 
   private:
@@ -87,19 +98,14 @@ class ExecutorRef {
         void (*call)(const void* task, Index i) noexcept;
         void operator()(Index i) const noexcept { call(task, i); }
     };
-    template <class E>
-    static void run(const void* executor, Index count, const TaskRef& task) noexcept {
-        (*static_cast<const E*>(executor))(count, task);
-    }
 
-    const void* executor_;
-    void (*run_)(const void* executor, Index count, const TaskRef& task) noexcept;
-    bool is_serial_;
+    std::shared_ptr<const void> executor_;  // none: one thread
+    void (*run_)(const void* executor, Index count, const TaskRef& task) noexcept = nullptr;
 };
 
 /// Calls `act(begin, end)` for parts of 0 to `count` of at most `grain_size`, each part in a task.
-template <class Threads, class Act>
-void parallel_for(const Threads& executor, std::size_t count, std::size_t grain_size, const Act& act) noexcept {
+template <Executor E, class Act>
+void parallel_for(const E& executor, std::size_t count, std::size_t grain_size, const Act& act) noexcept {
     const std::size_t tasks = count / grain_size + (count % grain_size > 0 ? 1 : 0);
     executor(static_cast<Index>(tasks), [&](Index task) noexcept {
         const std::size_t begin = static_cast<std::size_t>(task) * grain_size, left = count - begin;

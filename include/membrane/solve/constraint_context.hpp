@@ -44,7 +44,7 @@ class ConstraintContext {
 
     /// Where `v` is [m], and where it was when the step began.
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept {
-        return state_.loaded.contains(v) ? state_.row(state_.position, v).point() : start(v);
+        return state_.loaded.contains(v) ? state_.position_of(v) : start(v);
     }
     [[nodiscard]] Vector3<Scalar> start(Index v) const noexcept { return point(x_, v); }
 
@@ -81,14 +81,10 @@ class ConstraintContext {
     }
 
     /// How far at least [m/N].
-    [[nodiscard]] Scalar compliance(Index v) const noexcept {
-        return fixed(v) ? Scalar(0) : state_.row(state_.position, v).extra();
-    }
+    [[nodiscard]] Scalar compliance(Index v) const noexcept { return fixed(v) ? Scalar(0) : state_.compliance(v); }
 
     /// At the end of the step: the sum of all forces on `v` [N].
-    [[nodiscard]] Vector3<Scalar> residual_force(Index v) const noexcept {
-        return state_.row(state_.residual, v).point();
-    }
+    [[nodiscard]] Vector3<Scalar> residual_force(Index v) const noexcept { return state_.residual_force(v); }
 
     /// A change of force that is not worth making [N].
     [[nodiscard]] Scalar force_tolerance() const noexcept { return state_.force_tolerance; }
@@ -114,7 +110,8 @@ class ConstraintContext {
 
     // For the solver and `Press`.
 
-    [[nodiscard]] StepState<Scalar>& state() const noexcept { return state_; }
+    [[nodiscard]] StepState<Scalar>& state() noexcept { return state_; }
+    [[nodiscard]] const StepState<Scalar>& state() const noexcept { return state_; }
     void select_constraint(std::size_t constraint) noexcept { constraint_ = constraint; }
     [[nodiscard]] std::size_t constraint() const noexcept { return constraint_; }
 
@@ -154,12 +151,12 @@ class ConstraintContext {
     /// By how much a fixed vertex yields to the tools that press on it, as a spring of its support stiffness does [m]; no
     /// other does.
     [[nodiscard]] Vector3<Scalar> support_displacement(Index v) const noexcept {
-        const auto& support = state_.row(state_.support, v);
-        if (!state_.bearing.contains(v) || !(support.extra() > 0)) return Vector3<Scalar>::Zero();
-        return support.point() / support.extra();
+        const Scalar stiffness = state_.support_stiffness(v);
+        if (!state_.bearing.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
+        return state_.support_force(v) / stiffness;
     }
     [[nodiscard]] Scalar support_compliance(Index v) const noexcept {
-        const Scalar stiffness = state_.row(state_.support, v).extra();
+        const Scalar stiffness = state_.support_stiffness(v);
         return fixed(v) && stiffness > 0 ? 1 / stiffness : Scalar(0);
     }
     void set_support(Index v, Scalar stiffness) noexcept { state_.row(state_.support, v).number[3] = stiffness; }

@@ -157,8 +157,10 @@ class ConstraintList {
         for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(context_); });
         return mended;
     }
-    /// The forces on those who act; false if any is not finite.
+    /// The forces on those who act; false if any is not finite. Contact points have what was found of them from here on.
     [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {
+        auto& state = context_.state();
+        state.packs.unpack(state.points.items());
         bool finite = true;
         for_each([&](const auto& constraint, std::size_t i) {
             reactions[i] = constraint.reaction(context_);

@@ -92,6 +92,9 @@ class ContactPacks {
     template <class IsFixed>
     void append(std::span<const ContactPoint<Scalar>> points, std::size_t first, IsFixed is_fixed) noexcept;
 
+    /// Brings weights, normal and force of `points`, all of the step, up to date with their packs. Cost: linear in the points.
+    void unpack(std::span<ContactPoint<Scalar>> points) const noexcept;
+
   private:
     static constexpr std::size_t colour_count = 64;
     static constexpr std::size_t lanes = ContactPack<Scalar>::lanes;
@@ -185,6 +188,21 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
     }
     for (const auto& point : points) {
         for (const Index v : point.corners) colours(v) = 0;
+    }
+}
+
+template <Real Scalar>
+void ContactPacks<Scalar>::unpack(std::span<ContactPoint<Scalar>> points) const noexcept {
+    for (const auto& pack : items()) {
+        for (std::size_t i = 0; i < pack.size; ++i) {
+            auto& point = points[static_cast<std::size_t>(pack.point[i])];
+            for (std::size_t k = 0; k < 3; ++k) {
+                const auto row = static_cast<Eigen::Index>(k);
+                point.weights[static_cast<Eigen::Index>((k + pack.turn[i]) % 3)] = pack.load.weights[row][i];
+                point.normal[row] = pack.load.normal[row][i];
+            }
+            point.force = -pack.load.force[i] * point.normal;
+        }
     }
 }
 

@@ -58,10 +58,6 @@ ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<S
 template <Real Scalar>
 void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept;
 
-/// Brings weights, normal and force of the contact points up to date with their packs. Online. Cost: linear in the points.
-template <Real Scalar>
-void unpack(std::span<const ContactPack<Scalar>> packs, std::span<ContactPoint<Scalar>> points) noexcept;
-
 /// How far one of these vertices has moved from its `anchor` at most, squared [m^2]. @pre they are kept
 template <Real Scalar>
 [[nodiscard]] Scalar largest_squared_move(const StepState<Scalar>& state, std::span<const Index> vertices) noexcept;
@@ -222,8 +218,9 @@ template <Real Scalar>
         auto row = gather_padded(state.force.data(), pack.corner[k].data());
         const Wide now = load.force * load.weights[i], before = applied.force * applied.weights[i];
         const Vector3<Wide> change = before * applied.normal - now * load.normal;
+        Wide& contact_stiffness = row.extra;
         row.point += change;
-        row.extra += load.stiffness[i] - applied.stiffness[i];
+        contact_stiffness += load.stiffness[i] - applied.stiffness[i];
         scatter_padded(row, state.force.data(), pack.corner[k].data());
         if (!pack.on_fixed) return;
         auto support = gather_padded(state.support.data(), pack.corner[k].data());
@@ -249,12 +246,13 @@ template <Real Scalar>
     for (std::size_t k = 0; pack.on_fixed && k < 3; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
         const auto support = gather_padded(state.support.data(), pack.corner[k].data());
-        const auto yields = (support.extra > 0) & (pack.free[i] < 1);
-        const Wide compliance = select<Wide>(yields, 1 / select<Wide>(yields, support.extra, 1), 0);
+        const Wide& stiffness = support.extra;
+        const auto yields = (stiffness > 0) & (pack.free[i] < 1);
+        const Wide compliance = select<Wide>(yields, 1 / select<Wide>(yields, stiffness, 1), 0);
         sum.compliance += pack.load.weights[i] * pack.load.weights[i] * compliance;
         sum.displacement += pack.load.weights[i] * (compliance * dot(support.point, pack.load.normal));
         sum.force += (1 - pack.free[i]) * norm(support.point);
-        sum.stiffness += (1 - pack.free[i]) * support.extra;
+        sum.stiffness += (1 - pack.free[i]) * stiffness;
     }
     return sum;
 }
@@ -277,7 +275,8 @@ template <Real Scalar>
     Wide sum = 0;
     for (std::size_t k = 0; k < 3; ++k) {
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
-        sum += weight * weight * corner[k].extra;
+        const Wide& compliance = corner[k].extra;
+        sum += weight * weight * compliance;
     }
     const Wide rounding = 16 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude<Wide>(corner[0].point);
     const Wide tolerance = state.force_tolerance;
@@ -315,11 +314,12 @@ template <Real Scalar>
         const auto a = gather_padded(state.response.data(), begins.data());
         const auto b = gather_padded(state.response.data() + 1, begins.data());
         const Symmetric3<Wide> block{a.point[0], a.point[1], a.point[2], a.extra, b.point[0], b.point[1]};
+        const Wide &internal_force = b.point[2], &internal_stiffness = b.extra;
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         response.of_corner[k] = weight * (block * pack.load.normal);
         response.compliance += weight * dot(response.of_corner[k], pack.load.normal);
-        response.internal_force += b.point[2];
-        response.internal_stiffness += b.extra;
+        response.internal_force += internal_force;
+        response.internal_stiffness += internal_stiffness;
     });
     return response;
 }
@@ -426,21 +426,6 @@ template <Real Scalar>
         } else if (any(pack.applied.force > 0)) {
             load.stiffness = Vector3<Lanes<Scalar>>::Zero();
             detail::add_forces(state, pack);
-        }
-    }
-}
-
-template <Real Scalar>
-void unpack(std::span<const ContactPack<Scalar>> packs, std::span<ContactPoint<Scalar>> points) noexcept {
-    for (const auto& pack : packs) {
-        for (std::size_t i = 0; i < pack.size; ++i) {
-            auto& point = points[static_cast<std::size_t>(pack.point[i])];
-            for (std::size_t k = 0; k < 3; ++k) {
-                const auto row = static_cast<Eigen::Index>(k);
-                point.weights[static_cast<Eigen::Index>((k + pack.turn[i]) % 3)] = pack.load.weights[row][i];
-                point.normal[row] = pack.load.normal[row][i];
-            }
-            point.force = -pack.load.force[i] * point.normal;
         }
     }
 }

@@ -102,7 +102,7 @@ class PackedVertices {
     /// The same for packs number `begin` to `end` that no spring joins, some by each thread.
     template <class Scene, class Rule>
     void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule,
-                const ExecutorRef& executor) noexcept {
+                const AnyExecutor& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
         parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
             for (std::size_t p = begin + first; p < begin + last;) {
@@ -157,7 +157,7 @@ class PackedVertices {
     [[nodiscard]] Sum springs_on(std::size_t p, const Vector3<Wide>& here, const Scene& scene) const noexcept;
     // Of a pack before it moves.
     struct PackState {
-        PaddedLanes<Scalar> here, of_constraints;
+        Vector3<Wide> here, constraint_force;
         VertexState<Wide> vertex;
         Pull<Wide> others;
     };
@@ -171,8 +171,8 @@ class PackedVertices {
     template <bool in_contact, class Scene>
     void add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene, Pull<Wide>& others) const noexcept;
 
-    void keep_response(std::size_t p, const VertexState<Wide>& vertex, const PaddedLanes<Scalar>& of_constraints,
-                       const Symmetric3<Wide>& block, StepState<Scalar>& rows) const noexcept;
+    void keep_response(std::size_t p, const PackState& at, const Symmetric3<Wide>& block,
+                       StepState<Scalar>& rows) const noexcept;
 
     // Packs are half empty at the worst that is made room for.
     [[nodiscard]] static std::size_t packs_for(std::size_t vertices) noexcept {
@@ -364,8 +364,7 @@ template <bool in_contact, class Scene>
 
 // Compliance, and what resists without constraints; nothing where a vertex may not move.
 template <Real Scalar>
-[[gnu::always_inline]] inline void PackedVertices<Scalar>::keep_response(std::size_t p, const VertexState<Wide>& vertex,
-                                                                         const PaddedLanes<Scalar>& of_constraints,
+[[gnu::always_inline]] inline void PackedVertices<Scalar>::keep_response(std::size_t p, const PackState& at,
                                                                          const Symmetric3<Wide>& block,
                                                                          StepState<Scalar>& rows) const noexcept {
     const auto may_move = terms_[p].free != 0;
@@ -374,8 +373,9 @@ template <Real Scalar>
     for (std::size_t i = 0; i < lanes; ++i) begins[i] = 2 * packs_[p].own[i];
     scatter_padded<Scalar>({{kept(block.xx), kept(block.yy), kept(block.zz)}, kept(block.xy)}, rows.response.data(),
                            begins.data());
-    scatter_padded<Scalar>({{kept(block.xz), kept(block.yz), kept(norm<Wide>(vertex.force - of_constraints.point))},
-                            kept(vertex.stiffness - of_constraints.extra)},
+    const Wide internal_force = norm<Wide>(at.vertex.force - at.constraint_force);
+    const Wide internal_stiffness = at.vertex.stiffness - at.vertex.contact_stiffness;
+    scatter_padded<Scalar>({{kept(block.xz), kept(block.yz), kept(internal_force)}, kept(internal_stiffness)},
                            rows.response.data() + 1, begins.data());
 }
 
@@ -387,25 +387,23 @@ template <bool in_contact, class Rule, class Scene>
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     PackState at;
-    at.here = gather_padded(rows.position.data(), own.data());
-    at.vertex = spring_state<Rule>(p, at.here.point, scene);
+    at.here = gather(rows.position.data(), own.data());
+    at.vertex = spring_state<Rule>(p, at.here, scene);
     if constexpr (in_contact) {
-        at.of_constraints = gather_padded(rows.force.data(), own.data());
-        at.of_constraints.extra = larger<Wide>(at.of_constraints.extra, 0);
+        const auto of_constraints = gather_padded(rows.force.data(), own.data());
+        at.constraint_force = of_constraints.point;
+        at.vertex.contact_stiffness = larger<Wide>(of_constraints.extra, 0);
+        at.vertex.contact_normal = direction_or_zero<Wide>(at.constraint_force);
         const auto in_all_directions = Wide::of(
             [&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(own[i] / numbers_in_point)]; });
-        at.others = {at.of_constraints.point, at.of_constraints.extra + in_all_directions};
+        at.others = {at.constraint_force, at.vertex.contact_stiffness + in_all_directions};
     }
-    add_others<in_contact>(p, at.here.point, scene, at.others);
+    add_others<in_contact>(p, at.here, scene, at.others);
     at.vertex.force += at.others.force;
     at.vertex.stiffness += at.others.stiffness;
     at.vertex.mass = terms_[p].mass;
     at.vertex.dt = scene.dt;
     at.vertex.touched = in_contact;
-    if constexpr (in_contact) {
-        at.vertex.contact_stiffness = at.of_constraints.extra;
-        at.vertex.contact_normal = direction_or_zero<Wide>(at.of_constraints.point);
-    }
     return at;
 }
 
@@ -420,15 +418,15 @@ template <bool in_contact, class Scene, class Rule>
     const auto move = move_of(rule, at.vertex, rows.force_tolerance);
     if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
         if (!allowed && any(move.may_overshoot & may_move)) {
-            const auto springs = springs_on<CurvedSum<Wide>>(p, at.here.point, scene).total();
+            const auto springs = springs_on<CurvedSum<Wide>>(p, at.here, scene).total();
             const Wide bound = curvature_bound(springs) + at.others.stiffness;
             if (any((move.compliance * bound >= 2) & may_move)) return Outcome::too_far;
         }
     }
-    if constexpr (in_contact) keep_response(p, at.vertex, at.of_constraints, as_block<Wide>(move.compliance), rows);
+    if constexpr (in_contact) keep_response(p, at, as_block<Wide>(move.compliance), rows);
     const auto moves = move.moves & may_move;
-    PaddedLanes<Scalar> there{at.here.point + move.displacement, select<Wide>(may_move, move.least, 0)};
-    for (Eigen::Index k = 0; k < 3; ++k) there.point[k] = select(moves, there.point[k], at.here.point[k]);
+    PaddedLanes<Scalar> there{at.here + move.displacement, select<Wide>(may_move, move.least, 0)};
+    for (Eigen::Index k = 0; k < 3; ++k) there.point[k] = select(moves, there.point[k], at.here[k]);
     scatter_padded(there, rows.position.data(), own.data());
     return any(moves) ? Outcome::moved : Outcome::at_rest;
 }

@@ -42,7 +42,9 @@ struct Press {
     }
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>& context) const noexcept;
-    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept {
+        return reaction_at_points(context);
+    }
 
   private:
     using Context = ConstraintContext<Scalar>;
@@ -65,7 +67,7 @@ struct Press {
     [[nodiscard]] ContactTool<Scalar> shape() const noexcept {
         return {tool.position, tool.axis, contact.on_axis, contact.radius};
     }
-    [[nodiscard]] static auto packs(const Context& context) noexcept {
+    [[nodiscard]] static auto packs(Context& context) noexcept {
         return context.state().pack_ranges[context.constraint()].of(context.state().packs.items());
     }
     [[nodiscard]] static bool on_support(const Context& context) noexcept {
@@ -372,12 +374,6 @@ bool Press<Scalar>::has_new_overlap(const Context& context) const noexcept {
         }
     }
     return false;
-}
-
-template <Real Scalar>
-Vector3<Scalar> Press<Scalar>::reaction(const Context& context) const noexcept {
-    unpack<Scalar>(packs(context), context.state().points.items());
-    return reaction_at_points(context);
 }
 
 }  // namespace membrane

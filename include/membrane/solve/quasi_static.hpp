@@ -55,14 +55,15 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 ///
 /// Positions, network and volume springs are arguments of each step, always those of one membrane; what is remembered
 /// (queue, vertices awake, packed springs, contact forces) is a cache: `reset` it where constants of the network have changed. One thread at a time for each solver.
-template <Real Scalar, CheckedStepRule<Scalar> Rule = BlockStep, CheckedExecutor Threads = OneThread>
+template <Real Scalar, CheckedStepRule<Scalar> Rule = BlockStep>
 class QuasiStaticSolver {
   public:
+    /// `executor` is for orders in which several threads may move vertices.
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
     /// Cost: O(V) memory.
     template <detail::NetworkOfSolver<Scalar> Network>
     explicit QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options = {}, const Rule& rule = {},
-                               const Threads& executor = {});
+                               const AnyExecutor& executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 updates for each vertex in the queue or awake, in layer 0 `contact_visits` in each sweep; an
@@ -170,7 +171,9 @@ class QuasiStaticSolver {
         UpdatesInLanes<Scalar, Rule, std::remove_cvref_t<decltype(std::declval<Scene>().network)>,
                        std::remove_cvref_t<decltype(std::declval<Scene>().volume)>>;
 
-    Method<Rule, Scalar, Threads> method_;
+    [[no_unique_address]] Rule rule_;
+    SolverOptions<Scalar> options_;
+    AnyExecutor executor_;
     ActiveVertices active_;
     PackedVertices<Scalar> packed_;
     StepState<Scalar> state_;
@@ -188,11 +191,11 @@ class QuasiStaticSolver {
     StepCosts costs_;
 };
 
-template <class Network, class Rule = BlockStep, class Threads = OneThread,
-          bool = CheckedElasticNetwork<Network, typename Network::Scalar>&&
-              CheckedStepRule<Rule, typename Network::Scalar>&& CheckedExecutor<Threads>>
+template <
+    class Network, class Rule = BlockStep,
+    bool = CheckedElasticNetwork<Network, typename Network::Scalar>&& CheckedStepRule<Rule, typename Network::Scalar>>
 QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {},
-                  const Threads& = {}) -> QuasiStaticSolver<typename Network::Scalar, Rule, Threads>;
+                  const AnyExecutor& = {}) -> QuasiStaticSolver<typename Network::Scalar, Rule>;
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
@@ -207,12 +210,13 @@ template <class Scalar, class Rule, class Network>
 
 }  // namespace detail
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <detail::NetworkOfSolver<Scalar> Network>
-QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& network,
-                                                            const SolverOptions<Scalar>& options, const Rule& rule,
-                                                            const Threads& executor)
-    : method_{rule, (options.check(), options), executor},
+QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options,
+                                                   const Rule& rule, const AnyExecutor& executor)
+    : rule_(rule),
+      options_((options.check(), options)),
+      executor_(executor),
       active_(network.vertex_count()),
       packed_(network, detail::most_in_lanes<Scalar, Rule, Network>(options)),
       state_(network.vertex_count(), options.most_touches),
@@ -229,11 +233,11 @@ QuasiStaticSolver<Scalar, Rule, Threads>::QuasiStaticSolver(const Network& netwo
 }
 
 // A step, in the order in which it happens.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network, class Volume>
-StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt,
-                                                                     const Network& network, const Volume& volume,
-                                                                     Constraints constraints) noexcept {
+StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt,
+                                                            const Network& network, const Volume& volume,
+                                                            Constraints constraints) noexcept {
     MEMBRANE_ASSERT(x.cols() == state_.vertex_count() && network.vertex_count() == state_.vertex_count());
     detail::require_made<QuasiStaticSolver>();
     begin_report(constraints.size());
@@ -253,7 +257,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(TimeBudget 
 
     const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
     Progress progress{.budget = budget};
-    set_supports(scene, method_.options.rigid_stiffness, state_.seeds.items());
+    set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
     select(network, context);
     load_and_pack(scene, progress);
     sweep(scene, acting, progress);
@@ -269,24 +273,24 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::step_in(TimeBudget 
     return report_;
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-void QuasiStaticSolver<Scalar, Rule, Threads>::begin_report(std::size_t constraint_count) noexcept {
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+void QuasiStaticSolver<Scalar, Rule>::begin_report(std::size_t constraint_count) noexcept {
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {};
     report_.reactions = {reactions_.data(), constraint_count};
 }
 
 // The body has moved since the last step, and the membrane with it: what is remembered goes along.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Volume>
-void QuasiStaticSolver<Scalar, Rule, Threads>::follow_body([[maybe_unused]] const Volume& volume) noexcept {
+void QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume& volume) noexcept {
     if constexpr (moves<Volume>) {
         const auto& body = volume.body();
         if (std::exchange(deformations_, body.deformations()) != body.deformations()) wake_all();
         if (body.pose().same_pose(pose_)) return;
         const auto motion = motion_between(std::exchange(pose_, body.pose()), body.pose());
         state_.rotate(motion.rotation);
-        if (!method_.options.predict) return;
+        if (!options_.predict) return;
         for (const Index v : moved_.items()) {
             last_displacements_.col(v) = motion.direction_out(point(last_displacements_, v));
         }
@@ -295,11 +299,11 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::follow_body([[maybe_unused]] cons
 
 // Vertices that moved in the last step go on, as far as what drives them does. A step that was cut short is not
 // extrapolated: where vertices were not updated, the extrapolation would be extrapolated again, and grow from step to step.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Volume>
-void QuasiStaticSolver<Scalar, Rule, Threads>::extrapolate(const ConstraintList<Scalar>& acting,
-                                                           ConstraintContext<Scalar>& context) noexcept {
-    if (!method_.options.predict) return;
+void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& acting,
+                                                  ConstraintContext<Scalar>& context) noexcept {
+    if (!options_.predict) return;
     std::array<Lead<Scalar>, StepState<Scalar>::max_constraints> leads{};
     acting.collect_leads(leads);
     if constexpr (moves<Volume>) {  // as they go on the body
@@ -317,10 +321,10 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::extrapolate(const ConstraintList<
 }
 
 // The vertices at work in this step, those that were prescribed until now as well.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
-void QuasiStaticSolver<Scalar, Rule, Threads>::select(const Network& network,
-                                                      const ConstraintContext<Scalar>& context) noexcept {
+void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
+                                             const ConstraintContext<Scalar>& context) noexcept {
     for (const Index v : last_prescribed_.items()) {
         if (!context.fixed(v)) active_.wake(v);
     }
@@ -328,14 +332,14 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::select(const Network& network,
         if (!network.pinned(v)) active_.wake(v);
     }
     woken_.clear();
-    active_.arrange(network, state_.seeds.items(), method_.options);
+    active_.arrange(network, state_.seeds.items(), options_);
 }
 
 // Loads the vertices at work and their neighbours. Those at work are packed if the whole queue is at work and no constraint
 // adds a force beyond layer 0.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-void QuasiStaticSolver<Scalar, Rule, Threads>::load_and_pack(const Scene& scene, Progress& progress) noexcept {
+void QuasiStaticSolver<Scalar, Rule>::load_and_pack(const Scene& scene, Progress& progress) noexcept {
     std::size_t packed = 0;
     if constexpr (can_use_lanes<Scene>) {
         const auto& queue = active_.queue();
@@ -357,21 +361,21 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::load_and_pack(const Scene& scene,
     progress.budget.begin(active_.vertices().size() + active_.frontier().size());
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-void QuasiStaticSolver<Scalar, Rule, Threads>::load_neighbours(const Scene& scene, Index v) noexcept {
+void QuasiStaticSolver<Scalar, Rule>::load_neighbours(const Scene& scene, Index v) noexcept {
     state_.load(v, scene.start, scene.network);
     for (const auto& end : scene.network.neighbours(v)) state_.load(end.other, scene.start, scene.network);
 }
 
 // Sweeps until nothing changes, they are done, or time is up.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-void QuasiStaticSolver<Scalar, Rule, Threads>::sweep(const Scene& scene, const ConstraintList<Scalar>& acting,
-                                                     Progress& progress) noexcept {
+void QuasiStaticSolver<Scalar, Rule>::sweep(const Scene& scene, const ConstraintList<Scalar>& acting,
+                                            Progress& progress) noexcept {
     bool changed = true;
     std::size_t resume = resume_;
-    for (Index i = 0; i < method_.options.sweeps && changed && !report_.out_of_time; ++i) {
+    for (Index i = 0; i < options_.sweeps && changed && !report_.out_of_time; ++i) {
         changed = iterate_contact(scene, acting, progress);
         if (report_.status != StepStatus::advanced) return;
         const auto beyond = active_.beyond();
@@ -392,15 +396,15 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::sweep(const Scene& scene, const C
 }
 
 // Updates of layer 0 in turn with its constraints.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-bool QuasiStaticSolver<Scalar, Rule, Threads>::iterate_contact(const Scene& scene, const ConstraintList<Scalar>& acting,
-                                                               Progress& progress) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::iterate_contact(const Scene& scene, const ConstraintList<Scalar>& acting,
+                                                      Progress& progress) noexcept {
     const auto layer = active_.touched();
     const std::size_t packs = progress.in_lanes ? packed_.pack_from(layer.size()) : 0;
     const std::size_t packed = packs > 0 ? (std::min)(layer.size(), packed_.size()) : 0;
     bool changed = false;
-    for (Index i = 0; i < method_.options.contact_visits; ++i) {
+    for (Index i = 0; i < options_.contact_visits; ++i) {
         if (!progress.budget.has_time_for_contact(layer.size())) {
             report_.out_of_time = true;
             break;
@@ -417,10 +421,10 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::iterate_contact(const Scene& scen
     return changed;
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-bool QuasiStaticSolver<Scalar, Rule, Threads>::update_beyond(const Scene& scene, std::span<const Index> vertices,
-                                                             Progress& progress) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::update_beyond(const Scene& scene, std::span<const Index> vertices,
+                                                    Progress& progress) noexcept {
     bool changed = false;
     const auto begin = static_cast<std::size_t>(vertices.data() - active_.vertices().data());
     if (progress.in_lanes && begin < packed_.size()) {
@@ -443,12 +447,12 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update_beyond(const Scene& scene,
 }
 
 // The packs of vertices number `begin` to `end`.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs_beyond(const Scene& scene, std::size_t begin,
-                                                                   std::size_t end, Progress& progress) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::update_packs_beyond(const Scene& scene, std::size_t begin, std::size_t end,
+                                                          Progress& progress) noexcept {
     // Under a deadline batches are too small to distribute over threads.
-    const bool serial = progress.budget.limited() || ExecutorRef(method_.executor).is_serial();
+    const bool serial = progress.budget.limited() || executor_.is_serial();
     bool changed = false;
     std::size_t p = packed_.pack_from(begin);
     const std::size_t last = packed_.pack_from(end);
@@ -469,8 +473,8 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs_beyond(const Scene& 
 }
 
 // The pack at which the group of pack `p` ends.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-std::size_t QuasiStaticSolver<Scalar, Rule, Threads>::end_of_group(std::size_t p, std::size_t last) const noexcept {
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+std::size_t QuasiStaticSolver<Scalar, Rule>::end_of_group(std::size_t p, std::size_t last) const noexcept {
     const std::size_t first = packed_.first_of(p);
     for (const auto ends : {active_.queue().group_ends(), active_.group_ends()}) {
         const auto end = std::upper_bound(ends.begin(), ends.end(), first);
@@ -479,18 +483,17 @@ std::size_t QuasiStaticSolver<Scalar, Rule, Threads>::end_of_group(std::size_t p
     return last;
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <bool in_contact, class Scene>
-bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs([[maybe_unused]] const Scene& scene, std::size_t begin,
-                                                            std::size_t end, [[maybe_unused]] bool serial) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::update_packs([[maybe_unused]] const Scene& scene, std::size_t begin,
+                                                   std::size_t end, [[maybe_unused]] bool serial) noexcept {
     bool changed = false;
     if constexpr (can_use_lanes<Scene>) {
         if constexpr (!in_contact) {
-            if (!serial) packed_.update(begin, end, scene, method_.rule, ExecutorRef(method_.executor));
+            if (!serial) packed_.update(begin, end, scene, rule_, executor_);
         }
         for (std::size_t p = begin; p < end && report_.status == StepStatus::advanced;) {
-            const std::size_t next =
-                serial ? packed_.template update_next<in_contact>(p, end, scene, method_.rule) : p + 1;
+            const std::size_t next = serial ? packed_.template update_next<in_contact>(p, end, scene, rule_) : p + 1;
             for (; p < next; ++p) changed |= finish_update<in_contact>(scene, p, packed_.outcome(p));
         }
     }
@@ -498,30 +501,29 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update_packs([[maybe_unused]] con
 }
 
 // Where the stiffness bound does not prove that a move is stable, the largest eigenvalue of the block does or does not.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <bool in_contact, class Scene>
-bool QuasiStaticSolver<Scalar, Rule, Threads>::finish_update(
-    const Scene& scene, std::size_t p, typename PackedVertices<Scalar>::Outcome outcome) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::finish_update(const Scene& scene, std::size_t p,
+                                                    typename PackedVertices<Scalar>::Outcome outcome) noexcept {
     using Outcome = typename PackedVertices<Scalar>::Outcome;
     report_.visits += packed_.free_count(p);
     if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
         if (outcome == Outcome::too_far) {
             for (const Index v : packed_.vertices(p)) {
-                if (state_.is_fixed(v) || !diverges(scene, v, method_.rule.compliance(state_of<Rule>(scene, v))))
-                    continue;
+                if (state_.is_fixed(v) || !diverges(scene, v, rule_.compliance(state_of<Rule>(scene, v)))) continue;
                 report_.status = StepStatus::unstable;
                 return false;
             }
-            outcome = packed_.template update<in_contact>(p, scene, method_.rule, true);
+            outcome = packed_.template update<in_contact>(p, scene, rule_, true);
         }
     }
     return outcome == Outcome::moved;
 }
 
 // With `layers_as_needed`: adds the next layer, and updates it, if a force on it is above the tolerance.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-bool QuasiStaticSolver<Scalar, Rule, Threads>::add_layer(const Scene& scene, Progress& progress) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::add_layer(const Scene& scene, Progress& progress) noexcept {
     const auto frontier = active_.frontier();
     if (frontier.empty() || progress.next != nullptr || report_.status != StepStatus::advanced) return false;
     if (!progress.budget.has_time_for_batch()) {
@@ -535,20 +537,20 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::add_layer(const Scene& scene, Pro
     progress.budget.updated(frontier.size());
     const std::size_t before = active_.vertices().size();
     if (!needed) return false;
-    active_.grow(scene.network, method_.options);
+    active_.grow(scene.network, options_);
     for (const Index v : active_.frontier()) load_neighbours(scene, v);
     progress.budget.set_residual_count(active_.vertices().size() + active_.frontier().size());
     update_beyond(scene, active_.vertices().subspan(before), progress);
     return true;
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-bool QuasiStaticSolver<Scalar, Rule, Threads>::update(const Scene& scene, Index v) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::update(const Scene& scene, Index v) noexcept {
     if (state_.is_fixed(v) || report_.status != StepStatus::advanced) return false;
     ++report_.visits;
     const auto vertex = state_of<Rule>(scene, v);
-    const auto move = move_of(method_.rule, vertex, state_.force_tolerance);
+    const auto move = move_of(rule_, vertex, state_.force_tolerance);
     if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
         if (move.may_overshoot && diverges(scene, v, move.compliance)) {
             report_.status = StepStatus::unstable;
@@ -557,9 +559,8 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update(const Scene& scene, Index 
     }
     state_.set_compliance(v, as_block<Scalar>(move.compliance), move.least);
     if (vertex.touched) {
-        const auto& of_constraints = state_.row(state_.force, v);
-        state_.set_internal(v, norm<Scalar>(vertex.force - of_constraints.point()),
-                            vertex.stiffness - (std::max)(of_constraints.extra(), Scalar(0)));
+        state_.set_internal(v, norm<Scalar>(vertex.force - state_.constraint_force(v)),
+                            vertex.stiffness - vertex.contact_stiffness);
     }
     if (!move.moves) return false;
     state_.set_position(v, point(scene.x, v) + backtracked<Rule>(scene, v, move.displacement));
@@ -567,20 +568,19 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::update(const Scene& scene, Index 
 }
 
 // The forces at the end on all vertices at work; false if any is not finite.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-bool QuasiStaticSolver<Scalar, Rule, Threads>::evaluate_residuals(const Scene& scene,
-                                                                  const Progress& progress) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::evaluate_residuals(const Scene& scene, const Progress& progress) noexcept {
     bool finite = true;
     const auto count = [&](Index v) {
-        const Vector3<Scalar> force = state_.row(state_.residual, v).point();
+        const Vector3<Scalar> force = state_.residual_force(v);
         ++report_.visits;
         if (!state_.is_fixed(v)) report_.residual = (std::max)(report_.residual, norm(force));
         finite &= is_finite(force);
     };
     const auto evaluate = [&](Index v) {
         const Vector3<Scalar> force = pull_on(scene, v).force;
-        state_.row(state_.residual, v).set(force, norm(undamped_force(scene, v, force)));
+        state_.set_residual(v, force, norm(undamped_force(scene, v, force)));
         count(v);
     };
     std::size_t packed = 0;
@@ -603,21 +603,21 @@ bool QuasiStaticSolver<Scalar, Rule, Threads>::evaluate_residuals(const Scene& s
 }
 
 // Vertices that have moved get their new positions, and wake their neighbours.
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Scene>
-void QuasiStaticSolver<Scalar, Rule, Threads>::write_back(const Scene& scene, PointsRef<Scalar>& x,
-                                                          const Progress& progress) noexcept {
+void QuasiStaticSolver<Scalar, Rule>::write_back(const Scene& scene, PointsRef<Scalar>& x,
+                                                 const Progress& progress) noexcept {
     moved_.clear();
     for (const Index v : state_.loaded.items()) {
-        const Vector3<Scalar> now = state_.row(state_.position, v).point(), before = point(x, v);
+        const Vector3<Scalar> now = state_.position_of(v), before = point(x, v);
         if (now == before) continue;
         moved_.push(v);
-        if (method_.options.predict) last_displacements_.col(v) = now - before;
+        if (options_.predict) last_displacements_.col(v) = now - before;
         x.col(v) = now;
     }
     report_.moved = moved_.items();
     const auto is_balanced = [&](Index v) {
-        return state_.is_fixed(v) || state_.row(state_.residual, v).extra() <= state_.force_tolerance;
+        return state_.is_fixed(v) || state_.unbalanced_force(v) <= state_.force_tolerance;
     };
     report_.converged = active_.finish(scene.network, is_balanced, report_.moved) && !progress.constraints_changed &&
                         report_.residual <= state_.force_tolerance;
@@ -627,8 +627,8 @@ void QuasiStaticSolver<Scalar, Rule, Threads>::write_back(const Scene& scene, Po
     state_.end_step();
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepStatus status) noexcept {
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status) noexcept {
     if (status == StepStatus::unstable) state_.forget_points();  // what ran away may be a force from the step before
     predictor_.forget();
     reactions_.fill(Vector3<Scalar>::Zero());
@@ -636,20 +636,20 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule, Threads>::refuse_step(StepSta
     return report_;
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-void QuasiStaticSolver<Scalar, Rule, Threads>::wake(std::span<const Index> vertices) noexcept {
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+void QuasiStaticSolver<Scalar, Rule>::wake(std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
         if (v >= 0 && v < state_.vertex_count()) woken_.insert(v);
     }
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-void QuasiStaticSolver<Scalar, Rule, Threads>::wake_all() noexcept {
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+void QuasiStaticSolver<Scalar, Rule>::wake_all() noexcept {
     for (Index v = 0; v < state_.vertex_count(); ++v) wake({&v, 1});
 }
 
-template <Real Scalar, CheckedStepRule<Scalar> Rule, CheckedExecutor Threads>
-void QuasiStaticSolver<Scalar, Rule, Threads>::reset() noexcept {
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     active_.clear();
     state_.reset();
     predictor_.forget();

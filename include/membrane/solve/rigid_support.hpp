@@ -49,7 +49,7 @@ void set_supports(const StepInput<Scalar, Network, Volume>& scene, std::type_ide
             }
             support = detail::support_factor * stiffest;
         }
-        scene.state.row(scene.state.support, v).number[3] = support;
+        scene.state.set_support_stiffness(v, support);
         scene.state.clear_response(v);
     }
 }

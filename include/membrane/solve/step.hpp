@@ -5,7 +5,6 @@
 #include <string_view>
 
 #include <membrane/core/check.hpp>
-#include <membrane/core/executor.hpp>
 
 /// What a step of the solver may cost, and what it says of itself.
 ///
@@ -40,14 +39,6 @@ struct SolverOptions {
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
-};
-
-/// How a solver works: what moves a vertex, what that may cost, and who does what may be done at the same time.
-template <class Rule, Real Scalar, class Threads>
-struct Method {
-    [[no_unique_address]] Rule rule;
-    SolverOptions<Scalar> options;
-    [[no_unique_address]] Threads executor;
 };
 
 enum class StepStatus {

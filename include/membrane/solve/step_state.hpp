@@ -33,8 +33,8 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// and written several at a time. The user's positions are read when a vertex is loaded, and written when the step is over:
 /// until then they are where the vertices were when it began.
 ///
-/// A row is up to date where the vertex has been loaded in this step. The number beside a position is that of the vertex's last
-/// update, in whatever step that was; `response` that of its last update in layer 0.
+/// A row is up to date where the vertex has been loaded in this step. `compliance` is that of the vertex's last update, in
+/// whatever step that was; `compliance_block` that of its last update in layer 0.
 template <Real Scalar>
 struct StepState {
     /// The largest number of constraints of one step.
@@ -90,10 +90,34 @@ struct StepState {
     [[nodiscard]] static const PaddedPoint<Scalar>& row(const Rows& rows, Index v) noexcept {
         return rows[static_cast<std::size_t>(v)];
     }
+
+    /// Where `v` is [m].
+    [[nodiscard]] Vector3<Scalar> position_of(Index v) const noexcept { return row(position, v).point(); }
     void set_position(Index v, const Vector3<Scalar>& p) noexcept {
         auto& number = row(position, v).number;
         for (std::size_t k = 0; k < 3; ++k) number[k] = p[static_cast<Eigen::Index>(k)];
     }
+
+    /// The force of the constraints on `v` [N], and the stiffness that contact adds along it [N/m].
+    [[nodiscard]] Vector3<Scalar> constraint_force(Index v) const noexcept { return row(force, v).point(); }
+    [[nodiscard]] Scalar contact_stiffness(Index v) const noexcept {
+        return (std::max)(row(force, v).extra(), Scalar(0));  // a sum of differences: it may be below by rounding
+    }
+
+    /// The force of the tools on a fixed vertex [N], and its stiffness to them, 0 where none has come near [N/m].
+    [[nodiscard]] Vector3<Scalar> support_force(Index v) const noexcept { return row(support, v).point(); }
+    [[nodiscard]] Scalar support_stiffness(Index v) const noexcept { return row(support, v).extra(); }
+    void set_support_stiffness(Index v, Scalar stiffness) noexcept { row(support, v).number[3] = stiffness; }
+
+    /// The sum of all forces on `v` at the end of the step, and the size of it without damping [N].
+    [[nodiscard]] Vector3<Scalar> residual_force(Index v) const noexcept { return row(residual, v).point(); }
+    [[nodiscard]] Scalar unbalanced_force(Index v) const noexcept { return row(residual, v).extra(); }
+    void set_residual(Index v, const Vector3<Scalar>& all, Scalar unbalanced) noexcept {
+        row(residual, v).set(all, unbalanced);
+    }
+
+    /// How far `v` moves at least for each newton, by its last update [m/N].
+    [[nodiscard]] Scalar compliance(Index v) const noexcept { return row(position, v).extra(); }
 
     /// What the last update of `v` in layer 0 has found: by how much it moves for each newton, and its force and stiffness but
     /// for those of contacts.
@@ -118,12 +142,12 @@ struct StepState {
         row(response, 2 * v + 1).number[3] = stiffness;
     }
 
-    // One row more than vertices, for lanes that are not in use.
-    Rows position;  ///< [m]; the least compliance [m/N]
-    Rows force;     ///< of the constraints [N]; the stiffness that contact adds along it [N/m]
+    // One row more than vertices, for lanes that are not in use. Three numbers, and the fourth:
+    Rows position;  ///< `position_of`, `compliance`
+    Rows force;     ///< `constraint_force`, `contact_stiffness`
     Rows response;  ///< two rows: compliance xx, yy, zz, xy; xz, yz [m/N], internal force [N], internal stiffness [N/m]
-    Rows support;   ///< of fixed vertices: force of the tools [N]; stiffness to tools, 0 where none has come near [N/m]
-    Rows residual;  ///< force at the end of the step [N]; size of that without damping [N]
+    Rows support;   ///< of fixed vertices: `support_force`, `support_stiffness`
+    Rows residual;  ///< `residual_force`, `unbalanced_force`
     Rows anchor;    ///< where `kept` vertices go back to [m]
     std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
 
@@ -175,7 +199,7 @@ void StepState<Scalar>::begin_step() noexcept {
         row(force, v) = {};
         added_stiffness[static_cast<std::size_t>(v)] = 0;
     }
-    for (const Index v : bearing.items()) row(support, v).set(Vector3<Scalar>::Zero(), row(support, v).extra());
+    for (const Index v : bearing.items()) row(support, v).set(Vector3<Scalar>::Zero(), support_stiffness(v));
     for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &bearing, &kept, &watched}) set->clear();
     points.clear();
     packs.clear();
@@ -222,7 +246,7 @@ void StepState<Scalar>::rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noex
     }
     for (const Index v : loaded.items()) {  // in the last step
         const Symmetric3<Scalar> block = rotated(compliance_block(v), rotation);
-        set_compliance(v, block, row(position, v).extra());
+        set_compliance(v, block, compliance(v));
     }
 }
 

@@ -85,12 +85,12 @@ template <class Rule, Number N>
 /// What pulls on vertex `v` beside its springs: foundation, damping and constraints.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] Pull<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
-    const auto& of_constraints = scene.state.row(scene.state.force, v);
+    const Vector3<Scalar> of_constraints = scene.state.constraint_force(v);
     const Scalar stiffness =
-        (std::max)(of_constraints.extra(), Scalar(0)) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
-    if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {of_constraints.point(), stiffness};
+        scene.state.contact_stiffness(v) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
+    if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {of_constraints, stiffness};
     const auto foundation = scene.volume.pull(v, point(scene.x, v), point(scene.start, v), scene.dt);
-    return {foundation.force + of_constraints.point(), foundation.stiffness + stiffness};
+    return {foundation.force + of_constraints, foundation.stiffness + stiffness};
 }
 
 /// All that pulls on it.
@@ -133,9 +133,8 @@ template <class Rule, class Scalar, class Network, class Volume>
     state.dt = scene.dt;
     state.touched = scene.state.seeds.contains(v);
     if (state.touched) {
-        const auto& of_constraints = scene.state.row(scene.state.force, v);
-        state.contact_stiffness = (std::max)(of_constraints.extra(), Scalar(0));
-        state.contact_normal = direction_or_zero(of_constraints.point());
+        state.contact_stiffness = scene.state.contact_stiffness(v);
+        state.contact_normal = direction_or_zero(scene.state.constraint_force(v));
     }
     return state;
 }
