@@ -29,7 +29,7 @@ struct ContactPoint {
     Vector3<Scalar> weights;  ///< of the corners: barycentric
     Vector3<Scalar> normal;   ///< from the surface to the tool
     Vector3<Scalar> force;    ///< on the membrane [N]
-    bool on_fixed = false;    ///< whether a corner is fixed, and bears part of the force
+    bool on_fixed = false;    ///< whether a corner is fixed, and takes part of the force
     bool by_plane = false;    ///< whether the tool stays on its side of the triangle's plane, there and beside it
     Scalar side = 0;  ///< of the triangle that the tool is on where it is over its inside, 1 or -1; 0: as before
 };

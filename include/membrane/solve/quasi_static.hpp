@@ -50,7 +50,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// move one after the other, nearest to the contact first, by the step rule, each seeing those that have moved.
 ///
 /// Beyond the paper: a step starts from an extrapolation of the last one, if the tools move on as they did; it may sweep the queue
-/// several times; what a contact leaves behind stays at work until it is at rest, and then costs nothing; constraints keep
+/// several times; vertices that a contact leaves behind stay active until their forces balance, and then cost nothing; constraints keep
 /// their forces from step to step, so that a sweep ends with forces that balance. A step that is refused leaves the
 /// positions as they were, to the bit: it works on a copy of those that it loads, and writes back what has moved.
 ///
@@ -77,7 +77,7 @@ class QuasiStaticSolver {
     }
 
     /// The same, but stops at `deadline`. It may overrun by the error of its cost estimate, or by the minimum work: one
-    /// contact iteration, 32 updates beyond, and the residual forces of all at work. One thread does the updates. The next
+    /// contact iteration, 32 updates beyond, and the residual forces of all active vertices. One thread does the updates. The next
     /// step goes on where time ran out, so that a membrane comes to rest however little time its steps have.
     template <class Now, CheckedElasticNetwork<Scalar> Network, CheckedVolumeModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
@@ -116,7 +116,6 @@ class QuasiStaticSolver {
     template <class Network, class Volume>
     [[nodiscard]] StepReport<Scalar> step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt, const Network& network,
                                              const Volume& volume, Constraints constraints) noexcept;
-    void begin_report(std::size_t constraint_count) noexcept;
     template <class Volume>
     void follow_body(const Volume& volume) noexcept;
     template <class Volume>
@@ -140,7 +139,7 @@ class QuasiStaticSolver {
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
-    bool complete_ = false;           // the last step updated all that were at work, as often as it should
+    bool complete_ = false;           // the last step updated all active vertices as often as it should
     RigidFrame<Scalar> pose_;         // of the body at the last step
     std::uint64_t deformations_ = 0;  // of the body by then
     std::size_t resume_ = 0;          // the number beyond layer 0 of the vertex at which time ran out
@@ -196,7 +195,9 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
                                                             Constraints constraints) noexcept {
     MEMBRANE_ASSERT(x.cols() == state_.vertex_count() && network.vertex_count() == state_.vertex_count());
     detail::require_made<QuasiStaticSolver>();
-    begin_report(constraints.size());
+    reactions_.fill(Vector3<Scalar>::Zero());
+    report_ = {};
+    report_.reactions = {reactions_.data(), constraints.size()};
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
     follow_body(volume);  // with what the last step has loaded
     state_.begin_step();
@@ -214,16 +215,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
     set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
     select(network, context);
-    Sweeps<Scalar, Rule, Network, Volume> sweeps{.scene = scene,
-                                                 .rule = rule_,
-                                                 .options = options_,
-                                                 .executor = executor_,
-                                                 .active = active_,
-                                                 .packed = packed_,
-                                                 .constraints = acting,
-                                                 .report = report_,
-                                                 .budget = budget,
-                                                 .resume = resume_};
+    Sweeps<Scalar, Rule, Network, Volume> sweeps{scene,   rule_,  options_, executor_, active_,
+                                                 packed_, acting, report_,  budget,    resume_};
     sweeps.load_and_pack();
     sweeps.run();
     if (report_.status == StepStatus::advanced && !sweeps.evaluate_residuals()) {
@@ -237,13 +230,6 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     write_back(x, network, sweeps.constraints_changed);
     sweeps.budget.end();
     return report_;
-}
-
-template <Real Scalar, CheckedStepRule<Scalar> Rule>
-void QuasiStaticSolver<Scalar, Rule>::begin_report(std::size_t constraint_count) noexcept {
-    reactions_.fill(Vector3<Scalar>::Zero());
-    report_ = {};
-    report_.reactions = {reactions_.data(), constraint_count};
 }
 
 // The body has moved since the last step, and the membrane with it: what is remembered goes along.
@@ -277,16 +263,16 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
             if (lead) lead->at = lead->is_force ? pose_.direction_in(lead->at) : pose_.point_in(lead->at);
         }
     }
-    const Scalar part = predictor_.expect(leads);
-    if (part == 0 || !complete_) return;
+    const Scalar factor = predictor_.extrapolation_factor(leads);
+    if (factor == 0 || !complete_) return;
     for (const Index v : moved_.items()) {
         if (context.fixed(v)) continue;
-        context.move(v, part * point(last_displacements_, v));
+        context.move(v, factor * point(last_displacements_, v));
         active_.wake(v);
     }
 }
 
-// The vertices at work in this step, those that were prescribed until now as well.
+// The active vertices of this step, those that were prescribed until now as well.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,

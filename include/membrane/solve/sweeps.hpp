@@ -133,7 +133,7 @@ struct Sweeps {
     }
 
     bool iterate_contact() noexcept {
-        const auto layer = active.touched();
+        const auto layer = active.contact_layer();
         bool changed = false;
         for (Index i = 0; i < options.contact_visits; ++i) {
             if (!budget.has_time_for_contact(layer.size())) {
@@ -155,13 +155,13 @@ struct Sweeps {
     bool enforce() noexcept {
         constraints_hold = !constraints.enforce();
         budget.enforced();
-        if (forces_beyond_contact()) in_packs = (std::min)(in_packs, active.touched().size());
+        if (forces_beyond_contact()) in_packs = (std::min)(in_packs, active.contact_layer().size());
         return !constraints_hold;
     }
 
     // From where time ran out on, round to there.
     bool update_beyond() noexcept {
-        const std::size_t first = active.touched().size(), end = active.vertices().size();
+        const std::size_t first = active.contact_layer().size(), end = active.vertices().size();
         const std::size_t begin = first + (std::min)(std::exchange(resume, 0), end - first);
         bool changed = update_until_time_is_up(begin, end);
         changed |= update_until_time_is_up(first, begin);
@@ -222,7 +222,7 @@ struct Sweeps {
         if (stopped || !advances()) return false;
         if (budget.has_time_for_batch()) return true;
         report.out_of_time = stopped = true;
-        resume = i - active.touched().size();
+        resume = i - active.contact_layer().size();
         return false;
     }
 
