@@ -92,9 +92,10 @@ void packs(benchmark::State& state) {
     require(packed.size() == static_cast<std::size_t>(state.range(0)), "all vertices have room in the packs");
     packed.begin_step(scene);
     for (auto _ : state) {
-        for (std::size_t p = 0; p < packed.count();) {
-            p = packed.template update_next<false>(p, packed.count(), scene, Rule{});
-            benchmark::DoNotOptimize(p);
+        for (std::size_t p = 0, end = 0; p < packed.count(); p = end) {
+            end = packed.end_of_group(p, packed.count());
+            packed.template update<false>(p, end, scene, Rule{}, membrane::OneThread{});
+            benchmark::DoNotOptimize(end);
         }
     }
     require(membrane::is_finite(membrane::Points<Scalar>(now)), "the sweep must not diverge");

@@ -104,7 +104,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
     static_cast<void>([](ActiveVertices& active, const Network& network, std::span<const Index> vertices,
                          const SolverOptions<S>& options, bool (*is_balanced)(Index)) {
         static_assert(noexcept(active.arrange(network, vertices, options))&& noexcept(active.vertices()));
-        static_assert(noexcept(active.touched())&& noexcept(active.beyond())&& noexcept(active.queue()));
+        static_assert(noexcept(active.contact_layer())&& noexcept(active.queue()));
         static_assert(noexcept(active.finish(network, is_balanced, {}))&& noexcept(active.clear()));
         static_assert(noexcept(active.wake(0))&& noexcept(active.grow(network, options)));
         static_assert(noexcept(active.frontier())&& noexcept(active.group_ends()));
@@ -115,9 +115,9 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(packed.append(queue.vertices(), 0, queue.group_ends(), network)));
         static_assert(noexcept(packed.vertices(0))&& noexcept(packed.first_of(0))&& noexcept(packed.pack_from(0)));
         static_assert(noexcept(packed.begin_step(scene))&& noexcept(packed.evaluate_residual(0, scene)));
-        static_assert(noexcept(packed.template update<true>(0, scene, BlockStep{})));
-        static_assert(noexcept(packed.template update<false>(0, scene, SafeStep{})));
-        static_assert(noexcept(packed.update(0, 1, scene, BlockStep{}, executor)));
+        static_assert(noexcept(packed.template update_pack<true>(0, scene, BlockStep{})));
+        static_assert(noexcept(packed.template update_pack<false>(0, scene, SafeStep{})));
+        static_assert(noexcept(packed.template update<false>(0, 1, scene, BlockStep{}, executor)));
         static_assert(noexcept(packed.free_count(0))&& noexcept(packed.needed()));
     });
     static_cast<void>([](StepState<S>& state, const ContactTool<S>& tool, std::span<ContactPack<S>> packs,
@@ -128,7 +128,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(largest_squared_move(state, vertices)));
     });
     static_cast<void>([](Predictor<S, 4>& predictor, std::span<const Lead<S>> leads) {
-        static_assert(noexcept(predictor.expect(leads))&& noexcept(predictor.forget()));
+        static_assert(noexcept(predictor.extrapolation_factor(leads))&& noexcept(predictor.forget()));
     });
     static_cast<void>([](const Tool<S>& tool, const Contact<S>& contact, const Grasp<S>& grasp, const Vector3<S>& p,
                          const std::array<Index, 3>& corners, std::span<const Index> vertices) {

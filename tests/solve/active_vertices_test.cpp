@@ -48,8 +48,8 @@ TEST_CASE("visits go through the queue, then to what an earlier contact has left
     ActiveVertices active(12);
     active.arrange(chain.network, List{1}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{1, 0, 2});
-    CHECK(list_of(active.touched()) == List{1});
-    CHECK(list_of(active.beyond()) == List{0, 2});
+    CHECK(list_of(active.contact_layer()) == List{1});
+    CHECK(list_of(active.vertices()) == List{1, 0, 2});
     CHECK(active.finish(chain.network, balanced, {}));
 
     // The contact moves on: who was in the queue and is no longer is visited once more.
@@ -66,7 +66,7 @@ TEST_CASE("visits go through the queue, then to what an earlier contact has left
     // Nothing left of the contact: once all is at rest there is nothing to do.
     active.arrange(chain.network, List{}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5});
-    CHECK(active.touched().empty());
+    CHECK(active.contact_layer().empty());
     CHECK(active.finish(chain.network, balanced, {}));
     active.arrange(chain.network, List{}, Options{.layers = 1});
     CHECK(active.vertices().empty());
@@ -85,7 +85,7 @@ TEST_CASE("in groups, what is beyond the queue is ordered so that no two that ar
     CHECK(active.group_ends().empty());
 }
 
-TEST_CASE("beyond the layers nobody is stirred, however far the frontier moves", "[active]") {
+TEST_CASE("beyond the layers no vertex wakes, however far the frontier moves", "[active]") {
     const Chain chain;
     ActiveVertices active(12);
     for (int i = 0; i < 3; ++i) {
@@ -193,7 +193,7 @@ TEST_CASE("layers as needed: who there is no room for keeps a turn", "[active]")
     }
 }
 
-TEST_CASE("with little room layer 0 comes first, and the restless keep a turn", "[active]") {
+TEST_CASE("with little room layer 0 comes first, and those awake keep a turn", "[active]") {
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -219,10 +219,10 @@ TEST_CASE("with little room layer 0 comes first, and the restless keep a turn", 
             active.arrange(network, seeds, options);
             REQUIRE(active.vertices().size() <= room);
             REQUIRE(active.vertices().size() >= std::min(room - room / 4, std::size_t(162)));
-            REQUIRE(active.touched().size() == layer0.size());
+            REQUIRE(active.contact_layer().size() == layer0.size());
             const auto visits = list_of(active.vertices());
             REQUIRE(std::set<Index>(visits.begin(), visits.end()).size() == visits.size());
-            for (const Index v : active.touched()) REQUIRE(layer0.count(v) == 1);
+            for (const Index v : active.contact_layer()) REQUIRE(layer0.count(v) == 1);
             seen.insert(visits.begin(), visits.end());
             REQUIRE_FALSE(active.finish(network, unbalanced, {}));
         }

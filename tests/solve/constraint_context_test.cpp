@@ -143,7 +143,7 @@ TEST_CASE("a fixed vertex gives way to tools by force over stiffness, a free one
     SixPoints scene;
     ConstraintContext<double> context(scene.x, scene.work, scene);
     for (const Index v : {1, 5}) context.set_support(v, 4);
-    for (const Index v : {1, 5}) context.bear(v, {0, 0, 2});
+    for (const Index v : {1, 5}) context.add_support_force(v, {0, 0, 2});
     CHECK(context.support_displacement(5) == Vector3<double>(0, 0, 0.5));
     CHECK(context.support_compliance(5) == 0.25);
     CHECK(context.support_displacement(1) == Vector3<double>(0, 0, 0));

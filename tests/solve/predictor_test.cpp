@@ -91,21 +91,21 @@ struct Led {
 
 TEST_CASE("nothing is expected before something has gone on for two steps") {
     Predictor<double, 2> predictor;
-    CHECK(predictor.expect(Leads{at(1)}) == 0);
-    CHECK(predictor.expect(Leads{at(2)}) == 0);
-    CHECK(predictor.expect(Leads{at(3)}) == 1);
+    CHECK(predictor.extrapolation_factor(Leads{at(1)}) == 0);
+    CHECK(predictor.extrapolation_factor(Leads{at(2)}) == 0);
+    CHECK(predictor.extrapolation_factor(Leads{at(3)}) == 1);
     predictor.forget();
-    CHECK(predictor.expect(Leads{at(4)}) == 0);
-    CHECK(predictor.expect(Leads{at(5)}) == 0);
-    CHECK(predictor.expect(Leads{at(6)}) == 1);
+    CHECK(predictor.extrapolation_factor(Leads{at(4)}) == 0);
+    CHECK(predictor.extrapolation_factor(Leads{at(5)}) == 0);
+    CHECK(predictor.extrapolation_factor(Leads{at(6)}) == 1);
 }
 
 TEST_CASE("what is expected is how far the lead goes on along its last way, less what it turns") {
     const auto expected = [](const Lead<double>& next) {
         Predictor<double, 2> predictor;
-        static_cast<void>(predictor.expect(Leads{at(1)}));
-        static_cast<void>(predictor.expect(Leads{at(3)}));
-        return predictor.expect(Leads{next});
+        static_cast<void>(predictor.extrapolation_factor(Leads{at(1)}));
+        static_cast<void>(predictor.extrapolation_factor(Leads{at(3)}));
+        return predictor.extrapolation_factor(Leads{next});
     };
     CHECK(expected(at(5)) == 1);
     CHECK(expected(at(100)) == 1);
@@ -122,26 +122,26 @@ TEST_CASE("what is expected is how far the lead goes on along its last way, less
 
 TEST_CASE("of several leads the one that goes on least counts, those that stay do not") {
     Predictor<double, 2> predictor;
-    static_cast<void>(predictor.expect(Leads{at(1), at(1)}));
-    static_cast<void>(predictor.expect(Leads{at(2), at(1)}));
-    CHECK(predictor.expect(Leads{at(3), at(1)}) == 1);
-    CHECK(predictor.expect(Leads{at(4), at(2)}) == 1);
-    CHECK(predictor.expect(Leads{at(5), at(2.5)}) == 0.5);
-    CHECK(predictor.expect(Leads{at(6), at(2.5)}) == 0);
-    CHECK(predictor.expect(Leads{at(7), at(2.5)}) == 1);
-    CHECK(predictor.expect(Leads{at(8), std::nullopt}) == 0);
-    CHECK(predictor.expect(Leads{at(9), std::nullopt}) == 1);
-    CHECK(predictor.expect(std::span<const Lead<double>>()) == 0);
-    CHECK(predictor.expect(std::span<const Lead<double>>()) == 0);
+    static_cast<void>(predictor.extrapolation_factor(Leads{at(1), at(1)}));
+    static_cast<void>(predictor.extrapolation_factor(Leads{at(2), at(1)}));
+    CHECK(predictor.extrapolation_factor(Leads{at(3), at(1)}) == 1);
+    CHECK(predictor.extrapolation_factor(Leads{at(4), at(2)}) == 1);
+    CHECK(predictor.extrapolation_factor(Leads{at(5), at(2.5)}) == 0.5);
+    CHECK(predictor.extrapolation_factor(Leads{at(6), at(2.5)}) == 0);
+    CHECK(predictor.extrapolation_factor(Leads{at(7), at(2.5)}) == 1);
+    CHECK(predictor.extrapolation_factor(Leads{at(8), std::nullopt}) == 0);
+    CHECK(predictor.extrapolation_factor(Leads{at(9), std::nullopt}) == 1);
+    CHECK(predictor.extrapolation_factor(std::span<const Lead<double>>()) == 0);
+    CHECK(predictor.extrapolation_factor(std::span<const Lead<double>>()) == 0);
 }
 
 TEST_CASE("a way longer than the lead says lets one expect nothing, nor does the one after it") {
     const auto expected = [](double first, double second) {
         Predictor<double, 1> predictor;
         const auto no_farther = [](double x) { return std::array{Lead<double>(LeadPoint<double>{{x, 0, 0}, 2})}; };
-        static_cast<void>(predictor.expect(no_farther(0)));
-        static_cast<void>(predictor.expect(no_farther(first)));
-        return predictor.expect(no_farther(first + second));
+        static_cast<void>(predictor.extrapolation_factor(no_farther(0)));
+        static_cast<void>(predictor.extrapolation_factor(no_farther(first)));
+        return predictor.extrapolation_factor(no_farther(first + second));
     };
     CHECK(expected(2, 2) == 1);
     CHECK(expected(2, 2.1) == 0);
@@ -153,9 +153,9 @@ TEST_CASE("ways too small or too large for their square end in a part from 0 to 
     for (const double first : {tiny, small, 1.0, huge}) {
         for (const double second : {-huge, -1.0, -tiny, 0.0, tiny, small, 1.0, huge}) {
             Predictor<double, 1> predictor;
-            static_cast<void>(predictor.expect(std::array{at(0)}));
-            static_cast<void>(predictor.expect(std::array{at(first)}));
-            const double part = predictor.expect(std::array{at(first + second)});
+            static_cast<void>(predictor.extrapolation_factor(std::array{at(0)}));
+            static_cast<void>(predictor.extrapolation_factor(std::array{at(first)}));
+            const double part = predictor.extrapolation_factor(std::array{at(first + second)});
             CAPTURE(first, second);
             CHECK(part >= 0);
             CHECK(part <= 1);

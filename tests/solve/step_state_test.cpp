@@ -81,7 +81,7 @@ TEST_CASE("a step begins without forces, and keeps the stiffness of supports", "
     state.begin_step();
     state.forced.insert(1);
     state.row(state.force, 1).set({1, 2, 3}, 4);
-    state.bearing.insert(2);
+    state.pressed_supports.insert(2);
     state.row(state.support, 2).set({1, 2, 3}, 4);
     state.begin_step();
     CHECK(state.row(state.force, 1).number == std::array<double, 4>{});

@@ -114,13 +114,13 @@ TEST_CASE("a fixed corner gives way by its share of the force, and stays where i
         m.context.set_support(2, stiffness);
         const Vector3<double> force = random.vector();
         const ContactPoint<double> touch{0, 0, corners, random.barycentric(), random.unit_vector(), force, true};
-        membrane::bear(m.context, touch, force);
+        membrane::add_support_forces(m.context, touch, force);
         const double weight = seed % 2 == 0 ? touch.weights[2] : 0;  // on what is fixed
         const Vector3<double> yields = (weight / stiffness) * force;
         CHECK((m.context.support_displacement(2) - yields).norm() < 1e-12);
         CHECK((membrane::support_displacement(m.context, touch) - weight * yields).norm() < 1e-12);
         for (Index v = 0; v < 3; ++v) CHECK(m.context.position(v) == m.x.col(v));
-        membrane::bear<double>(m.context, touch, -force);
+        membrane::add_support_forces<double>(m.context, touch, -force);
         CHECK(m.context.support_displacement(2).norm() < 1e-14);
         // And as much as a free corner would where a tool presses the surface in.
         const Vector3<double> by = random.vector(), before = m.at(touch.weights);

@@ -22,7 +22,7 @@ struct ContactPoint {
     Vector3<Scalar> weights = Vector3<Scalar>::Zero();  ///< of the corners: barycentric
     Vector3<Scalar> normal = Vector3<Scalar>::Zero();   ///< unit vector from the surface to the tool; zero on its axis
     Vector3<Scalar> force = Vector3<Scalar>::Zero();    ///< on the membrane [N]
-    bool on_fixed = false;  ///< whether a corner is fixed, and bears part of the force; the solver knows
+    bool on_fixed = false;  ///< whether a corner is fixed, and takes part of the force; the solver sets it
     bool by_plane = false;  ///< whether the tool stays on its side of the triangle's plane, there and beside it
     Scalar side = 0;        ///< of the triangle that the tool is on where it is over its inside, 1 or -1; 0: as before
     Scalar gap = 0;         ///< signed distance of the tool when the point was found [m]; negative where it overlaps

@@ -62,7 +62,7 @@ class ConstraintContext {
     /// Moves `v` by a displacement [m].
     void move(Index v, const Vector3<Scalar>& by) noexcept { place(v, position(v) + by); }
 
-    /// Adds to the external force on `v` for this step [N].
+    /// Adds to the external force on `v` for this step [N]. It moves active vertices: `seed` one in `begin` to make it active.
     void add_force(Index v, const Vector3<Scalar>& force) noexcept {
         state_.forced.insert(v);
         auto& number = state_.row(state_.force, v).number;
@@ -152,7 +152,7 @@ class ConstraintContext {
     /// other does.
     [[nodiscard]] Vector3<Scalar> support_displacement(Index v) const noexcept {
         const Scalar stiffness = state_.support_stiffness(v);
-        if (!state_.bearing.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
+        if (!state_.pressed_supports.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
         return state_.support_force(v) / stiffness;
     }
     [[nodiscard]] Scalar support_compliance(Index v) const noexcept {
@@ -162,9 +162,9 @@ class ConstraintContext {
     void set_support(Index v, Scalar stiffness) noexcept { state_.row(state_.support, v).number[3] = stiffness; }
 
     /// Adds to the force of the tools on `v` [N], if it is fixed.
-    void bear(Index v, const Vector3<Scalar>& force) noexcept {
+    void add_support_force(Index v, const Vector3<Scalar>& force) noexcept {
         if (!fixed(v)) return;
-        state_.bearing.insert(v);
+        state_.pressed_supports.insert(v);
         auto& number = state_.row(state_.support, v).number;
         for (std::size_t k = 0; k < 3; ++k) number[k] += force[static_cast<Eigen::Index>(k)];
     }

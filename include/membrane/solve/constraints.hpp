@@ -22,7 +22,7 @@ namespace membrane {
 
 /// Something that acts on the membrane during one step. `begin` names all vertices where its force enters, and puts in
 /// place what it holds; `enforce` is called after each update of layer 0, and once more at the end where vertices have
-/// moved since; it restores what they broke and says whether there was anything to restore; `reaction` is the force of the membrane on whoever acts
+/// moved since; it restores what they broke and says whether there was anything to restore; `reaction` is the force of the membrane on it
 /// [N]. One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it. One
 /// that holds vertices may do so in `hold(context)`, which is called before any `begin`.
 template <class C, class Scalar>
@@ -153,9 +153,9 @@ class ConstraintList {
         });
     }
     [[nodiscard]] bool enforce() const noexcept {
-        bool mended = false;
-        for_each([&](const auto& constraint, std::size_t) { mended |= constraint.enforce(context_); });
-        return mended;
+        bool changed = false;
+        for_each([&](const auto& constraint, std::size_t) { changed |= constraint.enforce(context_); });
+        return changed;
     }
     /// The forces on those who act; false if any is not finite. Contact points have what was found of them from here on.
     [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {

@@ -18,7 +18,10 @@
 ///     packed.assign(queue.vertices(), queue.group_ends(), network);         // where the queue has changed
 ///     packed.append(active.vertices(), active.from_queue(), active.group_ends(), network);
 ///     packed.begin_step(scene);
-///     for (std::size_t p = 0; p < packed.count(); ++p) packed.update<false>(p, scene, rule);
+///     for (std::size_t p = 0, end; p < packed.count(); p = end) {
+///         end = packed.end_of_group(p, packed.count());
+///         packed.update<false>(p, end, scene, rule, membrane::OneThread());
+///     }
 namespace membrane {
 
 /// Whether a rule's updates may be made in lanes: the network is of springs, their law and the rule take `Lanes`, the volume
@@ -77,6 +80,12 @@ class PackedVertices {
                                         packs.begin());
     }
 
+    /// The pack with which the group of pack `p` is over, `end` at the latest.
+    [[nodiscard]] std::size_t end_of_group(std::size_t p, std::size_t end) const noexcept {
+        while (p + 1 < end && packs_[p].next_is_of_group) ++p;
+        return p + 1;
+    }
+
     /// All vertices in packs and their neighbours, each once: their positions must be loaded.
     [[nodiscard]] std::span<const Index> needed() const noexcept { return needed_.items(); }
 
@@ -89,29 +98,24 @@ class PackedVertices {
 
     enum class Outcome : unsigned char { at_rest, moved, too_far };
 
-    /// Moves the vertices of pack `p` as `rule` says; `in_contact`, constraints act on them, and their response is
-    /// kept. Where the move may be beyond what is stable, it is `too_far`, and nothing moves, unless it is `allowed`.
-    template <bool in_contact, class Scene, class Rule>
-    Outcome update(std::size_t p, const Scene& scene, const Rule& rule, bool allowed = false) noexcept;
-
-    /// The same for pack `p` and, if it is before `end` and no spring joins the two, the next one: their roots and divisions
-    /// overlap. Returns the number of the next pack.
-    template <bool in_contact, class Scene, class Rule>
-    std::size_t update_next(std::size_t p, std::size_t end, const Scene& scene, const Rule& rule) noexcept;
-
-    /// The same for packs number `begin` to `end` that no spring joins, some by each thread.
-    template <class Scene, class Rule>
-    void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule,
-                const AnyExecutor& executor) noexcept {
+    /// Moves the vertices of packs number `begin` to `end`, all of one group, as `rule` says; `in_contact`, constraints act on
+    /// them, and their response is kept. Where a move may be beyond what is stable, it is `too_far`, and its pack stays as
+    /// it is. Some packs by each thread, and in a thread two at a time, whose roots and divisions overlap.
+    template <bool in_contact, class Scene, class Rule, Executor E>
+    void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule, const E& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
         parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
-            for (std::size_t p = begin + first; p < begin + last;) {
-                p = update_next<false>(p, begin + last, scene, rule);
-            }
+            std::size_t p = begin + first;
+            for (; p + 1 < begin + last; p += 2) update_two<in_contact>(p, scene, rule);
+            if (p < begin + last) outcomes_[p] = update_pack<in_contact>(p, scene, rule);
         });
     }
-    /// What `update_next`, or the call for several packs, has done with pack `p`.
+    /// What the last `update` has done with pack `p`.
     [[nodiscard]] Outcome outcome(std::size_t p) const noexcept { return outcomes_[p]; }
+
+    /// The same for one pack, which goes too far if that is `allowed`.
+    template <bool in_contact, class Scene, class Rule>
+    Outcome update_pack(std::size_t p, const Scene& scene, const Rule& rule, bool allowed = false) noexcept;
 
     /// Leaves the forces on the vertices of pack `p` in the rows of residual forces.
     template <class Scene>
@@ -163,6 +167,8 @@ class PackedVertices {
     };
     template <bool in_contact, class Rule, class Scene>
     [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene) const noexcept;
+    template <bool in_contact, class Scene, class Rule>
+    void update_two(std::size_t p, const Scene& scene, const Rule& rule) noexcept;
     template <bool in_contact, class Scene, class Rule>
     Outcome move(std::size_t p, const PackState& at, const Scene& scene, const Rule& rule, bool allowed) noexcept;
     template <class Rule, class Scene>
@@ -433,25 +439,19 @@ template <bool in_contact, class Scene, class Rule>
 
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
-[[gnu::flatten]] auto PackedVertices<Scalar>::update(std::size_t p, const Scene& scene, const Rule& rule,
-                                                     bool allowed) noexcept -> Outcome {
+[[gnu::flatten]] auto PackedVertices<Scalar>::update_pack(std::size_t p, const Scene& scene, const Rule& rule,
+                                                          bool allowed) noexcept -> Outcome {
     const auto state = evaluate<in_contact, Rule>(p, scene);
     return move<in_contact>(p, state, scene, rule, allowed);
 }
 
+// Pack `p` and the next one of its group.
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
-[[gnu::flatten]] std::size_t PackedVertices<Scalar>::update_next(std::size_t p, std::size_t end, const Scene& scene,
-                                                                 const Rule& rule) noexcept {
-    const auto state = evaluate<in_contact, Rule>(p, scene);
-    if (!packs_[p].next_is_of_group || p + 1 == end) {
-        outcomes_[p] = move<in_contact>(p, state, scene, rule, false);
-        return p + 1;
-    }
-    const auto next = evaluate<in_contact, Rule>(p + 1, scene);
+[[gnu::flatten]] void PackedVertices<Scalar>::update_two(std::size_t p, const Scene& scene, const Rule& rule) noexcept {
+    const auto state = evaluate<in_contact, Rule>(p, scene), next = evaluate<in_contact, Rule>(p + 1, scene);
     outcomes_[p] = move<in_contact>(p, state, scene, rule, false);
     outcomes_[p + 1] = move<in_contact>(p + 1, next, scene, rule, false);
-    return p + 2;
 }
 
 template <Real Scalar>

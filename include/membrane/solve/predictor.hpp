@@ -11,17 +11,17 @@
 
 #include <membrane/core/types.hpp>
 
-/// How much of the last step is to be expected again.
+/// How much of the last step's displacements a step starts with.
 ///
-///     const double part = predictor.expect(leads);        // 1: what leads goes on as it did; 0: it has stopped
-///     for (v : moved) x.col(v) += part * last_way(v);
+///     const double factor = predictor.extrapolation_factor(leads);   // 1: the tools move on as they did; 0: they have stopped
+///     for (v : moved) x.col(v) += factor * last_displacements.col(v);
 namespace membrane {
 
-/// What a constraint is led by, a hand or a script: where that is on its way.
+/// What drives a constraint, a hand or a script: where that is now.
 template <Real Scalar>
 struct LeadPoint {
     Vector3<Scalar> at;                                        ///< a position [m], or a force [N]
-    Scalar longest = std::numeric_limits<Scalar>::infinity();  ///< of the ways in a tick that let one expect the next
+    Scalar longest = std::numeric_limits<Scalar>::infinity();  ///< displacement in a tick that is extrapolated
     bool is_force = false;
 };
 
@@ -29,58 +29,60 @@ struct LeadPoint {
 template <Real Scalar>
 using Lead = std::optional<LeadPoint<Scalar>>;
 
-/// Under a tool that slides on, a membrane goes on as it did in the tick before, but for how the tool speeds up or turns: a
-/// step that begins there has no more than that to mend.
+/// Under a tool that slides on, a membrane moves as it did in the tick before, but for how the tool speeds up or turns. A
+/// step that starts from an extrapolation has no more than that to correct.
 ///
-/// The part that is expected again is the least, over all that leads, of the new way along the last one, less twice the
-/// way across it, at most all of it; nothing where something comes, goes, jumps, stops or turns by more than 27 degrees.
-/// Less, since a way into the surface moves the membrane farther than one along it: where a tool turns from pressing to
-/// sliding, the membrane would run ahead of the tool, which pushes back what is behind but pulls nothing. Sweeps that leave
+/// The factor is the minimum over all inputs of the new displacement projected on the last, less twice the part across it,
+/// relative to the length of the last, clamped to [0, 1]; 0 if an input appears, vanishes, jumps, stops or turns by more
+/// than 27 degrees. Less, since a displacement into the surface moves the membrane farther than one along it: if a tool turns
+/// from pressing to sliding, the membrane would run ahead of the tool, which pushes but never pulls. Sweeps that leave
 /// the part q of an error, 0 <= q < 1, then leave sqrt(q) of it at most from tick to tick, since z^2 = q ((1 + p) z - p)
-/// has no larger root for 0 <= p <= 1: what converges without a prediction converges with it.
+/// has no larger root for 0 <= p <= 1: what converges without extrapolation converges with it.
 template <Real Scalar, std::size_t most_leads>
 class Predictor {
   public:
-    /// The part of the last step's ways to begin this one with, 0 to 1. @pre finite, `most_leads` at most
-    [[nodiscard]] Scalar expect(std::span<const Lead<Scalar>> leads) noexcept;
+    /// The part of the last step's displacements to start this step with, 0 to 1. @pre finite, `most_leads` at most
+    [[nodiscard]] Scalar extrapolation_factor(std::span<const Lead<Scalar>> leads) noexcept;
 
-    /// Expects nothing in the next two steps.
-    void forget() noexcept { paths_ = {}; }
+    /// Extrapolates nothing in the next two steps.
+    void forget() noexcept { inputs_ = {}; }
 
   private:
-    struct Path {
-        std::optional<Vector3<Scalar>> at, way;  // in the last step
+    struct Input {
+        std::optional<Vector3<Scalar>> at, displacement;  // in the last step
     };
-    [[nodiscard]] static Scalar part_of(const Vector3<Scalar>& now, const Vector3<Scalar>& before) noexcept;
+    [[nodiscard]] static Scalar factor_of(const Vector3<Scalar>& now, const Vector3<Scalar>& before) noexcept;
 
-    std::array<Path, most_leads> paths_{};
+    std::array<Input, most_leads> inputs_{};
 };
 
 template <Real Scalar, std::size_t most_leads>
-Scalar Predictor<Scalar, most_leads>::expect(std::span<const Lead<Scalar>> leads) noexcept {
-    Scalar part = 1;
-    bool led = false;
+Scalar Predictor<Scalar, most_leads>::extrapolation_factor(std::span<const Lead<Scalar>> leads) noexcept {
+    Scalar factor = 1;
+    bool moves = false;
     for (std::size_t i = 0; i < most_leads; ++i) {
-        const Path before = paths_[i];
+        const Input before = inputs_[i];
         const LeadPoint<Scalar>* const lead = i < leads.size() && leads[i] ? &*leads[i] : nullptr;
-        Path& path = paths_[i] = {};
-        if (lead != nullptr) path.at = lead->at;
-        if (lead != nullptr && before.at) path.way = lead->at - *before.at;
-        const bool comes_or_goes =
-            (lead != nullptr) != before.at.has_value() || before.at.has_value() != before.way.has_value();
-        const auto jumps = [&] { return norm(*path.way) > lead->longest || norm(*before.way) > lead->longest; };
-        if (comes_or_goes || (lead != nullptr && jumps())) {
-            part = 0;
-        } else if (lead != nullptr && squared_norm(*before.way) > 0) {
-            led = true;
-            part = (std::min)(part, part_of(*path.way, *before.way));
+        Input& input = inputs_[i] = {};
+        if (lead != nullptr) input.at = lead->at;
+        if (lead != nullptr && before.at) input.displacement = lead->at - *before.at;
+        const bool appears_or_vanishes =
+            (lead != nullptr) != before.at.has_value() || before.at.has_value() != before.displacement.has_value();
+        const auto jumps = [&] {
+            return norm(*input.displacement) > lead->longest || norm(*before.displacement) > lead->longest;
+        };
+        if (appears_or_vanishes || (lead != nullptr && jumps())) {
+            factor = 0;
+        } else if (lead != nullptr && squared_norm(*before.displacement) > 0) {
+            moves = true;
+            factor = (std::min)(factor, factor_of(*input.displacement, *before.displacement));
         }
     }
-    return led ? part : Scalar(0);
+    return moves ? factor : Scalar(0);
 }
 
 template <Real Scalar, std::size_t most_leads>
-Scalar Predictor<Scalar, most_leads>::part_of(const Vector3<Scalar>& now, const Vector3<Scalar>& before) noexcept {
+Scalar Predictor<Scalar, most_leads>::factor_of(const Vector3<Scalar>& now, const Vector3<Scalar>& before) noexcept {
     const Scalar along = dot(now, before), all = squared_norm(before);
     const Vector3<Scalar> across = now - along / all * before;
     const Scalar again = along - 2 * norm(across) * std::sqrt(all);

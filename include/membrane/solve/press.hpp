@@ -120,7 +120,7 @@ void Press<Scalar>::begin(Context& context) const noexcept {
         context.state().full = true;
         return;
     }
-    for (const auto& point : context.previous_points()) bear(context, point, point.force);
+    for (const auto& point : context.previous_points()) add_support_forces(context, point, point.force);
     const auto out = direction_out_of_support(context);
     if (contact.crossed && !out) carry_with_tool(context);
     list_watched(context);
@@ -128,7 +128,7 @@ void Press<Scalar>::begin(Context& context) const noexcept {
         clear_contact_point(context);
     }
     out ? touch_support(context, *out) : find_points(context);
-    for (const auto& point : context.previous_points()) bear<Scalar>(context, point, -point.force);
+    for (const auto& point : context.previous_points()) add_support_forces<Scalar>(context, point, -point.force);
     if (context.state().full) return;
     pack_points(context);
     for (int pass = 0; pass < detail::max_push_passes; ++pass) {
@@ -267,7 +267,7 @@ void Press<Scalar>::pack_points(Context& context) const noexcept {
     const auto points = context.points();
     for (const auto& point : points) {
         add_point_force(context, point.corners, point.weights, point.force);
-        bear(context, point, point.force);
+        add_support_forces(context, point, point.force);
     }
     auto& range = state.pack_ranges[context.constraint()];
     range.begin = state.packs.size();

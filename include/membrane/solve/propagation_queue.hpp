@@ -29,7 +29,7 @@ class PropagationQueue {
     template <class Network>
     void build(const Network& network, std::span<const Index> seeds, Index layers) noexcept;
 
-    /// Adds a layer; false if there is nobody left to add. Online. Cost: the springs of the last layer.
+    /// Adds a layer; false if there is no vertex left to add. Online. Cost: the springs of the last layer.
     template <class Network>
     bool grow(const Network& network) noexcept;
 

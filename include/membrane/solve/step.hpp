@@ -27,7 +27,7 @@ struct SolverOptions {
     Index layers = 6;               ///< the queue's threshold; `unlimited` moves all that the seeds are joined to
     bool layers_as_needed = false;  ///< a layer, up to `layers`, only while a force on it is not negligible
     Index sweeps = 2;               ///< passes over the queue in each step
-    Index contact_visits = 3;       ///< visits of layer 0 in each sweep at most: what touches the tool settles last
+    Index contact_visits = 3;       ///< visits of layer 0 in each sweep at most: what touches the tool converges last
     VisitOrder order = VisitOrder::groups;
     bool predict = true;  ///< a step starts from the last displacements again, if the last step was not cut short
     Index most_visits =
@@ -58,7 +58,7 @@ struct StepReport {
     bool converged = false;
     /// The deadline cut the step short: without it more vertices would have been visited, if only to look.
     bool out_of_time = false;
-    Scalar residual = 0;                         ///< largest unbalanced force on a free vertex at work, at the end [N]
+    Scalar residual = 0;                         ///< largest unbalanced force on a free active vertex, at the end [N]
     Index visits = 0;                            ///< of vertices, those that only look included
     std::span<const Index> moved;                ///< vertices whose position changed
     std::span<const Vector3<Scalar>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]

@@ -152,7 +152,7 @@ struct StepState {
     std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
 
     IndexSet loaded, seeds, prescribed, forced;
-    IndexSet bearing;                  // fixed vertices that a tool presses on
+    IndexSet pressed_supports;         // fixed vertices that a tool presses on
     IndexSet kept;                     // vertices with an `anchor`
     std::vector<unsigned char> fixed;  // of loaded vertices: pinned or prescribed
 
@@ -183,7 +183,7 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       seeds(vertices),
       prescribed(vertices),
       forced(vertices),
-      bearing(vertices),
+      pressed_supports(vertices),
       kept(vertices),
       fixed(static_cast<std::size_t>(vertices), 0),
       points(static_cast<std::size_t>(max_contact_points)),
@@ -199,8 +199,8 @@ void StepState<Scalar>::begin_step() noexcept {
         row(force, v) = {};
         added_stiffness[static_cast<std::size_t>(v)] = 0;
     }
-    for (const Index v : bearing.items()) row(support, v).set(Vector3<Scalar>::Zero(), support_stiffness(v));
-    for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &bearing, &kept, &watched}) set->clear();
+    for (const Index v : pressed_supports.items()) row(support, v).set(Vector3<Scalar>::Zero(), support_stiffness(v));
+    for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &pressed_supports, &kept, &watched}) set->clear();
     points.clear();
     packs.clear();
     point_ranges = {};

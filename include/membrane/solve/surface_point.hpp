@@ -134,12 +134,12 @@ void change_force(ConstraintContext<Scalar>& context, ContactPoint<Scalar>& poin
     }
 }
 
-/// Adds `force` [N] on the point to what its fixed corners bear.
+/// Adds the part of `force` [N] on the point that its fixed corners take to the force of the tools on these.
 template <Real Scalar>
-void bear(ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
-          const Vector3<Scalar>& force) noexcept {
+void add_support_forces(ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
+                        const Vector3<Scalar>& force) noexcept {
     for (std::size_t k = 0; k < 3 && point.on_fixed; ++k) {
-        context.bear(point.corners[k], point.weights[static_cast<Eigen::Index>(k)] * force);
+        context.add_support_force(point.corners[k], point.weights[static_cast<Eigen::Index>(k)] * force);
     }
 }
 

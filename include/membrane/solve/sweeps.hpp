@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <span>
+#include <utility>
+
+#include <membrane/core/executor.hpp>
+#include <membrane/solve/active_vertices.hpp>
+#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/deadline.hpp>
+#include <membrane/solve/packed_vertices.hpp>
+#include <membrane/solve/step.hpp>
+#include <membrane/solve/vertex_update.hpp>
+
+namespace membrane {
+
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
+/// The sweeps of one step over its active vertices: in each, contact iterations, which are updates of layer 0 in turn with
+/// the constraints, and then an update of each vertex beyond. As many of the vertices as there is room for, the first, are
+/// updated in packs; the others one by one, to the same bits.
+///
+///     sweeps.load_and_pack();
+///     sweeps.run();
+///     const bool finite = sweeps.evaluate_residuals();
+template <class Scalar, class Rule, class Network, class Volume>
+struct Sweeps {
+    const StepInput<Scalar, Network, Volume>& scene;
+    const Rule& rule;
+    const SolverOptions<Scalar>& options;
+    const AnyExecutor& executor;
+    ActiveVertices& active;
+    PackedVertices<Scalar>& packed;
+    const ConstraintList<Scalar>& constraints;
+    StepReport<Scalar>& report;
+    TimeBudget budget;
+    std::size_t
+        resume;  // the number beyond layer 0 of the vertex at which time ran out, in the last step or in this one
+
+    std::size_t in_packs = 0;          // how many of the active vertices
+    std::size_t forces_seen = 0;       // how many vertices with a force of a constraint there were
+    bool constraints_hold = false;     // when they were last enforced, and nothing has moved since
+    bool constraints_changed = false;  // by the last enforcement, or that had no time
+    bool stopped = false;              // time ran out beyond layer 0
+
+    static constexpr bool can_use_lanes = UpdatesInLanes<Scalar, Rule, Network, Volume>;
+
+    /// Takes the positions of the active vertices and their neighbours.
+    void load_and_pack() noexcept {
+        if constexpr (can_use_lanes) pack();
+        const auto one_by_one = active.vertices().subspan(in_packs);
+        for (const auto vertices : {one_by_one, active.frontier(), scene.state.prescribed.items()}) {
+            for (const Index v : vertices) load_neighbours(v);
+        }
+        budget.begin(active.vertices().size() + active.frontier().size());
+    }
+
+    /// Sweeps until nothing changes, they are done, or time is up.
+    void run() noexcept {
+        bool changed = true;
+        for (Index i = 0; i < options.sweeps && changed && !report.out_of_time; ++i) {
+            changed = iterate_contact();
+            if (!advances()) return;
+            const bool moved = update_beyond();
+            if (!advances()) return;
+            if (moved) constraints_hold = false;
+            changed |= moved;
+        }
+        if (changed && !constraints_hold) {
+            if (!budget.has_time_to_enforce()) report.out_of_time = true;
+            constraints_changed = report.out_of_time || enforce();
+        }
+    }
+
+    /// The forces at the end on all active vertices; false if any is not finite.
+    [[nodiscard]] bool evaluate_residuals() noexcept {
+        bool finite = true;
+        const auto count = [&](Index v) {
+            const Vector3<Scalar> force = scene.state.residual_force(v);
+            ++report.visits;
+            if (!scene.state.is_fixed(v)) report.residual = (std::max)(report.residual, norm(force));
+            finite &= is_finite(force);
+        };
+        const auto evaluate = [&](Index v) {
+            const Vector3<Scalar> force = pull_on(scene, v).force;
+            scene.state.set_residual(v, force, norm(undamped_force(scene, v, force)));
+            count(v);
+        };
+        const auto& prescribed = scene.state.prescribed;
+        if constexpr (can_use_lanes) {
+            for (std::size_t p = 0, end = packed.pack_from(in_packs); p < end; ++p) {
+                packed.evaluate_residual(p, scene);
+                for (const Index v : packed.vertices(p)) {
+                    if (!prescribed.contains(v)) count(v);
+                }
+            }
+        }
+        for (const auto vertices : {active.vertices().subspan(in_packs), active.frontier()}) {
+            for (const Index v : vertices) {
+                if (!prescribed.contains(v)) evaluate(v);
+            }
+        }
+        for (const Index v : prescribed.items()) evaluate(v);
+        return finite;
+    }
+
+  private:
+    [[nodiscard]] bool advances() const noexcept { return report.status == StepStatus::advanced; }
+
+    // If the whole queue is active and no constraint adds a force beyond layer 0.
+    void pack() noexcept {
+        const auto& queue = active.queue();
+        if (active.take_new_queue()) packed.assign(queue.vertices(), queue.group_ends(), scene.network);
+        if (active.from_queue() != queue.vertices().size() || forces_beyond_contact()) return;
+        packed.append(active.vertices(), active.from_queue(), active.group_ends(), scene.network);
+        for (const Index v : packed.needed()) scene.state.load(v, scene.start, scene.network);
+        packed.begin_step(scene);
+        in_packs = packed.size();
+    }
+
+    // Whether one that was not seen before is.
+    [[nodiscard]] bool forces_beyond_contact() noexcept {
+        const auto forced = scene.state.forced.items();
+        const auto unseen = forced.subspan(std::exchange(forces_seen, forced.size()));
+        return std::any_of(unseen.begin(), unseen.end(), [&](Index v) { return !scene.state.seeds.contains(v); });
+    }
+
+    void load_neighbours(Index v) noexcept {
+        scene.state.load(v, scene.start, scene.network);
+        for (const auto& end : scene.network.neighbours(v)) scene.state.load(end.other, scene.start, scene.network);
+    }
+
+    bool iterate_contact() noexcept {
+        const auto layer = active.contact_layer();
+        bool changed = false;
+        for (Index i = 0; i < options.contact_visits; ++i) {
+            if (!budget.has_time_for_contact(layer.size())) {
+                report.out_of_time = true;
+                break;
+            }
+            const std::size_t packed_count = (std::min)(layer.size(), in_packs);
+            changed |= update_packs<true>(0, packed.pack_from(packed_count));
+            for (const Index v : layer.subspan(packed_count)) changed |= update(v);
+            budget.updated(layer.size());
+            if (!advances()) break;
+            if (!enforce()) break;
+            changed = true;
+        }
+        return changed;
+    }
+
+    // Packs beyond layer 0 take no force of a constraint: where one comes, their vertices are updated one by one.
+    bool enforce() noexcept {
+        constraints_hold = !constraints.enforce();
+        budget.enforced();
+        if (forces_beyond_contact()) in_packs = (std::min)(in_packs, active.contact_layer().size());
+        return !constraints_hold;
+    }
+
+    // From where time ran out on, round to there.
+    bool update_beyond() noexcept {
+        const std::size_t first = active.contact_layer().size(), end = active.vertices().size();
+        const std::size_t begin = first + (std::min)(std::exchange(resume, 0), end - first);
+        bool changed = update_until_time_is_up(begin, end);
+        changed |= update_until_time_is_up(first, begin);
+        while (add_layer()) changed = true;
+        return changed;
+    }
+
+    // With `layers_as_needed`: adds the next layer, and updates it, if a force on it is above the tolerance.
+    bool add_layer() noexcept {
+        const auto frontier = active.frontier();
+        if (frontier.empty() || stopped || !advances()) return false;
+        if (!budget.has_time_for_batch()) {
+            report.out_of_time = true;
+            return false;
+        }
+        report.visits += static_cast<Index>(frontier.size());
+        const bool needed = std::any_of(frontier.begin(), frontier.end(), [&](Index v) {
+            return !scene.state.is_fixed(v) && norm(pull_on(scene, v).force) > scene.state.force_tolerance;
+        });
+        budget.updated(frontier.size());
+        if (!needed) return false;
+        const std::size_t before = active.vertices().size();
+        active.grow(scene.network, options);
+        for (const Index v : active.frontier()) load_neighbours(v);
+        budget.set_residual_count(active.vertices().size() + active.frontier().size());
+        update_until_time_is_up(before, active.vertices().size());
+        return true;
+    }
+
+    // The active vertices number `begin` to `end`.
+    bool update_until_time_is_up(std::size_t begin, std::size_t end) noexcept {
+        const std::size_t packed_end = std::clamp(in_packs, begin, end);
+        bool changed = update_packs_until_time_is_up(packed.pack_from(begin), packed.pack_from(packed_end));
+        for (std::size_t i = packed_end; i < end && goes_on(i);) {
+            const auto batch = active.vertices().subspan(i, (std::min)(updates_in_batch, end - i));
+            for (const Index v : batch) changed |= update(v);
+            budget.updated(batch.size());
+            i += batch.size();
+        }
+        return changed;
+    }
+
+    bool update_packs_until_time_is_up(std::size_t p, std::size_t end) noexcept {
+        bool changed = false;
+        while (p < end && goes_on(packed.first_of(p))) {
+            const Index before = report.visits;
+            const std::size_t batch = budget.limited() ? updates_in_batch / Lanes<Scalar>::count : end - p;
+            const std::size_t next = (std::min)(p + batch, end);
+            changed |= update_packs<false>(p, next);
+            budget.updated(static_cast<std::size_t>(report.visits - before));
+            p = next;
+        }
+        return changed;
+    }
+
+    // Whether there is time for a batch that begins with active vertex number `i`.
+    [[nodiscard]] bool goes_on(std::size_t i) noexcept {
+        if (stopped || !advances()) return false;
+        if (budget.has_time_for_batch()) return true;
+        report.out_of_time = stopped = true;
+        resume = i - active.contact_layer().size();
+        return false;
+    }
+
+    // No spring joins the packs of a group: threads may share them, but under a deadline batches are too small.
+    template <bool in_contact>
+    bool update_packs(std::size_t p, [[maybe_unused]] std::size_t end) noexcept {
+        bool changed = false;
+        if constexpr (can_use_lanes) {
+            while (p < end && advances()) {
+                const std::size_t group_end = packed.end_of_group(p, end);
+                if (budget.limited()) {
+                    packed.template update<in_contact>(p, group_end, scene, rule, OneThread{});
+                } else {
+                    packed.template update<in_contact>(p, group_end, scene, rule, executor);
+                }
+                for (; p < group_end && advances(); ++p) changed |= finish_update<in_contact>(p);
+            }
+        }
+        return changed;
+    }
+
+    // Where the stiffness bound does not prove that a move is stable, the largest eigenvalue of the block does or does not.
+    template <bool in_contact>
+    bool finish_update(std::size_t p) noexcept {
+        using Outcome = typename PackedVertices<Scalar>::Outcome;
+        Outcome outcome = packed.outcome(p);
+        report.visits += packed.free_count(p);
+        if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+            if (outcome == Outcome::too_far) {
+                for (const Index v : packed.vertices(p)) {
+                    if (scene.state.is_fixed(v) || !diverges(scene, v, rule.compliance(state_of<Rule>(scene, v))))
+                        continue;
+                    report.status = StepStatus::unstable;
+                    return false;
+                }
+                outcome = packed.template update_pack<in_contact>(p, scene, rule, true);
+            }
+        }
+        return outcome == Outcome::moved;
+    }
+
+    bool update(Index v) noexcept {
+        auto& state = scene.state;
+        if (state.is_fixed(v) || !advances()) return false;
+        ++report.visits;
+        const auto vertex = state_of<Rule>(scene, v);
+        const auto move = move_of(rule, vertex, state.force_tolerance);
+        if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+            if (move.may_overshoot && diverges(scene, v, move.compliance)) {
+                report.status = StepStatus::unstable;
+                return false;
+            }
+        }
+        state.set_compliance(v, as_block<Scalar>(move.compliance), move.least);
+        if (vertex.touched) {
+            state.set_internal(v, norm<Scalar>(vertex.force - state.constraint_force(v)),
+                               vertex.stiffness - vertex.contact_stiffness);
+        }
+        if (!move.moves) return false;
+        state.set_position(v, point(scene.x, v) + backtracked<Rule>(scene, v, move.displacement));
+        return true;
+    }
+};
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
+}  // namespace membrane
