@@ -74,12 +74,13 @@ class AnyExecutor {
 
     /// Allocates, but for `OneThread`.
     template <detail::OtherExecutor E>
-    AnyExecutor(const E& executor) {
-        if constexpr (std::same_as<E, OneThread>) return;
-        executor_ = std::make_shared<const E>(executor);
-        run_ = [](const void* of, Index count, const TaskRef& task) noexcept {
-            (*static_cast<const E*>(of))(count, task);
-        };
+    AnyExecutor([[maybe_unused]] const E& executor) {
+        if constexpr (!std::same_as<E, OneThread>) {
+            executor_ = std::make_shared<const E>(executor);
+            run_ = [](const void* of, Index count, const TaskRef& task) noexcept {
+                (*static_cast<const E*>(of))(count, task);
+            };
+        }
     }
 
     /// Whether it is known that one thread does all tasks in order.
