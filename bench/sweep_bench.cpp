@@ -17,8 +17,10 @@ void sizes_in_cache(benchmark::internal::Benchmark* measured) {
     for (const int vertices : {642, 2562, 10242}) measured->Arg(vertices);
 }
 
-BENCHMARK(plain<double>)->Name("plain/double")->Apply(sizes_in_cache);
-BENCHMARK(plain<float>)->Name("plain/float")->Apply(sizes_in_cache);
+BENCHMARK(plain<double, PlainMass>)->Name("plain/double/mass")->Apply(sizes_in_cache);
+BENCHMARK(plain<double, PlainNewton>)->Name("plain/double/newton")->Apply(sizes_in_cache);
+BENCHMARK(plain<float, PlainMass>)->Name("plain/float/mass")->Apply(sizes_in_cache);
+BENCHMARK(plain<float, PlainNewton>)->Name("plain/float/newton")->Apply(sizes_in_cache);
 BENCHMARK(packs<double, membrane::MassStep>)->Name("lanes/double/mass")->Apply(sizes_in_cache);
 BENCHMARK(packs<double, membrane::SafeStep>)->Name("lanes/double/safe")->Apply(sizes_in_cache);
 BENCHMARK(packs<double, membrane::BlockStep>)->Name("lanes/double/newton")->Apply(sizes_in_cache);

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <random>
 #include <span>
 #include <vector>
+
+#include <Eigen/LU>
 
 #include <membrane/solve/packed_vertices.hpp>
 #include <membrane/solve/propagation_queue.hpp>
@@ -42,8 +47,47 @@ struct Field {
 
 inline void count_visits(benchmark::State& state) { state.counters["visits"] = static_cast<double>(state.range(0)); }
 
-/// Vertex by vertex, as one would write it.
-template <Real Scalar>
+/// (4), as one would write it.
+struct PlainMass {
+    template <Real Scalar, class Springs>
+    static Eigen::Matrix<Scalar, 3, 1> move(const Springs& springs, const Eigen::Matrix<Scalar, 3, 1>& from_anchor) {
+        Eigen::Matrix<Scalar, 3, 1> force = -Scalar(backing) * from_anchor;
+        springs([&](const auto& reach, Scalar stiffness, Scalar rest_length) {
+            const Scalar length = reach.norm();
+            force += stiffness * (length - rest_length) / length * reach;
+        });
+        return static_cast<Scalar>(tick * tick / 4e-4) * force;
+    }
+};
+
+/// Newton's step on the 3 x 3 block, bounded as `BlockStep` is.
+struct PlainNewton {
+    template <Real Scalar, class Springs>
+    static Eigen::Matrix<Scalar, 3, 1> move(const Springs& springs, const Eigen::Matrix<Scalar, 3, 1>& from_anchor) {
+        using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
+        Eigen::Matrix<Scalar, 3, 1> force = -Scalar(backing) * from_anchor;
+        Matrix3 dyads = Matrix3::Zero();
+        Scalar sum = Scalar(backing), trace = 0, size = std::numeric_limits<Scalar>::max();
+        springs([&](const auto& reach, Scalar stiffness, Scalar rest_length) {
+            const Scalar length = reach.norm();
+            const Eigen::Matrix<Scalar, 3, 1> direction = reach / length;
+            force += stiffness * (length - rest_length) * direction;
+            const Scalar part = stiffness * std::min(rest_length / length, Scalar(1));
+            dyads.noalias() += (part * direction).lazyProduct(direction.transpose());
+            trace += part;
+            sum += stiffness;
+            size = std::min(size, length);
+        });
+        const Scalar longest = force.norm() / (sum * size), slack = 1 - trace / sum - longest;
+        const Scalar rho = (std::sqrt(slack * slack + 4 * longest) - slack) / 2;
+        // The relief is trace I - dyads.
+        const Matrix3 block = (sum - trace / (1 + rho)) * Matrix3::Identity() + dyads / (1 + rho);
+        return block.inverse() * force;
+    }
+};
+
+/// Vertex by vertex.
+template <Real Scalar, class Rule>
 void plain(benchmark::State& state) {
     struct End {
         Index other;
@@ -58,17 +102,16 @@ void plain(benchmark::State& state) {
     }
     auto& x = field.x;
     const membrane::Points<Scalar> anchor = field.mesh.positions();
-    const auto step = static_cast<Scalar>(tick * tick / 4e-4);
     for (auto _ : state) {
         for (Index v = 0; v < x.cols(); ++v) {
             const auto at = static_cast<std::size_t>(v);
-            membrane::Vector3<Scalar> force = -Scalar(backing) * (x.col(v) - anchor.col(v));
-            for (std::size_t e = row[at]; e < row[at + 1]; ++e) {
-                const membrane::Vector3<Scalar> reach = x.col(ends[e].other) - x.col(v);
-                const Scalar length = reach.norm();
-                force += ends[e].stiffness * (length - ends[e].rest_length) / length * reach;
-            }
-            x.col(v) += step * force;
+            const auto springs = [&](const auto& add) {
+                for (std::size_t e = row[at]; e < row[at + 1]; ++e) {
+                    const Eigen::Matrix<Scalar, 3, 1> reach = x.col(ends[e].other) - x.col(v);
+                    add(reach, ends[e].stiffness, ends[e].rest_length);
+                }
+            };
+            x.col(v) += Rule::template move<Scalar>(springs, x.col(v) - anchor.col(v));
         }
         benchmark::DoNotOptimize(x.data());
     }
