@@ -309,16 +309,17 @@ TEST_CASE("after any stroke of any tool over creases, rims and coarse meshes the
 }
 
 // Where nothing holds the border, a tool that slides off it may touch from the other side next, and lifts the membrane as
-// it is withdrawn. That is no failure to come back, and so it is lowered again, until it touches from there no more. In
-// these two strokes, a sphere on the flat sheet and a point on the folded one, the membrane is not back after that.
-TEST_CASE("a membrane with a free border comes back from what has gone round it", "[withdrawal][!shouldfail]") {
+// it is withdrawn. That is no failure to come back, and so it is lowered again, until it neither touches from there nor
+// overlaps the membrane at rest.
+TEST_CASE("a membrane with a free border comes back from what has gone round it", "[withdrawal]") {
     const std::vector<Scene> scenes{Scene(square(), false), Scene(folded_square(-0.7), false),
                                     Scene(folded_square(0.7), false),
                                     Scene(spherical_cap<double>({.rings = 8}), false)};
-    for (const int seed : {176, 234}) {
+    for (int seed = 1; seed <= cases(240, 2000); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
-        Scene scene = scenes[static_cast<std::size_t>(seed) % scenes.size()];
+        const Scene& fresh = scenes[static_cast<std::size_t>(seed) % scenes.size()];
+        Scene scene = fresh;
         const Stroke stroke = random_stroke(scene, random);
         double first_side = 0;
         for (int tick = 0; tick <= stroke.gone; ++tick) {
@@ -326,8 +327,9 @@ TEST_CASE("a membrane with a free border comes back from what has gone round it"
             if (first_side == 0 && scene.contact.touching()) first_side = scene.contact.side;
         }
         Tool<double> tool = stroke.at(stroke.gone);
+        const auto is_lifted = [&] { return scene.contact.touching() && scene.contact.side != first_side; };
         constexpr int lowering = 400;
-        for (int tick = 0; tick < lowering && scene.contact.touching() && scene.contact.side != first_side; ++tick) {
+        for (int tick = 0; tick < lowering && (is_lifted() || overlaps(fresh, tool)); ++tick) {
             tool.position -= 2.0 / lowering * stroke.out;
             scene.tick(tool);
         }
@@ -351,8 +353,8 @@ TEST_CASE("a shaft dragged slowly over a free border slides off, and the membran
     CHECK(caught <= expected + 2 * deviation);
 }
 
-TEST_CASE("no shaft that is dragged over a free border is left with the membrane on it", "[withdrawal][!shouldfail]") {
-    for (const int seed : {169, 711}) CHECK(drag_over_border(free_sheet(), seed).comes_back);
+TEST_CASE("no shaft that is dragged over a free border is left with the membrane on it", "[withdrawal]") {
+    for (const int seed : {169, 416, 418, 711}) CHECK(drag_over_border(free_sheet(), seed).comes_back);
 }
 
 // One or two in a hundred are not at rest after a second, one in two hundred has its axis inside until it is withdrawn.

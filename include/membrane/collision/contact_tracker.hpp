@@ -42,7 +42,8 @@ struct TrackerOptions {
 /// tool in contact is found after `check_every` ticks at the latest.
 ///
 /// The tool stays on the outer side of a closed surface: behind it is where the winding number is not 0. On an open one it
-/// stays on the side of first contact until it is clear of the surface, or has slid off a border that gave way. A tool that
+/// stays on the side of first contact until it is clear of the surface, or has slid off a border that gave way; of a shaft
+/// that slides off parts are on either side, and until it is clear it has gone through only where an end did. A tool that
 /// is outside the surface as it would be without it touches nothing that it would pull farther out. The depth is measured
 /// against the surface as it would be without the tool: the mesh, or the anchors of a body that moves.
 template <Real Scalar>
@@ -140,6 +141,7 @@ class ContactTracker {
     std::optional<Tool<Scalar>> last_tool_;
     RigidFrame<Scalar> pose_;  // of the body then
     Scalar side_ = 0;          // that the tool is known to be on; 0: not yet
+    bool slid_off_ = false;    // a shaft, off a border that gave way: from then on parts of it may be on either side
     // Where on the surface without the tool its two ends and its contact point are nearest to.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
     Index ticks_ = 0, tree_checks_ = 0;
@@ -173,6 +175,7 @@ void ContactTracker<Scalar>::reset() noexcept {
     last_tool_.reset();
     pose_ = {};
     side_ = 0;
+    slid_off_ = false;
     origin_triangles_.fill(no_index);
     ticks_ = 0;
     lively_ticks_ = 0;
@@ -218,8 +221,13 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
         complete(scene, contact);
         contact.phase = before ? ContactPhase::ongoing : ContactPhase::began;
         settle_side(scene, contact);
+        slid_off_ = slid_off_ || (feature_pairs(tool) > 1 && leaves_border(scene, contact));
     } else {
-        if (side_ != 0 && !tool.grasping && (is_clear(scene) || leaves_border(scene, contact))) side_ = 0;
+        if ((side_ != 0 || slid_off_) && !tool.grasping) {
+            const bool clear = is_clear(scene);
+            slid_off_ = slid_off_ && !clear;
+            if (clear || leaves_border(scene, contact)) side_ = 0;
+        }
         near_.clear();
         origin_triangles_.fill(no_index);
         contact = {};
@@ -285,7 +293,7 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
 template <Real Scalar>
 bool ContactTracker<Scalar>::touches(const Scene& scene, Contact<Scalar>& contact) noexcept {
     if (!last_.touching() && contact.gap > 0) return false;
-    if (contact.gap > 0 && is_below_border(scene, contact)) return false;
+    if (contact.gap > 0 && (slid_off_ || is_below_border(scene, contact))) return false;
     measure_depth(scene, contact);
     if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
@@ -333,17 +341,20 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     const Tool<Scalar>& before = last_tool_ ? *last_tool_ : scene.tool;
     const Vector3<Scalar> middle = before.position + before.axis / 2;
     if (behind && is_first_seen() && was_behind(scene, f, side, middle)) behind = seen_from(-1);
+    // A tool that is apart from the surface has not come through: a way of its ends that did is known by now.
+    if (is_first_seen() && contact.gap < -2 * scene.radius) return turn(scene, contact);
     if (side_ != 0 && contact.side != side_) {  // beside a border
         contact.side = side_;
         behind = !leaves_border(scene, contact);
         if (behind) turn(scene, contact);
     }
     const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1 &&  // stuck through, perhaps
+                                     (surface_.closed() || !last_tool_) &&
                                      !surface_.on_border(contact.triangle, contact.barycentric);
-    contact.crossed =
-        behind && (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.on_axis));
+    contact.crossed = behind && !slid_off_ &&
+                      (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.on_axis));
     if (behind && !contact.crossed) turn(scene, contact);
-    if (!contact.crossed && feature_pairs(scene.tool) > 1 && !leaves_border(scene, contact)) {
+    if (!contact.crossed && feature_pairs(scene.tool) > 1 && !slid_off_ && !leaves_border(scene, contact)) {
         describe_shaft(scene, f, side, contact);
     }
     contact.before = (contact.crossed ? contact.point : contact.on_axis) + margin_ * contact.normal;
@@ -364,14 +375,19 @@ void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar 
     const auto take_if_behind = [&](const Vector3<Scalar>& q) {
         if (contact.crossed || !has_passed(scene, f, side, q)) return;
         const Index g = surface_.descend(scene.x, f, q);
-        contact = contact_in(surface_, scene.x, g, Tool<Scalar>{.position = q}, scene.radius, side);
-        contact.crossed = true;
-        if (contact.side == side && contact.gap < -scene.radius) return;
-        contact.side = side;
-        turn(scene, contact);
+        auto there = contact_in(surface_, scene.x, g, Tool<Scalar>{.position = q}, scene.radius, side);
+        const bool seen_behind = there.side == side && there.gap < -scene.radius;
+        there.side = side;
+        if (leaves_border(scene, there)) return;
+        if (!seen_behind) turn(scene, there);
+        there.crossed = true;
+        contact = there;
     };
     if (const auto middle = middle_inside(scene, f, side)) take_if_behind(*middle);
     if (side_ == 0 || surface_.closed()) return;
+    // A shaft that has one end behind has gone through the surface, or round its border.
+    const Vector3<Scalar> end = scene.tool.position + scene.tool.axis;
+    if (scene.tree.first_hit(scene.x, scene.tool.position, end).triangle == no_index) return;
     take_if_behind(scene.tool.position);
     take_if_behind(scene.tool.position + scene.tool.axis);
 }
