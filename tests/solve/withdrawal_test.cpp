@@ -337,8 +337,8 @@ TEST_CASE("a membrane with a free border comes back from what has gone round it"
     }
 }
 
-// Most slide off and draw no edge out by much. One in ten catches on a border that has given way: it is taken to have gone
-// through it, and pulls a corner along. Some then hang on the shaft: see the next test.
+// Most slide off and draw no edge out by much. One in thirty catches on a border that has given way: it is taken to have
+// gone through it, and pulls a corner along.
 TEST_CASE("a shaft dragged slowly over a free border slides off, and the membrane comes back", "[withdrawal]") {
     const Scene fresh = free_sheet();
     const int runs = cases(40, 1000);
@@ -349,7 +349,7 @@ TEST_CASE("a shaft dragged slowly over a free border slides off, and the membran
         CHECK(left.comes_back);
         if (left.longest > 5 * fresh.edge) ++caught;
     }
-    const double expected = 0.1 * runs, deviation = std::sqrt(0.9 * expected);
+    const double expected = 0.04 * runs, deviation = std::sqrt(0.96 * expected);
     CHECK(caught <= expected + 2 * deviation);
 }
 
