@@ -8,7 +8,7 @@
 
 // What do the solver's defaults buy? Each option alone is varied, the others as they are when nobody sets them. A tool
 // slides along spheres of three sizes; forceps draw out one of them: a tool touches many vertices, forceps hold one
-// triangle and the rest is up to the layers. The backing is a tenth of the springs.
+// triangle and the rest is up to the layers. The foundation is a tenth of the springs.
 
 namespace {
 
@@ -18,9 +18,9 @@ template <Real Scalar>
 using Options = membrane::SolverOptions<Scalar>;
 
 constexpr Options<double> defaults;
-static_assert(defaults.layers == 6 && defaults.sweeps == 2 && defaults.contact_visits == 3,
+static_assert(defaults.layers == 6 && defaults.sweeps == 2 && defaults.contact_iterations == 3,
               "the plot rings these, and the tables name them");
-static_assert(defaults.order == membrane::VisitOrder::groups && defaults.predict);
+static_assert(defaults.order == membrane::UpdateOrder::colour_layers && defaults.predict);
 
 std::string mesh_of(const Place& place) { return "/vertices:" + std::to_string(place.vertices); }
 
@@ -28,7 +28,7 @@ std::string mesh_of(const Place& place) { return "/vertices:" + std::to_string(p
 /// faster: of all so far the fastest counts.
 template <class Play>
 void add(const std::string& name, Play play) {
-    constexpr int plays = 3;
+    constexpr int repetitions = 3;
     const auto run = [play, least = std::numeric_limits<double>::infinity()](benchmark::State& state) mutable {
         for (auto _ : state) {
             membrane::Outcome outcome = play();
@@ -36,7 +36,7 @@ void add(const std::string& name, Play play) {
             record(state, outcome);
         }
     };
-    benchmark::RegisterBenchmark(name.c_str(), run)->Iterations(plays)->UseManualTime();
+    benchmark::RegisterBenchmark(name.c_str(), run)->Iterations(repetitions)->UseManualTime();
 }
 
 /// Sets one option, a number, to each of these.
@@ -56,7 +56,7 @@ void choose(const Place& place, const std::string& choice, const Options<Scalar>
 }
 
 void choose_each(const Place& place) {
-    constexpr auto arrival = membrane::VisitOrder::arrival;
+    constexpr auto arrival = membrane::UpdateOrder::breadth_first;
     choose<double>(place, "default", {});
     choose<double>(place, "arrival", {.order = arrival});
     choose<float>(place, "float", {});
@@ -74,7 +74,7 @@ const bool added = [] {
         choose_each(place);
         vary(place, "layers", &Options<double>::layers, {1, 2, 3, 4, 6, 8, 12});
         vary(place, "sweeps", &Options<double>::sweeps, {1, 2, 3, 4, 6, 8});
-        vary(place, "contact_visits", &Options<double>::contact_visits, {1, 2, 3, 4, 6, 8});
+        vary(place, "contact_iterations", &Options<double>::contact_iterations, {1, 2, 3, 4, 6, 8});
     }
     return true;
 }();

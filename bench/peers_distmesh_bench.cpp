@@ -12,8 +12,8 @@
 #include <CGAL/Surface_mesh_default_criteria_3.h>
 #include <CGAL/Surface_mesh_default_triangulation_3.h>
 #include <CGAL/make_surface_mesh.h>
-#include <membrane/mesh/distmesh.hpp>
-#include <membrane/mesh/quality.hpp>
+#include <membrane/mesh_check/quality.hpp>
+#include <membrane/meshing/distmesh.hpp>
 
 #include "support/scene.hpp"
 
@@ -28,7 +28,7 @@ using namespace bench;
 using membrane::MeshQuality;
 using Mesh = membrane::TriangleMesh<double>;
 
-constexpr double most_off = 1e-9;  // that a vertex may be from the surface
+constexpr double max_off = 1e-9;  // that a vertex may be from the surface
 
 /// A body, bounds for ours, a point inside for CGAL's.
 template <class Distance>
@@ -68,7 +68,7 @@ struct Cgal {
         const double reach = (body.bounds.high - body.bounds.low).norm();
         const Traits::Point_3 inside(body.inside.x(), body.inside.y(), body.inside.z());
         const CGAL::Implicit_surface_3<Traits, std::decay_t<decltype(function)>> surface(
-            function, Traits::Sphere_3(inside, reach * reach), most_off / reach / 10);
+            function, Traits::Sphere_3(inside, reach * reach), max_off / reach / 10);
         Triangulation triangulation;
         CGAL::Complex_2_in_triangulation_3<Triangulation> complex(triangulation);
         const CGAL::Surface_mesh_default_criteria_3<Triangulation> criteria(30, size, size);
@@ -116,7 +116,7 @@ void measure(benchmark::State& state, const Body<Distance>& body) {
     require(membrane::Adjacency(mesh).closed(), "the surface must be closed");
     require(std::abs(quality.mean_edge / wanted - 1) < 0.2, "edges must be about as long as wanted");
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
-        require(std::abs(body.distance(membrane::point(mesh.positions(), v))) <= most_off,
+        require(std::abs(body.distance(membrane::point(mesh.positions(), v))) <= max_off,
                 "vertices are on the surface");
     }
     state.counters["vertices"] = mesh.vertex_count();

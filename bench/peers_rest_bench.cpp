@@ -13,13 +13,13 @@ using namespace bench;
 
 constexpr double wanted = 0.01;  // error of the force, as a part of it
 constexpr Index held = 0;
-constexpr int most_iterations = 1000;
+constexpr int max_iterations = 1000;
 
 struct Problem {
     explicit Problem(double mass = 1)
         : mesh(sphere(642)),
           network(mesh, {}, {.stiffness = stiffness, .mass = mass}),
-          volume(mesh, {.stiffness = backing}),
+          volume(mesh, {.stiffness = foundation}),
           target(0.8 * membrane::point(mesh.positions(), held)) {
         static const Vector3 known = equilibrium();
         expected = known;
@@ -45,27 +45,27 @@ struct Problem {
 
 /// Goes on until the reaction is near enough; the iterations that takes.
 template <class Way>
-int iterations_of(Way& way, const Problem& problem) {
-    way.restart();
-    for (int i = 1; i < most_iterations; ++i) {
-        way.iterate();
-        if (problem.error(way.reaction()) <= wanted) return i;
+int iterations_of(Way& displacement, const Problem& problem) {
+    displacement.reset();
+    for (int i = 1; i < max_iterations; ++i) {
+        displacement.iterate();
+        if (problem.error(displacement.reaction()) <= wanted) return i;
     }
-    return most_iterations;
+    return max_iterations;
 }
 
 /// Measures so many iterations, without a look at the error in between.
 template <class Way>
-void measure(benchmark::State& state, Way& way, const Problem& problem) {
-    const int iterations = iterations_of(way, problem);
+void measure(benchmark::State& state, Way& displacement, const Problem& problem) {
+    const int iterations = iterations_of(displacement, problem);
     for (auto _ : state) {
-        way.restart();
-        for (int i = 0; i < iterations; ++i) way.iterate();
-        benchmark::DoNotOptimize(way.reaction());
+        displacement.reset();
+        for (int i = 0; i < iterations; ++i) displacement.iterate();
+        benchmark::DoNotOptimize(displacement.reaction());
     }
-    require(problem.error(way.reaction()) <= wanted, "the force must be near the equilibrium's");
+    require(problem.error(displacement.reaction()) <= wanted, "the force must be near the equilibrium's");
     state.counters["iterations"] = iterations;
-    state.counters["force_error"] = problem.error(way.reaction());
+    state.counters["force_error"] = problem.error(displacement.reaction());
 }
 
 /// Our solver; an iteration is a step of one sweep.
@@ -74,7 +74,7 @@ struct Steps {
     Steps(const Problem& described, std::int64_t layers)
         : problem(described), solver(problem.network, {.layers = static_cast<Index>(layers), .sweeps = 1}) {}
 
-    void restart() {
+    void reset() {
         x = problem.mesh.positions();
         solver.reset();
     }
@@ -105,7 +105,7 @@ BENCHMARK(steps<membrane::SafeStep>)->Name("steps/safe")->Apply(by_layers);
 /// The part dt^2 k / m for which (4) takes the fewest steps.
 double best_part(std::int64_t layers) {
     double best = 0;
-    int fewest = most_iterations;
+    int fewest = max_iterations;
     for (double part = 0.02; part < 1; part += 0.02) {
         const Problem problem(tick * tick * stiffness / part);
         Steps<membrane::MassStep> ours(problem, layers);
@@ -134,12 +134,12 @@ enum class Pattern { anew, kept };
 
 /// Newton's method on the vertices up to this layer.
 struct Newton {
-    Newton(const Problem& described, Index most_layers, Pattern known)
-        : problem(described), pattern(known), newton(problem.network, problem.volume, vertices_in(most_layers)) {}
+    Newton(const Problem& described, Index max_layers, Pattern known)
+        : problem(described), pattern(known), newton(problem.network, problem.volume, vertices_in(max_layers)) {}
 
-    [[nodiscard]] std::vector<Index> vertices_in(Index most_layers) const {
+    [[nodiscard]] std::vector<Index> vertices_in(Index max_layers) const {
         membrane::PropagationQueue queue(problem.mesh.vertex_count());
-        queue.build(problem.network, std::span(&held, 1), most_layers);
+        queue.build(problem.network, std::span(&held, 1), max_layers);
         std::vector<Index> found;
         for (Index v = 0; v < problem.mesh.vertex_count(); ++v) {
             if (v != held && queue.contains(v)) found.push_back(v);
@@ -147,7 +147,7 @@ struct Newton {
         return found;
     }
 
-    void restart() {
+    void reset() {
         x = problem.mesh.positions();
         x.col(held) = problem.target;
         if (pattern == Pattern::anew) newton.analyse();
@@ -155,7 +155,7 @@ struct Newton {
     void iterate() { newton.step(x); }
     [[nodiscard]] Vector3 reaction() const {
         const Vector3 at = problem.target;
-        return problem.network.pull(held, x).force + problem.volume.pull(held, at, at, tick).force;
+        return problem.network.force_on(held, x).force + problem.volume.force_on(held, at, at, tick).force;
     }
 
     const Problem& problem;

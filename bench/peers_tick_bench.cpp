@@ -3,7 +3,7 @@
 
 // How long does a tick take on meshes from 162 to 655,362 vertices while a tool slides, ours (contact, 4 sweeps over 8
 // layers, boxes, normals, force) and that of Bullet's soft body (4 position iterations, contact, normals, its own shape
-// matching for a backing)? Bullet moves every node in every tick, and gives no force.
+// matching for a foundation)? Bullet moves every node in every tick, and gives no force.
 
 namespace {
 
@@ -38,9 +38,9 @@ const LoopOf<Scalar, Rule>& sliding(std::int64_t vertices, const Path& path) {
     return *loop;
 }
 
-template <membrane::Real Scalar, class Rule, Way way>
+template <membrane::Real Scalar, class Rule, Way displacement>
 void ours(benchmark::State& state) {
-    auto loop = sliding<Scalar, Rule>(state.range(0), way(state.range(0)));
+    auto loop = sliding<Scalar, Rule>(state.range(0), displacement(state.range(0)));
     double moved = 0;
     for (auto _ : state) {
         loop.frame();
@@ -60,7 +60,8 @@ BENCHMARK(ours<float, membrane::SafeStep, fine>)->Name("fine/float/safe")->Apply
 
 /// Bullet's body under a tool that goes on its path from tick to tick.
 struct BulletSlide {
-    BulletSlide(std::int64_t vertices, const Path& way) : path(way), scene(vertices, way.scale * way.tool_radius) {
+    BulletSlide(std::int64_t vertices, const Path& displacement)
+        : path(displacement), scene(vertices, displacement.scale * displacement.tool_radius) {
         for (Index t = 0; t < ticks_before; ++t) frame();
     }
     void frame() { scene.frame(path.at<double>(now++).position); }
@@ -71,19 +72,19 @@ struct BulletSlide {
 };
 
 /// With the tool pressed in; it goes on from where the last measurement ended, until another size is asked for.
-template <Way way>
+template <Way displacement>
 BulletSlide& bullet_sliding(std::int64_t vertices) {
     static std::unique_ptr<BulletSlide> slide;
     static std::int64_t made = 0;
     if (made == vertices) return *slide;
     made = vertices;
-    slide = std::make_unique<BulletSlide>(vertices, way(vertices));
+    slide = std::make_unique<BulletSlide>(vertices, displacement(vertices));
     return *slide;
 }
 
-template <Way way>
+template <Way displacement>
 void bullet(benchmark::State& state) {
-    auto& slide = bullet_sliding<way>(state.range(0));
+    auto& slide = bullet_sliding<displacement>(state.range(0));
     int touched = 0;
     for (auto _ : state) {
         slide.frame();

@@ -9,8 +9,8 @@ namespace {
 
 using namespace bench;
 
-constexpr double reach = 3e-4;  // of the spheres [m]
-constexpr double way = 1e-3;    // of the segments, towards the centre [m]
+constexpr double reach = 3e-4;         // of the spheres [m]
+constexpr double displacement = 1e-3;  // of the segments, towards the centre [m]
 constexpr std::size_t asked = 4096;
 
 const Mesh& mesh_of(std::int64_t triangles) {
@@ -46,7 +46,9 @@ struct Touching {
     static double of(auto& tree, const Vector3& q) { return tree.touching(q, reach); }
 };
 struct Hit {
-    static double of(auto& tree, const Vector3& q) { return tree.first_hit(q, (1 - way / membrane::norm(q)) * q); }
+    static double of(auto& tree, const Vector3& q) {
+        return tree.first_hit(q, (1 - displacement / membrane::norm(q)) * q);
+    }
 };
 
 /// The answers must be those of our tree in double but for roundings, which decide about what is hardly touched or hit.
@@ -130,8 +132,8 @@ const bool added = [] {
 
 void ask_tree(const Loop& loop) {
     benchmark::DoNotOptimize(loop.tree.closest_point(loop.x, loop.tool.position));
-    loop.tree.touching_sphere(loop.x, loop.tool.position, loop.contact.reach,
-                              [](Index f) { benchmark::DoNotOptimize(f); });
+    loop.tree.overlap_sphere(loop.x, loop.tool.position, loop.contact.detection_distance,
+                             [](Index f) { benchmark::DoNotOptimize(f); });
 }
 
 /// The contact while the tool of the scene slides: by the tracker, or what it would ask the tree for in each tick.
@@ -146,7 +148,7 @@ void contact(benchmark::State& state, bool tracked) {
         });
         if (!tracked) time = seconds([&] { ask_tree(loop); });
         state.SetIterationTime(time);
-        touched += static_cast<double>(loop.contact.touched.size());
+        touched += static_cast<double>(loop.contact.triangles.size());
     }
     loop.check();
     state.counters["touched"] = benchmark::Counter(touched, benchmark::Counter::kAvgIterations);

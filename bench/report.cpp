@@ -46,8 +46,8 @@ Table threshold_table(const std::string& vertices) {
 
 Table trade_table(const std::string& vertices) {
     const auto of = [](const std::string& rule, const std::string& visits, const std::string& predicted = "1") {
-        return "scene:slide/backing:0.1/scalar:double/rule:" + rule + "/predicted:" + predicted +
-               "/layers:3/contact_visits:" + visits;
+        return "scene:slide/foundation:0.1/scalar:double/rule:" + rule + "/predicted:" + predicted +
+               "/layers:3/contact_iterations:" + visits;
     };
     return {.topic = "trade",
             .key = "trade_" + vertices,
@@ -201,7 +201,7 @@ const std::vector<Table> all_tables{
     option_table("layers", "Time of a tick, and error of its force in percent, by layers: the default is 6",
                  {1, 2, 3, 4, 6, 8, 12}),
     option_table("sweeps", "The same by sweeps: the default is 2", {1, 2, 3, 4, 6, 8}),
-    option_table("contact_visits", "The same by visits of the contact in a sweep: the default is 3",
+    option_table("contact_iterations", "The same by visits of the contact in a sweep: the default is 3",
                  {1, 2, 3, 4, 6, 8}),
     choice_table("slide", "The same with one thing chosen for another: a tool slides", {162, 642, 2562}),
     choice_table("draw_out", "The same: forceps draw out", {642}),
@@ -386,10 +386,10 @@ struct Trial {
                            [&](const std::string& word) { return setting.at(word) == other.setting.at(word); });
     }
 
-    static inline const std::vector<std::string> scene_words{"scene",  "vertices", "backing",
+    static inline const std::vector<std::string> scene_words{"scene",  "vertices", "foundation",
                                                              "scalar", "rule",     "predicted"};
-    static inline const std::vector<std::string> words{"scene",     "vertices", "backing", "scalar",        "rule",
-                                                       "predicted", "layers",   "sweeps",  "contact_visits"};
+    static inline const std::vector<std::string> words{
+        "scene", "vertices", "foundation", "scalar", "rule", "predicted", "layers", "sweeps", "contact_iterations"};
 };
 
 std::vector<Trial> trials_in(const Results& results) {

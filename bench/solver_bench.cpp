@@ -19,7 +19,7 @@ struct Problem {
     explicit Problem(const membrane::TriangleMesh<double>& mesh, double viscosity = 0)
         : network(mesh, membrane::LinearSpring{},
                   {.stiffness = stiffness, .mass = mass_of(mesh), .viscosity = viscosity, .pinned = {held}}),
-          volume(mesh, {.stiffness = backing}),
+          volume(mesh, {.stiffness = foundation}),
           start(mesh.positions()),
           target((1 - press / radius) * start.col(held)) {}
 
@@ -42,7 +42,7 @@ std::int64_t come_to_rest(Points& x, membrane::QuasiStaticSolver<double>& solver
     std::int64_t visits = 0;
     for (int step = 0; step < 1000; ++step) {
         const auto report = solver.step(x, tick, network, problem.volume, membrane::pull(held, problem.target));
-        visits += report.visits;
+        visits += report.vertex_updates;
         if (report.converged) return visits;
     }
     require(false, "the quasi-static solver does not come to rest");
@@ -96,7 +96,7 @@ void quasi_static(benchmark::State& state, Index layers, double omega) {
     const auto mesh = sphere(state.range(0));
     const Problem problem(mesh);
     const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = stiffness});
-    membrane::QuasiStaticSolver solver(network, {.layers = layers, .sweeps = 16, .negligible_force = residual},
+    membrane::QuasiStaticSolver solver(network, {.layers = layers, .sweeps = 16, .force_tolerance = residual},
                                        membrane::BlockStep{.omega = omega});
     Points x;
     std::int64_t visits = 0;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/solve/curvature.hpp>
 #include <membrane/solve/explicit_euler.hpp>
+#include <membrane/solve/largest_eigenvalue.hpp>
 
 #include <optional>
 
 #include "support/scene.hpp"
 
-// How large may the time step be? 200 spheres of 162 vertices, jittered, each with stiffnesses of its own and a backing
+// How large may the time step be? 200 spheres of 162 vertices, jittered, each with stiffnesses of its own and a foundation
 // of a hundredth to ten times the springs, begin a little out of shape; a run diverges when that grows a hundredfold, or
 // the solver says so. dt is in hundredths of sqrt(mass / stiffness), or of each scene's own limit.
 
@@ -22,7 +22,7 @@ struct Scene {
         : rest(sphere(162).positions()), spring(std::pow(10, number(engine, 0, 2))), start(162 * 3) {
         for (double& coordinate : rest.reshaped()) coordinate += 0.02 * radius * number(engine, -1, 1);
         for (double& coordinate : start) coordinate = out_of_shape * number(engine, -1, 1);
-        volume.emplace(mesh(), membrane::VolumeOptions<double>{spring * std::pow(10, number(engine, -2, 1))});
+        volume.emplace(mesh(), membrane::VolumeSpringOptions<double>{spring * std::pow(10, number(engine, -2, 1))});
         network.emplace(mesh(), membrane::LinearSpring{},
                         membrane::NetworkOptions<double>{.stiffness = spring, .mass = 1.0});
         for (Index v = 0; v < 162; ++v) {
@@ -39,23 +39,23 @@ struct Scene {
 
     /// The largest eigenvalue of the Hessian at rest, where no spring has a tension, by power iteration.
     void find_largest() {
-        Points way = Eigen::Map<const Points>(start.data(), 3, 162), next;
+        Points displacement = Eigen::Map<const Points>(start.data(), 3, 162), next;
         for (int i = 0; i < 1000; ++i) {
-            next = volume->stiffness(0) * way;
+            next = volume->stiffness(0) * displacement;
             for (const auto& s : network->springs()) {
                 const Vector3 u = (rest.col(s.second) - rest.col(s.first)).normalized();
-                const Vector3 pull = s.stiffness * u.dot(way.col(s.second) - way.col(s.first)) * u;
+                const Vector3 pull = s.stiffness * u.dot(displacement.col(s.second) - displacement.col(s.first)) * u;
                 next.col(s.first) -= pull;
                 next.col(s.second) += pull;
             }
             largest = next.norm();
-            way = next / largest;
+            displacement = next / largest;
         }
     }
 
     [[nodiscard]] Vector3 force(Index v, const Points& x) const {
         const Vector3 here = membrane::point(x, v);
-        return network->pull(v, x).force + volume->pull(v, here, here, 1.0).force;
+        return network->force_on(v, x).force + volume->force_on(v, here, here, 1.0).force;
     }
 
     Points rest;

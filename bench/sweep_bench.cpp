@@ -31,20 +31,20 @@ BENCHMARK(packs<float, membrane::BlockStep>)->Name("lanes/float/newton")->Apply(
 /// Six springs and a volume spring for each vertex, all numbers in the order of their use.
 template <Real Scalar>
 void contiguous(benchmark::State& state) {
-    using Several = Lanes<Scalar>;
+    using Wide = Lanes<Scalar>;
     struct Slot {
-        membrane::Vector3<Several> there;
-        Several stiffness, rest_length;
+        membrane::Vector3<Wide> there;
+        Wide stiffness, rest_length;
     };
     struct Group {
-        membrane::Vector3<Several> here, anchor;
+        membrane::Vector3<Wide> here, anchor;
         std::array<Slot, 6> slots;
     };
-    std::vector<Group> groups((static_cast<std::size_t>(state.range(0)) + Several::count - 1) / Several::count);
+    std::vector<Group> groups((static_cast<std::size_t>(state.range(0)) + Wide::count - 1) / Wide::count);
     std::mt19937_64 random(1);
     const auto number = [&] {
-        Several lanes;
-        for (std::size_t i = 0; i < Several::count; ++i)
+        Wide lanes;
+        for (std::size_t i = 0; i < Wide::count; ++i)
             lanes.set(i, static_cast<Scalar>(1 + static_cast<double>(random() % 1000) / 1000));
         return lanes;
     };
@@ -55,13 +55,13 @@ void contiguous(benchmark::State& state) {
             slot.stiffness = slot.rest_length = number();
         }
     }
-    const Several step = Scalar(1e-3);
+    const Wide step = Scalar(1e-3);
     for (auto _ : state) {
         for (Group& group : groups) {
-            membrane::Vector3<Several> force = Several(Scalar(backing)) * (group.anchor - group.here);
+            membrane::Vector3<Wide> force = Wide(Scalar(foundation)) * (group.anchor - group.here);
             for (const Slot& slot : group.slots) {
-                const membrane::Vector3<Several> reach = slot.there - group.here;
-                const Several length = membrane::norm(reach);
+                const membrane::Vector3<Wide> reach = slot.there - group.here;
+                const Wide length = membrane::norm(reach);
                 force += (slot.stiffness * (length - slot.rest_length) / length) * reach;
             }
             group.here += step * force;

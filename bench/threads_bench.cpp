@@ -9,27 +9,27 @@
 namespace {
 
 using namespace bench;
-using membrane::VisitOrder;
+using membrane::UpdateOrder;
 
 template <membrane::Real Scalar>
-void step(benchmark::State& state, VisitOrder order, const membrane::AnyExecutor& executor) {
+void step(benchmark::State& state, UpdateOrder order, const membrane::AnyExecutor& executor) {
     const auto mesh = sphere_of<Scalar>(state.range(0));
     const auto network =
         membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>(mesh, {}, {.stiffness = Scalar(stiffness)});
-    const auto volume = membrane::VirtualVolumeSprings<Scalar>(mesh, {.stiffness = Scalar(backing / 100)});
+    const auto volume = membrane::VirtualVolumeSprings<Scalar>(mesh, {.stiffness = Scalar(foundation / 100)});
     const membrane::SolverOptions<Scalar> options{.layers = membrane::unlimited,
                                                   .sweeps = 16,
                                                   .order = order,
                                                   .predict = false,
-                                                  .most_in_groups = membrane::unlimited};
+                                                  .max_packed_vertices = membrane::unlimited};
     membrane::QuasiStaticSolver<Scalar> solver(network, options, {}, executor);
     auto x = mesh.positions();
     const membrane::Vector3<Scalar> out = Scalar(1.3) * membrane::point(x, 0);
     double visits = 0, residual = 0;
     for (auto _ : state) {
-        const auto report = solver.step(x, Scalar(tick), network, volume, membrane::pull(Index(0), out));
+        const auto report = solver.step(x, Scalar(tick), network, volume, membrane::force_on(Index(0), out));
         require(report.status == membrane::StepStatus::advanced && report.residual > 0, "the membrane must follow");
-        visits += report.visits;
+        visits += report.vertex_updates;
         residual = report.residual;
     }
     state.counters["visits"] = benchmark::Counter(visits, benchmark::Counter::kAvgIterations);
@@ -44,20 +44,20 @@ void sizes_of_whole(benchmark::internal::Benchmark* measured) {
 
 template <membrane::Real Scalar>
 void arrival(benchmark::State& state) {
-    step<Scalar>(state, VisitOrder::arrival, {});
+    step<Scalar>(state, UpdateOrder::breadth_first, {});
 }
 template <membrane::Real Scalar>
 void groups(benchmark::State& state) {
-    step<Scalar>(state, VisitOrder::groups, {});
+    step<Scalar>(state, UpdateOrder::colour_layers, {});
 }
 template <membrane::Real Scalar>
 void colours(benchmark::State& state) {
-    step<Scalar>(state, VisitOrder::colours, {});
+    step<Scalar>(state, UpdateOrder::colour_all, {});
 }
 template <membrane::Real Scalar>
 void threads(benchmark::State& state) {
     const membrane::ThreadPool pool;
-    step<Scalar>(state, VisitOrder::colours, pool.executor());
+    step<Scalar>(state, UpdateOrder::colour_all, pool.executor());
     state.counters["threads"] = pool.threads();
 }
 BENCHMARK_TEMPLATE(arrival, double)->Name("arrival/double")->Apply(sizes_of_whole);

@@ -20,12 +20,12 @@ BENCHMARK_CAPTURE(tracker, capsule_2mm, capsule_2mm)->Apply(sizes_around);
 
 void tree(benchmark::State& state, const Path& path) {
     Loop loop = pressed(state.range(0), path);
-    membrane::BoundedList<Index> touched(static_cast<std::size_t>(loop.mesh.triangle_count()));
+    membrane::FixedVector<Index> touched(static_cast<std::size_t>(loop.mesh.triangle_count()));
     const auto ask = [&] {
         touched.clear();
         benchmark::DoNotOptimize(loop.tree.closest_point(loop.x, loop.tool.position));
-        loop.tree.touching_capsule(loop.x, loop.tool.position, loop.tool.position + loop.tool.axis, loop.contact.reach,
-                                   [&](Index f) { touched.push(f); });
+        loop.tree.overlap_capsule(loop.x, loop.tool.position, loop.tool.position + loop.tool.axis,
+                                  loop.contact.detection_distance, [&](Index f) { touched.push(f); });
     };
     for (auto _ : state) {
         loop.frame();
@@ -37,7 +37,7 @@ void tree(benchmark::State& state, const Path& path) {
     ask();
     for (const Index f : touched.items()) {
         const auto is_f = [&](const auto& seen) { return seen.triangle == f; };
-        require(std::any_of(loop.contact.touched.begin(), loop.contact.touched.end(), is_f),
+        require(std::any_of(loop.contact.triangles.begin(), loop.contact.triangles.end(), is_f),
                 "the tracker must see what the tree sees");
     }
 }

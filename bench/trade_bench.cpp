@@ -21,14 +21,14 @@ struct Setting {
     Place place;
     std::string rule, scalar;
     bool predicted;
-    Index layers, sweeps, contact_visits;
+    Index layers, sweeps, contact_iterations;
 };
 
 template <Real Scalar>
 membrane::SolverOptions<Scalar> options_of(const Setting& setting) {
     return {.layers = setting.layers,
             .sweeps = setting.sweeps,
-            .contact_visits = setting.contact_visits,
+            .contact_iterations = setting.contact_iterations,
             .predict = setting.predicted};
 }
 
@@ -37,9 +37,9 @@ double& stable_part(const Setting& setting) {
     using Key = std::tuple<Place, std::string, bool, Index, Index, Index>;
     static std::map<Key, double> known;
     return known
-        .try_emplace(
-            {setting.place, setting.scalar, setting.predicted, setting.layers, setting.sweeps, setting.contact_visits},
-            0.5)
+        .try_emplace({setting.place, setting.scalar, setting.predicted, setting.layers, setting.sweeps,
+                      setting.contact_iterations},
+                     0.5)
         .first->second;
 }
 
@@ -74,9 +74,10 @@ void add(const Setting& setting) {
     char part[16];
     std::snprintf(part, sizeof part, "%g", setting.place.part);
     const auto number = [](Index n) { return std::to_string(n); };
-    const std::string name = "scene:" + setting.place.scene + "/backing:" + part + "/scalar:" + setting.scalar +
+    const std::string name = "scene:" + setting.place.scene + "/foundation:" + part + "/scalar:" + setting.scalar +
                              "/rule:" + setting.rule + "/predicted:" + (setting.predicted ? "1" : "0") +
-                             "/layers:" + number(setting.layers) + "/contact_visits:" + number(setting.contact_visits) +
+                             "/layers:" + number(setting.layers) +
+                             "/contact_iterations:" + number(setting.contact_iterations) +
                              "/vertices:" + number(setting.place.vertices) + "/sweeps:" + number(setting.sweeps);
     benchmark::RegisterBenchmark(name.c_str(), [setting](benchmark::State& state) { measure(state, setting); })
         ->Iterations(1)

@@ -24,7 +24,7 @@ struct ClosestPoint {
 struct TouchingSphere {
     static double by_tree(const Tree& tree, const Loop& loop, const Vector3& q) {
         int touched = 0;
-        tree.touching_sphere(loop.x, q, reach, [&](Index) { ++touched; });
+        tree.overlap_sphere(loop.x, q, reach, [&](Index) { ++touched; });
         return touched;
     }
     static double of_all(const Loop& loop, const Vector3& q) {

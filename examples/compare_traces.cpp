@@ -21,7 +21,8 @@ template <class Device>
 Recording recorded(const examples::Specimen& body, Device device) {
     const auto mesh = membrane::TriangleMesh(body.surface.points, body.surface.triangles);
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
-    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
+    const auto foundation =
+        membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
@@ -31,7 +32,7 @@ Recording recorded(const examples::Specimen& body, Device device) {
     while (device.running()) {
         const auto tool = device.read();
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, 1e-3, network, backing, press(tool, contact));
+        const auto report = solver.step(x, 1e-3, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
         const Eigen::Vector3d force = feel({tool, contact, report});
         device.write(force);
@@ -70,8 +71,8 @@ int main(int argc, char** argv) {
         std::filesystem::create_directories(out);
         if (!files.empty()) return compare(examples::read(files[0]), examples::read(files[1]), out);
         const auto body = mesh.specimen(examples::stock_sphere());
-        const membrane::NullDevice<double> hand({{0, body.above(0.3)}, {0.4, body.above(0)}, {0.8, body.above(0.3)}},
-                                                {.radius = body.tool_radius()});
+        const membrane::ScriptedDevice<double> hand(
+            {{0, body.above(0.3)}, {0.4, body.above(0)}, {0.8, body.above(0.3)}}, {.radius = body.tool_radius()});
         const auto first = recorded(body, hand);
         const auto second = recorded(body, membrane::ReplayDevice<double>(first));
         examples::save(out / "press.rec", first);

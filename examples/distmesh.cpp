@@ -7,8 +7,8 @@
 #include <iostream>
 #include <string>
 
-#include <membrane/mesh/distmesh.hpp>
-#include <membrane/mesh/quality.hpp>
+#include <membrane/mesh_check/quality.hpp>
+#include <membrane/meshing/distmesh.hpp>
 
 #include "support/camera.hpp"
 #include "support/picture.hpp"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Which constants make a membrane answer as a measured one did? Fits springs and backing of a lens to a table of forces
+// Which constants make a membrane answer as a measured one did? Fits springs and foundation of a lens to a table of forces
 // and depths, says how sure they are and which of them the table does not tell, and draws both.
 #include <algorithm>
 #include <cstddef>
@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/accuracy/fit.hpp>
-#include <membrane/accuracy/indentation.hpp>
+#include <membrane/calibration/fit.hpp>
+#include <membrane/calibration/indentation.hpp>
 #include <membrane/membrane.hpp>
 
 #include "support/force_table.hpp"
@@ -56,8 +56,8 @@ void run(const std::filesystem::path& data, const examples::Specimen& body, cons
 
     std::printf("constant          value    95 %% interval      told\n");
     for (std::size_t k = 0; k < 2; ++k) {
-        std::printf("%-8s [N/m] %8.2f   %6.2f to %6.2f    %s\n", k == 0 ? "springs" : "backing", found.constants[k],
-                    found.intervals[k].lower, found.intervals[k].upper, found.told[k] ? "yes" : "no");
+        std::printf("%-8s [N/m] %8.2f   %6.2f to %6.2f    %s\n", k == 0 ? "springs" : "foundation", found.constants[k],
+                    found.intervals[k].lower, found.intervals[k].upper, found.identifiable[k] ? "yes" : "no");
     }
     std::printf("misfit %.1f %% of the force, %d evaluations%s\n", 100 * found.misfit, found.evaluations,
                 found.converged ? "" : ", not converged");

@@ -48,13 +48,13 @@ void press_in_place(const examples::Specimen& specimen) {
     const float dt = 1e-3F;  // [s]
     const membrane::TriangleMesh mesh(x, triangles);
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0F});  // [N/m]
-    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0F});                          // [N/m]
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0F});                       // [N/m]
     auto solver = membrane::QuasiStaticSolver(network);
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
     auto normals = membrane::VertexNormals(mesh);
     shown_normals = normals.values();
-    membrane::NullDevice<float> device(
+    membrane::ScriptedDevice<float> device(
         {{0, specimen.above(0.3).cast<float>()}, {0.2F, specimen.above(0).cast<float>()}},
         {.radius = specimen.tool_radius()});
 
@@ -62,7 +62,7 @@ void press_in_place(const examples::Specimen& specimen) {
     while (device.running()) {
         const auto tool = device.read();
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
         for (const auto v : normals.update(x, report.moved)) shown_normals.col(v) = normals.values().col(v);
         device.write(membrane::ReactionForce{}({tool, contact, report}));

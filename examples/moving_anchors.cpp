@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 
 #include <membrane/membrane.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/moved_volume.hpp>
 
 #include "support/specimen.hpp"
 
@@ -19,14 +19,14 @@ constexpr double dt = 1e-3;  // [s]
 struct Membrane {
     explicit Membrane(const membrane::TriangleMesh<double>& mesh)
         : network(mesh, membrane::LinearSpring{}, {.stiffness = 40.0}),  // [N/m]
-          backing(mesh, {.stiffness = 8.0, .damping = 0.02}),            // [N/m], [N s/m]
+          foundation(mesh, {.stiffness = 8.0, .damping = 0.02}),         // [N/m], [N s/m]
           solver(network, {.layers = 6, .sweeps = 8}),
           tree(mesh),
           tracker(mesh),
           x(mesh.positions()) {}
 
     membrane::MassSpringNetwork<double, membrane::LinearSpring> network;
-    membrane::VirtualVolumeSprings<double> backing;
+    membrane::VirtualVolumeSprings<double> foundation;
     membrane::QuasiStaticSolver<double> solver;
     membrane::AabbTree<double> tree;
     membrane::ContactTracker<double> tracker;
@@ -46,11 +46,11 @@ void turning_eye(const examples::Specimen& specimen) {
         frame.angular_velocity = {rate, 0, 0};
         frame.origin = specimen.centre - frame.rotation * specimen.centre;  // the centre stays where it is
         frame.velocity = frame.angular_velocity.cross(frame.origin - specimen.centre);
-        const auto seen = carried_in(tool, frame);
+        const auto seen = to_body_frame(tool, frame);
         const auto contact = eye.tracker.update(eye.tree, eye.x, seen);
-        const auto report = eye.solver.step(eye.x, dt, eye.network, eye.backing, press(seen, contact));
+        const auto report = eye.solver.step(eye.x, dt, eye.network, eye.foundation, press(seen, contact));
         eye.tree.refit(eye.x, report.moved);
-        const Eigen::Vector3d force = frame.direction_out(report.reactions[0]);
+        const Eigen::Vector3d force = frame.vector_to_world(report.reactions[0]);
         if (tick == 0 || tick % 100 != 0) continue;
         std::printf("%10.1f %13.1f   (%5.1f, %5.1f, %5.1f)\n", dt * tick, angle * 180 / std::numbers::pi,
                     1e3 * force.x(), 1e3 * force.y(), 1e3 * force.z());
@@ -72,7 +72,7 @@ void beating_vessel(const examples::Specimen& specimen) {
         vessel.tree.refit(vessel.x);
         const auto contact = vessel.tracker.update(vessel.tree, vessel.x, tool, body);
         const auto report =
-            vessel.solver.step(vessel.x, dt, vessel.network, on(body, vessel.backing), press(tool, contact));
+            vessel.solver.step(vessel.x, dt, vessel.network, on(body, vessel.foundation), press(tool, contact));
         vessel.tree.refit(vessel.x, report.moved);
         if (tick % 50 != 0) continue;
         std::printf("%10.2f %17.2f %12.2f %12.1f\n", dt * tick, 1e3 * swollen * specimen.size, 1e3 * contact.depth,

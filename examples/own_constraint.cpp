@@ -18,7 +18,7 @@ struct Suction {
 
     using Context = membrane::ConstraintContext<double>;
 
-    bool sound() const noexcept { return membrane::is_finite(force); }
+    bool valid() const noexcept { return membrane::is_finite(force); }
     void begin(Context& context) const noexcept {
         for (const membrane::Index v : vertices) {
             if (!context.check(v)) return;
@@ -36,7 +36,8 @@ int main(int argc, char** argv) {
     const double dt = 1e-3, mouth = 0.3 * specimen.size, pressure = 500;  // [s], [m], [Pa]
     const auto mesh = membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles);
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
-    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
+    const auto foundation =
+        membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto x = mesh.positions();
 
@@ -49,7 +50,7 @@ int main(int argc, char** argv) {
     for (int tick = 1; tick <= 400; ++tick) {
         const double now = pressure * std::min(tick / 200.0, 1.0);
         const Eigen::Vector3d force = now * area / static_cast<double>(below.size()) * specimen.outward;
-        const auto report = solver.step(x, dt, network, backing, Suction{below, force});
+        const auto report = solver.step(x, dt, network, foundation, Suction{below, force});
         if (tick % 50 != 0) continue;
         const double height = (x.col(specimen.vertex) - specimen.above(0)).dot(specimen.outward);
         std::printf("%8.2f %15.0f %13.3f %23.2f\n", tick * dt, now, 1e3 * height, 1e3 * report.reactions[0].norm());

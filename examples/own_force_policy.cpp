@@ -32,18 +32,19 @@ void play(const examples::Specimen& specimen, std::vector<membrane::Waypoint<dou
     const double dt = 1e-3;  // [s]
     const auto mesh = membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles);
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
-    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
+    const auto foundation =
+        membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
-    membrane::NullDevice<double> device(std::move(script), {.tick = dt, .radius = specimen.tool_radius()});
+    membrane::ScriptedDevice<double> device(std::move(script), {.tick = dt, .radius = specimen.tool_radius()});
     auto x = mesh.positions();
 
     std::printf("time [s]   depth [mm]   reaction [mN]   hand feels [N]\n");
     for (int tick = 0; device.running(); ++tick) {
         const auto tool = device.read();
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
         device.write(feel({tool, contact, report}));
         if (tick % 50 != 0) continue;

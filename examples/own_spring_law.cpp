@@ -30,12 +30,12 @@ double holding_force(const examples::Specimen& specimen, const Law& law, double 
     const auto network =
         membrane::MassSpringNetwork(mesh, law, {.stiffness = 40.0, .pinned = specimen.rim()});  // [N/m]
     auto solver =
-        membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = 100, .negligible_force = 1e-6});
+        membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = 100, .force_tolerance = 1e-6});
     auto x = mesh.positions();
     for (int tick = 0; tick < 1000; ++tick) {
         const Eigen::Vector3d target = specimen.above(0) + height * specimen.outward;
         const auto report =
-            solver.step(x, 1e-3, network, membrane::NoVolumeSprings{}, membrane::pull(specimen.vertex, target));
+            solver.step(x, 1e-3, network, membrane::NoFoundation{}, membrane::pull(specimen.vertex, target));
         if (report.converged) return report.reactions[0].norm();
     }
     std::fprintf(stderr, "not at rest after 1000 ticks\n");

@@ -20,7 +20,8 @@
 using namespace examples;
 
 template <class Volume>
-Record run(const Scene& scene, const Volume& backing, const Motion& motion, const Settings& settings, Series series) {
+Record run(const Scene& scene, const Volume& foundation, const Motion& motion, const Settings& settings,
+           Series series) {
     const double dt = 1e-3;  // [s]
     const auto network = membrane::MassSpringNetwork(scene.mesh, membrane::LinearSpring{},
                                                      {.stiffness = scene.stiffness, .pinned = scene.pinned});
@@ -30,7 +31,7 @@ Record run(const Scene& scene, const Volume& backing, const Motion& motion, cons
     auto tracker = membrane::ContactTracker(scene.mesh);
     auto grasper = membrane::Grasper(scene.mesh);
     auto normals = membrane::VertexNormals(scene.mesh);
-    membrane::NullDevice<double> device(motion.script, {.tick = dt, .radius = scene.tool_radius});
+    membrane::ScriptedDevice<double> device(motion.script, {.tick = dt, .radius = scene.tool_radius});
     auto x = scene.mesh.positions();  // 3 x V [m]
     Record record{.phases = motion.phases};
     while (device.running()) {
@@ -39,7 +40,7 @@ Record run(const Scene& scene, const Volume& backing, const Motion& motion, cons
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
         watch.lap();
-        const auto report = solver.step(x, dt, network, backing, press(tool, contact, grasp), pull(tool, grasp));
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact, grasp), pull(tool, grasp));
         watch.lap();
         tree.refit(x, report.moved);
         watch.lap();
@@ -47,16 +48,17 @@ Record run(const Scene& scene, const Volume& backing, const Motion& motion, cons
         watch.lap();
         device.write(feel({tool, contact, report, grasp}));
         watch.lap();
-        const Vector3d way = tool.position + grasp.offset - grasp.origin;  // of what is held
+        const Vector3d displacement = tool.position + grasp.offset - grasp.origin;  // of what is held
         record.add({.tool = tool,
                     .depth = contact.depth,
-                    .pulled = grasp.holding() ? way.norm() : 0,
+                    .pulled = grasp.holding() ? displacement.norm() : 0,
                     .felt = device.force(),
                     .reaction = report.reactions[0] + report.reactions[1],
-                    .at_work = report.visits > 0,
+                    .at_work = report.vertex_updates > 0,
                     .seconds = watch.seconds()},
                    x);
-        if (series.due(tool.time)) series.add(tool.time, surface_state(scene.mesh, x, network, backing), scene.origin);
+        if (series.due(tool.time))
+            series.add(tool.time, surface_state(scene.mesh, x, network, foundation), scene.origin);
     }
     return record;
 }
@@ -67,12 +69,12 @@ Outcome run_both(const Scene& scene, const Settings& settings) {
         return Series(settings.series, scene.key + name, scene.mesh.triangles(), 0.02);
     };
     std::cout << scene.name << ": with volume springs ..." << std::flush;
-    const auto backing = membrane::VirtualVolumeSprings(
+    const auto foundation = membrane::VirtualVolumeSprings(
         scene.mesh, {.stiffness = scene.backing_stiffness, .damping = scene.backing_damping});
-    auto with = run(scene, backing, motion(scene, joined(press, pull), settings.pace), settings, series(""));
+    auto with = run(scene, foundation, motion(scene, joined(press, pull), settings.pace), settings, series(""));
 
     std::cout << " without ..." << std::flush;  // and the pull from rest: it does not come back from the press
-    const membrane::NoVolumeSprings none;
+    const membrane::NoFoundation none;
     auto pressed = run(scene, none, motion(scene, press, settings.pace), settings, series("_without_pressed"));
     auto pulled = run(scene, none, motion(scene, pull, settings.pace, pressed.phases.back().end), settings,
                       series("_without_pulled"));

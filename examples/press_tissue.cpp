@@ -9,14 +9,14 @@
 #include <string>
 
 #include <membrane/membrane.hpp>
-#include <membrane/mesh/distmesh.hpp>
-#include <membrane/network/calibration.hpp>
-#include <membrane/network/foundation_springs.hpp>
+#include <membrane/meshing/distmesh.hpp>
+#include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/spring_stiffness.hpp>
 // [tissue]
-#include <membrane/network/bending.hpp>
-#include <membrane/network/pressure.hpp>
-#include <membrane/network/tissue.hpp>
-#include <membrane/network/triangular_springs.hpp>
+#include <membrane/model/bending.hpp>
+#include <membrane/model/pressure.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
 // [/tissue]
 
 #include "support/figure.hpp"
@@ -30,9 +30,9 @@ struct Scene {
     std::string name;
     Specimen body;
     Material material;
-    double rigidity, stretch, pressure;  // [N m]; how far the tissue is stretched at rest; in the eye [Pa]
-    membrane::Foundation foundation;     // what the tissue lies on
-    double radius, depth;                // of the press [m]
+    double rigidity, stretch, pressure;    // [N m]; how far the tissue is stretched at rest; in the eye [Pa]
+    membrane::FoundationLayer foundation;  // what the tissue lies on
+    double radius, depth;                  // of the press [m]
 };
 
 Figure press(const Scene& scene) {
@@ -46,7 +46,7 @@ Figure press(const Scene& scene) {
     const auto loads = membrane::balancing_loads(mesh, membrane::Tissue(none, sheet, pressure));
     const auto tissue = membrane::Tissue(none, sheet, bending, pressure, loads);
     // [/tissue]
-    const auto backing =
+    const auto foundation =
         membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, scene.foundation),
                                            .tangential = membrane::tangential_stiffnesses(mesh, scene.foundation),
                                            .recovery_time = 0.05});
@@ -54,17 +54,17 @@ Figure press(const Scene& scene) {
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
     auto x = mesh.positions();
-    const Eigen::Vector3d top = scene.body.above(0), way = scene.body.outward;
-    membrane::NullDevice<double> device({{0.0, top + 2 * scene.radius * way},
-                                         {0.1, top + (scene.radius - scene.depth) * way},
-                                         {0.25, top + (scene.radius - scene.depth) * way}},
-                                        {.radius = scene.radius});
+    const Eigen::Vector3d top = scene.body.above(0), displacement = scene.body.outward;
+    membrane::ScriptedDevice<double> device({{0.0, top + 2 * scene.radius * displacement},
+                                             {0.1, top + (scene.radius - scene.depth) * displacement},
+                                             {0.25, top + (scene.radius - scene.depth) * displacement}},
+                                            {.radius = scene.radius});
     membrane::Tool<double> tool;
     Eigen::Vector3d force = Eigen::Vector3d::Zero();
     while (device.running()) {
         tool = device.read();
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, 1e-3, tissue, backing, membrane::press(tool, contact));
+        const auto report = solver.step(x, 1e-3, tissue, foundation, membrane::press(tool, contact));
         tree.refit(x, report.moved);
         force = report.total_reaction();
         device.write(force);
@@ -85,8 +85,8 @@ int main(int argc, char** argv) {
         const auto lens = distmesh(Ellipsoid{.radii = {4.5e-3, 4.5e-3, 2e-3}}, {.edge_length = 0.3e-3});
         const auto front = trimmed(Ball{.radius = 7.8e-3}, HalfSpace{.point = {0, 0, 5.2e-3}, .normal = {0, 0, -1}});
         const Material thin = materials::lens_capsule().typical, thick = materials::cornea().typical;
-        const Foundation fibres{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
-        const Foundation aqueous{.young_modulus = 10, .poisson_ratio = 0.3, .thickness = 1e-3};  // next to nothing
+        const FoundationLayer fibres{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
+        const FoundationLayer aqueous{.young_modulus = 10, .poisson_ratio = 0.3, .thickness = 1e-3};  // next to nothing
         const Specimen body = mesh.specimen(lens);
         std::filesystem::create_directories(folder);
         const auto show = [&](const Scene& s) { save(folder / ("tissue_" + s.name + ".svg"), drawn(press(s))); };

@@ -40,7 +40,7 @@ membrane::Tool<double> tool_at(double now, const Specimen& body) {
 Felt slide(const Specimen& body) {
     const auto mesh = membrane::TriangleMesh(body.surface.points, body.surface.triangles);
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
-    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
     const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};
     const auto smooth = membrane::SmoothContact(mesh);
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
@@ -51,7 +51,7 @@ Felt slide(const Specimen& body) {
     for (double now = 0; now < press_for + slide_for; now += tick) {
         const auto tool = tool_at(now, body);
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, tick, network, backing, press(tool, contact));
+        const auto report = solver.step(x, tick, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
         if (now < press_for) continue;
         felt.flat.push_back(feel({tool, contact, report}));

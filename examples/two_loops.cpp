@@ -40,7 +40,8 @@ struct Loops {
 
 void touch(const membrane::TriangleMesh<double>& mesh, double dt, Loops& loops) {
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
-    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
+    const auto foundation =
+        membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
@@ -55,7 +56,7 @@ void touch(const membrane::TriangleMesh<double>& mesh, double dt, Loops& loops) 
         tool.position = hand.position();
         tool.velocity = hand.velocity();
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
         hand.move(report.total_reaction(), dt);
         loops.moved.publish(report.moved, x, now());
@@ -66,7 +67,8 @@ void touch(const membrane::TriangleMesh<double>& mesh, double dt, Loops& loops) 
 
 void run(const examples::Specimen& body, double seconds, double rate, double frame = 1 / 60.0) {
     const auto mesh = membrane::TriangleMesh(body.surface.points, body.surface.triangles);
-    membrane::NullDevice<double> mouse({{0, body.above(0.3)}, {seconds, body.above(0)}}, {frame, body.tool_radius()});
+    membrane::ScriptedDevice<double> mouse({{0, body.above(0.3)}, {seconds, body.above(0)}},
+                                           {frame, body.tool_radius()});
     Loops loops{membrane::MovedPoints<double>(mesh.vertex_count())};
     loops.wanted.publish(mouse.read(), now());
     loops.ticks.reserve(static_cast<std::size_t>(2 * seconds * rate));

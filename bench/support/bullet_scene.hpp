@@ -9,7 +9,7 @@
 namespace bench {
 
 /// Bullet's body, and the tool as a rigid body that goes its way whatever it meets: 4 position iterations a tick, contact,
-/// normals, Bullet's own shape matching for a backing.
+/// normals, Bullet's own shape matching for a foundation.
 ///
 ///     BulletScene scene(642, 2e-3);
 ///     scene.frame(tool.position);                                                                       // each tick

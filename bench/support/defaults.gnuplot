@@ -27,7 +27,7 @@ percent(i) = column(word(errors, i))
 set ylabel 'error of the force [%]'
 set key at graph 1, 1 right top opaque reverse Left samplen 1.2 font ',12'
 do for [k = 1:3] {
-    option = word('layers sweeps contact_visits', k)
+    option = word('layers sweeps contact_iterations', k)
     default = int(word('6 2 3', k))
     file = sprintf('defaults_%s.tsv', option)
     at_default = sprintf("< awk -F'\\t' 'NR == 1 || $1 == %d' %s", default, file)

@@ -33,7 +33,7 @@ using Points = membrane::Points<double>;
 
 inline constexpr double radius = 0.01;      // of the sphere [m]
 inline constexpr double stiffness = 40;     // of its springs [N/m]
-inline constexpr double backing = 8;        // stiffness of the volume springs [N/m]
+inline constexpr double foundation = 8;     // stiffness of the volume springs [N/m]
 inline constexpr double depth = 1e-3;       // of the tool's press [m]
 inline constexpr double tick = 1e-3;        // [s]
 inline constexpr Index ticks_around = 600;  // that the tool takes to come round
@@ -107,10 +107,10 @@ enum class Stage { contact, solve, refit, normals, force };
 /// The loop of the README, its stages one by one, with a tool that goes a way like `Path`.
 template <membrane::Real Scalar, class Rule = membrane::BlockStep, class Way = Path>
 struct LoopOf {
-    explicit LoopOf(std::int64_t vertices, const Way& way = {},
+    explicit LoopOf(std::int64_t vertices, const Way& displacement = {},
                     const membrane::SolverOptions<Scalar>& options = usual(),
                     Index ticks = Way::ticks_in + ticks_around)
-        : path(way), mesh(sphere_of<Scalar>(vertices)), solver(network, options) {
+        : path(displacement), mesh(sphere_of<Scalar>(vertices)), solver(network, options) {
         while (now < ticks) frame();
     }
 
@@ -142,7 +142,7 @@ struct LoopOf {
     Index now = 0;  // ticks
     membrane::TriangleMesh<Scalar> mesh;
     membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network{mesh, {}, {.stiffness = Scalar(stiffness)}};
-    membrane::VirtualVolumeSprings<Scalar> volume{mesh, {.stiffness = Scalar(backing), .damping = Scalar(0.02)}};
+    membrane::VirtualVolumeSprings<Scalar> volume{mesh, {.stiffness = Scalar(foundation), .damping = Scalar(0.02)}};
     membrane::QuasiStaticSolver<Scalar, Rule> solver;
     membrane::AabbTree<Scalar> tree{mesh};
     membrane::ContactTracker<Scalar> tracker{mesh};

@@ -46,8 +46,8 @@ struct Slide {
     /// The middle of the tool, from -1, where it begins to press [m].
     [[nodiscard]] Vector3 position(Index t) const {
         const double pressed = depth * std::min(t + 1, ticks_in) / ticks_in;
-        const double way = std::max(t - ticks_in + 1, 0) * speed * tick / radius;
-        return (radius + tool_radius - pressed) * (std::cos(way) * start() + std::sin(way) * along());
+        const double displacement = std::max(t - ticks_in + 1, 0) * speed * tick / radius;
+        return (radius + tool_radius - pressed) * (std::cos(displacement) * start() + std::sin(displacement) * along());
     }
 };
 

@@ -61,8 +61,9 @@ class SparseNewton {
     void step(Points& x) {
         assemble(x);
         factors_.factorize(matrix_);
-        const Eigen::VectorXd way = factors_.solve(force_);
-        for (std::size_t i = 0; i < moving_.size(); ++i) x.col(moving_[i]) += way.segment<3>(3 * static_cast<Index>(i));
+        const Eigen::VectorXd displacement = factors_.solve(force_);
+        for (std::size_t i = 0; i < moving_.size(); ++i)
+            x.col(moving_[i]) += displacement.segment<3>(3 * static_cast<Index>(i));
     }
 
   private:

@@ -24,7 +24,7 @@ using membrane::Real;
 
 inline constexpr double wide_tool = 3e-3, deep = 1.5e-3;  // radius and depth [m]
 
-/// A scene by its name, `slide`, `put_down` or `draw_out`, on so many vertices, its backing a part of the springs.
+/// A scene by its name, `slide`, `put_down` or `draw_out`, on so many vertices, its foundation a part of the springs.
 struct Place {
     std::string scene;
     int vertices;
@@ -45,9 +45,9 @@ struct Place {
     const Vector3 along = membrane::cross<double>(start, across);
     std::vector<membrane::Tool<double>> tools;
     for (Index t = 1; t <= ticks_in + ticks_along; ++t) {
-        const double way = speed * tick * std::max(t - ticks_in, 0) / radius;
+        const double displacement = speed * tick * std::max(t - ticks_in, 0) / radius;
         const double from_centre = radius + wide_tool - deep * std::min(t, ticks_in) / ticks_in;
-        tools.push_back(wide_tool_at(from_centre * (std::cos(way) * start + std::sin(way) * along)));
+        tools.push_back(wide_tool_at(from_centre * (std::cos(displacement) * start + std::sin(displacement) * along)));
     }
     return tools;
 }
@@ -72,8 +72,8 @@ struct Place {
     std::vector<membrane::Tool<double>> tools;
     for (Index t = 1; t <= ticks_out + ticks_along; ++t) {
         const double from_centre = radius + out * std::min(t, ticks_out) / ticks_out;
-        const double way = speed * tick * std::max(t - ticks_out, 0);
-        tools.push_back({.position = from_centre * start + way * along, .radius = tip, .grasping = true});
+        const double displacement = speed * tick * std::max(t - ticks_out, 0);
+        tools.push_back({.position = from_centre * start + displacement * along, .radius = tip, .grasping = true});
     }
     return tools;
 }
@@ -105,15 +105,16 @@ struct StrokeScene {
 };
 
 /// The equilibria of every sixth tick: of those down, the last ones. Found once.
-[[nodiscard]] inline const std::vector<membrane::TickAtRest>& rests_of(const Place& place) {
-    static std::map<Place, std::vector<membrane::TickAtRest>> known;
-    auto& rests = known[place];
-    if (!rests.empty()) return rests;
+[[nodiscard]] inline const std::vector<membrane::ReferenceTick>& rests_of(const Place& place) {
+    static std::map<Place, std::vector<membrane::ReferenceTick>> known;
+    auto& references = known[place];
+    if (!references.empty()) return references;
     const StrokeScene<double> scene(place);
     constexpr Index every = 6;
-    rests = equilibria(scene.mesh, scene.network, scene.volume, scene.stroke, every);
-    require(rests.size() == static_cast<std::size_t>(scene.stroke.ticks() / every), "all ticks have an equilibrium");
-    return rests;
+    references = equilibria(scene.mesh, scene.network, scene.volume, scene.stroke, every);
+    require(references.size() == static_cast<std::size_t>(scene.stroke.ticks() / every),
+            "all ticks have an equilibrium");
+    return references;
 }
 
 template <Real Scalar, class Rule>

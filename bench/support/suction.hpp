@@ -9,16 +9,16 @@ namespace bench {
 
 /// A cup that sucks: the vertices under its mouth share a force along its axis. A constraint as a user writes one.
 ///
-///     const auto report = solver.step(x, dt, network, backing, Suction<double>{under, mouth, force});
+///     const auto report = solver.step(x, dt, network, foundation, Suction<double>{under, mouth, force});
 template <membrane::Real Scalar>
 struct Suction {
     std::span<const membrane::Index> vertices;  ///< under the mouth; of the caller
     membrane::Vector3<Scalar> mouth;            ///< its centre [m]
     membrane::Vector3<Scalar> force;            ///< of all of it [N]
 
-    [[nodiscard]] bool sound() const noexcept { return membrane::is_finite(mouth) && membrane::is_finite(force); }
-    [[nodiscard]] membrane::Lead<Scalar> lead() const noexcept {
-        return vertices.empty() ? membrane::Lead<Scalar>() : membrane::LeadPoint<Scalar>{mouth};
+    [[nodiscard]] bool valid() const noexcept { return membrane::is_finite(mouth) && membrane::is_finite(force); }
+    [[nodiscard]] membrane::DrivingInput<Scalar> driving_input() const noexcept {
+        return vertices.empty() ? membrane::DrivingInput<Scalar>() : membrane::InputSample<Scalar>{mouth};
     }
     void begin(membrane::ConstraintContext<Scalar>& context) const noexcept {
         for (const membrane::Index v : vertices) {

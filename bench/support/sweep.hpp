@@ -27,7 +27,7 @@ struct Field {
     explicit Field(std::int64_t vertices)
         : mesh(sphere_of<Scalar>(vertices)),
           network(mesh, {}, {.stiffness = Scalar(stiffness), .mass = Scalar(4e-4)}),
-          volume(mesh, {.stiffness = Scalar(backing)}),
+          volume(mesh, {.stiffness = Scalar(foundation)}),
           state(mesh.vertex_count(), 0) {
         std::mt19937_64 random(1);
         for (Index v = 0; v < x.cols(); ++v) {
@@ -51,7 +51,7 @@ inline void count_visits(benchmark::State& state) { state.counters["visits"] = s
 struct PlainMass {
     template <Real Scalar, class Springs>
     static Eigen::Matrix<Scalar, 3, 1> move(const Springs& springs, const Eigen::Matrix<Scalar, 3, 1>& from_anchor) {
-        Eigen::Matrix<Scalar, 3, 1> force = -Scalar(backing) * from_anchor;
+        Eigen::Matrix<Scalar, 3, 1> force = -Scalar(foundation) * from_anchor;
         springs([&](const auto& reach, Scalar stiffness, Scalar rest_length) {
             const Scalar length = reach.norm();
             force += stiffness * (length - rest_length) / length * reach;
@@ -65,9 +65,9 @@ struct PlainNewton {
     template <Real Scalar, class Springs>
     static Eigen::Matrix<Scalar, 3, 1> move(const Springs& springs, const Eigen::Matrix<Scalar, 3, 1>& from_anchor) {
         using Matrix3 = Eigen::Matrix<Scalar, 3, 3>;
-        Eigen::Matrix<Scalar, 3, 1> force = -Scalar(backing) * from_anchor;
+        Eigen::Matrix<Scalar, 3, 1> force = -Scalar(foundation) * from_anchor;
         Matrix3 dyads = Matrix3::Zero();
-        Scalar sum = Scalar(backing), trace = 0, size = std::numeric_limits<Scalar>::max();
+        Scalar sum = Scalar(foundation), trace = 0, size = std::numeric_limits<Scalar>::max();
         springs([&](const auto& reach, Scalar stiffness, Scalar rest_length) {
             const Scalar length = reach.norm();
             const Eigen::Matrix<Scalar, 3, 1> direction = reach / length;
@@ -131,7 +131,7 @@ void packs(benchmark::State& state) {
     queue.build(field.network, std::span(&seed, 1), membrane::unlimited);
     queue.group(field.network);
     membrane::PackedVertices<Scalar> packed(field.network);
-    packed.assign(queue.vertices(), queue.group_ends(), field.network);
+    packed.assign(queue.vertices(), queue.colour_ends(), field.network);
     require(packed.size() == static_cast<std::size_t>(state.range(0)), "all vertices have room in the packs");
     packed.begin_step(scene);
     for (auto _ : state) {

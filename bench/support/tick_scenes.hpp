@@ -9,10 +9,10 @@
 
 #include <Eigen/Geometry>
 
-#include <membrane/network/bending.hpp>
-#include <membrane/network/moved_volume.hpp>
-#include <membrane/network/tissue.hpp>
-#include <membrane/network/triangular_springs.hpp>
+#include <membrane/model/bending.hpp>
+#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
 
 #include "slide.hpp"
 #include "suction.hpp"
@@ -32,7 +32,8 @@ using LinearNetwork = membrane::MassSpringNetwork<double, membrane::LinearSpring
 /// All parts of one membrane and the usual tool. Other scenes aim otherwise, or have a tick of their own.
 template <class Network = LinearNetwork, class Rule = membrane::BlockStep>
 struct Membrane {
-    Membrane(const Mesh& on, const Network& of, const Slide& way = {}) : slide(way), mesh(on), network(of) {}
+    Membrane(const Mesh& on, const Network& of, const Slide& displacement = {})
+        : slide(displacement), mesh(on), network(of) {}
 
     void aim(Index t) { tool = slide.at<double>(t); }
 
@@ -58,7 +59,7 @@ struct Membrane {
     Slide slide;
     Mesh mesh;
     Network network;
-    membrane::VirtualVolumeSprings<double> volume{mesh, {.stiffness = backing, .damping = 0.02}};
+    membrane::VirtualVolumeSprings<double> volume{mesh, {.stiffness = foundation, .damping = 0.02}};
     membrane::QuasiStaticSolver<double, Rule> solver{network, {.layers = 6, .sweeps = 2}};
     membrane::AabbTree<double> tree{mesh};
     membrane::ContactTracker<double> tracker{mesh};
@@ -221,19 +222,19 @@ struct Published : Membrane<LinearNetwork, membrane::MassStep> {
 struct Cup : SphereScene {
     using SphereScene::SphereScene;
 
-    static constexpr double cup_radius = 1e-3;                                              // [m]
-    static constexpr double most_force = 5e3 * std::numbers::pi * cup_radius * cup_radius;  // [N]
+    static constexpr double cup_radius = 1e-3;                                             // [m]
+    static constexpr double max_force = 5e3 * std::numbers::pi * cup_radius * cup_radius;  // [N]
 
     void aim(Index t) {
         SphereScene::aim(t);
         axis = tool.position.normalized();
         tool.position = radius * axis;
-        pull_of_cup = most_force * std::min(t + 1, Slide::ticks_in) / Slide::ticks_in * axis;
+        pull_of_cup = max_force * std::min(t + 1, Slide::ticks_in) / Slide::ticks_in * axis;
     }
 
     void frame() {
         under.clear();
-        tree.touching_sphere(x, tool.position, cup_radius, [&](Index f) {
+        tree.overlap_sphere(x, tool.position, cup_radius, [&](Index f) {
             for (const Index v : mesh.triangles().col(f)) under.insert(v);
         });
         finish(solver.step(x, tick, network, volume, Suction<double>{under.items(), tool.position, pull_of_cup}));

@@ -13,11 +13,11 @@ set key bottom left opaque reverse Left spacing 1.2 samplen 2
 set style data linespoints
 set pointsize 0.6
 
-# Columns of the file: scene, vertices, backing, scalar, rule, predicted, layers, sweeps, contact_visits, time, force_error,
+# Columns of the file: scene, vertices, foundation, scalar, rule, predicted, layers, sweeps, contact_iterations, time, force_error,
 # position_error, front.
 rows(what) = sprintf("< awk -F, '$1 == \"slide\" && %s' trade.csv", what)
 by_sweeps(what) = rows(what) . ' | sort -t , -k 8n'
-of(vertices, backing) = sprintf('$2 == %d && $3 == %g', vertices, backing)
+of(vertices, foundation) = sprintf('$2 == %d && $3 == %g', vertices, foundation)
 by(rule, predicted, visits) = \
     sprintf(' && $4 == "double" && $5 == "%s" && $6 == %d && $7 == 3 && $9 == %d', rule, predicted, visits)
 all_by(rule, predicted) = sprintf(' && $4 == "double" && $5 == "%s" && $6 == %d', rule, predicted)
@@ -43,7 +43,7 @@ do for [vertices in '162 642'] {
 set key bottom left opaque reverse Left spacing 1.2 samplen 2
 set xlabel 'time of a tick [µs]'
 set ylabel 'error of the force [%]'
-set title '642 vertices: fronts of the default by backing, in parts of the springs'
+set title '642 vertices: fronts of the default by foundation, in parts of the springs'
 plot for [i = 1:4] rows(of(642, real(word('0.01 0.1 1 10', i))) . all_by('block', 1)) using (1e6 * $10):(100 * $11) \
          with points pt 7 ps 0.2 lc rgb word('#c0392b #1a1a1a #2471a3 #1e8449', i) notitle, \
      for [i = 1:4] rows(of(642, real(word('0.01 0.1 1 10', i))) . front('double')) using (1e6 * $10):(100 * $11) \
@@ -52,7 +52,7 @@ plot for [i = 1:4] rows(of(642, real(word('0.01 0.1 1 10', i))) . all_by('block'
 set xrange [12:5000]
 set xtics nomirror (20, 50, 100, 200, 500, 1000, 2000, 5000)
 set ylabel ''
-set title 'backing 0.1: fronts of the default by vertices'
+set title 'foundation 0.1: fronts of the default by vertices'
 plot for [i = 1:3] rows(of(int(word('162 642 2562', i)), 0.1) . all_by('block', 1)) using (1e6 * $10):(100 * $11) \
          with points pt 7 ps 0.2 lc rgb word('#d68910 #1a1a1a #7d3c98', i) notitle, \
      for [i = 1:3] rows(of(int(word('162 642 2562', i)), 0.1) . front('double')) using (1e6 * $10):(100 * $11) \

@@ -44,7 +44,7 @@ class Ours {
     }
     [[nodiscard]] int touching(const Vector3& q, double reach) const {
         int count = 0;
-        tree_.touching_sphere(x_, q.cast<Scalar>(), static_cast<Scalar>(reach), [&](Index) { ++count; });
+        tree_.overlap_sphere(x_, q.cast<Scalar>(), static_cast<Scalar>(reach), [&](Index) { ++count; });
         return count;
     }
     [[nodiscard]] double first_hit(const Vector3& p, const Vector3& q) const {
@@ -113,9 +113,10 @@ class Embree {
     [[nodiscard]] double first_hit(const Vector3& p, const Vector3& q) const {
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
-        const Eigen::Vector3f from = p.cast<float>(), way = (q - p).cast<float>();
+        const Eigen::Vector3f from = p.cast<float>(), displacement = (q - p).cast<float>();
         RTCRayHit asked{};
-        asked.ray = {from.x(), from.y(), from.z(), 0, way.x(), way.y(), way.z(), 0, 1, ~0U, 0, 0};
+        asked.ray = {from.x(), from.y(), from.z(), 0, displacement.x(), displacement.y(), displacement.z(), 0,
+                     1,        ~0U,      0,        0};
         asked.hit.geomID = RTC_INVALID_GEOMETRY_ID;
         rtcIntersect1(scene_, &context, &asked);
         return asked.hit.geomID == RTC_INVALID_GEOMETRY_ID ? 2 : asked.ray.tfar;
@@ -244,7 +245,7 @@ class Fcl {
     [[nodiscard]] int touching(const Vector3& q, double reach) const {
         const fcl::Sphered ball(reach);
         fcl::CollisionResultd result;
-        fcl::collide(&ball, at(q), model_.get(), fcl::Transform3d::Identity(), fcl::CollisionRequestd(most_contacts),
+        fcl::collide(&ball, at(q), model_.get(), fcl::Transform3d::Identity(), fcl::CollisionRequestd(max_contacts),
                      result);
         return static_cast<int>(result.numContacts());
     }
@@ -260,7 +261,7 @@ class Fcl {
     using Model = fcl::BVHModel<fcl::OBBRSSd>;
 
     static constexpr double tiny = 1e-9;  // [m]
-    static constexpr std::size_t most_contacts = 1'000'000;
+    static constexpr std::size_t max_contacts = 1'000'000;
 
     static fcl::Transform3d at(const Vector3& q) { return fcl::Transform3d(fcl::Translation3d(q)); }
     void copy(const Points& x) {

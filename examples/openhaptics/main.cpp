@@ -18,7 +18,8 @@
 void press(const examples::Specimen& body, const std::string& name, double seconds) {
     const auto mesh = membrane::TriangleMesh(body.surface.points, body.surface.triangles);
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
-    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
+    const auto foundation =
+        membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
@@ -36,7 +37,7 @@ void press(const examples::Specimen& body, const std::string& name, double secon
         {.name = name, .scale = scale, .radius = body.tool_radius()});
     device.start([&](const membrane::Tool<double>& tool) {
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, 1e-3, network, backing, press(tool, contact));
+        const auto report = solver.step(x, 1e-3, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
         if (report.status == membrane::StepStatus::advanced) ++solves;
         return examples::Answer{feel({tool, contact, report}), solves};
@@ -48,7 +49,7 @@ void press(const examples::Specimen& body, const std::string& name, double secon
     device.stop();
     const auto& report = device.report();
     std::printf("%ld ticks, %ld late, the longest of %.2f ms; at most %.3f N\n", report.ticks, report.late,
-                1e3 * report.longest_tick, report.most_force);
+                1e3 * report.max_tick, report.max_force);
     std::printf("no force: %ld for errors (%s), %ld for what is not finite\n", report.errors, report.last_error,
                 report.refused);
     std::printf("less force: %ld fading, %ld above the peak, %ld for heat, %ld too fast\n", report.faded, report.peak,

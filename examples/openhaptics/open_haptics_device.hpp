@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-#include <membrane/collision/tool.hpp>
+#include <membrane/contact/tool.hpp>
 #include <membrane/haptics/device_profile.hpp>
 #include <membrane/haptics/force_limits.hpp>
 #include <membrane/haptics/units.hpp>
@@ -128,8 +128,8 @@ class OpenHapticsDevice {
 
 namespace detail {
 
-inline constexpr int most_errors = 100;  // on a stack; more are not worth waiting for
-inline constexpr int patience = 100;     // ticks that `stop` waits for the last one
+inline constexpr int max_errors = 100;  // on a stack; more are not worth waiting for
+inline constexpr int patience = 100;    // ticks that `stop` waits for the last one
 
 }  // namespace detail
 
@@ -189,7 +189,7 @@ void OpenHapticsDevice<Hd>::narrow(double peak, double continuous) {
     profile.continuous_force = std::min({profile.continuous_force, continuous, profile.peak_force});
     const auto& known = limiter_.device();
     if (profile.peak_force == known.peak_force && profile.continuous_force == known.continuous_force) {
-        limiter_.restart();
+        limiter_.reset();
     } else {
         limiter_ = membrane::ForceLimiter(profile, options_.limits);
     }
@@ -239,7 +239,7 @@ bool OpenHapticsDevice<Hd>::servo() noexcept {
     write(over ? Force::Zero() : force);
     Hd::end_frame(device_);
     look_for_errors();  // the next tick's force answers for these
-    report_.longest_tick = std::max(report_.longest_tick, Hd::seconds() - now);
+    report_.max_tick = std::max(report_.max_tick, Hd::seconds() - now);
     if (over) ended_ = true;
     return !over;
 }
@@ -247,7 +247,7 @@ bool OpenHapticsDevice<Hd>::servo() noexcept {
 template <class Hd>
 membrane::Tool<double> OpenHapticsDevice<Hd>::read(double now) noexcept {
     Tool tool = options_.scale.to_scene(Hd::position(), Hd::velocity());
-    if (options_.shaft > 0) tool.axis = options_.scale.device.direction_out(options_.shaft * Hd::stylus());
+    if (options_.shaft > 0) tool.axis = options_.scale.device.vector_to_world(options_.shaft * Hd::stylus());
     tool.radius = options_.radius;
     tool.time = now;
     tool.grasping = grasping_ = Hd::button(grasping_);
@@ -259,10 +259,10 @@ template <class Hd>
 typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::answer(const Tool& tool) noexcept {
     constexpr double none = std::numeric_limits<double>::quiet_NaN();  // the limiter starts softly after one
     Force force(none, none, none);
-    if (is_sound(tool)) {
+    if (is_valid(tool)) {
         try {
             const Answer given = tick_(tool);
-            force = options_.scale.to_device(membrane::Newtons(given.force)).on_hand.value();
+            force = options_.scale.to_device(membrane::Newtons(given.force)).device_force.value();
             solves_ = given.solves;
         } catch (...) {
             exception_ = std::current_exception();
@@ -283,7 +283,7 @@ void OpenHapticsDevice<Hd>::write(const Force& force) noexcept {
     if (look_for_errors()) {
         Hd::set_force(membrane::Newtons(Force::Zero()));
     } else {
-        report_.most_force = std::max(report_.most_force, membrane::norm<double>(force));
+        report_.max_force = std::max(report_.max_force, membrane::norm<double>(force));
     }
 }
 
@@ -291,7 +291,7 @@ void OpenHapticsDevice<Hd>::write(const Force& force) noexcept {
 template <class Hd>
 bool OpenHapticsDevice<Hd>::look_for_errors() noexcept {
     int found = 0;
-    for (; found < detail::most_errors; ++found) {
+    for (; found < detail::max_errors; ++found) {
         const unsigned error = Hd::take_error();
         if (error == 0) break;
         if (Hd::passes(error)) {
@@ -307,7 +307,7 @@ bool OpenHapticsDevice<Hd>::look_for_errors() noexcept {
 
 template <class Hd>
 void OpenHapticsDevice<Hd>::forget_errors() noexcept {
-    int left = detail::most_errors;
+    int left = detail::max_errors;
     while (left > 0 && Hd::take_error() != 0) --left;
 }
 

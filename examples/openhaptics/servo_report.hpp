@@ -11,10 +11,10 @@ namespace examples {
 struct ServoReport {
     long ticks = 0;
     long late = 0;                    ///< That came more than 2 ms after the one before.
-    double longest_interval = 0;      ///< From one to the next [s].
-    double longest_tick = 0;          ///< That one took [s].
+    double max_interval = 0;          ///< From one to the next [s].
+    double max_tick = 0;              ///< That one took [s].
     double hottest_motor = 0;         ///< As the device says: 0 is cold, 1 too hot.
-    double most_force = 0;            ///< That was written [N].
+    double max_force = 0;             ///< That was written [N].
     long errors = 0;                  ///< No force, for the device told of an error that passes,
     const char* last_error = "none";  ///< the last of these.
     long refused = 0;                 ///< No force, for tool or force was not finite.
@@ -26,12 +26,12 @@ struct ServoReport {
     /// A tick, `interval` after the one before [s]; none for the first.
     void begin_tick(double interval) noexcept {
         ++ticks;
-        longest_interval = std::max(longest_interval, interval);
+        max_interval = std::max(max_interval, interval);
         late += interval > 2e-3;
     }
 
     /// `held`: by an error that passes.
-    void count(const membrane::LimitsActed& acted, bool held) noexcept {
+    void count(const membrane::ActiveLimits& acted, bool held) noexcept {
         errors += held;
         refused += acted.fault && !held;
         faded += acted.faded;

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include <membrane/accuracy/fit.hpp>
+#include <membrane/calibration/fit.hpp>
 
 namespace examples {
 

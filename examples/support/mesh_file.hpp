@@ -11,7 +11,7 @@
 ///     const auto mesh = membrane::TriangleMesh(points, triangles);
 namespace examples {
 
-/// A surface as arrays: what a file holds, before anybody has looked whether it is sound.
+/// A surface as arrays: what a file holds, before anybody has looked whether it is valid.
 struct Surface {
     membrane::Points<double> points;  ///< 3 x V [m]
     membrane::Triangles triangles;

@@ -12,16 +12,16 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 #include "support/surface_state.hpp"
 
 /// Membranes for other programs: files of VTK for ParaView, a time series of them, and PLY for MeshLab. Numbers are
 /// written with as many digits as it takes to read the same ones.
 ///
-///     write_vtp("pressed.vtp", mesh.triangles(), surface_state(mesh, x, network, backing));
+///     write_vtp("pressed.vtp", mesh.triangles(), surface_state(mesh, x, network, foundation));
 ///     Series series("frames", "sphere", mesh.triangles(), 0.02);
-///     if (series.due(tool.time)) series.add(tool.time, surface_state(mesh, x, network, backing));  // in the loop
+///     if (series.due(tool.time)) series.add(tool.time, surface_state(mesh, x, network, foundation));  // in the loop
 namespace examples {
 
 namespace detail {

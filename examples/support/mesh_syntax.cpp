@@ -14,7 +14,7 @@ namespace examples {
 namespace {
 
 constexpr std::string_view blanks = " \t\v\f";
-constexpr std::int64_t most_vertices = std::numeric_limits<std::int32_t>::max();
+constexpr std::int64_t max_vertices = std::numeric_limits<std::int32_t>::max();
 
 bool digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -156,7 +156,7 @@ std::string checked_obj(const std::string& file, std::string_view bytes) {
             if (kind == "v") lines.check_number(i);
             if (kind == "v" && i > 3) continue;  // a weight or a colour
             const std::string_view corner = lines.word(i).substr(0, lines.word(i).find('/'));
-            if (kind == "f") static_cast<void>(lines.integer(corner, -vertices, most_vertices));
+            if (kind == "f") static_cast<void>(lines.integer(corner, -vertices, max_vertices));
             (result += ' ') += corner;
         }
     }
@@ -173,8 +173,8 @@ std::string checked_off(const std::string& file, std::string_view bytes) {
     if (same_line && lines.word(1) == "BINARY") lines.refuse("expected an OFF in ASCII, got BINARY");
     if (!same_line) lines.expect("the counts of vertices and faces");
     lines.check_size(same_line ? 4 : 3);
-    const auto vertices = lines.integer(same_line ? 1 : 0, 1, most_vertices);
-    const auto faces = lines.integer(same_line ? 2 : 1, 1, most_vertices);
+    const auto vertices = lines.integer(same_line ? 1 : 0, 1, max_vertices);
+    const auto faces = lines.integer(same_line ? 2 : 1, 1, max_vertices);
     std::string result = "OFF\n" + std::to_string(vertices) + ' ' + std::to_string(faces) + " 0\n";
     for (std::int64_t v = 0; v < vertices; ++v) {
         lines.expect("vertex ", v, " of ", vertices);
@@ -186,7 +186,7 @@ std::string checked_off(const std::string& file, std::string_view bytes) {
     }
     for (std::int64_t f = 0; f < faces; ++f) {
         lines.expect("face ", f, " of ", faces);
-        const auto corners = static_cast<std::size_t>(lines.integer(0, 3, most_vertices));
+        const auto corners = static_cast<std::size_t>(lines.integer(0, 3, max_vertices));
         if (lines.size() <= corners) lines.refuse("expected ", corners, " corners, got ", lines.size() - 1);
         const std::size_t begin = result.size();
         result += lines.word(0);

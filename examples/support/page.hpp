@@ -14,7 +14,7 @@ using Table = std::vector<std::vector<std::string>>;
 
 /// One HTML page that needs nothing beside it: drawings are inline.
 ///
-///     Page page("Press and pull");
+///     Page page("ToolContact and pull");
 ///     page.heading("Sphere, 642 vertices");
 ///     page.figure(svg.str(), "Figure 4. At rest, pressed, pulled.");
 ///     std::ofstream("index.html") << page.str();

@@ -12,11 +12,11 @@
 
 #include <Eigen/Core>
 
-#include <membrane/collision/tool.hpp>
-#include <membrane/mesh/adjacency.hpp>
-#include <membrane/mesh/normals.hpp>
-#include <membrane/mesh/triangle.hpp>
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/contact/tool.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/normals.hpp>
+#include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 #include "support/camera.hpp"
 #include "support/colours.hpp"

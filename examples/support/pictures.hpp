@@ -77,7 +77,7 @@ inline std::string after_figure(const std::string& number) {
     for (const Record* record : {&without, &with}) {
         for (const Step step : {recover, recover_again}) {
             Panel panel{step == recover ? "After the press, " : "After the pull, ",
-                        power_of_ten(off_shape(scene, *record, step)) + " of the radius off its shape",
+                        power_of_ten(shape_error(scene, *record, step)) + " of the radius off its shape",
                         detail::picture(scene, record->snapshots[step])};
             panel.title += record == &with ? "with volume springs" : "without volume springs";
             panel.picture.tool.reset();

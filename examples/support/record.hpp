@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/collision/tool.hpp>
+#include <membrane/contact/tool.hpp>
 #include <membrane/core/types.hpp>
 
 #include "support/camera.hpp"

@@ -53,12 +53,12 @@ template <class Value>
 
 /// What the hand did and felt in two runs: its way from the first tool on, the force, and how far the forces are apart.
 [[nodiscard]] inline Plot plot_of(const membrane::Recording<double>& first, const membrane::Recording<double>& second) {
-    PlotPanel way{"way [mm]", {}}, force{"force [N]", {}};
+    PlotPanel displacement{"way [mm]", {}}, force{"force [N]", {}};
     const auto add = [&](const auto& ticks, const Curve& curve) {
         const auto millimetres = [&](std::size_t i) {
             return 1e3 * (ticks[i].tool.position - ticks[0].tool.position).norm();
         };
-        way.curves.push_back(detail::traced(curve, ticks.size(), millimetres));
+        displacement.curves.push_back(detail::traced(curve, ticks.size(), millimetres));
         force.curves.push_back(detail::traced(curve, ticks.size(), [&](auto i) { return ticks[i].force.norm(); }));
     };
     add(first.ticks, {.name = "first", .colour = "#7fb3d5"});
@@ -69,7 +69,7 @@ template <class Value>
     });
     return {.title = "Two traces",
             .phases = {{"", 0, static_cast<double>((std::max)(most, std::size_t{2}) - 1)}},
-            .panels = {std::move(way), std::move(force), {"apart [N]", {apart}}},
+            .panels = {std::move(displacement), std::move(force), {"apart [N]", {apart}}},
             .axis = "tick"};
 }
 

@@ -56,7 +56,7 @@ struct Speed {
 }
 
 /// How far the membrane is from its shape at the end of `step`, as a part of its radius; rigid drift removed.
-[[nodiscard]] inline double off_shape(const Scene& scene, const Record& record, Step step) {
+[[nodiscard]] inline double shape_error(const Scene& scene, const Record& record, Step step) {
     return distance_from_shape(record.snapshots[step].points, scene.mesh.positions()) / scene.radius;
 }
 
@@ -105,8 +105,8 @@ struct Speed {
         for (const Record* record : {&with, &without}) {
             table.push_back({scene.name, record == &with ? "with" : "without", significant(peak(*record, &Frame::felt)),
                              significant(peak(*record, &Frame::reaction)),
-                             exponential(off_shape(scene, *record, recover)),
-                             exponential(off_shape(scene, *record, recover_again))});
+                             exponential(shape_error(scene, *record, recover)),
+                             exponential(shape_error(scene, *record, recover_again))});
         }
     }
     return table;
@@ -160,8 +160,8 @@ inline void print(std::ostream& out, const Table& table, const std::string& note
             one[record == &with ? "with_volume_springs" : "without_volume_springs"] = {
                 {"peak_force_felt_N", peak(*record, &Frame::felt)},
                 {"peak_reaction_N", peak(*record, &Frame::reaction)},
-                {"off_shape_after_press_radius", off_shape(scene, *record, recover)},
-                {"off_shape_after_pull_radius", off_shape(scene, *record, recover_again)}};
+                {"off_shape_after_press_radius", shape_error(scene, *record, recover)},
+                {"off_shape_after_pull_radius", shape_error(scene, *record, recover_again)}};
         }
         all["scenes"].push_back(one);
     }

@@ -12,8 +12,8 @@
 #include <Eigen/LU>
 
 #include <membrane/haptics/device.hpp>
-#include <membrane/mesh/adjacency.hpp>
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/camera.hpp"
 #include "support/plot.hpp"

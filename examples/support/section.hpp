@@ -6,7 +6,7 @@
 
 #include <Eigen/Geometry>
 
-#include <membrane/mesh/triangle.hpp>
+#include <membrane/surface/triangle.hpp>
 
 #include "support/camera.hpp"
 #include "support/picture.hpp"

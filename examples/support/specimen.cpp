@@ -7,10 +7,10 @@
 #include <map>
 #include <utility>
 
-#include <membrane/mesh/adjacency.hpp>
-#include <membrane/mesh/normals.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/mesh/surface_facts.hpp>
+#include <membrane/mesh_check/surface_facts.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/normals.hpp>
+#include <membrane/surface/shapes.hpp>
 
 namespace examples {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 #include "support/command_line.hpp"
 #include "support/mesh_file.hpp"

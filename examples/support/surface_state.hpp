@@ -4,8 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
-#include <membrane/mesh/triangle.hpp>
-#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/surface/triangle.hpp>
 
 /// What there is to see on a membrane at one time.
 namespace examples {
@@ -34,7 +34,7 @@ template <class Network, class Volume>
     }
     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) {
         const membrane::Vector3<double> here = x.col(v);
-        state.force.col(v) = -network.pull(v, x).force - volume.pull(v, here, here, 1.0).force;
+        state.force.col(v) = -network.force_on(v, x).force - volume.force_on(v, here, here, 1.0).force;
         double sum = 0;
         network.for_each_pull(v, x, [&](const auto& spring) { sum += spring.tension * spring.length; });
         state.tension[v] = area[v] > 0 ? sum / (4 * area[v]) : 0;

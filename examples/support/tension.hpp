@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <string>
 
-#include <membrane/network/elements.hpp>
+#include <membrane/model/elements.hpp>
 
 #include "support/figure.hpp"
 

@@ -12,26 +12,26 @@
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/core/version.hpp>
 
-#include <membrane/mesh/triangle.hpp>
-#include <membrane/mesh/triangle_mesh.hpp>
-#include <membrane/mesh/adjacency.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/mesh/reordered.hpp>
-#include <membrane/mesh/normals.hpp>
+#include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/shapes.hpp>
+#include <membrane/surface/reordered.hpp>
+#include <membrane/surface/normals.hpp>
 
-#include <membrane/network/spring_law.hpp>
-#include <membrane/network/mass_spring_network.hpp>
-#include <membrane/network/volume_springs.hpp>
+#include <membrane/model/spring_law.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/model/volume_springs.hpp>
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/tool.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/collision/grasper.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/tool.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/grasper.hpp>
 
 #include <membrane/solve/propagation_queue.hpp>
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/constraints.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/solve/tool_contact.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
 #include <membrane/haptics/force_policy.hpp>

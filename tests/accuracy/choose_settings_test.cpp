@@ -11,7 +11,7 @@
 #include <tuple>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -41,10 +41,10 @@ struct CountedSpring {
     }
 };
 
-struct CountedPress : Press<double> {
+struct CountedPress : ToolContact<double> {
     bool enforce(ConstraintContext<double>& context) const noexcept {
         WorkClock::add(3e-6);
-        return Press<double>::enforce(context);
+        return ToolContact<double>::enforce(context);
     }
 };
 
@@ -80,10 +80,10 @@ TriangleMesh<double> random_mesh(Random& random) {
 /// A membrane, and how a tool is used on it.
 struct Scene {
     explicit Scene(Random& random) : mesh(random_mesh(random)) {
-        backing = VirtualVolumeSprings(mesh, {.stiffness = stiffness * std::pow(10, random.number(-2.0, 1.0))});
+        foundation = VirtualVolumeSprings(mesh, {.stiffness = stiffness * std::pow(10, random.number(-2.0, 1.0))});
         tool_radius = radius * random.number(0.15, 0.4);
         depth = radius * random.number(0.05, 0.15);
-        way = 1e-3 * random.number(0.05, 0.2);
+        displacement = 1e-3 * random.number(0.05, 0.2);
     }
 
     /// Presses here and there, each with a slide; between them the tool goes around the membrane.
@@ -92,7 +92,7 @@ struct Scene {
         std::vector<Tool<double>> tools;
         const auto go = [&](const Point& to) { tools.push_back({.position = to, .radius = tool_radius}); };
         for (int i = 0; i < presses; ++i) {
-            const auto [place, normal, along] = place_on(random, 1.2 * ticks_along * way);
+            const auto [place, normal, along] = place_on(random, 1.2 * ticks_along * displacement);
             const Point above = 3 * radius * place.normalized();
             if (!tools.empty()) {
                 const Point from = tools.back().position;
@@ -102,7 +102,7 @@ struct Scene {
                 }
             }
             go(above);
-            const double deep = depth * random.number(0.8, 1.2), step = way * random.number(0.8, 1.2);
+            const double deep = depth * random.number(0.8, 1.2), step = displacement * random.number(0.8, 1.2);
             double height = tool_radius - step * random.number();
             for (; height > tool_radius - deep; height -= step) go(place + height * normal);
             for (int t = 1; t <= ticks_along; ++t) go(place + height * normal + step * t * along);
@@ -115,9 +115,9 @@ struct Scene {
 
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, CountedSpring> network{mesh, {}, {.stiffness = stiffness, .pinned = border(mesh)}};
-    VirtualVolumeSprings<double> backing{mesh, {.stiffness = stiffness}};
+    VirtualVolumeSprings<double> foundation{mesh, {.stiffness = stiffness}};
     double tool_radius, depth;  // [m]
-    double way;                 // in a tick [m]
+    double displacement;        // in a tick [m]
 
   private:
     struct Place {
@@ -142,11 +142,12 @@ struct Scene {
 struct Judge {
     const Scene& scene;
     CountedStroke stroke;
-    std::vector<TickAtRest> rests = equilibria(scene.mesh, scene.network, scene.backing, stroke, every);
+    std::vector<ReferenceTick> references = equilibria(scene.mesh, scene.network, scene.foundation, stroke, every);
 
     static constexpr Index every = 2;  // most of the error is in few ticks, where the tool sets on or turns
     Outcome operator()(const SolverOptions<double>& options) const {
-        return trial(scene.mesh, scene.network, scene.backing, stroke, rests, options, BlockStep{}, WorkClock{});
+        return trial(scene.mesh, scene.network, scene.foundation, stroke, references, options, BlockStep{},
+                     WorkClock{});
     }
 
     /// Whether any setting of the experiment takes less than `time` and is off by no more than `error`: all are tried
@@ -162,19 +163,19 @@ struct Judge {
     /// Whether any setting with the most sweeps of all is off by no more than `error`.
     bool any_with_most_sweeps(double error) const {
         return any([&](const SolverOptions<double>& setting, bool&) {
-            return setting.sweeps == ExperimentOptions<double>{}.sweeps.back() && (*this)(setting).force_error <= error;
+            return setting.sweeps == GridSearchOptions<double>{}.sweeps.back() && (*this)(setting).force_error <= error;
         });
     }
 
   private:
     template <class Found>
     bool any(Found found) const {
-        const ExperimentOptions<double> all;
+        const GridSearchOptions<double> all;
         for (const Index layers : all.layers) {
-            for (const Index visits : all.contact_visits) {
+            for (const Index visits : all.contact_iterations) {
                 bool go_on = true;
                 for (std::size_t i = 0; i < all.sweeps.size() && go_on; ++i) {
-                    if (found({.layers = layers, .sweeps = all.sweeps[i], .contact_visits = visits}, go_on))
+                    if (found({.layers = layers, .sweeps = all.sweeps[i], .contact_iterations = visits}, go_on))
                         return true;
                 }
             }
@@ -197,18 +198,20 @@ struct KnownOutcomes {
 
     Outcome of(const SolverOptions<double>& o) const {
         return {
-            .force_error = std::exp(-a * o.sweeps) + std::exp(-b * o.layers) + 0.1 * std::exp(-c * o.contact_visits),
-            .time = 1e-6 * (std::pow(o.sweeps, d) * (std::pow(o.layers, 1 + e) + std::pow(o.contact_visits, f))),
+            .force_error =
+                std::exp(-a * o.sweeps) + std::exp(-b * o.layers) + 0.1 * std::exp(-c * o.contact_iterations),
+            .time = 1e-6 * (std::pow(o.sweeps, d) * (std::pow(o.layers, 1 + e) + std::pow(o.contact_iterations, f))),
             .layers_reached = o.layers};
     }
     template <class IsBetter, class Keeps>
     SolverOptions<double> best(IsBetter is_better, Keeps keeps) const {
-        const ExperimentOptions<double> all;
+        const GridSearchOptions<double> all;
         std::vector<SolverOptions<double>> kept;
         for (const Index layers : all.layers) {
             for (const Index sweeps : all.sweeps) {
-                for (const Index visits : all.contact_visits) {
-                    const SolverOptions<double> options{.layers = layers, .sweeps = sweeps, .contact_visits = visits};
+                for (const Index visits : all.contact_iterations) {
+                    const SolverOptions<double> options{
+                        .layers = layers, .sweeps = sweeps, .contact_iterations = visits};
                     if (keeps(of(options))) kept.push_back(options);
                 }
             }
@@ -222,17 +225,17 @@ struct KnownOutcomes {
 bool by_time(const Outcome& p, const Outcome& q) { return p.time < q.time; }
 bool by_error(const Outcome& p, const Outcome& q) { return p.force_error < q.force_error; }
 
-void check_same(const Choice<double>& choice, const SolverOptions<double>& expected) {
+void check_same(const ChosenSettings<double>& choice, const SolverOptions<double>& expected) {
     CHECK(choice.options.layers == expected.layers);
     CHECK(choice.options.sweeps == expected.sweeps);
-    CHECK(choice.options.contact_visits == expected.contact_visits);
+    CHECK(choice.options.contact_iterations == expected.contact_iterations);
 }
 
 /// A sphere, and a short press on it.
 struct SmallScene {
     TriangleMesh<double> mesh = icosphere<double>({.radius = radius, .subdivisions = 1});
     MassSpringNetwork<double, CountedSpring> network{mesh, {}, {.stiffness = 40.0}};
-    VirtualVolumeSprings<double> backing{mesh, {.stiffness = 8.0}};
+    VirtualVolumeSprings<double> foundation{mesh, {.stiffness = 8.0}};
     std::vector<Tool<double>> tools;
 
     explicit SmallScene(double height = radius) {
@@ -241,8 +244,9 @@ struct SmallScene {
         }
     }
     CountedStroke stroke() const { return {Stroke(mesh, tools, 1e-3)}; }
-    Choice<double> choose(const Wanted& wanted, const ExperimentOptions<double>& experiment = {.plays = 1}) const {
-        return choose_settings(mesh, network, backing, stroke(), wanted, experiment, BlockStep{}, WorkClock{});
+    ChosenSettings<double> choose(const Requirement& wanted,
+                                  const GridSearchOptions<double>& experiment = {.repetitions = 1}) const {
+        return choose_settings(mesh, network, foundation, stroke(), wanted, experiment, BlockStep{}, WorkClock{});
     }
 };
 
@@ -250,7 +254,7 @@ struct SmallScene {
 
 // In five parts, for the time a long run takes. All together keep 95 %, 80 % of them cheaply; each has some room for chance.
 TEST_CASE("a chosen setting keeps the wanted error on unseen strokes, at hardly more than it takes") {
-    int judged = 0, kept = 0, cheap = 0, out_of_reach = 0;
+    int ticks_compared = 0, kept = 0, cheap = 0, out_of_reach = 0;
     const int count = cases(5, 500);
     for (int seed = 1; seed <= 100 * count; seed += 100) {
         CAPTURE(seed);
@@ -258,31 +262,31 @@ TEST_CASE("a chosen setting keeps the wanted error on unseen strokes, at hardly 
         const Scene scene(random);
         const double error = std::pow(10, random.number(-3.0, -1.0));
         const auto choice =
-            choose_settings(scene.mesh, scene.network, scene.backing, scene.stroke(random), {.force_error = error},
-                            {.every = Judge::every, .plays = 1}, BlockStep{}, WorkClock{});
+            choose_settings(scene.mesh, scene.network, scene.foundation, scene.stroke(random), {.force_error = error},
+                            {.every = Judge::every, .repetitions = 1}, BlockStep{}, WorkClock{});
         if (!choice.met) continue;
-        CHECK(choice.force_error <= error / ExperimentOptions<double>{}.margin);
+        CHECK(choice.force_error <= error / GridSearchOptions<double>{}.margin);
         const Judge unseen{scene, scene.stroke(random)};
         const auto outcome = unseen(choice.options);
         if (outcome.force_error <= error) {
-            ++judged;
+            ++ticks_compared;
             ++kept;
             if (!unseen.any_within(error, outcome.time / 1.5)) ++cheap;
         } else if (unseen.any_with_most_sweeps(error)) {
-            ++judged;
+            ++ticks_compared;
         } else {
             ++out_of_reach;
         }
     }
-    WARN(count << " scenes, " << judged << " judged: " << kept << " keep the error, " << cheap << " of these cheaply; "
-               << out_of_reach << " out of reach of any setting");
-    CHECK(judged - kept <= std::max(0.07 * judged, 1.0));
-    CHECK(judged - cheap <= std::max(0.25 * judged, 1.0));
-    CHECK(3 * (judged + 1) > count);  // the others are not met, and said so, or out of reach
+    WARN(count << " scenes, " << ticks_compared << " judged: " << kept << " keep the error, " << cheap
+               << " of these cheaply; " << out_of_reach << " out of reach of any setting");
+    CHECK(ticks_compared - kept <= std::max(0.07 * ticks_compared, 1.0));
+    CHECK(ticks_compared - cheap <= std::max(0.25 * ticks_compared, 1.0));
+    CHECK(3 * (ticks_compared + 1) > count);  // the others are not met, and said so, or out of reach
 }
 
 TEST_CASE("of all settings the cheapest that keeps the error, the most accurate that keeps the time") {
-    int most_tried = 0, all_tried = 0;
+    int max_tried = 0, all_tried = 0;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -294,33 +298,34 @@ TEST_CASE("of all settings the cheapest that keeps the error, the most accurate 
             return known.of(options);
         };
 
-        const auto cheapest = choose_settings(ExperimentOptions<double>{}, {.force_error = error}, attempt);
-        const double most = error / ExperimentOptions<double>{}.margin;
+        const auto cheapest = choose_settings(GridSearchOptions<double>{}, {.force_error = error}, attempt);
+        const double most = error / GridSearchOptions<double>{}.margin;
         const auto expected = known.best(by_time, [&](const Outcome& o) { return o.force_error <= most; });
         CHECK(cheapest.met == (expected.layers != no_index));
         CHECK(cheapest.met == (cheapest.force_error <= most));
         if (cheapest.met) check_same(cheapest, expected);
-        most_tried = std::max(most_tried, tried);
+        max_tried = std::max(max_tried, tried);
         all_tried += tried;
 
-        const auto finest = choose_settings(ExperimentOptions<double>{}, {.time = time}, attempt);
+        const auto finest = choose_settings(GridSearchOptions<double>{}, {.time = time}, attempt);
         const auto in_time = known.best(by_error, [&](const Outcome& o) { return o.time <= time; });
         CHECK(finest.met == (in_time.layers != no_index));
         CHECK(finest.met == (finest.time <= time));
         if (finest.met) CHECK(finest.force_error == known.of(in_time).force_error);
     }
-    CHECK(most_tried < 256);
+    CHECK(max_tried < 256);
     CHECK(all_tried <= 64 * cases(200));
 }
 
 TEST_CASE("what is chosen is what the solver then does, in any tick") {
     const SmallScene scene;
-    const auto rests = equilibria(scene.mesh, scene.network, scene.backing, scene.stroke());
-    for (const Wanted wanted : {Wanted{.force_error = 0.02}, Wanted{.force_error = 2e-3}, Wanted{.time = 100e-6}}) {
+    const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke());
+    for (const Requirement wanted :
+         {Requirement{.force_error = 0.02}, Requirement{.force_error = 2e-3}, Requirement{.time = 100e-6}}) {
         const auto choice = scene.choose(wanted);
         REQUIRE(choice.met);
-        const auto outcome = trial(scene.mesh, scene.network, scene.backing, scene.stroke(), rests, choice.options,
-                                   BlockStep{}, WorkClock{});
+        const auto outcome = trial(scene.mesh, scene.network, scene.foundation, scene.stroke(), references,
+                                   choice.options, BlockStep{}, WorkClock{});
         CHECK(outcome.force_error == choice.force_error);
         CHECK(outcome.position_error == choice.position_error);
         CHECK(outcome.time == Approx(choice.time).epsilon(1e-6));
@@ -334,18 +339,18 @@ TEST_CASE("what cannot be kept is said, and the nearest to it given") {
     CHECK_FALSE(dear.met);
     CHECK(dear.options.layers == 1);
     CHECK(dear.options.sweeps == 1);
-    CHECK(dear.options.contact_visits == 1);
-    const auto coarse = scene.choose({.force_error = 1e-3}, {.layers = {1, 2}, .sweeps = {1}, .plays = 1});
+    CHECK(dear.options.contact_iterations == 1);
+    const auto coarse = scene.choose({.force_error = 1e-3}, {.layers = {1, 2}, .sweeps = {1}, .repetitions = 1});
     CHECK_FALSE(coarse.met);
     CHECK(coarse.force_error > 1e-3 / 1.8);
     CHECK(coarse.options.sweeps == 1);
-    CHECK(coarse.options.contact_visits == 8);
+    CHECK(coarse.options.contact_iterations == 8);
 }
 
 TEST_CASE("the shortest of several plays counts") {
     const SmallScene scene;
     const auto once = scene.choose({.force_error = 0.02});
-    const auto thrice = scene.choose({.force_error = 0.02}, {.plays = 3});
+    const auto thrice = scene.choose({.force_error = 0.02}, {.repetitions = 3});
     check_same(thrice, once.options);
     CHECK(thrice.time == Approx(once.time).epsilon(1e-6));
 }
@@ -353,32 +358,34 @@ TEST_CASE("the shortest of several plays counts") {
 TEST_CASE("by default the clock is a real one, the options besides are kept") {
     const SmallScene scene;
     const Stroke stroke(scene.mesh, scene.tools, 1e-3);
-    const auto choice = choose_settings(scene.mesh, scene.network, scene.backing, stroke, {.force_error = 0.02},
-                                        {.others = {.negligible_force = 1e-7}});
+    const auto choice = choose_settings(scene.mesh, scene.network, scene.foundation, stroke, {.force_error = 0.02},
+                                        {.others = {.force_tolerance = 1e-7}});
     CHECK(choice.met);
     CHECK(choice.time > 0);
     CHECK(choice.time < 1);
-    CHECK(choice.options.negligible_force == 1e-7);
+    CHECK(choice.options.force_tolerance == 1e-7);
 }
 
 TEST_CASE("another rule is tried as it is, one that diverges is never chosen") {
     const auto mesh = icosphere<double>({.radius = radius, .subdivisions = 1});
-    const VirtualVolumeSprings<double> backing(mesh, {.stiffness = 8.0});
+    const VirtualVolumeSprings<double> foundation(mesh, {.stiffness = 8.0});
     const Stroke stroke(mesh, SmallScene().tools, 1e-3);
     const MassSpringNetwork heavy(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 4e-4});
     const MassSpringNetwork light(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 4e-7});
-    const auto stable = choose_settings(mesh, heavy, backing, stroke, {.force_error = 0.05}, {.plays = 1}, MassStep{});
+    const auto stable =
+        choose_settings(mesh, heavy, foundation, stroke, {.force_error = 0.05}, {.repetitions = 1}, MassStep{});
     CHECK(stable.met);
-    const auto wild = choose_settings(mesh, light, backing, stroke, {.force_error = 0.05}, {.plays = 1}, MassStep{});
+    const auto wild =
+        choose_settings(mesh, light, foundation, stroke, {.force_error = 0.05}, {.repetitions = 1}, MassStep{});
     CHECK_FALSE(wild.met);
     CHECK_FALSE(wild.advanced);
-    const auto late = choose_settings(mesh, light, backing, stroke, {.time = 1.0}, {.plays = 1}, MassStep{});
+    const auto late = choose_settings(mesh, light, foundation, stroke, {.time = 1.0}, {.repetitions = 1}, MassStep{});
     CHECK_FALSE(late.met);
 }
 
 TEST_CASE("what makes no sense is refused") {
     const SmallScene scene;
-    const auto refused = [&](const Wanted& wanted, const ExperimentOptions<double>& experiment = {}) {
+    const auto refused = [&](const Requirement& wanted, const GridSearchOptions<double>& experiment = {}) {
         return refusal([&] { (void)scene.choose(wanted, experiment); });
     };
     const double nan = std::numeric_limits<double>::quiet_NaN();
@@ -390,20 +397,21 @@ TEST_CASE("what makes no sense is refused") {
     CHECK_THAT(refused({.force_error = nan}), ContainsSubstring("force_error must be finite and positive, got"));
     CHECK(refused({.time = -2}) == "choose_settings: the wanted time must be finite and positive [s], got -2");
 
-    const Wanted percent{.force_error = 0.01};
+    const Requirement percent{.force_error = 0.01};
     CHECK(refused(percent, {.layers = {}}) == "choose_settings: layers must hold a number to try, got none");
     CHECK(refused(percent, {.layers = {3, -1}}) == "choose_settings: layers must be at least 0, got -1");
     CHECK(refused(percent, {.sweeps = {}}) == "choose_settings: sweeps must hold a number to try, got none");
     CHECK(refused(percent, {.sweeps = {0}}) == "choose_settings: sweeps must be at least 1, got 0");
-    CHECK(refused(percent, {.contact_visits = {}}) ==
-          "choose_settings: contact_visits must hold a number to try, got none");
-    CHECK(refused(percent, {.contact_visits = {0}}) == "choose_settings: contact_visits must be at least 1, got 0");
-    CHECK(refused(percent, {.others = {.most_visits = 0}}) ==
-          "QuasiStaticSolver: most_visits must be at least 1, got 0");
+    CHECK(refused(percent, {.contact_iterations = {}}) ==
+          "choose_settings: contact_iterations must hold a number to try, got none");
+    CHECK(refused(percent, {.contact_iterations = {0}}) ==
+          "choose_settings: contact_iterations must be at least 1, got 0");
+    CHECK(refused(percent, {.others = {.max_vertex_updates = 0}}) ==
+          "QuasiStaticSolver: max_vertex_updates must be at least 1, got 0");
     CHECK(refused(percent, {.margin = 0.5}) == "choose_settings: margin must be finite and at least 1, got 0.5");
     CHECK_THAT(refused(percent, {.margin = nan}), ContainsSubstring("margin must be finite and at least 1, got"));
     CHECK(refused(percent, {.every = 0}) == "choose_settings: every must be at least 1, got 0");
-    CHECK(refused(percent, {.plays = 0}) == "choose_settings: plays must be at least 1, got 0");
+    CHECK(refused(percent, {.repetitions = 0}) == "choose_settings: plays must be at least 1, got 0");
 
     const SmallScene apart(2 * radius);
     CHECK(refusal([&] { (void)apart.choose(percent); }) ==

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/catch.hpp"
 #include "support/convexity_check.hpp"
@@ -25,9 +25,9 @@ TEST_CASE("blocks are even where one spring of many pushes", "[convexity]") {
     const TriangleMesh<double> mesh(x, triangles);
     const MassSpringNetwork network(mesh, LinearSpring{},
                                     {.stiffness = 1.0, .rest_length = std::vector{1.1, 1.0, 1.1}});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 1.0});
-    RestProblem problem(network);
-    REQUIRE(problem.take(x, network, backing) == ProblemStatus::sound);
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 1.0});
+    EquilibriumProblem problem(network);
+    REQUIRE(problem.take(x, network, foundation) == ProblemStatus::valid);
     BlockConvexity convexity(problem);
     CHECK(convexity.around(problem, 0) == Approx(1 - 3 * 0.1).epsilon(1e-3));
 }

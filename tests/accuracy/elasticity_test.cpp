@@ -5,9 +5,9 @@
 #include <cmath>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/foundation_springs.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/moved_volume.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -48,8 +48,8 @@ void check_derivatives(const Law& law, int seed) {
     test::Random random(static_cast<std::uint64_t>(seed));
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     const MassSpringNetwork network(mesh, law, {.stiffness = 2.0});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 0.7, .damping = 5.0});
-    Elasticity elasticity(network, backing);
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 0.7, .damping = 5.0});
+    Elasticity elasticity(network, foundation);
     const Points<double> x = test::jittered<double>(mesh.positions(), 0.1, random);
     const auto here = elasticity.at(x);
     const auto H = stiffness_of(elasticity, here);
@@ -67,20 +67,20 @@ void check_derivatives(const Law& law, int seed) {
         more.reshaped()[i] += h;
         less.reshaped()[i] -= h;
         const auto after = elasticity.at(more), before = elasticity.at(less);
-        const double force = here.springs.reshaped()[i] + here.backing.reshaped()[i];
+        const double force = here.springs.reshaped()[i] + here.foundation.reshaped()[i];
         CHECK(elasticity.energy_change(before, after) / (2 * h) == Approx(-force).margin(1e-8));
-        const Points<double> slope = (after.springs + after.backing - before.springs - before.backing) / (2 * h);
+        const Points<double> slope = (after.springs + after.foundation - before.springs - before.foundation) / (2 * h);
         for (Index j = 0; j < x.size(); ++j) {
             if (i / 3 != j / 3) CHECK(-slope.reshaped()[j] == Approx(H(j, i)).epsilon(1e-5).margin(1e-5));
         }
     }
 }
 
-/// A backing that pulls less and less.
+/// A foundation that pulls less and less.
 struct Saturating {
     template <Real Scalar>
-    [[nodiscard]] Pull<Scalar> pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>&,
-                                    Scalar) const noexcept {
+    [[nodiscard]] VertexForce<Scalar> force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>&,
+                                               Scalar) const noexcept {
         return {-position / (1 + squared_norm(position)), 1};
     }
 };
@@ -96,7 +96,7 @@ TEST_CASE("forces are the slopes of energies, stiffnesses those of forces", "[el
     }
 }
 
-TEST_CASE("forces are those of network and backing without damping", "[elasticity]") {
+TEST_CASE("forces are those of network and foundation without damping", "[elasticity]") {
     test::Random random(1);
     const auto mesh = icosphere({.radius = 0.01, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
@@ -112,10 +112,10 @@ TEST_CASE("forces are those of network and backing without damping", "[elasticit
     double largest = 0;
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         const auto here = point(x, v);
-        CHECK((state.springs.col(v) - network.pull(v, x).force).norm() < 1e-15);
-        CHECK((state.backing.col(v) - undamped.pull(v, here, here, 1.0).force).norm() == 0);
-        CHECK((state_moved.backing.col(v) - 8 * (anchors.col(v) - here)).norm() < 1e-15);
-        largest = std::max(largest, state.backing.col(v).norm());
+        CHECK((state.springs.col(v) - network.force_on(v, x).force).norm() < 1e-15);
+        CHECK((state.foundation.col(v) - undamped.force_on(v, here, here, 1.0).force).norm() == 0);
+        CHECK((state_moved.foundation.col(v) - 8 * (anchors.col(v) - here)).norm() < 1e-15);
+        largest = std::max(largest, state.foundation.col(v).norm());
     }
     for (Index s = 0; s < static_cast<Index>(network.springs().size()); ++s) {
         largest = std::max(largest, std::abs(network.tension(s, x)));
@@ -123,7 +123,7 @@ TEST_CASE("forces are those of network and backing without damping", "[elasticit
     CHECK(state.largest_force == Approx(largest).epsilon(1e-14));
 }
 
-TEST_CASE("network and backing of floats are evaluated in double", "[elasticity]") {
+TEST_CASE("network and foundation of floats are evaluated in double", "[elasticity]") {
     for (int seed = 1; seed <= 20; ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -135,12 +135,12 @@ TEST_CASE("network and backing of floats are evaluated in double", "[elasticity]
         Points<float> along = mesh.positions();
         REQUIRE(body.move_to(test::jittered<float>(along, 1e-4F, random), 1e-3F, along));
         const Points<double> x = test::jittered<double>(mesh.positions().cast<double>(), 1e-3, random);
-        const auto check = [&](const auto& backing, const Points<float>& anchors, auto stiffness) {
-            const auto state = Elasticity(network, backing).at(x);
+        const auto check = [&](const auto& foundation, const Points<float>& anchors, auto stiffness) {
+            const auto state = Elasticity(network, foundation).at(x);
             for (Index v = 0; v < mesh.vertex_count(); ++v) {
-                const Eigen::Vector3d way = anchors.col(v).cast<double>() - x.col(v);
-                const Eigen::Vector3d exact = stiffness(v) * way;
-                CHECK((state.backing.col(v) - exact).norm() <= 2e-15 * exact.norm());
+                const Eigen::Vector3d displacement = anchors.col(v).cast<double>() - x.col(v);
+                const Eigen::Vector3d exact = stiffness(v) * displacement;
+                CHECK((state.foundation.col(v) - exact).norm() <= 2e-15 * exact.norm());
             }
         };
         const auto springs = [](Index) -> Eigen::Matrix3d { return double(7.3F) * Eigen::Matrix3d::Identity(); };
@@ -154,7 +154,7 @@ TEST_CASE("network and backing of floats are evaluated in double", "[elasticity]
         const auto state = Elasticity(network, moved).at(x);
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             const Eigen::Vector3d exact = double(7.3F) * (body.anchors().col(v).cast<double>() - x.col(v));
-            CHECK((state.backing.col(v) - exact).norm() <= 2e-15 * exact.norm());
+            CHECK((state.foundation.col(v) - exact).norm() <= 2e-15 * exact.norm());
         }
     }
 }
@@ -163,53 +163,53 @@ TEST_CASE("a network of floats has smooth forces in double", "[elasticity]") {
     test::Random random(1);
     const auto mesh = icosphere<float>({.radius = 1, .subdivisions = 1});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0F});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 0.5F});
-    Elasticity elasticity(network, backing);
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 0.5F});
+    Elasticity elasticity(network, foundation);
     const Points<double> x = test::jittered<double>(mesh.positions().cast<double>(), 0.1, random);
     const auto here = elasticity.at(x);
-    const Points<double> way = test::jittered<double>(Points<double>::Zero(3, x.cols()), 1e-9, random);
-    const auto there = elasticity.at(x + way);
-    CHECK(((there.backing - here.backing) + 0.5 * way).norm() < 1e-15);
+    const Points<double> displacement = test::jittered<double>(Points<double>::Zero(3, x.cols()), 1e-9, random);
+    const auto there = elasticity.at(x + displacement);
+    CHECK(((there.foundation - here.foundation) + 0.5 * displacement).norm() < 1e-15);
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         const Vector3<double> exact = -0.5 * (x.col(v) - mesh.positions().col(v).cast<double>());
-        CHECK((here.backing.col(v) - exact).norm() < 1e-6 * exact.norm());
+        CHECK((here.foundation.col(v) - exact).norm() < 1e-6 * exact.norm());
     }
 }
 
 TEST_CASE("a spring without length has no force and no energy that is not finite", "[elasticity]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     const MassSpringNetwork network(mesh, test::CubicSpring{}, {.stiffness = 1.0});
-    Elasticity elasticity(network, NoVolumeSprings{});
+    Elasticity elasticity(network, NoFoundation{});
     const Points<double> at_one_place = Points<double>::Zero(3, mesh.vertex_count());
     const auto state = elasticity.at(at_one_place);
     CHECK(state.springs.isZero(0));
-    CHECK(state.backing.isZero(0));
+    CHECK(state.foundation.isZero(0));
     CHECK(is_finite(state.energy));
     CHECK(is_finite(elasticity.largest_stiffness(state)));
 }
 
-TEST_CASE("a backing of one's own is asked wherever it is", "[elasticity]") {
+TEST_CASE("a foundation of one's own is asked wherever it is", "[elasticity]") {
     test::Random random(1);
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
-    const Saturating backing;
-    Elasticity elasticity(network, backing);
+    const Saturating foundation;
+    Elasticity elasticity(network, foundation);
     for (int i = 0; i < 10; ++i) {
         const Points<double> x = test::jittered<double>(mesh.positions(), 0.5, random);
         const auto state = elasticity.at(x);
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             const Vector3<double> expected = -x.col(v) / (1 + x.col(v).squaredNorm());
-            CHECK((state.backing.col(v) - expected).norm() < 1e-14);
+            CHECK((state.foundation.col(v) - expected).norm() < 1e-14);
         }
     }
 }
 
-TEST_CASE("a backing that is not alike in all directions gives way as its stiffness says", "[elasticity]") {
+TEST_CASE("a foundation that is not alike in all directions gives way as its stiffness says", "[elasticity]") {
     test::Random random(1);
     const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 0.0});
-    const FoundationSprings backing(mesh, {.normal = 7.0, .tangential = 0.3, .recovery_time = 5.0});
-    Elasticity elasticity(network, backing);
+    const FoundationSprings foundation(mesh, {.normal = 7.0, .tangential = 0.3, .recovery_time = 5.0});
+    Elasticity elasticity(network, foundation);
     const auto rest = elasticity.at(mesh.positions());
     CHECK(elasticity.largest_stiffness(rest) == Approx(7));
     NewtonSystem system(std::vector<unsigned char>(static_cast<std::size_t>(mesh.vertex_count()), 0));
@@ -222,8 +222,9 @@ TEST_CASE("a backing that is not alike in all directions gives way as its stiffn
     }
     const Points<double> step = system.solve(7).step;
     const auto there = elasticity.at(mesh.positions() + step);
-    CHECK((there.backing + force).cwiseAbs().maxCoeff() < 1e-13);
+    CHECK((there.foundation + force).cwiseAbs().maxCoeff() < 1e-13);
     double energy = 0;
-    for (Index v = 0; v < mesh.vertex_count(); ++v) energy += backing.energy(v, mesh.positions().col(v) + step.col(v));
+    for (Index v = 0; v < mesh.vertex_count(); ++v)
+        energy += foundation.energy(v, mesh.positions().col(v) + step.col(v));
     CHECK(elasticity.energy_change(rest, there) == Approx(energy));
 }

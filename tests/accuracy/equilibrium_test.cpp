@@ -11,10 +11,10 @@
 #include <vector>
 
 #include <Eigen/Geometry>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/model/moved_volume.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -41,14 +41,14 @@ struct Reference {
     double radius, factor;
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, LinearSpring> network;
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
 
     explicit Reference(const ReferenceRow& row, double r = 1, double f = 1)
         : radius(r),
           factor(f),
           mesh(icosphere({.radius = r, .subdivisions = row.integer("level")})),
           network(mesh, LinearSpring{}, {.stiffness = stiffnesses(row)}),
-          backing(mesh, {.stiffness = f * row.number("k_volume"), .damping = 1.0}) {}
+          foundation(mesh, {.stiffness = f * row.number("k_volume"), .damping = 1.0}) {}
 
     std::vector<double> stiffnesses(const ReferenceRow& row) const {
         std::vector<double> result;
@@ -65,7 +65,9 @@ struct Reference {
         (mesh.positions().colwise() - (radius * place.normalized()).eigen()).colwise().norm().minCoeff(&nearest);
         return static_cast<Index>(nearest);
     }
-    HeldVertex<double> hold(Index v, double by) const { return pull(v, ((1 + by) * mesh.positions().col(v)).eval()); }
+    VertexAttachment<double> hold(Index v, double by) const {
+        return pull(v, ((1 + by) * mesh.positions().col(v)).eval());
+    }
 
     template <class Volume>
     double energy(const Points<double>& x, const Volume& volume) const {
@@ -83,14 +85,14 @@ void check_row(const ReferenceRow& row, double radius, double factor) {
     const auto& initial = membrane.mesh.positions();
     const Index held = membrane.vertex_at({0, 1, std::numbers::phi});
     const Index layers = row.integer("layers") == 0 ? unlimited : row.integer("layers");
-    const auto rest = equilibrium(initial, membrane.mesh, membrane.network, membrane.backing,
+    const auto rest = equilibrium(initial, membrane.mesh, membrane.network, membrane.foundation,
                                   {.increments = 20, .layers = layers}, membrane.hold(held, row.number("delta")));
     REQUIRE(rest.converged);
     CHECK(rest.residual < 1e-13 * radius * factor);
     const double force = row.number("holding_force") * radius * factor;
     CHECK(-dot<double>(rest.reactions[0], initial.col(held)) / radius == Approx(force).epsilon(1e-9));
     const double energy = row.number("energy") * radius * radius * factor;
-    CHECK(membrane.energy(rest.x, membrane.backing) == Approx(energy).epsilon(1e-9));
+    CHECK(membrane.energy(rest.x, membrane.foundation) == Approx(energy).epsilon(1e-9));
     PropagationQueue all(membrane.mesh.vertex_count());
     all.build(membrane.network, std::array{held}, unlimited);
     for (const Index distance : {1, 2, 4, 8}) {
@@ -113,13 +115,13 @@ void check_force(const Point& found, const ReferenceRow& row, const std::string&
 struct Sphere {
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, LinearSpring> network;
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
     double k;
 
     explicit Sphere(double volume_stiffness = 0.3, Index subdivisions = 2, const std::vector<Index>& pinned = {})
         : mesh(icosphere({.radius = 1, .subdivisions = subdivisions})),
           network(mesh, LinearSpring{}, {.stiffness = 1.0, .pinned = pinned}),
-          backing(mesh, {.stiffness = volume_stiffness, .damping = 0.02}),
+          foundation(mesh, {.stiffness = volume_stiffness, .damping = 0.02}),
           k(volume_stiffness) {}
 
     const Points<double>& x() const { return mesh.positions(); }
@@ -131,7 +133,7 @@ struct Sphere {
     }
     template <class... Constraints>
     Equilibrium rest(const EquilibriumOptions& options, const Constraints&... constraints) const {
-        return equilibrium(x(), mesh, network, backing, options, constraints...);
+        return equilibrium(x(), mesh, network, foundation, options, constraints...);
     }
     test::PressedMembrane pressed_by(const std::vector<Tool<double>>& tools) const {
         return {mesh.triangles(), {network.springs().begin(), network.springs().end()}, x(), k, tools};
@@ -141,11 +143,11 @@ struct Sphere {
 /// A tool and where it goes; it does not touch yet.
 struct Stroke {
     Tool<double> tool;
-    Point way;
+    Point displacement;
 
     Tool<double> at(double part) const {
         Tool<double> moved = tool;
-        moved.position += part * way;
+        moved.position += part * displacement;
         return moved;
     }
     /// How it touches in the end if the membrane does not give way.
@@ -168,7 +170,7 @@ Stroke random_stroke(const Point& outward, bool is_capsule, Random& random) {
         const Point axis = random.unit_vector() + random.number() * outward;
         stroke.tool.axis = random.number(0.2, 0.8) * (axis.dot(outward) < 0 ? -axis : axis);
     }
-    stroke.way = (0.1 + random.number(0.05, 0.15)) * inward;
+    stroke.displacement = (0.1 + random.number(0.05, 0.15)) * inward;
     return stroke;
 }
 
@@ -181,7 +183,7 @@ test::PressedState newton_along(const Sphere& sphere, const std::vector<Stroke>&
     for (int i = 1; i <= steps && state.converged; ++i) {
         std::vector<Tool<double>> tools;
         for (const auto& stroke : strokes) tools.push_back(stroke.at(static_cast<double>(i) / steps));
-        state = test::at_rest(sphere.pressed_by(tools), state.x, {.far = 0.15, .longest_step = radius / 2});
+        state = test::at_rest(sphere.pressed_by(tools), state.x, {.far = 0.15, .max_step = radius / 2});
     }
     return state;
 }
@@ -200,7 +202,7 @@ void check_pressed(const Equilibrium& rest, const Sphere& sphere, const std::vec
     const auto touching = test::features_near(pressed, rest.x, 1e-11);
     const Eigen::MatrixXd J = test::gap_gradients(touching, rest.x.size());
     const Eigen::VectorXd F = pressed.forces(rest.x);
-    const Eigen::VectorXd pressures = test::least_not_negative(J * J.transpose(), J * F);
+    const Eigen::VectorXd pressures = test::smallest_non_negative(J * J.transpose(), J * F);
     CHECK((F + J.transpose() * pressures).lpNorm<Eigen::Infinity>() < 1e-12);
     std::vector<Point> reactions(tools.size(), Point::Zero());
     for (std::size_t i = 0; i < touching.size(); ++i) {
@@ -220,11 +222,11 @@ void check_same(const Equilibrium& rest, const test::PressedState& expected) {
 /// A solver's loop, to the end, and the equilibrium of the same scene.
 template <class... Constraints>
 void check_solver(const Sphere& sphere, const Points<double>& start, const Constraints&... constraints) {
-    QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 50, .negligible_force = 1e-13});
+    QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 50, .force_tolerance = 1e-13});
     Points<double> x = start;
-    const auto report = test::settle(solver, x, 1e-3, sphere.network, sphere.backing, constraints...);
+    const auto report = test::settle(solver, x, 1e-3, sphere.network, sphere.foundation, constraints...);
     REQUIRE(report.converged);
-    const auto rest = equilibrium(start, sphere.mesh, sphere.network, sphere.backing, {}, constraints...);
+    const auto rest = equilibrium(start, sphere.mesh, sphere.network, sphere.foundation, {}, constraints...);
     REQUIRE(rest.converged);
     CHECK((rest.x - x).cwiseAbs().maxCoeff() < 1e-7);
     REQUIRE(rest.reactions.size() == report.reactions.size());
@@ -235,7 +237,7 @@ void check_solver(const Sphere& sphere, const Points<double>& start, const Const
 
 /// Pulls vertex 7 with a force that is not a number.
 struct BrokenBacking {
-    [[nodiscard]] Pull<double> pull(Index v, const Point& position, const Point&, double) const noexcept {
+    [[nodiscard]] VertexForce<double> force_on(Index v, const Point& position, const Point&, double) const noexcept {
         return {(v == 7 ? std::numeric_limits<double>::quiet_NaN() : 0.0) * position, 1.0};
     }
 };
@@ -245,7 +247,7 @@ struct Clamp {
     Index first, second;
     Point by;
 };
-void describe(const Clamp& clamp, RestScene& scene) {
+void describe(const Clamp& clamp, EquilibriumScene& scene) {
     for (const Index v : {clamp.first, clamp.second}) scene.hold(v, point(scene.goals(1).targets, v) + clamp.by);
 }
 
@@ -271,14 +273,14 @@ TEST_CASE("equilibrium of mixed springs, two held vertices, moved anchors: every
         CAPTURE(row.line());
         const Reference membrane(row);
         const auto& initial = membrane.mesh.positions();
-        Eigen::Matrix3d way = Eigen::Matrix3d::Zero();
-        if (row.integer("anchors") == 1) way(0, 1) = 1;
-        if (row.integer("anchors") == 2) way.diagonal() << 1, -0.5, -0.5;
-        const Points<double> anchors = initial + row.number("amount") * way * initial;
+        Eigen::Matrix3d displacement = Eigen::Matrix3d::Zero();
+        if (row.integer("anchors") == 1) displacement(0, 1) = 1;
+        if (row.integer("anchors") == 2) displacement.diagonal() << 1, -0.5, -0.5;
+        const Points<double> anchors = initial + row.number("amount") * displacement * initial;
         MovingBody body(membrane.mesh);
         Points<double> start = initial;
         REQUIRE(body.move_to(anchors, 1, start));
-        const auto volume = on(body, membrane.backing);
+        const auto volume = on(body, membrane.foundation);
         const auto hold = [&](const std::string& n) {
             const Point place(row.number("x" + n), row.number("y" + n), row.number("z" + n));
             return membrane.hold(membrane.vertex_at(place), row.number("delta" + n));
@@ -339,7 +341,7 @@ TEST_CASE("equilibrium near a press takes a few iterations", "[equilibrium]") {
     contact.gap = 0;
     const auto start = test::jittered<double>(rest.x, 1e-4, random);
     const auto again =
-        equilibrium(start, sphere.mesh, sphere.network, sphere.backing, {}, press(stroke.at(1), contact));
+        equilibrium(start, sphere.mesh, sphere.network, sphere.foundation, {}, press(stroke.at(1), contact));
     REQUIRE(again.converged);
     CHECK(again.iterations <= 8);
     CHECK((again.x - rest.x).cwiseAbs().maxCoeff() < 1e-12);
@@ -348,7 +350,7 @@ TEST_CASE("equilibrium near a press takes a few iterations", "[equilibrium]") {
 TEST_CASE("a tool that is deeper than it is thick comes from outside", "[equilibrium]") {
     const Sphere sphere;
     for (const double radius : {0.02, 0.1}) {
-        const Stroke stroke{.tool = {.position = {0.1, 0.2, 1.3}, .radius = radius}, .way = {0, 0, -0.6}};
+        const Stroke stroke{.tool = {.position = {0.1, 0.2, 1.3}, .radius = radius}, .displacement = {0, 0, -0.6}};
         const auto rest = sphere.rest({}, press(stroke.at(1), stroke.contact(sphere)));
         check_pressed(rest, sphere, {stroke.at(1)});
         CHECK(rest.reactions[0].z() > 0.05);
@@ -387,7 +389,7 @@ TEST_CASE("equilibrium agrees with the quasi-static solver's loop", "[equilibriu
         const Point here = random.unit_vector(), there = (here + 1.2 * here.eigen().unitOrthogonal()).normalized();
         const std::array strokes{random_stroke(here, seed % 2 == 0, random), random_stroke(there, false, random)};
         const Index v = sphere.mesh.triangles()(0, 0);
-        QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 16, .negligible_force = 1e-12});
+        QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 16, .force_tolerance = 1e-12});
         AabbTree tree(sphere.mesh);
         std::vector<ContactTracker<double>> trackers(2, ContactTracker(sphere.mesh));
         Points<double> x = sphere.x();
@@ -401,11 +403,11 @@ TEST_CASE("equilibrium agrees with the quasi-static solver's loop", "[equilibriu
                 contacts[t] = trackers[t].update(tree, x, tools[t]);
             }
             const auto hold = pull(v, (1.05 * sphere.x().col(v)).eval());
-            report = solver.step(x, 1e-3, sphere.network, sphere.backing, press(tools[0], contacts[0]), hold,
+            report = solver.step(x, 1e-3, sphere.network, sphere.foundation, press(tools[0], contacts[0]), hold,
                                  press(tools[1], contacts[1]));
             tree.refit(x, report.moved);
             if (i > 20 && report.converged) {
-                rest = equilibrium(x, sphere.mesh, sphere.network, sphere.backing, {}, press(tools[0], contacts[0]),
+                rest = equilibrium(x, sphere.mesh, sphere.network, sphere.foundation, {}, press(tools[0], contacts[0]),
                                    hold, press(tools[1], contacts[1]));
             }
         }
@@ -422,7 +424,7 @@ TEST_CASE("equilibrium of any law, against Newton's method by differences", "[eq
         Random random(static_cast<std::uint64_t>(seed));
         const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
         const MassSpringNetwork network(mesh, law, {.stiffness = 2.0});
-        const VirtualVolumeSprings backing(mesh, {.stiffness = 2.0, .damping = 0.1});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = 2.0, .damping = 0.1});
         const auto& x = mesh.positions();
         const std::array<Index, 3> corners{mesh.triangles()(0, 7), mesh.triangles()(1, 7), mesh.triangles()(2, 7)};
         const std::vector<Index> vertices(corners.begin(), corners.end());
@@ -436,13 +438,13 @@ TEST_CASE("equilibrium of any law, against Newton's method by differences", "[eq
             network, x, 2, {pinned}, {{vertices, shares, target}}, {{{loaded}, {1}, force}}};
         const auto expected = oracle.equilibrium(x);
         const Grasp<double> grasp{.triangle = 7, .corners = corners, .barycentric = weights};
-        const auto rest = equilibrium(x, mesh, network, backing, {}, pull(Tool<double>{.position = target}, grasp),
+        const auto rest = equilibrium(x, mesh, network, foundation, {}, pull(Tool<double>{.position = target}, grasp),
                                       pin(pins), load<double>({loaded, 0, 1}, {1, 0, 0}, force));
         REQUIRE(rest.converged);
         CHECK((rest.x - expected.x).cwiseAbs().maxCoeff() < 1e-9);
         CHECK((rest.reactions[0] + expected.holding[0]).norm() < 1e-8);
         CHECK(rest.reactions[2] == -force);
-        // All reactions together balance what the backing pulls with.
+        // All reactions together balance what the foundation pulls with.
         const Point backed = 2 * (x - rest.x).rowwise().sum();
         CHECK((rest.reactions[0] + rest.reactions[1] + rest.reactions[2] - backed).norm() < 1e-11);
     };
@@ -455,7 +457,7 @@ TEST_CASE("equilibrium of any law, against Newton's method by differences", "[eq
 }
 
 TEST_CASE("equilibrium beyond the point where only a hold is stable", "[equilibrium]") {
-    // A dome without backing snaps through under a force, not under a hold.
+    // A dome without foundation snaps through under a force, not under a hold.
     const auto mesh = spherical_cap({.radius = 1, .diameter = 1, .rings = 6});
     const Adjacency adjacency(mesh);
     const std::vector<Index> rim(adjacency.border_vertices().begin(), adjacency.border_vertices().end());
@@ -463,8 +465,8 @@ TEST_CASE("equilibrium beyond the point where only a hold is stable", "[equilibr
     const Grasp<double> grasp{.triangle = 0, .corners = {0, 1, 2}, .barycentric = {1, 0, 0}};
     const Point target = mesh.positions().col(0) - Point(0, 0, 0.12);
     const EquilibriumOptions options{.increments = 10};
-    const auto vertex = equilibrium(mesh.positions(), mesh, network, NoVolumeSprings{}, options, pull(0, target));
-    const auto held = equilibrium(mesh.positions(), mesh, network, NoVolumeSprings{}, options,
+    const auto vertex = equilibrium(mesh.positions(), mesh, network, NoFoundation{}, options, pull(0, target));
+    const auto held = equilibrium(mesh.positions(), mesh, network, NoFoundation{}, options,
                                   pull(Tool<double>{.position = target}, grasp));
     REQUIRE(vertex.converged);
     REQUIRE(held.converged);
@@ -479,7 +481,7 @@ TEST_CASE("equilibrium of a flat sheet that nothing backs", "[equilibrium]") {
     const Adjacency adjacency(mesh);
     const std::vector<Index> rim(adjacency.border_vertices().begin(), adjacency.border_vertices().end());
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0, .pinned = rim});
-    const auto rest = equilibrium(mesh.positions(), mesh, network, NoVolumeSprings{}, {}, pull(0, Point(0, 0, 0.3)));
+    const auto rest = equilibrium(mesh.positions(), mesh, network, NoFoundation{}, {}, pull(0, Point(0, 0, 0.3)));
     REQUIRE(rest.converged);
     CHECK(rest.reactions[0].z() < -0.01);
     CHECK(std::abs(rest.reactions[0].x()) < 1e-12);
@@ -523,9 +525,9 @@ TEST_CASE("what cannot move is not kept out of a tool, and a point of it is not 
     for (Index v = 0; v < mesh.vertex_count(); ++v) all.push_back(v);
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0, .pinned = all});
     const Sphere sphere(0.3, 1);
-    const Stroke stroke{.tool = {.position = {0, 0, 1.3}, .radius = 0.1}, .way = {0, 0, -0.3}};
+    const Stroke stroke{.tool = {.position = {0, 0, 1.3}, .radius = 0.1}, .displacement = {0, 0, -0.3}};
     const auto rest =
-        equilibrium(mesh.positions(), mesh, network, sphere.backing, {}, press(stroke.at(1), stroke.contact(sphere)),
+        equilibrium(mesh.positions(), mesh, network, sphere.foundation, {}, press(stroke.at(1), stroke.contact(sphere)),
                     pull(stroke.at(0), sphere.grasp(3, {0.2, 0.3, 0.5})));
     CHECK(rest.converged);
     CHECK(test::same_bits(rest.x, mesh.positions()));
@@ -558,11 +560,11 @@ TEST_CASE("equilibrium of a scene of floats is that of the same numbers in doubl
             constants.push_back(random.number<float>(1.0F, 9.0F));
             stiffness.push_back(constants.back());
         }
-        const VirtualVolumeSprings backing(mesh, {.stiffness = constants, .damping = 0.02F});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = constants, .damping = 0.02F});
         const VirtualVolumeSprings wide_backing(wide, {.stiffness = stiffness});
         const Index v = random.index(mesh.vertex_count());
         const Vector3<float> target = 1.1F * mesh.positions().col(v);
-        const auto rest = equilibrium(mesh.positions(), mesh, network, backing, {}, pull(v, target));
+        const auto rest = equilibrium(mesh.positions(), mesh, network, foundation, {}, pull(v, target));
         const auto expected =
             equilibrium(wide.positions(), wide, wide_network, wide_backing, {}, pull(v, target.cast<double>()));
         REQUIRE(rest.converged);
@@ -572,7 +574,7 @@ TEST_CASE("equilibrium of a scene of floats is that of the same numbers in doubl
         for (Index w = 0; w < mesh.vertex_count(); ++w) {  // really in balance
             if (w == v) continue;
             const Point here = rest.x.col(w);
-            const auto force = wide_network.pull(w, rest.x).force + wide_backing.pull(w, here, here, 1.0).force;
+            const auto force = wide_network.force_on(w, rest.x).force + wide_backing.force_on(w, here, here, 1.0).force;
             REQUIRE(norm<double>(force) < 1e-14);
         }
     }
@@ -583,7 +585,7 @@ TEST_CASE("equilibrium in floats is the one in doubles, as near as floats come",
     const Sphere sphere(0.3);
     const auto mesh = icosphere<float>({.radius = 1, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0F});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 0.3F, .damping = 0.02F});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 0.3F, .damping = 0.02F});
     const Point weights = random.barycentric(), force = 0.1 * random.vector();
     const Stroke stroke = random_stroke(random.unit_vector(), true, random);
     Tool<float> tool;
@@ -596,13 +598,13 @@ TEST_CASE("equilibrium in floats is the one in doubles, as near as floats come",
     touching.corners = contact.corners;
     touching.point = contact.point.cast<float>();
     touching.normal = contact.normal.cast<float>();
-    touching.on_axis = contact.on_axis.cast<float>();
+    touching.axis_point = contact.axis_point.cast<float>();
     touching.gap = static_cast<float>(contact.gap);
-    touching.reach = static_cast<float>(contact.reach);
+    touching.reach = static_cast<float>(contact.detection_distance);
     touching.radius = static_cast<float>(contact.radius);
 
     const auto rest = sphere.rest({}, press(stroke.at(1), contact), load<double>(sphere.corners(9), weights, force));
-    const auto in_float = equilibrium(mesh.positions(), mesh, network, backing, {}, press(tool, touching),
+    const auto in_float = equilibrium(mesh.positions(), mesh, network, foundation, {}, press(tool, touching),
                                       load<float>(sphere.corners(9), weights.cast<float>(), force.cast<float>()));
     REQUIRE(rest.converged);
     REQUIRE(in_float.converged);
@@ -614,7 +616,7 @@ TEST_CASE("equilibrium in floats is the one in doubles, as near as floats come",
 TEST_CASE("equilibrium says when it is not there yet", "[equilibrium]") {
     const Sphere sphere;
     const Point target = 0.7 * sphere.x().col(0);
-    const auto rest = sphere.rest({.most_iterations = 1}, pull(0, target));
+    const auto rest = sphere.rest({.max_iterations = 1}, pull(0, target));
     CHECK(!rest.converged);
     CHECK(rest.iterations == 1);
     CHECK(rest.residual > 1e-6);
@@ -622,13 +624,13 @@ TEST_CASE("equilibrium says when it is not there yet", "[equilibrium]") {
 
     // Nothing to balance it.
     const MassSpringNetwork network(sphere.mesh, LinearSpring{}, {.stiffness = 1.0});
-    const auto lost = equilibrium(sphere.x(), sphere.mesh, network, NoVolumeSprings{}, {},
+    const auto lost = equilibrium(sphere.x(), sphere.mesh, network, NoFoundation{}, {},
                                   load<double>(sphere.corners(0), {1, 0, 0}, {0, 0, 1}));
     CHECK(!lost.converged);
     CHECK(lost.residual > 1e-3);
 
     // A point held where a tool is.
-    const Stroke stroke{.tool = {.position = {0, 0, 1.3}, .radius = 0.1}, .way = {0, 0, -0.3}};
+    const Stroke stroke{.tool = {.position = {0, 0, 1.3}, .radius = 0.1}, .displacement = {0, 0, -0.3}};
     const auto contact = stroke.contact(sphere);
     const auto grasp = sphere.grasp(contact.triangle, contact.barycentric);
     const auto stuck = sphere.rest({}, press(stroke.at(1), contact), pull(stroke.at(1), grasp));
@@ -643,22 +645,22 @@ TEST_CASE("equilibrium says when it is not there yet", "[equilibrium]") {
 
 TEST_CASE("equilibrium refuses what does not fit together", "[equilibrium]") {
     const Sphere sphere(0.3, 1), other(0.3, 0);
-    const auto refused = [&](const auto& x, const auto& mesh, const auto& network, const auto& backing) {
-        return refusal([&] { std::ignore = equilibrium(x, mesh, network, backing, {}); });
+    const auto refused = [&](const auto& x, const auto& mesh, const auto& network, const auto& foundation) {
+        return refusal([&] { std::ignore = equilibrium(x, mesh, network, foundation, {}); });
     };
-    CHECK(refused(sphere.x(), sphere.mesh, sphere.network, sphere.backing) == "");
-    CHECK(refused(other.x(), sphere.mesh, sphere.network, sphere.backing) ==
+    CHECK(refused(sphere.x(), sphere.mesh, sphere.network, sphere.foundation) == "");
+    CHECK(refused(other.x(), sphere.mesh, sphere.network, sphere.foundation) ==
           "equilibrium: x must have as many vertices as the mesh, 42, got 12");
-    CHECK(refused(sphere.x(), sphere.mesh, other.network, sphere.backing) ==
+    CHECK(refused(sphere.x(), sphere.mesh, other.network, sphere.foundation) ==
           "equilibrium: the network must have as many vertices as the mesh, 42, got 12");
-    CHECK(refused(sphere.x(), sphere.mesh, sphere.network, other.backing) ==
-          "equilibrium: the backing must have as many vertices as the mesh, 42, got 12");
+    CHECK(refused(sphere.x(), sphere.mesh, sphere.network, other.foundation) ==
+          "equilibrium: the foundation must have as many vertices as the mesh, 42, got 12");
     Points<double> x = sphere.x();
     x(1, 7) = std::numeric_limits<double>::quiet_NaN();
-    CHECK(refused(x, sphere.mesh, sphere.network, sphere.backing) ==
+    CHECK(refused(x, sphere.mesh, sphere.network, sphere.foundation) ==
           "equilibrium: y of vertex 7 must be finite [m], got nan");
     CHECK(refused(sphere.x(), sphere.mesh, sphere.network, BrokenBacking{}) ==
-          "equilibrium: the backing of vertex 7 must pull with a finite force [N], got one that is not");
+          "equilibrium: the foundation of vertex 7 must pull with a finite force [N], got one that is not");
     CHECK(refusal([&] { std::ignore = sphere.rest({.increments = 0}); }) ==
           "equilibrium: increments must be at least 1, got 0");
     CHECK(refusal([&] { std::ignore = sphere.rest({}, pull(0, Point(0, 0, 1)), pull(42, Point(0, 0, 1))); }) ==

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include <membrane/accuracy/factored_convexity.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/moved_volume.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/model/moved_volume.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -66,31 +66,31 @@ std::string summary(const Tally& tally) {
     return text.str();
 }
 
-/// By decade of the backing.
+/// By decade of the foundation.
 struct Tallies {
     std::array<Tally, 3> quick, sharp;
 };
 
 /// A vertex pressed or pulled by a solver that is not given the time to come to rest.
 struct HeldVertexCase {
-    double backing, depth;
+    double foundation, depth;
     Index held;
     Vector3<double> target, reaction;
     Points<double> x;
 
     HeldVertexCase(const Sphere& sphere, test::Random& random)
-        : backing(std::pow(10, random.number(-2.0, 1.0))),
+        : foundation(std::pow(10, random.number(-2.0, 1.0))),
           depth(std::pow(10, random.number(-3.0, -0.6)) * (random.chance(0.5) ? 1 : -1)),
           held(random.index(sphere.mesh.vertex_count())),
           x(sphere.mesh.positions()) {
-        const VirtualVolumeSprings springs(sphere.mesh, {.stiffness = backing});
+        const VirtualVolumeSprings springs(sphere.mesh, {.stiffness = foundation});
         QuasiStaticSolver solver(sphere.network, {.layers = 1 + random.index(12), .sweeps = 1 + random.index(6)});
         const Vector3<double> start = point(x, held);
         target = start - depth * (start + random.vector<double>(-0.3, 0.3));
         const Index steps = 1 + random.index(20);
         for (Index i = 1; i <= steps; ++i) {
-            const Vector3<double> way = (std::min)(2.0 * i / steps, 1.0) * (target - start);
-            const auto report = solver.step(x, 1e-3, sphere.network, springs, pull(held, start + way));
+            const Vector3<double> displacement = (std::min)(2.0 * i / steps, 1.0) * (target - start);
+            const auto report = solver.step(x, 1e-3, sphere.network, springs, pull(held, start + displacement));
             reaction = report.reactions[0];
         }
     }
@@ -104,7 +104,7 @@ struct Truth {
 };
 
 Truth truth_of(Sphere& sphere, const HeldVertexCase& held) {
-    sphere.still.back(held.backing);
+    sphere.still.back(held.foundation);
     sphere.still.fix(held.held);
     const auto rest = sphere.still.equilibrium(held.x);
     sphere.still.release(held.held);
@@ -125,24 +125,24 @@ void check_bound(const ErrorReport& error, const HeldVertexCase& held, const Tru
     const auto& reaction = error.reactions[0];
     CHECK(truth.stable);
     CHECK(off <= error.position);
-    CHECK(force_off <= reaction.farthest_from(held.reaction));
+    CHECK(force_off <= reaction.max_distance_to(held.reaction));
     CHECK(norm<double>(truth.reaction - reaction.centre) <= reaction.radius + 1e-13);  // rounding of the truth
     tally.positions.push_back(error.position / off);
-    tally.forces.push_back(reaction.farthest_from(held.reaction) / force_off);
+    tally.forces.push_back(reaction.max_distance_to(held.reaction) / force_off);
 }
 
 void press_or_pull(Sphere& sphere, test::Random& random, Tallies& tallies) {
     const HeldVertexCase held(sphere, random);
-    const VirtualVolumeSprings backing(sphere.mesh, {.stiffness = held.backing});
+    const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = held.foundation});
     const Truth truth = truth_of(sphere, held);
     const double off = farthest(truth.x, held.x);
     if (!(off > 1e-9)) return;
-    CAPTURE(held.backing, held.depth, off, off / sphere.edge);
-    const std::size_t decade = held.backing < 0.1 ? 0 : held.backing < 1 ? 1 : 2;
-    const auto quick = sphere.quick.of(held.x, sphere.network, backing, pull(held.held, held.target));
+    CAPTURE(held.foundation, held.depth, off, off / sphere.edge);
+    const std::size_t decade = held.foundation < 0.1 ? 0 : held.foundation < 1 ? 1 : 2;
+    const auto quick = sphere.quick.of(held.x, sphere.network, foundation, pull(held.held, held.target));
     check_bound(quick, held, truth, tallies.quick[decade]);
-    if (held.backing >= 1 && off <= 0.005 * sphere.edge) CHECK(quick.certified());
-    const auto sharp = sphere.sharp.of(held.x, sphere.network, backing, pull(held.held, held.target));
+    if (held.foundation >= 1 && off <= 0.005 * sphere.edge) CHECK(quick.certified());
+    const auto sharp = sphere.sharp.of(held.x, sphere.network, foundation, pull(held.held, held.target));
     check_bound(sharp, held, truth, tallies.sharp[decade]);
 }
 
@@ -167,7 +167,7 @@ TEST_CASE("no vertex and no reaction is farther from the equilibrium than the bo
     const std::array<std::string, 3> decades{"0.01 to 0.1", "0.1 to 1", "1 to 10"};
     for (std::size_t i = 0; i < 3; ++i) {
         const auto &quick = tallies.quick[i], &sharp = tallies.sharp[i];
-        table += "backing " + decades[i] + " of the springs\n  blocks:  " + summary(quick) +
+        table += "foundation " + decades[i] + " of the springs\n  blocks:  " + summary(quick) +
                  "\n  factors: " + summary(sharp) + "\n";
         for (const auto& tally : {quick, sharp}) {
             CHECK(quantile(tally.positions, 0.9) <= 5);
@@ -192,7 +192,7 @@ TEST_CASE("which of several equilibria is never left open", "[error_bound]") {
     }();
     const MassSpringNetwork network(mesh, LinearSpring{},
                                     {.stiffness = 1.0, .rest_length = 1.2, .pinned = {1, 2, 3, 4, 5, 6}});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 0.1});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 0.1});
     const double up = std::sqrt(std::pow(7.2 / 6.1, 2) - 1);
     ErrorBound quick(network);
     ErrorBound<FactoredConvexity> sharp(network);
@@ -201,7 +201,7 @@ TEST_CASE("which of several equilibria is never left open", "[error_bound]") {
         Points<double> x = mesh.positions();
         x(2, 0) = i * 0.005;
         CAPTURE(x(2, 0));
-        for (const auto& error : {quick.of(x, network, backing), sharp.of(x, network, backing)}) {
+        for (const auto& error : {quick.of(x, network, foundation), sharp.of(x, network, foundation)}) {
             if (!error.certified()) continue;
             ++certified;
             int within = 0;
@@ -216,14 +216,14 @@ TEST_CASE("which of several equilibria is never left open", "[error_bound]") {
 TEST_CASE("between two equilibria of a dented sphere nothing is certified for the wrong one", "[error_bound]") {
     Sphere sphere(2);
     const double stiffness = 0.002;
-    const VirtualVolumeSprings backing(sphere.mesh, {.stiffness = stiffness});
+    const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = stiffness});
     sphere.still.back(stiffness);
     const Points<double>& whole = sphere.mesh.positions();
     Points<double> dented = whole;
     for (Index v = 0; v < dented.cols(); ++v) dented(2, v) = (std::min)(whole(2, v), 1.2 - whole(2, v));
     QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 50});
     solver.wake_all();
-    (void)test::settle_within(100, solver, dented, 1e-3, sphere.network, backing);
+    (void)test::settle_within(100, solver, dented, 1e-3, sphere.network, foundation);
     dented = sphere.still.equilibrium(dented).x;
     const double apart = farthest(whole, dented);
     REQUIRE(sphere.still.forces(dented).norm() < 1e-10);
@@ -231,7 +231,7 @@ TEST_CASE("between two equilibria of a dented sphere nothing is certified for th
     for (int i = 0; i <= 200; ++i) {
         const double part = i / 200.0;
         const Points<double> x = (1 - part) * whole + part * dented;
-        const auto error = sphere.sharp.of(x, sphere.network, backing);
+        const auto error = sphere.sharp.of(x, sphere.network, foundation);
         CAPTURE(part, static_cast<int>(error.status));
         CHECK((error.certified() || (part > 0 && part < 1)));
         if (!error.certified()) continue;
@@ -253,13 +253,13 @@ TEST_CASE("random crumpled states: where one equilibrium is proven, no start nea
         for (const auto& s : as_built.springs()) lengths.push_back(swollen * s.rest_length);
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0, .rest_length = lengths});
         const double stiffness = std::pow(10, random.number(-2.0, 0.5));
-        const VirtualVolumeSprings backing(mesh, {.stiffness = stiffness});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = stiffness});
         test::StillMembrane still(network, mesh.positions(), stiffness);
         Points<double> x = still.equilibrium(test::jittered(mesh.positions(), 0.05, random)).x;
         x = test::jittered(x, std::pow(10, random.number(-6.0, -1.5)), random);
         ++tried;
         ErrorBound<FactoredConvexity> bound(network);
-        const auto error = bound.of(x, network, backing);
+        const auto error = bound.of(x, network, foundation);
         if (!error.certified()) continue;
         ++certified;
         const auto rest = still.equilibrium(x);
@@ -284,12 +284,12 @@ TEST_CASE("bounds with pins, loads, several held vertices and anchors that moved
         std::vector<double> stiffnesses;
         for (std::size_t s = 0; s < Adjacency(mesh).edges().size(); ++s) stiffnesses.push_back(random.number(0.5, 2.0));
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = stiffnesses, .pinned = border(mesh)});
-        const VirtualVolumeSprings backing(mesh, {.stiffness = 1.0, .damping = 2e-4});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = 1.0, .damping = 2e-4});
         const Points<double> anchors = test::jittered(mesh.positions(), 0.004, random);
         MovingBody body(mesh);
         Points<double> along = mesh.positions();
         REQUIRE(body.move_to(anchors, 1, along));
-        const auto moved = on(body, backing);
+        const auto moved = on(body, foundation);
         const std::array<Index, 2> pinned{20, 33};
         const std::array<Index, 3> corners{mesh.triangles()(0, 5), mesh.triangles()(1, 5), mesh.triangles()(2, 5)};
         const auto weights = random.barycentric();
@@ -318,7 +318,7 @@ TEST_CASE("bounds with pins, loads, several held vertices and anchors that moved
         for (std::size_t i = 0; i < 3; ++i) {
             CHECK(norm<double>(reactions[i] - error.reactions[i].centre) <= error.reactions[i].radius + 1e-13);
             CHECK(norm<double>(reactions[i] - report.reactions[i]) <=
-                  error.reactions[i].farthest_from(report.reactions[i]) + 1e-13);
+                  error.reactions[i].max_distance_to(report.reactions[i]) + 1e-13);
         }
         CHECK(error.reactions[1].radius == 0);
     }
@@ -333,23 +333,23 @@ TEST_CASE("bounds with points of triangles held", "[error_bound]") {
         const auto mesh = icosphere<double>({.radius = 1, .subdivisions = 1});
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
         const double stiffness = random.number(0.2, 2.0);
-        const VirtualVolumeSprings backing(mesh, {.stiffness = stiffness});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = stiffness});
         const auto held_at = [&](Index f) {
             const std::array<Index, 3> corners{mesh.triangles()(0, f), mesh.triangles()(1, f), mesh.triangles()(2, f)};
             const auto weights = random.barycentric();
             const Vector3<double> now = point_at(triangle_at(mesh.positions(), corners), weights);
-            return HeldPoint<double>{f, corners, weights, now + random.vector<double>(-0.1, 0.1)};
+            return PointAttachment<double>{f, corners, weights, now + random.vector<double>(-0.1, 0.1)};
         };
         const auto one = held_at(3), two = held_at(70);
         QuasiStaticSolver solver(network, {.layers = 3, .sweeps = 3});
         Points<double> x = mesh.positions();
         StepReport<double> report;
-        for (int i = 0; i < 5; ++i) report = solver.step(x, 1e-3, network, backing, one, two);
+        for (int i = 0; i < 5; ++i) report = solver.step(x, 1e-3, network, foundation, one, two);
         ErrorBound<FactoredConvexity> bound(network);
-        const auto error = bound.of(x, network, backing, one, two);
+        const auto error = bound.of(x, network, foundation, one, two);
         if (!error.certified()) continue;
         ++certified;
-        const auto place = [](const HeldPoint<double>& held) {
+        const auto place = [](const PointAttachment<double>& held) {
             return test::HeldPlace{{held.corners.begin(), held.corners.end()},
                                    {held.barycentric[0], held.barycentric[1], held.barycentric[2]},
                                    held.target};
@@ -365,7 +365,7 @@ TEST_CASE("bounds with points of triangles held", "[error_bound]") {
             const Vector3<double> reaction = -rest.holding[i];
             CHECK(norm<double>(reaction - error.reactions[i].centre) <= error.reactions[i].radius + 1e-11);
             CHECK(norm<double>(reaction - report.reactions[i]) <=
-                  error.reactions[i].farthest_from(report.reactions[i]) + 1e-11);
+                  error.reactions[i].max_distance_to(report.reactions[i]) + 1e-11);
         }
     }
     CHECK(certified >= cases(30));
@@ -374,14 +374,14 @@ TEST_CASE("bounds with points of triangles held", "[error_bound]") {
 TEST_CASE("a membrane of floats", "[error_bound]") {
     const auto mesh = icosphere<float>({.radius = 0.01, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0F});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 20.0F});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 20.0F});
     QuasiStaticSolver solver(network, {.layers = 3, .sweeps = 3});
     Points<float> x = mesh.positions();
     const Vector3<float> target = 0.9F * point(x, 7);
     StepReport<float> report;
-    for (int i = 0; i < 3; ++i) report = solver.step(x, 1e-3F, network, backing, pull(7, target));
+    for (int i = 0; i < 3; ++i) report = solver.step(x, 1e-3F, network, foundation, pull(7, target));
     ErrorBound bound(network);
-    const auto error = bound.of(x, network, backing, pull(7, target));
+    const auto error = bound.of(x, network, foundation, pull(7, target));
     REQUIRE(error.certified());
     test::StillMembrane still(network, mesh.positions().cast<double>(), 20);
     still.fix(7);
@@ -390,31 +390,31 @@ TEST_CASE("a membrane of floats", "[error_bound]") {
     CHECK(farthest(rest.x, x.cast<double>()) <= error.position);
     CHECK(error.position <= 1.1 * farthest(rest.x, x.cast<double>()));
     CHECK(norm<double>(reaction - report.reactions[0].cast<double>()) <=
-          error.reactions[0].farthest_from(report.reactions[0]));
+          error.reactions[0].max_distance_to(report.reactions[0]));
 }
 
 TEST_CASE("at rest the bound is a matter of rounding", "[error_bound]") {
     const Sphere sphere(2);
     ErrorBound bound(sphere.network);
-    const VirtualVolumeSprings backing(sphere.mesh, {.stiffness = 1.0});
-    const auto error = bound.of(sphere.mesh.positions(), sphere.network, backing);
+    const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = 1.0});
+    const auto error = bound.of(sphere.mesh.positions(), sphere.network, foundation);
     CHECK(error.certified());
     CHECK(error.position < 1e-12);
     CHECK(error.reactions.empty());
     // All that is held is where it is to be, and nothing else can move.
     std::vector<Index> all;
     for (Index v = 0; v < sphere.mesh.vertex_count(); ++v) all.push_back(v);
-    const auto held = bound.of(sphere.mesh.positions(), sphere.network, backing, pin(all));
+    const auto held = bound.of(sphere.mesh.positions(), sphere.network, foundation, pin(all));
     CHECK(held.certified());
     CHECK(held.position < 1e-12);
 }
 
 TEST_CASE("a vertex that is not yet where it is held counts", "[error_bound]") {
     Sphere sphere(2);
-    const VirtualVolumeSprings backing(sphere.mesh, {.stiffness = 1.0});
+    const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = 1.0});
     const Points<double>& x = sphere.mesh.positions();
     const Vector3<double> target = 1.01 * point(x, 5);
-    const auto error = sphere.quick.of(x, sphere.network, backing, pull(5, target));
+    const auto error = sphere.quick.of(x, sphere.network, foundation, pull(5, target));
     REQUIRE(error.certified());
     CHECK(error.position >= 0.01);
     CHECK(error.position <= 0.0101);
@@ -422,10 +422,10 @@ TEST_CASE("a vertex that is not yet where it is held counts", "[error_bound]") {
 
 TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
     Sphere sphere(1);
-    const VirtualVolumeSprings backing(sphere.mesh, {.stiffness = 1.0});
+    const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = 1.0});
     const Points<double> x = sphere.mesh.positions();
     const auto status = [&](const Points<double>& at, const auto&... constraints) {
-        const auto error = sphere.quick.of(at, sphere.network, backing, constraints...);
+        const auto error = sphere.quick.of(at, sphere.network, foundation, constraints...);
         if (!error.certified()) CHECK(error.position == std::numeric_limits<double>::infinity());
         return error.status;
     };
@@ -436,27 +436,28 @@ TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
     for (const double wrong : {nan, infinite, -infinite}) {
         Points<double> broken = x;
         broken(1, 4) = wrong;
-        CHECK(status(broken) == BoundStatus::bad_input);
-        CHECK(status(x, pull(3, Vector3<double>(wrong, 0, 0))) == BoundStatus::bad_input);
+        CHECK(status(broken) == BoundStatus::invalid_input);
+        CHECK(status(x, pull(3, Vector3<double>(wrong, 0, 0))) == BoundStatus::invalid_input);
         CHECK(status(x, load({0, 1, 2}, Vector3<double>(1, 0, 0), Vector3<double>(0, wrong, 0))) ==
-              BoundStatus::bad_input);
+              BoundStatus::invalid_input);
     }
     for (const Index wrong : {-1, 42, 1'000'000}) {
-        CHECK(status(x, pull(wrong, here)) == BoundStatus::bad_input);
-        CHECK(status(x, pin(std::array{wrong})) == BoundStatus::bad_input);
-        CHECK(status(x, load({0, wrong, 2}, Vector3<double>(1, 0, 0), here)) == BoundStatus::bad_input);
-        CHECK(status(x, HeldPoint<double>{0, {0, 1, wrong}, {1, 0, 0}, here}) == BoundStatus::bad_input);
+        CHECK(status(x, pull(wrong, here)) == BoundStatus::invalid_input);
+        CHECK(status(x, pin(std::array{wrong})) == BoundStatus::invalid_input);
+        CHECK(status(x, load({0, wrong, 2}, Vector3<double>(1, 0, 0), here)) == BoundStatus::invalid_input);
+        CHECK(status(x, PointAttachment<double>{0, {0, 1, wrong}, {1, 0, 0}, here}) == BoundStatus::invalid_input);
     }
-    CHECK(status(x.leftCols(20)) == BoundStatus::bad_input);
+    CHECK(status(x.leftCols(20)) == BoundStatus::invalid_input);
     CHECK(status(1e200 * x) != BoundStatus::certified);
     CHECK(status(0 * x) == BoundStatus::not_convex);
 
-    const HeldPoint<double> point_held{0, {0, 12, 14}, {0.5, 0.25, 0.25}, here};
+    const PointAttachment<double> point_held{0, {0, 12, 14}, {0.5, 0.25, 0.25}, here};
     CHECK(status(x, point_held, pin(std::array{12})) == BoundStatus::unsupported);
-    CHECK(status(x, point_held, HeldPoint<double>{1, {12, 5, 6}, {0.5, 0.25, 0.25}, here}) == BoundStatus::unsupported);
-    CHECK(status(x, HeldPoint<double>{}) == BoundStatus::certified);
+    CHECK(status(x, point_held, PointAttachment<double>{1, {12, 5, 6}, {0.5, 0.25, 0.25}, here}) ==
+          BoundStatus::unsupported);
+    CHECK(status(x, PointAttachment<double>{}) == BoundStatus::certified);
 
-    const auto free = sphere.quick.of(x, sphere.network, NoVolumeSprings{});
+    const auto free = sphere.quick.of(x, sphere.network, NoFoundation{});
     CHECK(free.status == BoundStatus::not_convex);  // it may drift
 
     Contact<double> contact;
@@ -466,25 +467,25 @@ TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
     contact.radius = 0.1;
     CHECK(status(x, press(Tool<double>{.radius = 0.1}, contact)) == BoundStatus::contact);
 
-    ErrorBound hasty(sphere.network, {.refinements = 1});
-    const auto far = hasty.of(x, sphere.network, backing, pull(3, 1.3 * here));
+    ErrorBound hasty(sphere.network, {.cg_iterations = 1});
+    const auto far = hasty.of(x, sphere.network, foundation, pull(3, 1.3 * here));
     CHECK_FALSE(far.certified());
-    CHECK(far.refinements == 1);
-    CHECK_THROWS_AS(ErrorBound(sphere.network, {.refinements = 0}), InvalidInput);
+    CHECK(far.cg_iterations == 1);
+    CHECK_THROWS_AS(ErrorBound(sphere.network, {.cg_iterations = 0}), InvalidInput);
 }
 
 TEST_CASE("a bound remembers nothing, and its copies are their own", "[error_bound]") {
     Sphere sphere(1);
-    const VirtualVolumeSprings backing(sphere.mesh, {.stiffness = 1.0});
+    const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = 1.0});
     const Points<double> x = sphere.mesh.positions();
     const Vector3<double> target = 1.02 * point(x, 5);
-    const auto first = sphere.quick.of(x, sphere.network, backing, pull(5, target));
+    const auto first = sphere.quick.of(x, sphere.network, foundation, pull(5, target));
     ErrorBound copy = sphere.quick;
-    (void)sphere.quick.of(x, sphere.network, backing, pull(9, 0.9 * point(x, 9)), pin(std::array{1, 2}));
+    (void)sphere.quick.of(x, sphere.network, foundation, pull(9, 0.9 * point(x, 9)), pin(std::array{1, 2}));
     for (auto* bound : {&copy, &sphere.quick}) {
-        const auto again = bound->of(x, sphere.network, backing, pull(5, target));
+        const auto again = bound->of(x, sphere.network, foundation, pull(5, target));
         CHECK(again.position == first.position);
         CHECK(again.reactions.size() == 1);
     }
-    CHECK(copy.of(x, sphere.network, backing).reactions.data() != first.reactions.data());
+    CHECK(copy.of(x, sphere.network, foundation).reactions.data() != first.reactions.data());
 }

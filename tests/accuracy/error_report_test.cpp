@@ -11,20 +11,20 @@ using namespace membrane;
 TEST_CASE("nothing is known until something is", "[error_bound]") {
     const ErrorReport report;
     CHECK_FALSE(report.certified());
-    CHECK(report.status == BoundStatus::bad_input);
+    CHECK(report.status == BoundStatus::invalid_input);
     CHECK(report.position == std::numeric_limits<double>::infinity());
     CHECK(report.estimate == std::numeric_limits<double>::infinity());
     CHECK(report.reactions.empty());
-    CHECK(EnclosedForce{}.farthest_from(Vector3<double>(1, 2, 3)) == std::numeric_limits<double>::infinity());
+    CHECK(ForceEnclosure{}.max_distance_to(Vector3<double>(1, 2, 3)) == std::numeric_limits<double>::infinity());
 }
 
 TEMPLATE_TEST_CASE("no force that is enclosed is farther off than said", "[error_bound]", double, float) {
     test::Random random(1);
     for (int i = 0; i < 1000; ++i) {
         CAPTURE(i);
-        const EnclosedForce force{random.vector<double>(), random.number(0.0, 0.1)};
+        const ForceEnclosure force{random.vector<double>(), random.number(0.0, 0.1)};
         const Vector3<TestType> given = random.vector<TestType>();
-        const double farthest = force.farthest_from(given);
+        const double farthest = force.max_distance_to(given);
         for (int k = 0; k < 10; ++k) {
             const Vector3<double> within = force.centre + force.radius * random.unit_vector();
             CHECK(norm<double>(given.template cast<double>() - within) <= farthest + 1e-15);

@@ -11,15 +11,15 @@ TEST_CASE("factors: nowhere near is the stiffness less than the bound", "[factor
     test::bounds_hold_nearby<FactoredConvexity>(0.4);
 }
 
-TEST_CASE("springs that pull make up for a backing that is not there", "[factored_convexity]") {
+TEST_CASE("springs that pull make up for a foundation that is not there", "[factored_convexity]") {
     // A flat sheet, stretched in its rim: only the tension holds it.
     const auto mesh = disc<double>({.radius = 1, .rings = 4});
     const Adjacency adjacency(mesh);
     const auto rim = adjacency.border_vertices();
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0, .pinned = {rim.begin(), rim.end()}});
     const Points<double> x = 1.1 * mesh.positions();
-    RestProblem problem(network);
-    REQUIRE(problem.take(x, network, NoVolumeSprings{}) == ProblemStatus::sound);
+    EquilibriumProblem problem(network);
+    REQUIRE(problem.take(x, network, NoFoundation{}) == ProblemStatus::valid);
     FactoredConvexity sharp(problem);
     const double bound = sharp.around(problem, 1e-4);
     CHECK(bound > 0);
@@ -39,10 +39,10 @@ TEST_CASE("springs that pull make up for a backing that is not there", "[factore
 TEST_CASE("where nothing is free, or nothing holds, there is no bound to be wrong", "[factored_convexity]") {
     const auto mesh = icosphere<double>({.radius = 1, .subdivisions = 0});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
-    RestProblem problem(network);
+    EquilibriumProblem problem(network);
     FactoredConvexity sharp(problem);
-    REQUIRE(problem.take(mesh.positions(), network, NoVolumeSprings{}) == ProblemStatus::sound);
+    REQUIRE(problem.take(mesh.positions(), network, NoFoundation{}) == ProblemStatus::valid);
     CHECK_FALSE(sharp.around(problem, 1e-6) > 0);
-    REQUIRE(problem.take(0 * mesh.positions(), network, NoVolumeSprings{}) == ProblemStatus::sound);
+    REQUIRE(problem.take(0 * mesh.positions(), network, NoFoundation{}) == ProblemStatus::valid);
     CHECK_FALSE(sharp.around(problem, 1e-6) > 0);
 }

@@ -8,14 +8,14 @@
 #include <vector>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/distmesh.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/calibration.hpp>
-#include <membrane/network/foundation_springs.hpp>
-#include <membrane/network/tissue.hpp>
-#include <membrane/network/triangular_springs.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/meshing/distmesh.hpp>
+#include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -30,7 +30,7 @@ constexpr double R = 0.01;  // of the sphere [m]
 
 /// A lens capsule; on a layer as stiff as makes the normal decay length 0.3 R.
 const Material capsule = materials::lens_capsule().typical;
-const Foundation layer{.young_modulus = 6073.67, .poisson_ratio = 0.3, .thickness = 1e-3};
+const FoundationLayer layer{.young_modulus = 6073.67, .poisson_ratio = 0.3, .thickness = 1e-3};
 
 enum class Constants { calibrated, the_same_for_each };
 
@@ -40,17 +40,17 @@ constexpr std::array places{Over::vertex, Over::edge, Over::face};
 struct Sphere {
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, LinearSpring> network;
-    FoundationSprings<double> backing;
+    FoundationSprings<double> foundation;
     double edge;
     double per_depth;  // of the foundation at a vertex [N/m]
 
     explicit Sphere(Index subdivisions, Constants constants = Constants::calibrated)
         : mesh(icosphere({.radius = R, .subdivisions = subdivisions})),
           network(mesh, LinearSpring{}, {.stiffness = springs(mesh, constants)}),
-          backing(mesh, {.normal = scaled(normal_stiffnesses(mesh, layer), constants),
-                         .tangential = scaled(tangential_stiffnesses(mesh, layer), constants)}),
+          foundation(mesh, {.normal = scaled(normal_stiffnesses(mesh, layer), constants),
+                            .tangential = scaled(tangential_stiffnesses(mesh, layer), constants)}),
           edge(mean_edge(mesh)),
-          per_depth(backing.normal_stiffness(mesh.vertex_count() - 1)) {}
+          per_depth(foundation.normal_stiffness(mesh.vertex_count() - 1)) {}
 
     /// Those of the sphere of 642 vertices, where they are not calibrated.
     static std::vector<double> springs(const TriangleMesh<double>& mesh, Constants constants) {
@@ -87,13 +87,13 @@ struct Sphere {
         AabbTree tree(mesh);
         ContactTracker tracker(mesh);
         QuasiStaticSolver solver(network,
-                                 {.layers = unlimited, .sweeps = 4, .negligible_force = 1e-4 * per_depth * depth});
+                                 {.layers = unlimited, .sweeps = 4, .force_tolerance = 1e-4 * per_depth * depth});
         Points<double> x = mesh.positions();
         StepReport<double> report;
         for (int i = 0; i <= 40 || (!report.converged && i < 10'000); ++i) {
             const double above = std::max(0.0, 1 - i / 40.0) * (depth + 0.05 * R);
             const Tool<double> tool{.position = (R + radius - depth + above) * out, .radius = tool_radius};
-            report = solver.step(x, 1.0, network, backing, press(tool, tracker.update(tree, x, tool)));
+            report = solver.step(x, 1.0, network, foundation, press(tool, tracker.update(tree, x, tool)));
             tree.refit(x, report.moved);
         }
         REQUIRE(report.converged);
@@ -108,13 +108,13 @@ struct Sphere {
 struct Elastic {
     TriangleMesh<double> mesh;
     Tissue<MassSpringNetwork<double, LinearSpring>, Elements<double, TriangularSpring<double>>> tissue;
-    FoundationSprings<double> backing;
+    FoundationSprings<double> foundation;
 
     explicit Elastic(const TriangleMesh<double>& surface)
         : mesh(surface),
           tissue(MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 0.0}), triangular_springs(mesh, capsule)),
-          backing(mesh,
-                  {.normal = normal_stiffnesses(mesh, layer), .tangential = tangential_stiffnesses(mesh, layer)}) {}
+          foundation(mesh,
+                     {.normal = normal_stiffnesses(mesh, layer), .tangential = tangential_stiffnesses(mesh, layer)}) {}
 
     double force(double radius, double depth) const {
         const double pressing = membrane::tool_radius(radius, mean_edge(mesh));
@@ -126,7 +126,7 @@ struct Elastic {
         for (int i = 0; i <= 2; ++i) {
             const double above = (1 - i / 2.0) * (depth + 0.05 * R);
             const Tool<double> tool{.position = (R + radius - depth + above) * out, .radius = pressing};
-            const auto rest = equilibrium(x, mesh, tissue, backing, {}, press(tool, tracker.update(tree, x, tool)));
+            const auto rest = equilibrium(x, mesh, tissue, foundation, {}, press(tool, tracker.update(tree, x, tool)));
             REQUIRE(rest.converged);
             x = rest.x;
             tree.refit(x);
@@ -211,7 +211,7 @@ TEST_CASE("a step that has come to rest holds a tissue with the force of its equ
     std::ignore = tracker.update(tree, sphere.mesh.positions(), above);
     const auto contact = tracker.update(tree, sphere.mesh.positions(), tool);
     const auto rest =
-        equilibrium(sphere.mesh.positions(), sphere.mesh, sphere.network, sphere.backing, {}, press(tool, contact));
+        equilibrium(sphere.mesh.positions(), sphere.mesh, sphere.network, sphere.foundation, {}, press(tool, contact));
     REQUIRE(rest.converged);
     CHECK(sphere.force(radius, depth, Over::face, radius) == Approx(norm(rest.reactions[0])).epsilon(1e-3));
 }

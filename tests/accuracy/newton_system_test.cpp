@@ -161,7 +161,7 @@ TEST_CASE("multipliers of random quadratic problems", "[newton_system]") {
         const Eigen::VectorXd q = W * random_vector(count, random);  // bounded below
         std::vector<unsigned char> equality;
         for (Eigen::Index i = 0; i < count; ++i) equality.push_back(random.chance(0.2) ? 1 : 0);
-        const Eigen::VectorXd y = least_multipliers(W, q, equality), slope = W * y + q;
+        const Eigen::VectorXd y = estimated_multipliers(W, q, equality), slope = W * y + q;
         for (Eigen::Index i = 0; i < count; ++i) {
             if (equality[static_cast<std::size_t>(i)] != 0) {
                 CHECK(std::abs(slope[i]) < 1e-8);

@@ -86,13 +86,13 @@ struct Slide {
 /// Of what lies on the way.
 class Crossings {
   public:
-    void take(const Contact<double>& contact, const TriangleMesh<double>& mesh, const Vector3<double>& way_out,
-              double near, Slide& out) {
+    void take(const Contact<double>& contact, const TriangleMesh<double>& mesh,
+              const Vector3<double>& exit_displacement, double near, Slide& out) {
         out.edges += face_ != no_index && contact.triangle != face_ ? 1U : 0U;
         face_ = contact.triangle;
         faces_.insert(face_);
         for (const Index v : contact.corners) {
-            if (norm<double>(point(mesh.positions(), v) / ball - way_out) < near) vertices_.insert(v);
+            if (norm<double>(point(mesh.positions(), v) / ball - exit_displacement) < near) vertices_.insert(v);
         }
         out.faces = faces_.size();
         out.vertices = vertices_.size();
@@ -105,7 +105,7 @@ class Crossings {
 
 Slide slide(const TriangleMesh<double>& mesh, const Path& path, double tick) {
     const auto network = MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 40.0});
-    const auto backing = VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const auto foundation = VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
     const SpringDamperForce feel{.stiffness = stiffness, .damping = damping};
     auto solver = QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = AabbTree(mesh);
@@ -122,7 +122,7 @@ Slide slide(const TriangleMesh<double>& mesh, const Path& path, double tick) {
         const double now = tick * i;
         const auto tool = path.tool(now);
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, tick, network, backing, press(tool, contact));
+        const auto report = solver.step(x, tick, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
         const auto force = feel({tool, smooth(contact), report});
         const auto written = limit(force, now, static_cast<std::uint64_t>(i));

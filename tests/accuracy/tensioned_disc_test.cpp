@@ -5,13 +5,13 @@
 #include <numbers>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/mesh/adjacency.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/calibration.hpp>
-#include <membrane/network/pressure.hpp>
-#include <membrane/network/tissue.hpp>
-#include <membrane/network/triangular_springs.hpp>
+#include <membrane/model/pressure.hpp>
+#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/catch.hpp"
 #include "support/meshes.hpp"
@@ -37,7 +37,7 @@ struct Disc {
           stretched(triangular_springs(mesh, material, 1.1)),
           tension(stretched.all()[0].element.mean_tension(stretched.where(stretched.all()[0], mesh.positions()))),
           pressure(tension / (decay * decay)),
-          backing(mesh, {.stiffness = scaled(vertex_areas(mesh), pressure)}) {}
+          foundation(mesh, {.stiffness = scaled(vertex_areas(mesh), pressure)}) {}
 
     static TriangleMesh<double> irregular(Random& random) {
         auto surface = test::surface_of(disc({.radius = radius, .rings = rings}));
@@ -58,7 +58,7 @@ struct Disc {
         std::vector<Loads::Placed> all;
         for (Index v = 0; v < mesh.vertex_count(); ++v) all.push_back({{v}, {loads.col(v)}});
         const auto tissue = Tissue(springs, stretched, Loads(mesh, all));
-        const auto rest = equilibrium(mesh.positions(), mesh, tissue, backing, {});
+        const auto rest = equilibrium(mesh.positions(), mesh, tissue, foundation, {});
         REQUIRE(rest.converged);
         return -rest.x.row(2).transpose();
     }
@@ -69,7 +69,7 @@ struct Disc {
     Elements<double, TriangularSpring<double>> stretched;
     double tension;   // [N/m]
     double pressure;  // of the foundation, for each metre of depth [Pa/m]
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
 };
 
 }  // namespace

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -137,7 +137,7 @@ TEST_CASE("in a safe part of a step no triangle reaches the axis", "[tool_points
         test::Random random(static_cast<std::uint64_t>(seed));
         const std::array tools{random_tool(random, 1.3 * random.unit_vector(), seed % 2 == 0)};
         const Points<double> step = test::jittered<double>(Points<double>::Zero(3, mesh.vertex_count()), 0.5, random);
-        const double part = safe_part(mesh.triangles(), mesh.positions(), step, tools);
+        const double part = collision_free_step(mesh.triangles(), mesh.positions(), step, tools);
         REQUIRE(part >= 0);
         REQUIRE(part <= 1);
         cut += part < 1;
@@ -149,5 +149,5 @@ TEST_CASE("in a safe part of a step no triangle reaches the axis", "[tool_points
     }
     CHECK(cut > 0);
     const Points<double> none = Points<double>::Zero(3, mesh.vertex_count());
-    CHECK(safe_part(mesh.triangles(), mesh.positions(), none, std::array{Tool<double>{}}) == 1);
+    CHECK(collision_free_step(mesh.triangles(), mesh.positions(), none, std::array{Tool<double>{}}) == 1);
 }

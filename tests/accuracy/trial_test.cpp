@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/catch.hpp"
@@ -32,7 +32,7 @@ template <Real Scalar>
 struct Scene {
     TriangleMesh<Scalar> mesh = icosphere<Scalar>({.radius = radius, .subdivisions = 2});
     MassSpringNetwork<Scalar, LinearSpring> network{mesh, {}, {.stiffness = Scalar(40), .mass = Scalar(4e-4)}};
-    VirtualVolumeSprings<Scalar> backing{mesh, {.stiffness = Scalar(8)}};
+    VirtualVolumeSprings<Scalar> foundation{mesh, {.stiffness = Scalar(8)}};
     std::vector<Tool<Scalar>> tools;
 
     Scene() {
@@ -50,9 +50,9 @@ struct Scene {
     Index ticks() const { return static_cast<Index>(tools.size()); }
 
     template <class History, class Rule = BlockStep, class Clock = SteadySeconds>
-    Outcome play(const History& history, std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options = {},
-                 const Rule& rule = {}, const Clock& clock = {}) const {
-        return trial(mesh, network, backing, history, rests, options, rule, clock);
+    Outcome play(const History& history, std::span<const ReferenceTick> references,
+                 const SolverOptions<Scalar>& options = {}, const Rule& rule = {}, const Clock& clock = {}) const {
+        return trial(mesh, network, foundation, history, references, options, rule, clock);
     }
 };
 
@@ -63,8 +63,9 @@ struct Pinch {
 
     Index ticks() const { return last + 1; }
     double dt() const { return 1e-3; }
-    std::tuple<HeldVertex<double>, Load<double>, Pinned> operator()(Index tick, const ConstPointsRef<double>&,
-                                                                    std::span<const Index>) const {
+    std::tuple<VertexAttachment<double>, PointLoad<double>, PinnedVertices> operator()(Index tick,
+                                                                                       const ConstPointsRef<double>&,
+                                                                                       std::span<const Index>) const {
         const double turn = 0.1 * tick;
         return {pull(5, pulled + 5e-5 * tick * pulled.normalized()),
                 load<double>({0, 12, 14}, {0.5, 0.25, 0.25}, {0.02 * std::cos(turn), 0.02 * std::sin(turn), 0}),
@@ -79,7 +80,7 @@ static_assert(LoadHistory<Pinch, double> && !LoadHistory<Pinch, float> && !LoadH
 struct LoadedAlone {
     Index ticks() const { return 3; }
     double dt() const { return 1e-3; }
-    std::tuple<Load<double>> operator()(Index tick, const ConstPointsRef<double>&, std::span<const Index>) const {
+    std::tuple<PointLoad<double>> operator()(Index tick, const ConstPointsRef<double>&, std::span<const Index>) const {
         return {load<double>({0, 12, 14}, {0.5, 0.25, 0.25}, {0, 0, -0.01 * (tick + 1)})};
     }
 };
@@ -113,11 +114,11 @@ TEST_CASE("a stroke gives what the loop of the README does") {
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
         const auto report =
-            solver.step(x, dt, scene.network, scene.backing, press(tool, contact, grasp), pull(tool, grasp));
+            solver.step(x, dt, scene.network, scene.foundation, press(tool, contact, grasp), pull(tool, grasp));
         tree.refit(x, report.moved);
 
         const auto constraints = stroke(tick, y, moved);
-        const auto same = other.step(y, stroke.dt(), scene.network, scene.backing, std::get<0>(constraints),
+        const auto same = other.step(y, stroke.dt(), scene.network, scene.foundation, std::get<0>(constraints),
                                      std::get<1>(constraints));
         moved.assign(same.moved.begin(), same.moved.end());
         CHECK(test::same_bits(x, y));
@@ -132,60 +133,61 @@ TEST_CASE("the errors of a trial are those to the equilibrium of each tick") {
     const Scene<double> scene;
     const SolverOptions<double> options{.layers = 4, .sweeps = 2};
     for (const Index every : {1, 3}) {
-        const auto rests = equilibria(scene.mesh, scene.network, scene.backing, scene.stroke(), every);
-        REQUIRE(rests.size() == static_cast<std::size_t>(scene.ticks() / every));
-        const auto outcome = scene.play(scene.stroke(), rests, options);
+        const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), every);
+        REQUIRE(references.size() == static_cast<std::size_t>(scene.ticks() / every));
+        const auto outcome = scene.play(scene.stroke(), references, options);
 
         auto stroke = scene.stroke();
         QuasiStaticSolver solver(scene.network, options);
         Points<double> x = scene.mesh.positions();
         std::vector<Index> moved;
-        double errors = 0, squares = 0, ways = 0;
+        double errors = 0, squares = 0, displacements = 0;
         for (Index tick = 0; tick < scene.ticks(); ++tick) {
             const auto [presses, pulls] = stroke(tick, x, moved);
-            const auto report = solver.step(x, dt, scene.network, scene.backing, presses, pulls);
+            const auto report = solver.step(x, dt, scene.network, scene.foundation, presses, pulls);
             moved.assign(report.moved.begin(), report.moved.end());
             if ((tick + 1) % every != 0) continue;
-            const auto& rest = rests[static_cast<std::size_t>(tick / every)];
+            const auto& rest = references[static_cast<std::size_t>(tick / every)];
             CHECK(rest.tick == tick);
-            const auto exact = equilibrium(x, scene.mesh, scene.network, scene.backing, {}, presses, pulls);
+            const auto exact = equilibrium(x, scene.mesh, scene.network, scene.foundation, {}, presses, pulls);
             CHECK((exact.x - rest.x).norm() < 0.02 * radius);
             for (std::size_t i = 0; i < 2; ++i) {
                 errors += (report.reactions[i] - rest.reactions[i]).squaredNorm();
                 squares += rest.reactions[i].squaredNorm();
             }
-            ways += std::pow((x - rest.x).colwise().norm().maxCoeff(), 2);
+            displacements += std::pow((x - rest.x).colwise().norm().maxCoeff(), 2);
         }
         CHECK(outcome.force_error == Approx(std::sqrt(errors / squares)));
-        CHECK(outcome.position_error == Approx(std::sqrt(ways / static_cast<double>(rests.size()))));
+        CHECK(outcome.position_error == Approx(std::sqrt(displacements / static_cast<double>(references.size()))));
         CHECK(outcome.force_error < 0.1);
-        CHECK(outcome.judged == scene.ticks() / every);
+        CHECK(outcome.ticks_compared == scene.ticks() / every);
         CHECK(outcome.advanced);
     }
 }
 
 TEST_CASE("more of everything is nearer to the equilibrium") {
     const Scene<double> scene;
-    const auto rests = equilibria(scene.mesh, scene.network, scene.backing, scene.stroke());
-    double force = 1, way = radius;
+    const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke());
+    double force = 1, displacement = radius;
     for (const Index much : {1, 4, 16, 64}) {
-        const auto outcome = scene.play(scene.stroke(), rests, {.layers = much, .sweeps = much, .contact_visits = 8});
+        const auto outcome =
+            scene.play(scene.stroke(), references, {.layers = much, .sweeps = much, .contact_iterations = 8});
         CHECK(outcome.force_error < force);
-        CHECK(outcome.position_error < way);
+        CHECK(outcome.position_error < displacement);
         CHECK(outcome.layers_reached == std::min(much, outcome.layers_reached));
         force = outcome.force_error;
-        way = outcome.position_error;
+        displacement = outcome.position_error;
     }
     CHECK(force < 1e-3);
-    CHECK(way < 1e-4 * radius);
-    CHECK(scene.play(scene.stroke(), rests, {.layers = 64}).layers_reached < 12);
-    CHECK(scene.play(scene.stroke(), rests, {.layers = 2}).layers_reached == 2);
+    CHECK(displacement < 1e-4 * radius);
+    CHECK(scene.play(scene.stroke(), references, {.layers = 64}).layers_reached < 12);
+    CHECK(scene.play(scene.stroke(), references, {.layers = 2}).layers_reached == 2);
 }
 
 TEST_CASE("floats are set against the same equilibria") {
     const Scene<float> scene;
-    const auto rests = equilibria(scene.mesh, scene.network, scene.backing, scene.stroke());
-    const auto outcome = scene.play(scene.stroke(), rests, {.layers = 64, .sweeps = 16});
+    const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke());
+    const auto outcome = scene.play(scene.stroke(), references, {.layers = 64, .sweeps = 16});
     CHECK(outcome.force_error < 0.01);
     CHECK(outcome.force_error > 0);
 }
@@ -193,17 +195,17 @@ TEST_CASE("floats are set against the same equilibria") {
 TEST_CASE("a history of one's own is played, and what loads and pins answer with does not count") {
     const Scene<double> scene;
     const Pinch pinch;
-    const auto rests = equilibria(scene.mesh, scene.network, scene.backing, pinch);
-    REQUIRE(rests.size() == 20);
-    for (const auto& rest : rests) {
+    const auto references = equilibria(scene.mesh, scene.network, scene.foundation, pinch);
+    REQUIRE(references.size() == 20);
+    for (const auto& rest : references) {
         REQUIRE(rest.reactions.size() == 3);
         CHECK(rest.force == rest.reactions[0].norm());
     }
-    const auto outcome = scene.play(pinch, rests, {.layers = 64, .sweeps = 32});
+    const auto outcome = scene.play(pinch, references, {.layers = 64, .sweeps = 32});
     CHECK(outcome.force_error < 0.02);
-    CHECK(scene.play(pinch, rests, {.layers = 2, .sweeps = 1}).force_error > outcome.force_error);
+    CHECK(scene.play(pinch, references, {.layers = 2, .sweeps = 1}).force_error > outcome.force_error);
 
-    const auto alone = equilibria(scene.mesh, scene.network, scene.backing, LoadedAlone{});
+    const auto alone = equilibria(scene.mesh, scene.network, scene.foundation, LoadedAlone{});
     CHECK(alone.back().force == 0);
     const auto unfelt = scene.play(LoadedAlone{}, alone);
     CHECK(unfelt.force_error == 0);
@@ -217,19 +219,19 @@ TEST_CASE("the time is that of the ticks in which a force is felt, by the clock 
         double operator()() const { return *now += 1; }
     };
     const Scene<double> scene;
-    const auto rests = equilibria(scene.mesh, scene.network, scene.backing, scene.stroke(), 10);
+    const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), 10);
     double now = 0;
-    CHECK(scene.play(scene.stroke(), rests, {}, BlockStep{}, OneSecondEach{&now}).time == 1);
+    CHECK(scene.play(scene.stroke(), references, {}, BlockStep{}, OneSecondEach{&now}).time == 1);
     CHECK(now == 2 * scene.ticks());
-    CHECK(scene.play(scene.stroke(), rests).time < 1);
+    CHECK(scene.play(scene.stroke(), references).time < 1);
 }
 
 TEST_CASE("a step that is refused ends the trial") {
     const Scene<double> scene;
-    const auto rests = equilibria(scene.mesh, scene.network, scene.backing, scene.stroke(), 10);
-    CHECK(scene.play(scene.stroke(), rests, {}, MassStep{}).advanced);
+    const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), 10);
+    CHECK(scene.play(scene.stroke(), references, {}, MassStep{}).advanced);
     const MassSpringNetwork light(scene.mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 1e-7});
-    const auto outcome = trial(scene.mesh, light, scene.backing, scene.stroke(), rests, {}, MassStep{});
+    const auto outcome = trial(scene.mesh, light, scene.foundation, scene.stroke(), references, {}, MassStep{});
     CHECK_FALSE(outcome.advanced);
     CHECK(outcome.force_error == std::numeric_limits<double>::infinity());
     CHECK(outcome.time == std::numeric_limits<double>::infinity());
@@ -247,24 +249,25 @@ TEST_CASE("a stroke or a trial that makes no sense is refused") {
           "Stroke: the tool of tick 7 must be finite, its radius not negative, got one that is not");
 
     const auto rests_of = [&](const auto& history, Index every = 1) {
-        return equilibria(scene.mesh, scene.network, scene.backing, history, every);
+        return equilibria(scene.mesh, scene.network, scene.foundation, history, every);
     };
     CHECK(refusal([&] { (void)rests_of(Odd{.count = 0}); }) == "equilibria: the history must have a tick, got 0");
     CHECK(refusal([&] { (void)rests_of(Odd{.step = -1}); }) ==
           "equilibria: dt of the history must be finite and positive [s], got -1");
     CHECK(refusal([&] { (void)rests_of(Odd{}, 0); }) == "equilibria: every must be at least 1, got 0");
 
-    auto rests = rests_of(Pinch{}, 5);
+    auto references = rests_of(Pinch{}, 5);
     const std::string others = "trial: rests must be of ticks of the history, one at least, in their order, got others";
     CHECK(refusal([&] { (void)scene.play(Pinch{}, {}); }) == others);
-    CHECK(refusal([&] { (void)scene.play(Pinch{.last = 12}, rests); }) == others);
-    CHECK(refusal([&] { (void)scene.play(Odd{.count = 0}, rests); }) == "trial: the history must have a tick, got 0");
-    CHECK(refusal([&] { (void)scene.play(Pinch{}, rests, {.sweeps = 0}); }) ==
+    CHECK(refusal([&] { (void)scene.play(Pinch{.last = 12}, references); }) == others);
+    CHECK(refusal([&] { (void)scene.play(Odd{.count = 0}, references); }) ==
+          "trial: the history must have a tick, got 0");
+    CHECK(refusal([&] { (void)scene.play(Pinch{}, references, {.sweeps = 0}); }) ==
           "QuasiStaticSolver: sweeps must be at least 1, got 0");
-    rests[1].reactions.pop_back();
-    CHECK(refusal([&] { (void)scene.play(Pinch{}, rests); }) ==
+    references[1].reactions.pop_back();
+    CHECK(refusal([&] { (void)scene.play(Pinch{}, references); }) ==
           "trial: the rest of tick 9 must have 162 vertices and 3 reactions, got 162 and 2");
-    rests = rests_of(Pinch{}, 5);
-    std::swap(rests[0], rests[1]);
-    CHECK(refusal([&] { (void)scene.play(Pinch{}, rests); }) == others);
+    references = rests_of(Pinch{}, 5);
+    std::swap(references[0], references[1]);
+    CHECK(refusal([&] { (void)scene.play(Pinch{}, references); }) == others);
 }

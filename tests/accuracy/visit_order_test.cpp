@@ -41,8 +41,8 @@ std::vector<Tool<double>> pull() {
     std::vector<Tool<double>> tools;
     for (Index t = 1; t <= 90; ++t) {
         const double from_centre = ball + out * std::min<Index>(t, 30) / 30;
-        const double way = speed * tick * std::max<Index>(t - 30, 0);
-        tools.push_back({.position = from_centre * start() + way * along, .radius = tip, .grasping = true});
+        const double displacement = speed * tick * std::max<Index>(t - 30, 0);
+        tools.push_back({.position = from_centre * start() + displacement * along, .radius = tip, .grasping = true});
     }
     return tools;
 }
@@ -53,19 +53,19 @@ TEST_CASE("the default order of updates costs no accuracy, in press and pull, at
     for (Index subdivisions = 2; subdivisions <= std::max(2, cases(3, 4)); ++subdivisions) {
         const auto mesh = icosphere<double>({.radius = ball, .subdivisions = subdivisions});
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
-        const VirtualVolumeSprings backing(mesh, {.stiffness = 8.0});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0});
         for (const bool pulls : {false, true}) {
             const Stroke<double> stroke(mesh, pulls ? pull() : press(), tick);
-            const auto rests = equilibria(mesh, network, backing, stroke, 6);
-            REQUIRE(rests.size() == 15);
-            const auto error = [&](VisitOrder order, Index layers, Index sweeps) {
+            const auto references = equilibria(mesh, network, foundation, stroke, 6);
+            REQUIRE(references.size() == 15);
+            const auto error = [&](UpdateOrder order, Index layers, Index sweeps) {
                 const SolverOptions<double> options{.layers = layers, .sweeps = sweeps, .order = order};
-                return trial(mesh, network, backing, stroke, rests, options).force_error;
+                return trial(mesh, network, foundation, stroke, references, options).force_error;
             };
             for (const auto& [layers, sweeps] : {std::pair<Index, Index>{6, 2}, {3, 1}, {6, 8}}) {
                 CAPTURE(mesh.vertex_count(), pulls, layers, sweeps);
                 const double by_default = error(SolverOptions<double>().order, layers, sweeps),
-                             by_arrival = error(VisitOrder::arrival, layers, sweeps);
+                             by_arrival = error(UpdateOrder::breadth_first, layers, sweeps);
                 CHECK(by_default <= 1.1 * by_arrival + 1e-4);  // of the force: a hundredth of a percent is nothing
             }
         }

@@ -11,7 +11,7 @@
 struct Scene {
     membrane::TriangleMesh<double> mesh;
     membrane::MassSpringNetwork<double, membrane::LinearSpring> network;
-    membrane::VirtualVolumeSprings<double> backing;
+    membrane::VirtualVolumeSprings<double> foundation;
     membrane::QuasiStaticSolver<double> solver;
     membrane::AabbTree<double> tree;
     membrane::ContactTracker<double> tracker;
@@ -19,7 +19,7 @@ struct Scene {
     membrane::Points<double> x;
 };
 #elif defined(GIVE) || defined(TAKE_MAIN)
-#include <membrane/collision/aabb_tree.hpp>
+#include <membrane/contact/aabb_tree.hpp>
 
 membrane::AabbTree<double>* given();
 void take(const membrane::AabbTree<double>* tree);
@@ -53,12 +53,12 @@ Scene* UNIT::make() {
 // The force on a tool that presses. Frees the scene.
 double UNIT::step(Scene* scene) {
     const std::unique_ptr<Scene> owner(scene);
-    auto& [mesh, network, backing, solver, tree, tracker, normals, x] = *scene;
+    auto& [mesh, network, foundation, solver, tree, tracker, normals, x] = *scene;
     double force = 0;
     for (int tick = 0; tick < 50; ++tick) {
         const membrane::Tool<double> tool{.position = {0, 0, 0.0115 - 4e-5 * tick}, .radius = 1e-3};
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, 1e-3, network, backing, press(tool, contact));
+        const auto report = solver.step(x, 1e-3, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
         normals.update(x, report.moved);
         force = report.reactions[0].norm();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // What does a part cost that a scene leaves out? Each pair of functions does the same with every vertex of a sphere:
-// ours leaves a part out by the library's means (no backing, volume springs without damping, a law of whose answer only
+// ours leaves a part out by the library's means (no foundation, volume springs without damping, a law of whose answer only
 // the tension is used), the other does not know it. The last one is the loop one would write by hand. `left_out` counts
 // their instructions; here they must come to the same bits.
 #include <algorithm>
@@ -25,7 +25,7 @@ using Points = membrane::Points<S>;
 using PointsRef = membrane::PointsRef<S>;
 using Rule = membrane::MassStep;
 
-constexpr S dt = S(1e-3), stiffness = 40, mass = S(1e-3), backing = 8;
+constexpr S dt = S(1e-3), stiffness = 40, mass = S(1e-3), foundation = 8;
 
 /// A linear law that knows no energy.
 struct NoEnergy {
@@ -41,12 +41,12 @@ struct NoDamping {
     const std::vector<S>* stiffness;
 
     template <class V>
-    membrane::Pull<S> pull(Index v, const V& position, const V&, S) const noexcept {
+    membrane::VertexForce<S> force_on(Index v, const V& position, const V&, S) const noexcept {
         const S k = (*stiffness)[static_cast<std::size_t>(v)];
         return {-k * (position - membrane::point(*anchors, v)), k};
     }
 };
-static_assert(membrane::VolumeModel<NoDamping, S>);
+static_assert(membrane::FoundationModel<NoDamping, S>);
 
 /// What the solver does with a vertex that it updates alone, by a rule that moves it along the force.
 template <class Scene>
@@ -60,10 +60,10 @@ template <class Scene>
 template <class Volume>
 using SceneOf = membrane::StepInput<S, Network, Volume>;
 
-/// `state_of` without a backing.
-membrane::VertexState<S> bare_state(const SceneOf<membrane::NoVolumeSprings>& scene, Index v) noexcept {
+/// `state_of` without a foundation.
+membrane::VertexState<S> bare_state(const SceneOf<membrane::NoFoundation>& scene, Index v) noexcept {
     membrane::VertexState<S> state;
-    const auto springs = scene.network.pull(v, scene.x);
+    const auto springs = scene.network.force_on(v, scene.x);
     state.force = springs.force;
     state.stiffness = springs.stiffness;
     state.force += scene.state.constraint_force(v);
@@ -104,11 +104,11 @@ struct Rows {
 
 extern "C" {
 
-COUNTED void backing_ours(const SceneOf<membrane::NoVolumeSprings>& scene) {
+COUNTED void backing_ours(const SceneOf<membrane::NoFoundation>& scene) {
     for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v)
         visit(scene, v, membrane::state_of<Rule>(scene, v));
 }
-COUNTED void backing_bare(const SceneOf<membrane::NoVolumeSprings>& scene) {
+COUNTED void backing_bare(const SceneOf<membrane::NoFoundation>& scene) {
     for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v) visit(scene, v, bare_state(scene, v));
 }
 
@@ -122,14 +122,14 @@ COUNTED void damping_bare(const SceneOf<NoDamping>& scene) {
 }
 
 COUNTED void energy_ours(const Network& network, const membrane::ConstPointsRef<S>& x, Points& force) {
-    for (Index v = 0; v < force.cols(); ++v) force.col(v) = network.pull(v, x).force;
+    for (Index v = 0; v < force.cols(); ++v) force.col(v) = network.force_on(v, x).force;
 }
 COUNTED void energy_bare(const membrane::MassSpringNetwork<S, NoEnergy>& network, const membrane::ConstPointsRef<S>& x,
                          Points& force) {
-    for (Index v = 0; v < force.cols(); ++v) force.col(v) = network.pull(v, x).force;
+    for (Index v = 0; v < force.cols(); ++v) force.col(v) = network.force_on(v, x).force;
 }
 
-COUNTED void by_hand_bare(const Rows& rows, S* x, const S* external, const S* touches) {
+COUNTED void by_hand_bare(const Rows& rows, S* x, const S* external, const S* contacts) {
     for (std::size_t v = 0; v < rows.masses.size(); ++v) {
         S* here = x + 3 * v;
         S force_x = 0, force_y = 0, force_z = 0, sum = 0;
@@ -144,7 +144,7 @@ COUNTED void by_hand_bare(const Rows& rows, S* x, const S* external, const S* to
             force_z += across * dz;
             sum += end.stiffness < across ? across : end.stiffness;
         }
-        sum += touches[v] < 0 ? 0 : touches[v];
+        sum += contacts[v] < 0 ? 0 : contacts[v];
         const S step = dt * dt / rows.masses[v];
         if (step * sum >= 2) std::abort();
         here[0] += step * (force_x + external[3 * v]);
@@ -159,9 +159,9 @@ int main(int argc, char** argv) {
     const auto mesh = membrane::icosphere<S>({.radius = S(0.01), .subdivisions = 3});
     const Network network(mesh, {}, {.stiffness = stiffness, .mass = mass});
     const membrane::MassSpringNetwork<S, NoEnergy> network_without_energy(mesh, {}, {.stiffness = stiffness});
-    const membrane::VirtualVolumeSprings<S> springs(mesh, {.stiffness = backing});
-    const membrane::NoVolumeSprings none;
-    const std::vector<S> stiffnesses(static_cast<std::size_t>(mesh.vertex_count()), backing);
+    const membrane::VirtualVolumeSprings<S> springs(mesh, {.stiffness = foundation});
+    const membrane::NoFoundation none;
+    const std::vector<S> stiffnesses(static_cast<std::size_t>(mesh.vertex_count()), foundation);
     const NoDamping undamped{&springs.anchors(), &stiffnesses};
     membrane::StepState<S> state(mesh.vertex_count(), 0);
 
@@ -192,7 +192,7 @@ int main(int argc, char** argv) {
             x = now;
         };
     };
-    compare("backing", visited(backing_ours, none), visited(backing_bare, none));
+    compare("foundation", visited(backing_ours, none), visited(backing_bare, none));
     compare("damping", visited(damping_ours, springs), visited(damping_bare, undamped));
     compare(
         "energy", [&](Points& x) { energy_ours(network, start, x); },

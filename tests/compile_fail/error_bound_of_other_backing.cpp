@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// A bound for a backing that may not be linear.
-// expect: LinearBacking
+// A bound for a foundation that may not be linear.
+// expect: LinearFoundation
 #include <membrane/accuracy/error_bound.hpp>
 
 struct Tether {
     template <membrane::Real Scalar>
-    membrane::Pull<Scalar> pull(membrane::Index, const membrane::Vector3<Scalar>& position,
-                                const membrane::Vector3<Scalar>&, Scalar) const noexcept {
+    membrane::VertexForce<Scalar> pull(membrane::Index, const membrane::Vector3<Scalar>& position,
+                                       const membrane::Vector3<Scalar>&, Scalar) const noexcept {
         return {-membrane::norm(position) * position, 2 * membrane::norm(position)};
     }
 };
-static_assert(membrane::VolumeModel<Tether, double>);
+static_assert(membrane::FoundationModel<Tether, double>);
 #ifdef CORRECT
-using Backing = membrane::NoVolumeSprings;
+using Backing = membrane::NoFoundation;
 #else
 using Backing = Tether;
 #endif

@@ -14,4 +14,4 @@ struct Stump {
     const membrane::Vector3<double>& velocity() const noexcept;
 };
 
-using Device = membrane::NullDevice<double, Stump>;
+using Device = membrane::ScriptedDevice<double, Stump>;

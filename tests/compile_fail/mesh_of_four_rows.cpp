@@ -2,7 +2,7 @@
 // Homogeneous points, or any others of four rows.
 // expect: positions must be 3 x V
 // expect: transpose
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 auto mesh(const Eigen::Matrix4Xd& positions, const Eigen::Matrix3Xi& triangles) {
 #ifdef CORRECT

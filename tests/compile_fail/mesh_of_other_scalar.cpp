@@ -2,7 +2,7 @@
 // Float positions for a mesh of doubles.
 // expect: positions must be of the mesh's own scalar
 // expect: cast
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 auto mesh(const Eigen::Matrix3Xf& positions, const Eigen::Matrix3Xi& triangles) {
 #ifdef CORRECT

@@ -2,7 +2,7 @@
 // Four corners to a face.
 // expect: triangles must be 3 x F
 // expect: cut quads into triangles
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 #ifdef CORRECT
 inline constexpr int corners = 3;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Triangles that name their vertices by floating-point numbers.
 // expect: triangles must be of an integer type
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 auto mesh(const Eigen::Matrix3Xd& positions, const Eigen::Matrix3Xd& triangles) {
 #ifdef CORRECT

@@ -4,10 +4,10 @@
 // expect: no match for|invalid operands|no viable
 #include <membrane/haptics/units.hpp>
 
-membrane::Metres moved(const membrane::Metres& place, const membrane::Millimetres& way) {
+membrane::Metres moved(const membrane::Metres& place, const membrane::Millimetres& displacement) {
 #ifdef CORRECT
-    return place + membrane::in_metres(way);
+    return place + membrane::in_metres(displacement);
 #else
-    return place + way;
+    return place + displacement;
 #endif
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A scalar that is neither float nor double.
 // expect: Real
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 #ifdef CORRECT
 using Scalar = double;

@@ -12,5 +12,5 @@ using Positions = Eigen::Matrix3Xf;
 using Network = membrane::MassSpringNetwork<double, membrane::LinearSpring>;
 
 auto step(membrane::QuasiStaticSolver<double>& solver, Positions& x, const Network& network) {
-    return solver.step(x, 1e-3, network, membrane::NoVolumeSprings{}).residual;
+    return solver.step(x, 1e-3, network, membrane::NoFoundation{}).residual;
 }

@@ -2,7 +2,7 @@
 // A law that is not noexcept, though it is called online.
 // expect: SpringLaw<.*Cubic
 // expect: (may throw|is not .*noexcept)
-#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/model/mass_spring_network.hpp>
 
 struct Cubic {
     template <membrane::Real Scalar>

@@ -2,7 +2,7 @@
 // A law that answers with the tension alone.
 // expect: SpringLaw<.*Cubic
 // expect: (return-type-requirement|type constraint)
-#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/model/mass_spring_network.hpp>
 
 struct Cubic {
     template <membrane::Real Scalar>

@@ -4,7 +4,7 @@
 #include <type_traits>
 
 #include <membrane/core/lane_points.hpp>
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 #include "support/catch.hpp"
 

@@ -25,10 +25,10 @@ TEMPLATE_TEST_CASE("a frame at rest in the world changes nothing", "[core]", dou
     using S = TestType;
     const RigidFrame<S> world;
     const Vector3<S> p(1, -2, 3), v(S(0.5), 4, 0);
-    CHECK(world.point_in(p) == p);
-    CHECK(world.point_out(p) == p);
-    CHECK(world.direction_in(p) == p);
-    CHECK(world.direction_out(p) == p);
+    CHECK(world.point_to_body(p) == p);
+    CHECK(world.point_to_world(p) == p);
+    CHECK(world.vector_to_body(p) == p);
+    CHECK(world.vector_to_world(p) == p);
     CHECK(world.velocity_in(v, p) == v);
 }
 
@@ -36,10 +36,10 @@ TEST_CASE("a frame turned by hand", "[core]") {
     RigidFrame<double> frame;
     frame.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;  // the body's x is the world's y
     frame.origin = {10, 0, 0};
-    CHECK(frame.point_out({1, 0, 0}) == Vector3<double>(10, 1, 0));
-    CHECK(frame.point_in({10, 1, 0}) == Vector3<double>(1, 0, 0));
-    CHECK(frame.direction_out({1, 0, 0}) == Vector3<double>(0, 1, 0));
-    CHECK(frame.direction_in({0, 1, 0}) == Vector3<double>(1, 0, 0));
+    CHECK(frame.point_to_world({1, 0, 0}) == Vector3<double>(10, 1, 0));
+    CHECK(frame.point_to_body({10, 1, 0}) == Vector3<double>(1, 0, 0));
+    CHECK(frame.vector_to_world({1, 0, 0}) == Vector3<double>(0, 1, 0));
+    CHECK(frame.vector_to_body({0, 1, 0}) == Vector3<double>(1, 0, 0));
     frame.angular_velocity = {0, 0, 2};
     // What stands still in the world 1 m along the body's x seems to run backwards along the circle.
     CHECK(frame.velocity_in({0, 0, 0}, {10, 1, 0}) == Vector3<double>(0, -2, 0));
@@ -55,14 +55,14 @@ TEMPLATE_TEST_CASE("into a frame and out of it again", "[core]", double, float) 
         test::Random random(static_cast<std::uint64_t>(seed));
         const auto frame = random_frame<S>(random);
         const Vector3<S> p = random.vector<S>(), q = random.vector<S>();
-        REQUIRE(norm<S>(frame.point_out(frame.point_in(p)) - p) < tolerance);
-        REQUIRE(norm<S>(frame.point_in(frame.point_out(p)) - p) < tolerance);
-        REQUIRE(norm<S>(frame.direction_out(frame.direction_in(p)) - p) < tolerance);
-        REQUIRE(norm<S>(frame.point_out(p) - (frame.rotation * p + frame.origin)) < tolerance);
-        REQUIRE(norm<S>(frame.direction_in(p) - frame.rotation.transpose() * p) < tolerance);
+        REQUIRE(norm<S>(frame.point_to_world(frame.point_to_body(p)) - p) < tolerance);
+        REQUIRE(norm<S>(frame.point_to_body(frame.point_to_world(p)) - p) < tolerance);
+        REQUIRE(norm<S>(frame.vector_to_world(frame.vector_to_body(p)) - p) < tolerance);
+        REQUIRE(norm<S>(frame.point_to_world(p) - (frame.rotation * p + frame.origin)) < tolerance);
+        REQUIRE(norm<S>(frame.vector_to_body(p) - frame.rotation.transpose() * p) < tolerance);
         // Directions are differences of points; lengths and angles stay.
-        REQUIRE(norm<S>(frame.direction_in(p - q) - (frame.point_in(p) - frame.point_in(q))) < tolerance);
-        REQUIRE(std::abs(dot(frame.direction_in(p), frame.direction_in(q)) - dot(p, q)) < tolerance);
+        REQUIRE(norm<S>(frame.vector_to_body(p - q) - (frame.point_to_body(p) - frame.point_to_body(q))) < tolerance);
+        REQUIRE(std::abs(dot(frame.vector_to_body(p), frame.vector_to_body(q)) - dot(p, q)) < tolerance);
     }
 }
 
@@ -75,8 +75,8 @@ TEMPLATE_TEST_CASE("the motion from one pose to another takes along what is on t
         const auto from = random_frame<S>(random), to = random_frame<S>(random);
         const auto motion = motion_between(from, to);
         const Vector3<S> p = random.vector<S>();
-        REQUIRE(norm<S>(motion.point_out(from.point_out(p)) - to.point_out(p)) < tolerance);
-        REQUIRE(norm<S>(motion.direction_out(from.direction_out(p)) - to.direction_out(p)) < tolerance);
+        REQUIRE(norm<S>(motion.point_to_world(from.point_to_world(p)) - to.point_to_world(p)) < tolerance);
+        REQUIRE(norm<S>(motion.vector_to_world(from.vector_to_world(p)) - to.vector_to_world(p)) < tolerance);
         REQUIRE(motion.velocity == Vector3<S>(0, 0, 0));
         REQUIRE(from.same_pose(from));
         REQUIRE_FALSE(from.same_pose(to));
@@ -98,7 +98,7 @@ TEST_CASE("a velocity seen from a frame is how fast the point moves in it", "[co
             then.rotation =
                 Eigen::AngleAxisd(speed * t, (now.angular_velocity / speed).eigen()).matrix() * now.rotation;
             then.origin += t * now.velocity;
-            return then.point_in(p + t * velocity);
+            return then.point_to_body(p + t * velocity);
         };
         const Vector3<double> difference = (place_at(h) - place_at(-h)) / (2 * h);
         REQUIRE(norm<double>(now.velocity_in(velocity, p) - difference) < 1e-8);

@@ -11,9 +11,9 @@
 
 #include <Eigen/Geometry>
 
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "mesh_texts.hpp"
 #include "support/cases.hpp"
@@ -57,7 +57,7 @@ examples::SurfaceState random_state(const membrane::TriangleMesh<double>& mesh, 
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
     membrane::Points<double> x = mesh.positions();
     for (double& number : x.reshaped()) number += random.number(-1e-4, 1e-4);
-    return examples::surface_state(mesh, x, network, membrane::NoVolumeSprings{});
+    return examples::surface_state(mesh, x, network, membrane::NoFoundation{});
 }
 
 }  // namespace
@@ -70,7 +70,7 @@ TEST_CASE("tension and force are what the energy says") {
         const auto network = membrane::MassSpringNetwork(mesh, membrane::ExponentialSpring{}, {.stiffness = 40.0});
         membrane::Points<double> x = random.number(0.9, 1.2) * mesh.positions();
         for (double& number : x.reshaped()) number += random.number(-2e-4, 2e-4);
-        const auto state = examples::surface_state(mesh, x, network, membrane::NoVolumeSprings{});
+        const auto state = examples::surface_state(mesh, x, network, membrane::NoFoundation{});
         CHECK(state.points == x);
         CHECK(state.displacement == x - mesh.positions());
 
@@ -93,15 +93,15 @@ TEST_CASE("tension and force are what the energy says") {
 TEST_CASE("what holds a vertex that is pulled is the reaction, and nothing holds the others") {
     const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 2});
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
-    const auto backing = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
     auto solver = membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = 100});
     auto x = mesh.positions();
     const Eigen::Vector3d target = 1.3 * mesh.positions().col(17);
     Eigen::Vector3d reaction = Eigen::Vector3d::Zero();
     for (int tick = 0; tick < 200; ++tick) {
-        reaction = solver.step(x, 1e-3, network, backing, membrane::pull(17, target)).reactions[0];
+        reaction = solver.step(x, 1e-3, network, foundation, membrane::pull(17, target)).reactions[0];
     }
-    auto state = examples::surface_state(mesh, x, network, backing);
+    auto state = examples::surface_state(mesh, x, network, foundation);
     REQUIRE(reaction.norm() > 0.01);
     CHECK((state.force.col(17) + reaction).norm() < 1e-5 * reaction.norm());
     state.force.col(17).setZero();

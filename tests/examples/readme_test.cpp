@@ -32,7 +32,7 @@
 // [/rest]
 
 // [moving]
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/moved_volume.hpp>
 // [/moving]
 
 // [handover]
@@ -48,18 +48,18 @@
 // [/recording]
 
 // [distmesh]
-#include <membrane/mesh/distmesh.hpp>
+#include <membrane/meshing/distmesh.hpp>
 // [/distmesh]
 
 // [validate]
-#include <membrane/mesh/repair.hpp>
-#include <membrane/mesh/validate.hpp>
+#include <membrane/mesh_check/repair.hpp>
+#include <membrane/mesh_check/validate.hpp>
 // [/validate]
 
 // [constants]
-#include <membrane/network/calibration.hpp>
-#include <membrane/network/foundation_springs.hpp>
-#include <membrane/network/recommended_layers.hpp>
+#include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/recommended_layers.hpp>
+#include <membrane/model/spring_stiffness.hpp>
 // [/constants]
 
 // [equilibrium]
@@ -86,7 +86,7 @@ double now() { return std::chrono::duration<double>(Clock::now().time_since_epoc
 struct AtRest {
     membrane::TriangleMesh<double> mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 2});
     membrane::MassSpringNetwork<double, membrane::LinearSpring> network{mesh, {}, {.stiffness = 40.0}};
-    membrane::VirtualVolumeSprings<double> backing{mesh, {.stiffness = 40.0}};
+    membrane::VirtualVolumeSprings<double> foundation{mesh, {.stiffness = 40.0}};
     const double dt = 1e-3;
 };
 
@@ -128,7 +128,8 @@ TEST_CASE_METHOD(AtRest, "the README's moving body") {
     tree.refit(x);
     const auto contact = tracker.update(tree, x, tool, body);
     const auto grasp = grasper.update(contact, x, tool, body);
-    const auto report = solver.step(x, dt, network, on(body, backing), press(tool, contact, grasp), pull(tool, grasp));
+    const auto report =
+        solver.step(x, dt, network, on(body, foundation), press(tool, contact, grasp), pull(tool, grasp));
     const auto force = feel({tool, smooth(contact, body), report, grasp});
     // [/moving]
     CHECK(contact.touching());
@@ -144,7 +145,7 @@ TEST_CASE_METHOD(Touched, "the README's constraints") {
     const std::vector<membrane::Index> vertices{100, 101};
     // [constraints]
     const auto grasp = grasper.update(contact, x, tool);  // forceps: membrane::Grasper(mesh)
-    const auto report = solver.step(x, dt, network, backing, press(tool, contact, grasp), pull(tool, grasp),
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact, grasp), pull(tool, grasp),
                                     membrane::load(corners, barycentric, force), membrane::pin(vertices));
     // [/constraints]
     CHECK(grasp.holding());
@@ -156,7 +157,7 @@ TEST_CASE_METHOD(Touched, "the README's constraints") {
 TEST_CASE_METHOD(Touched, "the README's deadline") {
     // [deadline]
     const auto deadline = membrane::Deadline([] { return Clock::now(); }, Clock::now() + 300us);
-    const auto report = solver.step_until(deadline, x, dt, network, backing, press(tool, contact));
+    const auto report = solver.step_until(deadline, x, dt, network, foundation, press(tool, contact));
     // [/deadline]
     CHECK(report.status == membrane::StepStatus::advanced);
 }
@@ -164,21 +165,22 @@ TEST_CASE_METHOD(Touched, "the README's deadline") {
 TEST_CASE_METHOD(AtRest, "the README's threads") {
     // [threads]
     const membrane::ThreadPool pool;
-    auto solver = membrane::QuasiStaticSolver(network,
-                                              {.layers = membrane::unlimited,
-                                               .sweeps = 16,
-                                               .order = membrane::VisitOrder::colours,
-                                               .most_in_groups = membrane::unlimited},  // for more than 32,768 vertices
-                                              membrane::BlockStep{}, pool.executor());
+    auto solver =
+        membrane::QuasiStaticSolver(network,
+                                    {.layers = membrane::unlimited,
+                                     .sweeps = 16,
+                                     .order = membrane::UpdateOrder::colour_all,
+                                     .max_packed_vertices = membrane::unlimited},  // for more than 32,768 vertices
+                                    membrane::BlockStep{}, pool.executor());
     // [/threads]
     auto x = mesh.positions();
-    const auto report = solver.step(x, dt, network, backing, membrane::pull(7, 1.01 * x.col(7)));
+    const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, 1.01 * x.col(7)));
     CHECK(report.status == membrane::StepStatus::advanced);
 }
 
 TEST_CASE_METHOD(Touched, "the README's hand") {
-    membrane::NullDevice<double> device({{.time = 0}}, {.tick = 1e-3});
-    const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+    membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [hand]
     const auto profile = membrane::devices::touch;
     const auto loop = membrane::SampledLoop{.stiffness = 100,  // [N/m]
@@ -227,7 +229,7 @@ TEST_CASE_METHOD(AtRest, "the README's loop with limits and recorder replays to 
             if (recorder != nullptr && steps % 40 == 0) std::this_thread::sleep_for(2ms);
             const auto tool = device.read();
             const auto contact = tracker.update(tree, x, tool);
-            const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+            const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
             tree.refit(x, report.moved);
             const auto force = limit(feel({tool, smooth(contact), report}), tool.time, ++steps);
             device.write(force);
@@ -236,8 +238,8 @@ TEST_CASE_METHOD(AtRest, "the README's loop with limits and recorder replays to 
         }
         return limited;
     };
-    membrane::NullDevice<double> device({{0, {0, 0, 0.012}}, {0.03, {0, 0, 0.009}}, {0.3, {0, 2e-3, 0.009}}},
-                                        {.radius = 1e-3});
+    membrane::ScriptedDevice<double> device({{0, {0, 0, 0.012}}, {0.03, {0, 0, 0.009}}, {0.3, {0, 2e-3, 0.009}}},
+                                            {.radius = 1e-3});
     membrane::Recorder<double> recorder(1000, mesh.vertex_count());
     CHECK(play(device, &recorder) > 50);  // a soft start, at least
     std::stringstream file;
@@ -251,11 +253,11 @@ TEST_CASE_METHOD(AtRest, "the README's loop with limits and recorder replays to 
 TEST_CASE("the README's device in millimetres") {
     const Eigen::Vector3d position(0, 0, 108), velocity(0, 0, -50);
     const membrane::Vector3<double> force(0, 0, 0.01);
-    membrane::NullDevice<double> device({{.time = 0}}, {.tick = 1e-3});
+    membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
     // [units]
     const auto scale = membrane::DeviceScale{.force = 40, .motion = 0.1};  // 40 times the force, 10 times the way
     const auto seen = scale.to_scene(membrane::Millimetres(position), membrane::MillimetresPerSecond(velocity));
-    device.write(scale.to_device(membrane::Newtons(force)).on_hand.value());
+    device.write(scale.to_device(membrane::Newtons(force)).device_force.value());
     // [/units]
     CHECK(seen.position.z() == Approx(0.0108));
     CHECK(device.force().z() == 0.4);
@@ -264,7 +266,7 @@ TEST_CASE("the README's device in millimetres") {
 
 TEST_CASE_METHOD(Touched, "the README's two loops") {
     auto shown = x;
-    const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [handover]
     membrane::MovedPoints<double> moved(mesh.vertex_count());
     moved.publish(report.moved, x, now());  // haptic loop, each tick; a steady clock [s]
@@ -304,11 +306,11 @@ TEST_CASE("the README's mesh from elsewhere") {
     const auto report = membrane::validate(points, triangles);  // any numbers, 3 x V [m] and 3 x F
     std::cout << to_string(report);                             // each defect with its indices and what to do
     if (report.facts.likely_unit == membrane::LengthUnit::millimetre) points /= 1000;  // facts: what the mesh is
-    const auto mended =
+    const auto repaired =
         membrane::repair(points, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true, .flip_inward = true});
-    const auto mesh = membrane::TriangleMesh(mended.positions, mended.triangles);  // throws where more is wrong
+    const auto mesh = membrane::TriangleMesh(repaired.positions, repaired.triangles);  // throws where more is wrong
     // [/validate]
-    CHECK_FALSE(report.sound());
+    CHECK_FALSE(report.valid());
     CHECK(membrane::validate(mesh).empty());
     CHECK(membrane::validate(mesh).facts.facing == membrane::Facing::outward);
     CHECK(mesh.vertex_count() == good.vertex_count());
@@ -320,10 +322,10 @@ TEST_CASE("the README's constants") {
     membrane::Tool<double> tool{.radius = 2e-3};
     // [constants]
     const auto capsule = membrane::materials::lens_capsule().typical;  // with the source of each number
-    const auto fibres = membrane::Foundation{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
+    const auto fibres = membrane::FoundationLayer{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
                                                      {.stiffness = membrane::spring_stiffnesses(mesh, capsule)});
-    const auto backing =
+    const auto foundation =
         membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, fibres),
                                            .tangential = membrane::tangential_stiffnesses(mesh, fibres),
                                            .recovery_time = 0.2});
@@ -335,27 +337,28 @@ TEST_CASE("the README's constants") {
 }
 
 TEST_CASE_METHOD(Touched, "the README's equilibrium") {
-    const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [equilibrium]
-    const auto rest = membrane::equilibrium(x, mesh, network, backing, {}, press(tool, contact));
-    const double way = (x - rest.x).colwise().norm().maxCoeff();            // error of the positions [m]
+    const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
+    const double displacement = (x - rest.x).colwise().norm().maxCoeff();   // error of the positions [m]
     const double force = (report.reactions[0] - rest.reactions[0]).norm();  // and of the force [N]
     // [/equilibrium]
     CHECK(rest.converged);
-    CHECK(way < 1e-5);
+    CHECK(displacement < 1e-5);
     CHECK(force < 0.1 * rest.reactions[0].norm());
 }
 
 TEST_CASE_METHOD(Touched, "the README's bound") {
     const Eigen::Vector3d target = 1.01 * x.col(7);
-    const auto report = solver.step(x, dt, network, backing, membrane::pull(7, target));
+    const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
     // [bound]
-    auto bound = membrane::ErrorBound(network);                                   // once: allocates all it needs
-    const auto error = bound.of(x, network, backing, membrane::pull(7, target));  // allocates nothing
+    auto bound = membrane::ErrorBound(network);                                      // once: allocates all it needs
+    const auto error = bound.of(x, network, foundation, membrane::pull(7, target));  // allocates nothing
     if (error.certified()) {
-        const double way = error.position;                                           // no vertex is farther off [m]
-        const double force = error.reactions[0].farthest_from(report.reactions[0]);  // the force is no farther off [N]
-        std::printf("%g m, %g N\n", way, force);
+        const double displacement = error.position;  // no vertex is farther off [m]
+        const double force =
+            error.reactions[0].max_distance_to(report.reactions[0]);  // the force is no farther off [N]
+        std::printf("%g m, %g N\n", displacement, force);
     }
     // [/bound]
     CHECK(error.certified());
@@ -365,7 +368,8 @@ TEST_CASE_METHOD(AtRest, "the README's settings") {
     const auto tools = stroke_of_ticks();
     // [settings]
     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);  // a tool for each tick of 1 ms
-    const auto choice = membrane::choose_settings(mesh, network, backing, stroke, {.force_error = 0.05});  // or .time
+    const auto choice =
+        membrane::choose_settings(mesh, network, foundation, stroke, {.force_error = 0.05});  // or .time
     if (!choice.met) std::puts("Nothing that was tried is enough. What came nearest:");
     std::printf("%g of the force, %g s\n", choice.force_error, choice.time);  // as the experiment has measured
     auto solver = membrane::QuasiStaticSolver(network, choice.options);

@@ -8,7 +8,7 @@
 
 #include <Eigen/Geometry>
 
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "mesh_texts.hpp"
 #include "support/cases.hpp"

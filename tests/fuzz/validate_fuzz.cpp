@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
-#include <membrane/mesh/repair.hpp>
-#include <membrane/mesh/validate.hpp>
+#include <membrane/mesh_check/repair.hpp>
+#include <membrane/mesh_check/validate.hpp>
 
 // Any bytes as a mesh: validation comes back, its verdict is that of `TriangleMesh`, and so it is after a repair.
 
@@ -64,7 +64,7 @@ void examine(Bytes bytes) {
                               : bytes.next<std::uint8_t>() % (static_cast<membrane::Index>(x.cols()) + 1);
     }
     const membrane::MeshReport report = membrane::validate(x, triangles);
-    require(report.sound() == taken(x, triangles));
+    require(report.valid() == taken(x, triangles));
     require(report.empty() == to_string(report).empty() || !report.complete);
 
     const membrane::RepairOptions options{.weld = on(2) ? std::optional<double>(on(3) ? 0.0 : 1.0) : std::nullopt,
@@ -76,9 +76,9 @@ void examine(Bytes bytes) {
                                           .flip_inward = on(3),
                                           .drop_isolated = on(4)};
     try {
-        const auto mended = membrane::repair(x, triangles, options);
-        require(membrane::validate(mended.positions, mended.triangles).sound() ==
-                taken(mended.positions, mended.triangles));
+        const auto repaired = membrane::repair(x, triangles, options);
+        require(membrane::validate(repaired.positions, repaired.triangles).valid() ==
+                taken(repaired.positions, repaired.triangles));
     } catch (const membrane::InvalidInput&) {
         require(report.count(membrane::MeshDefect::index_out_of_range) > 0);
     }

@@ -65,7 +65,7 @@ TEST_CASE("friction keeps to the cone, acts along the surface, and gives no ener
         const auto normal = random.unit_vector();
         const SpringDamperForce press{.stiffness = pressing};
         ContactFriction feel(press, {.coefficient = coefficient, .stiffness = sticking});
-        EnergyObserver observer(std::max(pressing, sticking) * dt / 2);
+        PassivityObserver observer(std::max(pressing, sticking) * dt / 2);
         Vector3<double> position = 0.001 * normal, speed = Vector3<double>::Zero();
         for (int tick = 0; tick < 300; ++tick) {
             const double depth = -dot(position, normal);
@@ -81,7 +81,7 @@ TEST_CASE("friction keeps to the cone, acts along the surface, and gives no ener
             if (std::abs(depth) > 0.004) speed = (depth > 0 ? 0.2 : -0.2) * normal;
             position += dt * speed;
         }
-        if (observer.least() < -1e-9 * observer.brought()) FAIL("seed " << seed << ": " << observer.least() << " J");
+        if (observer.least() < -1e-9 * observer.energy_in()) FAIL("seed " << seed << ": " << observer.least() << " J");
     }
 }
 

@@ -15,7 +15,7 @@
 using namespace membrane;
 using test::Random;
 
-static_assert(Device<NullDevice<double>, double> && Device<NullDevice<float>, float>);
+static_assert(Device<ScriptedDevice<double>, double> && Device<ScriptedDevice<float>, float>);
 
 namespace {
 
@@ -30,7 +30,7 @@ std::vector<Waypoint<S>> simple_script() {
 
 TEMPLATE_TEST_CASE("the tool follows its script in straight lines", "[device]", double, float) {
     using S = TestType;
-    NullDevice<S> device(simple_script<S>(), {.tick = 0.25, .radius = 0.125});
+    ScriptedDevice<S> device(simple_script<S>(), {.tick = 0.25, .radius = 0.125});
     const S tolerance = 8 * std::numeric_limits<S>::epsilon();
     int ticks = 0;
     for (; device.running(); ++ticks) {
@@ -69,7 +69,7 @@ TEST_CASE("positions are those between the waypoints, on whatever script", "[dev
             time += random.number(1e-3, 1.0);
         }
         const double tick = random.number(1e-3, 0.3);  // sometimes longer than from waypoint to waypoint
-        NullDevice<double> device(script, {.tick = tick});
+        ScriptedDevice<double> device(script, {.tick = tick});
         const double begin = script.front().time;
         for (int i = 0; device.running(); ++i) {
             const auto tool = device.read();
@@ -90,26 +90,27 @@ TEST_CASE("positions are those between the waypoints, on whatever script", "[dev
 }
 
 TEST_CASE("time does not drift, however long the script", "[device]") {
-    NullDevice<double> device({{.time = 0, .position = {0, 0, 0}}, {.time = 1000, .position = {1, 0, 0}}},
-                              {.tick = 1e-3});
+    ScriptedDevice<double> device({{.time = 0, .position = {0, 0, 0}}, {.time = 1000, .position = {1, 0, 0}}},
+                                  {.tick = 1e-3});
     int ticks = 0;
     Tool<double> last;
     for (; device.running(); ++ticks) last = device.read();
     CHECK(ticks == 1'000'001);
     CHECK(last.position == Vector3<double>(1, 0, 0));
-    NullDevice<float> coarse({{.time = 0, .position = {0, 0, 0}}, {.time = 10, .position = {1, 0, 0}}}, {.tick = 1e-3});
+    ScriptedDevice<float> coarse({{.time = 0, .position = {0, 0, 0}}, {.time = 10, .position = {1, 0, 0}}},
+                                 {.tick = 1e-3});
     for (ticks = 0; coarse.running(); ++ticks) (void)coarse.read();
     CHECK(std::abs(ticks - 10'001) <= 1);
 }
 
 TEST_CASE("a script may be written where the device is made", "[device]") {
-    NullDevice<double> device({{.time = 0}, {.time = 1, .position = {1, 0, 0}}}, {.tick = 0.5});
+    ScriptedDevice<double> device({{.time = 0}, {.time = 1, .position = {1, 0, 0}}}, {.tick = 0.5});
     (void)device.read();
     CHECK(device.read().position == Vector3<double>(0.5, 0, 0));
 }
 
 TEST_CASE("a script of one waypoint lasts a tick", "[device]") {
-    NullDevice<double> device({{.time = 3, .position = {1, 2, 3}, .grasping = true}});
+    ScriptedDevice<double> device({{.time = 3, .position = {1, 2, 3}, .grasping = true}});
     CHECK(device.running());
     const auto tool = device.read();
     CHECK(tool.position == Vector3<double>(1, 2, 3));
@@ -120,13 +121,13 @@ TEST_CASE("a script of one waypoint lasts a tick", "[device]") {
 
 TEMPLATE_TEST_CASE("the device keeps the last force, and restarts as it began", "[device]", double, float) {
     using S = TestType;
-    NullDevice<S> device(simple_script<S>(), {.tick = 0.25});
+    ScriptedDevice<S> device(simple_script<S>(), {.tick = 0.25});
     CHECK(device.force() == Vector3<S>(0, 0, 0));
     const auto first = device.read();
     device.write({1, 2, 3});
     CHECK(device.force() == Vector3<S>(1, 2, 3));
     while (device.running()) (void)device.read();
-    device.restart();
+    device.reset();
     CHECK(device.force() == Vector3<S>(0, 0, 0));
     CHECK(device.running());
     const auto again = device.read();
@@ -136,25 +137,25 @@ TEMPLATE_TEST_CASE("the device keeps the last force, and restarts as it began", 
 }
 
 TEST_CASE("a device is copied and moved in the middle of its script", "[device]") {
-    NullDevice<double> device(simple_script<double>(), {.tick = 0.25});
+    ScriptedDevice<double> device(simple_script<double>(), {.tick = 0.25});
     for (int i = 0; i < 5; ++i) (void)device.read();
-    NullDevice<double> copy = device, moved = std::move(device);
+    ScriptedDevice<double> copy = device, moved = std::move(device);
     while (copy.running()) CHECK(copy.read().position == moved.read().position);
     CHECK_FALSE(moved.running());
     STATIC_REQUIRE(noexcept(copy.read()));
     STATIC_REQUIRE(noexcept(copy.write(std::declval<const Vector3<double>&>())));
     STATIC_REQUIRE(noexcept(copy.running()));
     STATIC_REQUIRE_FALSE(Device<int, double>);
-    STATIC_REQUIRE_FALSE(Device<NullDevice<float>, double>);
+    STATIC_REQUIRE_FALSE(Device<ScriptedDevice<float>, double>);
 }
 
 TEMPLATE_TEST_CASE("scripts and options that make no sense are refused by name", "[device][bad]", double, float) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const auto refused = [](const std::vector<Waypoint<S>>& script, const NullDeviceOptions& options = {}) {
-        return test::refusal([&] { NullDevice<S> device(script, options); });
+        return test::refusal([&] { ScriptedDevice<S> device(script, options); });
     };
-    const std::string name = "NullDevice: ";
+    const std::string name = "ScriptedDevice: ";
     const auto good = simple_script<S>();
     CHECK(refused(good) == "");
     CHECK(refused({}) == name + "the script must have a waypoint, got none");

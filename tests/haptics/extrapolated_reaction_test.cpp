@@ -39,9 +39,9 @@ TEMPLATE_TEST_CASE("between solves the reaction goes on as the tangent says", "[
         feel.solved(reaction, stiffness, at);
         auto state = touching<S>(at, {0, 0, 1});
         REQUIRE(feel(state) == S(40) * reaction);
-        const Vector3<S> way = random.vector<S>(S(-1e-3), S(1e-3));
-        state.tool.position = at + way;
-        const Vector3<S> expected = S(40) * (reaction - stiffness * way);
+        const Vector3<S> displacement = random.vector<S>(S(-1e-3), S(1e-3));
+        state.tool.position = at + displacement;
+        const Vector3<S> expected = S(40) * (reaction - stiffness * displacement);
         REQUIRE(norm<S>(feel(state) - expected) <= S(40) * 16 * std::numeric_limits<S>::epsilon());
         state.tool.position = at + Vector3<S>(0, 0, 1);  // far out: it pushes no more, and does not pull
         REQUIRE(std::abs(feel(state).z()) <= S(400) * std::numeric_limits<S>::epsilon());

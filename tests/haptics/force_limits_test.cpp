@@ -41,7 +41,7 @@ bool within_slew(const Vector3<S>& before, const Vector3<S>& after, double most)
 }
 
 /// Nothing but the device's peak.
-constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .fresh_for = infinity, .heating = false};
+constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .max_state_age = infinity, .heating = false};
 
 /// A limiter in its loop: a tick of 1 ms, a solve in each.
 template <class S>
@@ -107,7 +107,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
     ForceLimiter limit(device, options);
     Mishaps<S> scene(7);
     Vector3<S> before = Vector3<S>::Zero();
-    double clean_since = 0, last_solve = 0, last = 0, warmth = 0;
+    double clean_since = 0, last_solve = 0, last = 0, thermal_load = 0;
     std::uint64_t state = 0;
     long whole = 0, frozen = 0;
     const int ticks = cases(500'000);  // of each scalar
@@ -117,11 +117,12 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
         const double size = size_of(felt);
         if (scene.state != state || scene.dt < 0) last_solve = scene.now;
         state = scene.state;
-        if (scene.faulty() || scene.now - last_solve > options.fresh_for) clean_since = scene.now;
+        if (scene.faulty() || scene.now - last_solve > options.max_state_age) clean_since = scene.now;
         const double relative = size_of(before) / device.continuous_force;
-        warmth += scene.dt > 0 ? (relative * relative - warmth) * (1 - std::exp(-scene.dt / device.thermal_time)) : 0;
+        thermal_load +=
+            scene.dt > 0 ? (relative * relative - thermal_load) * (1 - std::exp(-scene.dt / device.thermal_time)) : 0;
 
-        const double may_change = slew * std::clamp(scene.now - last, 0.0, options.longest_tick);
+        const double may_change = slew * std::clamp(scene.now - last, 0.0, options.max_tick);
         last = scene.now;
         const bool within = is_finite(felt) && size <= device.peak_force && within_slew(before, felt, may_change);
         if (!within) {
@@ -140,8 +141,8 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
     }
     CHECK(frozen > ticks / 200);  // the cases that the test is about did occur
     CHECK(whole > ticks / 20);
-    CHECK(warmth < 1);
-    CHECK(limit.warmth() < 1);
+    CHECK(thermal_load < 1);
+    CHECK(limit.thermal_load() < 1);
 }
 
 TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the device bears", "[limits]", double,
@@ -161,7 +162,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
         const auto mishap = mishaps.next();
         loop.tick(mishap);
         const double size = size_of(loop.felt), asked = size_of(loop.asked);
-        const double may_change = slew * std::clamp(loop.now - last, 0.0, options.longest_tick);
+        const double may_change = slew * std::clamp(loop.now - last, 0.0, options.max_tick);
         if (!(is_finite(loop.felt) && size <= device.peak_force && within_slew(before, loop.felt, may_change))) {
             FAIL("tick " << i << ": " << loop.felt.transpose() << " N after " << before.transpose() << " N");
         }
@@ -422,31 +423,31 @@ TEST_CASE("a soft start rises evenly and falls at once", "[limits]") {
 
 TEST_CASE("motors warm up as a first-order model does, and are not asked for more than they bear", "[limits]") {
     const auto device = devices::touch;
-    MotorHeat heat(device);
-    CHECK(heat.most_force() == device.peak_force);
+    MotorThermalModel heat(device);
+    CHECK(heat.max_force() == device.peak_force);
     const double relative = 0.5;
     for (int i = 1; i <= 30'000; ++i) {
         heat.add(relative * device.continuous_force, 1e-3);
         if (i % 5000 == 0) {
             const double exact = relative * relative * (1 - std::exp(-1e-3 * i / device.thermal_time));
-            REQUIRE(heat.warmth() == Approx(exact).epsilon(1e-3));
+            REQUIRE(heat.thermal_load() == Approx(exact).epsilon(1e-3));
         }
     }
     for (const auto& strong : {devices::touch, devices::phantom_desktop, devices::premium_1_5, devices::premium_3_0}) {
         Loop<double> loop{ForceLimiter(strong)};
-        double least = strong.peak_force, at_once = 0;
+        double least = strong.peak_force, grain_size = 0;
         for (int i = 0; i < 60'000; ++i) {  // a minute of too much
             const double felt = loop.tick({0, 100, 0}).y();
             if (i > 110) {
                 REQUIRE(felt >= strong.continuous_force * (1 - 1e-12));
-                at_once = std::max(at_once, least - felt);
+                grain_size = std::max(grain_size, least - felt);
                 least = std::min(least, felt);
             }
-            REQUIRE(loop.limit.warmth() <= 1);
+            REQUIRE(loop.limit.thermal_load() <= 1);
         }
         CHECK(least == Approx(strong.continuous_force).epsilon(0.02));
         CHECK(loop.limit.acted().heat);
-        CHECK(at_once < 0.03 * strong.peak_force);  // down in small steps
+        CHECK(grain_size < 0.03 * strong.peak_force);  // down in small steps
     }
 }
 
@@ -466,9 +467,9 @@ TEST_CASE("a wild reading of the clock is got over", "[limits]") {
                     const double felt = loop.tick({0, 0, 0.5}).z();
                     REQUIRE((felt >= 0 && felt <= 0.5));
                 }
-                CHECK(loop.limit.warmth() >= 0);
+                CHECK(loop.limit.thermal_load() >= 0);
                 if (thermal_time < 0.1) continue;  // warm at once, whatever the clock
-                CHECK(loop.limit.warmth() < 0.75);
+                CHECK(loop.limit.thermal_load() < 0.75);
                 double felt = 0;
                 for (int i = 0; i < 25; ++i) felt = std::max(felt, loop.tick({0, 0, 3.3}).z());
                 CHECK(felt > 3.2);  // the peak is there again
@@ -485,14 +486,14 @@ TEST_CASE("in a gap motors warm up as the force that is held has them do", "[lim
             for (int lead = 110; lead < 6000; lead += 65) {
                 Loop<double> loop{ForceLimiter(device)};
                 for (int i = 0; i < lead; ++i) (void)loop.tick({0, 0, device.peak_force});
-                const double before = loop.limit.warmth();
+                const double before = loop.limit.thermal_load();
                 const double held = loop.tick({0, 0, device.peak_force}).z() / device.continuous_force;
                 (void)loop.tick({0, 0, device.peak_force}, gap);
                 const double share = -std::expm1(-gap / device.thermal_time);
                 const double exact = before + share * (held * held - before);
-                REQUIRE(loop.limit.warmth() ==
+                REQUIRE(loop.limit.thermal_load() ==
                         Approx(exact).epsilon(0.005).margin(0.03 * hottest * share * share + 0.01));
-                REQUIRE(loop.limit.warmth() <= (gap > 0.04 ? hottest : 1));
+                REQUIRE(loop.limit.thermal_load() <= (gap > 0.04 ? hottest : 1));
             }
         }
     }
@@ -506,15 +507,15 @@ TEST_CASE("each limit can be taken off", "[limits]") {
     CHECK(loop.tick({0, 0, 5}).z() == Approx(3.3));
     CHECK(loop.limit.acted().peak);
     for (int i = 0; i < 20'000; ++i) REQUIRE(loop.limit(Vector3<double>(0, 3.2, 0), 1e-3 * i, 1).y() == 3.2);
-    CHECK(loop.limit.warmth() > 1);  // it still counts
+    CHECK(loop.limit.thermal_load() > 1);  // it still counts
 }
 
 TEST_CASE("a limiter that restarts begins softly, with motors as warm as they are", "[limits]") {
     Loop<double> loop{ForceLimiter(devices::touch)};
     for (int i = 0; i < 300; ++i) (void)loop.tick({0.8, 0, 0});
-    const double warmth = loop.limit.warmth();
-    loop.limit.restart();
-    CHECK(loop.limit.warmth() == warmth);
+    const double thermal_load = loop.limit.thermal_load();
+    loop.limit.reset();
+    CHECK(loop.limit.thermal_load() == thermal_load);
     CHECK(loop.tick({0.8, 0, 0}).x() == 0);
     CHECK(loop.tick({0.8, 0, 0}).x() == Approx(0.008));
     STATIC_REQUIRE(noexcept(loop.limit(std::declval<const Vector3<float>&>(), 0.0, 0)));
@@ -529,10 +530,10 @@ TEST_CASE("limits that make no sense are refused by name", "[limits][bad]") {
     CHECK(refused({.rise_time = -1}) == "ForceLimiter: rise_time must be finite and not negative [s], got -1");
     CHECK(refused({.soft_start = infinity}) == "ForceLimiter: soft_start must be finite and not negative [s], got inf");
     CHECK(refused({.fade_time = -2}) == "ForceLimiter: fade_time must be finite and not negative [s], got -2");
-    CHECK(refused({.longest_tick = 0}) == "ForceLimiter: longest_tick must be finite and positive [s], got 0");
-    CHECK(refused({.fresh_for = 0}) == "ForceLimiter: fresh_for must be positive [s], got 0");
-    CHECK(refused({.fresh_for = -infinity}) == "ForceLimiter: fresh_for must be positive [s], got -inf");
-    CHECK(refused({.fresh_for = nan_value}) != "");
+    CHECK(refused({.max_tick = 0}) == "ForceLimiter: max_tick must be finite and positive [s], got 0");
+    CHECK(refused({.max_state_age = 0}) == "ForceLimiter: max_state_age must be positive [s], got 0");
+    CHECK(refused({.max_state_age = -infinity}) == "ForceLimiter: max_state_age must be positive [s], got -inf");
+    CHECK(refused({.max_state_age = nan_value}) != "");
     auto device = devices::touch;
     device.peak_force = -1;
     CHECK(test::refusal([&] { const ForceLimiter limit(device); }) ==

@@ -30,12 +30,12 @@ HapticState<S> touching(S depth, const Vector3<S>& normal, const Vector3<S>& vel
 }
 
 template <class S>
-HapticState<S> pulling(const Vector3<S>& way, const Vector3<S>& velocity) {
+HapticState<S> pulling(const Vector3<S>& displacement, const Vector3<S>& velocity) {
     HapticState<S> state{};
     state.grasp.triangle = 3;
     state.grasp.origin = Vector3<S>(1, 2, 3);
     state.grasp.offset = Vector3<S>(S(0.25), 0, S(-0.5));
-    state.tool.position = state.grasp.origin + way - state.grasp.offset;
+    state.tool.position = state.grasp.origin + displacement - state.grasp.offset;
     state.tool.velocity = velocity;
     return state;
 }
@@ -80,10 +80,10 @@ TEMPLATE_TEST_CASE("pulling, the force runs against the way of what is held", "[
     for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        const Vector3<S> way = random.vector<S>(), velocity = random.vector<S>();
-        auto state = pulling(way, velocity);
-        const Vector3<S> along = way / norm(way);
-        const Vector3<S> expected = -(100 * norm(way) + S(0.5) * dot(velocity, along)) * along;
+        const Vector3<S> displacement = random.vector<S>(), velocity = random.vector<S>();
+        auto state = pulling(displacement, velocity);
+        const Vector3<S> along = displacement / norm(displacement);
+        const Vector3<S> expected = -(100 * norm(displacement) + S(0.5) * dot(velocity, along)) * along;
         const S tolerance = 1000 * std::numeric_limits<S>::epsilon();
         REQUIRE(norm<S>(feel(state) - expected) <= tolerance);
         // What the tool touches meanwhile does not matter.

@@ -49,7 +49,7 @@ TEMPLATE_TEST_CASE("taking hold and letting go, the force does not jump", "[tran
             if (tick > 0) REQUIRE(norm<S>(force - last) < S(0.15));
             if (tick > changed + 51) {
                 REQUIRE(force == law(state));
-                REQUIRE_FALSE(feel.under_way());
+                REQUIRE_FALSE(feel.in_transition());
             }
             last = force;
         }
@@ -67,7 +67,7 @@ TEST_CASE("at the change the force is what it was, half way it is between", "[tr
     state.grasp.triangle = 3;
     state.grasp.origin = {0.03, 0, 0};  // held so that it pulls by 3 N along x
     CHECK(norm<double>(feel(state) - Vector3<double>(0, 0, 1)) < 1e-15);
-    CHECK(feel.under_way());
+    CHECK(feel.in_transition());
     state.tool.time = 0.05;
     CHECK(norm<double>(feel(state) - Vector3<double>(1.5, 0, 0.5)) < 1e-12);
     state.tool.time = 0.1;
@@ -76,7 +76,7 @@ TEST_CASE("at the change the force is what it was, half way it is between", "[tr
     (void)feel(state);
     state.tool.time = std::numeric_limits<double>::quiet_NaN();
     CHECK(feel(state) == Vector3<double>(0, 0, 1));  // a clock that is none ends it
-    CHECK_FALSE(feel.under_way());
+    CHECK_FALSE(feel.in_transition());
     CHECK(test::refusal([] { const GraspTransition made(SpringDamperForce{.stiffness = 1}, {.duration = 0}); }) ==
           "GraspTransition: duration must be finite and positive [s], got 0");
 }
@@ -104,7 +104,7 @@ struct Handling {
         return tool;
     }
     /// Its speed is no more than this [m/s].
-    [[nodiscard]] double fastest() const { return turn * (depth + sway / 2); }
+    [[nodiscard]] double max_speed() const { return turn * (depth + sway / 2); }
 
     static constexpr double pi = 3.14159265358979323846, begin = 0.12, end = 0.7;  // [s]
     Vector3<double> out, aside;
@@ -119,9 +119,10 @@ struct Handled {
 };
 
 template <class Law>
-Handled handle(const Handling& way, const TriangleMesh<double>& mesh, const Law& law, double duration, double tick) {
+Handled handle(const Handling& displacement, const TriangleMesh<double>& mesh, const Law& law, double duration,
+               double tick) {
     const auto network = MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 40.0});
-    const auto backing = VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const auto foundation = VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
     auto solver = QuasiStaticSolver(network, {.layers = 4, .sweeps = 2});
     auto tree = AabbTree(mesh);
     auto tracker = ContactTracker(mesh);
@@ -134,10 +135,10 @@ Handled handle(const Handling& way, const TriangleMesh<double>& mesh, const Law&
     Vector3<double> last = Vector3<double>::Zero(), last_bare = last;
     bool held = false;
     for (int i = 0; tick * i < Handling::end; ++i) {
-        const auto tool = way.tool(tick * i);
+        const auto tool = displacement.tool(tick * i);
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
-        const auto report = solver.step(x, tick, network, backing, press(tool, contact, grasp), pull(tool, grasp));
+        const auto report = solver.step(x, tick, network, foundation, press(tool, contact, grasp), pull(tool, grasp));
         tree.refit(x, report.moved);
         const HapticState<double> state{tool, smooth(contact), report, grasp};
         const Vector3<double> force = feel(state), alone = bare(state);
@@ -165,15 +166,16 @@ TEST_CASE("jaws close and open on a membrane that is touched, pulled and let go:
     const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 2});
     int changes = 0;
     for (int seed = 1; seed <= cases(3, 40); ++seed) {
-        const Handling way(static_cast<std::uint64_t>(seed));
+        const Handling displacement(static_cast<std::uint64_t>(seed));
         double before = 0;
         for (const double tick : {1e-3, 5e-4, 2.5e-4}) {
             CAPTURE(seed, tick);
             const SpringDamperForce law{.stiffness = 100};
             const double duration = 0.1;
-            const auto found = handle(way, mesh, law, duration, tick);
+            const auto found = handle(displacement, mesh, law, duration, tick);
             // The law goes with the tool, and what the laws differ by comes in over the duration.
-            CHECK(found.largest <= tick * (1.5 * law.stiffness * way.fastest() + found.difference / duration));
+            CHECK(found.largest <=
+                  tick * (1.5 * law.stiffness * displacement.max_speed() + found.difference / duration));
             if (before > 0) {
                 CHECK(found.largest > 0.4 * before);
                 CHECK(found.largest < 0.6 * before);
@@ -183,7 +185,7 @@ TEST_CASE("jaws close and open on a membrane that is touched, pulled and let go:
             if (found.changes > 0 && found.difference > 0.05) CHECK(found.law_alone > 20 * found.largest);
         }
         // A reaction jumps by what it differs by, and goes on to settle in the ticks after that.
-        const auto reaction = handle(way, mesh, ReactionForce{.scale = 5}, 0.1, 1e-3);
+        const auto reaction = handle(displacement, mesh, ReactionForce{.scale = 5}, 0.1, 1e-3);
         CAPTURE(seed, reaction.largest, reaction.law_alone, reaction.difference);
         if (reaction.difference > 0.05) CHECK(reaction.law_alone > 8 * reaction.largest);
     }

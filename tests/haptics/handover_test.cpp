@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/collision/tool.hpp>
+#include <membrane/contact/tool.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -62,7 +62,7 @@ struct Ticks {
 /// `write(number)` for numbers up to `last` in one thread, `read(complete)` in another until it returns the last number;
 /// `complete` is that of a write that was over before.
 template <class Write, class Read>
-void at_once(std::uint64_t last, Write write, Read read) {
+void grain_size(std::uint64_t last, Write write, Read read) {
     std::atomic<std::uint64_t> complete{0};
     std::thread writer([&] {
         for (std::uint64_t number = 1; number <= last; ++number) {
@@ -98,7 +98,7 @@ TEST_CASE("nothing is torn, goes back or is older than the last complete publish
     Latest<Wide> latest;
     const auto last = static_cast<std::uint64_t>(cases(300'000, 10'000'000));
     std::uint64_t torn = 0, backward = 0, stale = 0, before = 0, seen = 0;
-    at_once(
+    grain_size(
         last, [&](std::uint64_t number) { latest.publish(Wide::of(number), static_cast<double>(number)); },
         [&](std::uint64_t complete) {
             const auto& read = latest.read();
@@ -171,7 +171,7 @@ TEST_CASE("two threads share a membrane, and each snapshot is that of its tick",
     Points<double> shown = expected.x;
     const auto last = static_cast<std::uint64_t>(cases(300'000, 10'000'000));
     std::uint64_t torn = 0, backward = 0, stale = 0, seen = 0;
-    at_once(
+    grain_size(
         last,
         [&](std::uint64_t number) {
             written();

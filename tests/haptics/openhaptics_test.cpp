@@ -24,7 +24,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .fresh_for = infinity, .heating = false};
+constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .max_state_age = infinity, .heating = false};
 
 /// Pushes up whatever goes below zero.
 struct Floor {
@@ -196,12 +196,12 @@ TEST_CASE("a force within the limits reaches the device bit for bit", "[openhapt
     HdDouble hd({.hand = firm_hand()});
     OpenHaptics device({.profile = devices::phantom_desktop});
     Random random(3);
-    Force way(0, 0, 1);
+    Force displacement(0, 0, 1);
     Answer answer{Force::Zero(), 0};
     device.start([&](const Tool<double>&) { return answer; });
     for (int i = 0; i < 2000; ++i) {
-        way += random.vector(-0.1, 0.1);  // turns, by less than the slew limit has
-        answer.force = (0.6 + 0.3 * std::sin(0.01 * i)) * way.normalized();
+        displacement += random.vector(-0.1, 0.1);  // turns, by less than the slew limit has
+        answer.force = (0.6 + 0.3 * std::sin(0.01 * i)) * displacement.normalized();
         ++answer.solves;
         hd.run(1);
         if (i > settled) REQUIRE(same_bits(hd.force(), answer.force.eigen()));
@@ -211,7 +211,7 @@ TEST_CASE("a force within the limits reaches the device bit for bit", "[openhapt
     const auto& report = device.report();
     CHECK(report.faded == Approx(100).margin(1));  // while it came in
     CHECK(report.errors + report.refused + report.peak + report.heat == 0);
-    CHECK(report.most_force == Approx(0.9).epsilon(1e-3));
+    CHECK(report.max_force == Approx(0.9).epsilon(1e-3));
 }
 
 TEST_CASE("the device's own word narrows its profile, never widens it", "[openhaptics]") {
@@ -275,7 +275,7 @@ TEST_CASE("what is too much, too fast, too old or not a number is held back and 
     CHECK(report.heat > 10'000);
     CHECK(report.slew >= 15);
     CHECK(report.faded > 300);
-    CHECK(report.most_force == Approx(3.3));
+    CHECK(report.max_force == Approx(3.3));
     CHECK(device.trouble().empty());
 
     device.start([&](const Tool<double>&) { return Answer{Force(0, 0, 3.3), ++answer.solves}; });
@@ -313,7 +313,7 @@ TEST_CASE("a tool that is not a number is not passed on", "[openhaptics]") {
     OpenHaptics device;
     int ticks = 0;
     device.start([&](const Tool<double>& tool) {
-        REQUIRE(is_sound(tool));
+        REQUIRE(is_valid(tool));
         return Answer{pushed, static_cast<std::uint64_t>(++ticks)};
     });
     hd.run(settled);
@@ -371,7 +371,7 @@ TEST_CASE("ticks that come late or not at all are counted, and do no harm", "[op
     device.stop();
     check_closed(hd);
     CHECK(device.report().ticks == 1998);
-    CHECK(device.report().longest_interval == Approx(0.0105));
+    CHECK(device.report().max_interval == Approx(0.0105));
     CHECK(device.report().late >= 2);  // 2 ms is on the verge
     CHECK(device.report().late <= 3);
 }
@@ -446,5 +446,5 @@ TEST_CASE("a stop in the middle of a tick takes the force of that tick", "[openh
     while (!inside) std::this_thread::yield();
     device.stop();
     check_closed(hd);
-    CHECK(device.report().most_force == 0);
+    CHECK(device.report().max_force == 0);
 }

@@ -171,7 +171,7 @@ TEST_CASE("whatever goes wrong in a device's loop, each tick keeps within profil
             if (size != 0) FAIL("frozen, and " << size << " N");
         }
         const bool rushing = hd.hand.velocity.norm() > 1;  // back from where it was moved: the policy's force jumps
-        const bool stale = now - wild.fresh > LimitOptions{}.fresh_for;
+        const bool stale = now - wild.fresh > LimitOptions{}.max_state_age;
         if (fault != Fault::none || wild.starts || withdrawn || rushing || stale) clean_since = now;
         if (now - clean_since > 0.2) {
             ++whole;

@@ -39,17 +39,17 @@ struct Scene {
           normal(random.unit_vector()),
           soft(stiffening ? random.number(0.0, 3e-3) : 0) {
         frequency = 2 * std::numbers::pi * std::pow(10, random.number(-0.3, 2.0));
-        for (auto& way : ways) way = random.vector(-0.01, 0.01);
+        for (auto& displacement : displacements) displacement = random.vector(-0.01, 0.01);
     }
 
     double hand_mass, hand_stiffness, damping;  // damping of device and hand together
     Vector3<double> normal;
     double soft;       // depth at which the wall has half its stiffness [m]
     double frequency;  // [rad/s]
-    std::array<Vector3<double>, 2> ways;
+    std::array<Vector3<double>, 2> displacements;
 
     [[nodiscard]] Vector3<double> wanted(double time) const {
-        return std::sin(frequency * time) * ways[0] + std::sin(0.37 * frequency * time) * ways[1];
+        return std::sin(frequency * time) * displacements[0] + std::sin(0.37 * frequency * time) * displacements[1];
     }
 
     /// Depth from which the force of a spring has slope depth^2 / (depth^2 + soft^2) <= 1.
@@ -74,7 +74,7 @@ struct Scene {
 
 /// What a loop has come to.
 struct Energies {
-    EnergyObserver port;         // of the loop, device and hand damping included
+    PassivityObserver port;      // of the loop, device and hand damping included
     double hand = 0, given = 0;  // by what the hand wants: all it did, and what of it went in [J]
     double least = 0;
     bool touched = false;
@@ -92,10 +92,10 @@ struct Hand {
             const Vector3<double> pull = k * scene.wanted(time + (i + 0.5) * h);  // the spring's other end
             const Vector3<double> push = held + pull - k * position - b * velocity - k * h / 2 * velocity;
             const Vector3<double> more = push / (m / h + b / 2 + k * h / 4);
-            const Vector3<double> way = h * (velocity + more / 2);
-            position += way;
+            const Vector3<double> displacement = h * (velocity + more / 2);
+            position += displacement;
             velocity += more;
-            const double work = dot(pull, way);
+            const double work = dot(pull, displacement);
             energies.hand += work;
             energies.given += std::max(work, 0.0);
             energies.least = std::min(energies.least, energies.hand);
@@ -106,7 +106,7 @@ struct Hand {
 /// Plays a loop of `policy`, answered `delay` ticks late.
 template <class Policy>
 Energies play(const Scene& scene, Policy policy, double tissue, const SampledLoop& loop, int ticks) {
-    Energies energies{.port = EnergyObserver(scene.damping)};
+    Energies energies{.port = PassivityObserver(scene.damping)};
     Hand hand{.position = Vector3<double>::Zero()};
     const auto late = static_cast<std::size_t>(std::lround(loop.delay / loop.tick));
     std::vector<Vector3<double>> positions(late + 2, hand.position);
@@ -148,7 +148,7 @@ TEST_CASE("random loops inside the check never give energy", "[passivity]") {
         const double share = random.number(0.0, 1.0);
         const auto device = bare(share * scene.damping);
         const Dissipation there{.hand_damping = (1 - share) * scene.damping};
-        loop.stiffness = random.number(0.2, 0.9999) * passivity(loop, device, there).most_stiffness;
+        loop.stiffness = random.number(0.2, 0.9999) * passivity(loop, device, there).max_stiffness;
         if (!passivity(loop, device, there).passive) FAIL("refused, seed " << seed);
 
         const double tissue = random.number(1.0, 50.0);
@@ -157,9 +157,9 @@ TEST_CASE("random loops inside the check never give energy", "[passivity]") {
                                   : play(scene, SpringDamperForce{.stiffness = loop.stiffness, .damping = loop.damping},
                                          tissue, loop, 150);
         const bool good =
-            energies.port.least() >= -1e-9 * energies.port.brought() && energies.least >= -1e-9 * energies.given;
+            energies.port.least() >= -1e-9 * energies.port.energy_in() && energies.least >= -1e-9 * energies.given;
         if (!good) {
-            FAIL("seed " << seed << ": " << energies.port.least() << " of " << energies.port.brought() << " J, "
+            FAIL("seed " << seed << ": " << energies.port.least() << " of " << energies.port.energy_in() << " J, "
                          << energies.least << " of " << energies.given << " J");
         }
         touched += energies.touched ? 1 : 0;
@@ -179,15 +179,15 @@ TEST_CASE("at 1.5 times the bound loops are active", "[passivity]") {
         auto loop = random_loop(random, scene.damping);
         loop.damping = 0;  // it would help here: what a damper gives, it gives to a quiver, see below
         const auto device = bare(scene.damping);
-        const double bound = passivity(loop, device, {.hand_damping = 0}).most_stiffness;
+        const double bound = passivity(loop, device, {.hand_damping = 0}).max_stiffness;
         // Heavy for the stiffness: an oscillation takes a hundred ticks and more.
         scene.hand_mass = 1.5 * bound * std::pow(30 * loop.tick, 2);
         for (const double times : {0.9, 1.5}) {
             loop.stiffness = times * bound;
             CHECK(passivity(loop, device, {.hand_damping = 0}).passive == (times < 1));
-            Energies energies{.port = EnergyObserver(scene.damping)};
+            Energies energies{.port = PassivityObserver(scene.damping)};
             Hand hand{.position = Vector3<double>::Zero(), .velocity = 0.01 * scene.normal};
-            const double brought = scene.hand_mass * 1e-4 / 2;  // in motion
+            const double energy_in = scene.hand_mass * 1e-4 / 2;  // in motion
             std::array<Vector3<double>, 4> positions;
             positions.fill(hand.position);
             const auto late = static_cast<std::size_t>(std::lround(loop.delay / loop.tick));
@@ -201,8 +201,8 @@ TEST_CASE("at 1.5 times the bound loops are active", "[passivity]") {
                 last = scene.hand_mass / 2 * squared_norm(hand.velocity) +
                        loop.stiffness / 2 * squared_norm(hand.position);
             }
-            CHECK((energies.port.least() < -0.01 * brought) == (times > 1));
-            CHECK((last > 1.05 * brought) == (times > 1));
+            CHECK((energies.port.least() < -0.01 * energy_in) == (times > 1));
+            CHECK((last > 1.05 * energy_in) == (times > 1));
         }
     }
 }
@@ -214,11 +214,11 @@ TEST_CASE("a quiver as fast as the ticks is the worst for spring and damper toge
         const double damping = random.number(0.2, 4.0);
         auto loop = random_loop(random, damping);
         loop.delay = 0;
-        const double bound = passivity(loop, bare(damping), {.hand_damping = 0}).most_stiffness;
+        const double bound = passivity(loop, bare(damping), {.hand_damping = 0}).max_stiffness;
         for (const double times : {0.9, 1.5}) {
             loop.stiffness = times * bound;
             const SpringDamperForce feel{.stiffness = loop.stiffness, .damping = loop.damping};
-            EnergyObserver observer(damping);
+            PassivityObserver observer(damping);
             HapticState<double> state{};
             state.contact.phase = ContactPhase::ongoing;
             state.contact.normal = {0, 0, 1};
@@ -238,26 +238,26 @@ TEST_CASE("the bound is that of Colgate and Schenkel, with delay, friction and r
     const SampledLoop wall{
         .stiffness = 1000, .damping = 0.3, .tick = 1e-3, .negative_stiffness = 0, .off_potential = 0};
     CHECK(passivity(wall, bare(0.5), {.hand_damping = 0.4}).damping_needed == Approx(0.8));
-    CHECK(passivity(wall, bare(0.5), {.hand_damping = 0.4}).damping_there == Approx(0.9));
-    CHECK(passivity(wall, bare(0.5), {.hand_damping = 0.4}).most_stiffness == Approx(1200));
+    CHECK(passivity(wall, bare(0.5), {.hand_damping = 0.4}).damping_available == Approx(0.9));
+    CHECK(passivity(wall, bare(0.5), {.hand_damping = 0.4}).max_stiffness == Approx(1200));
     const SampledLoop late{.stiffness = 1000, .tick = 1e-3, .delay = 2e-3, .negative_stiffness = 0, .off_potential = 0};
     CHECK(passivity(late, bare(0.5), {.hand_damping = 0}).damping_needed == Approx(2.5));
-    CHECK(passivity(late, bare(0.5), {.hand_damping = 0}).most_stiffness == Approx(200));
+    CHECK(passivity(late, bare(0.5), {.hand_damping = 0}).max_stiffness == Approx(200));
     // Friction of 0.2 N is a damper of 2 N s/m up to 0.1 m/s, of nothing if the speed is not known.
     auto device = bare(0);
     device.friction = 0.2;
-    CHECK(passivity(wall, device, {.hand_damping = 0, .fastest = 0.1}).damping_there == Approx(2));
-    CHECK(passivity(wall, device, {.hand_damping = 0}).damping_there == 0);
+    CHECK(passivity(wall, device, {.hand_damping = 0, .max_speed = 0.1}).damping_available == Approx(2));
+    CHECK(passivity(wall, device, {.hand_damping = 0}).damping_available == 0);
     CHECK_FALSE(passivity(wall, device, {.hand_damping = 0}).passive);
     // A coarse position takes its share of it; a device shows no more than it can.
     device.resolution = 1e-4;
-    CHECK(passivity(wall, device, {.hand_damping = 5}).most_stiffness == Approx(2 * (0.2 - 0.03) / 1e-4));
+    CHECK(passivity(wall, device, {.hand_damping = 5}).max_stiffness == Approx(2 * (0.2 - 0.03) / 1e-4));
     device.friction = 0.05;
     CHECK_FALSE(passivity(wall, device, {.hand_damping = 5}).passive);
     device = bare(5);
     device.stiffness = 900;
     CHECK_FALSE(passivity(wall, device, {.hand_damping = 0}).passive);
-    CHECK(passivity(wall, device, {.hand_damping = 0}).most_stiffness == 900);
+    CHECK(passivity(wall, device, {.hand_damping = 0}).max_stiffness == 900);
     CHECK(passivity({.stiffness = 0}, device, {.hand_damping = 0}).passive);
 }
 
@@ -297,12 +297,12 @@ TEST_CASE("the most stiffness is that with which a loop is just passive, whateve
         loop.negative_stiffness = random.chance(0.2) ? infinity : std::pow(10, random.number(-1.0, 5.0));
         loop.off_potential = random.chance(0.5) ? 0 : random.number(0.0, 0.2);
         const Dissipation there{.hand_damping = random.number(0.0, 3.0),
-                                .fastest = random.chance(0.5) ? infinity : random.number(0.05, 1.0)};
+                                .max_speed = random.chance(0.5) ? infinity : random.number(0.05, 1.0)};
         const auto passive_at = [&](double stiffness) {
             loop.stiffness = stiffness;
             return passivity(loop, device, there).passive;
         };
-        const double most = passivity(loop, device, there).most_stiffness;
+        const double most = passivity(loop, device, there).max_stiffness;
         REQUIRE(is_finite(most));
         if (most > 0) REQUIRE(passive_at(0.999 * most));
         if (most < device.stiffness) REQUIRE_FALSE(passive_at(1.001 * most + 1e-9));
@@ -332,8 +332,9 @@ class Walks {
                 const std::size_t here = state % places, seen = state / (states / places);
                 double least = infinity;
                 for (std::size_t to = 0; to < places; ++to) {
-                    const double way = static_cast<double>(to) - static_cast<double>(here);
-                    const double more = force_[seen] * way + damping * way * way - (potential_[to] - potential_[here]);
+                    const double displacement = static_cast<double>(to) - static_cast<double>(here);
+                    const double more = force_[seen] * displacement + damping * displacement * displacement -
+                                        (potential_[to] - potential_[here]);
                     least = std::min(least, more + best[state % (states / places) * places + to]);
                 }
                 next[state] = least;
@@ -401,15 +402,15 @@ TEST_CASE("a wall that ends is refused where it is answered late", "[passivity]"
         const SampledLoop wall{.stiffness = stiffness, .tick = tick, .delay = delay * tick, .off_potential = 0};
         const Dissipation hand{.hand_damping = 1.01 * stiffness * (tick / 2 + delay * tick)};
         CHECK(passivity(wall, bare(0), hand).passive == (delay == 0));
-        EnergyObserver observer(hand.hand_damping);
-        std::vector<double> way;
-        for (int i = 0; i <= 100; ++i) way.push_back((end - off) * i / 100);
-        for (int i = 0; i < 2000; ++i) way.push_back(i / std::max(delay, 1) % 2 == 1 ? end - off : end + off);
-        for (std::size_t i = 0; i < way.size(); ++i) {
+        PassivityObserver observer(hand.hand_damping);
+        std::vector<double> displacement;
+        for (int i = 0; i <= 100; ++i) displacement.push_back((end - off) * i / 100);
+        for (int i = 0; i < 2000; ++i) displacement.push_back(i / std::max(delay, 1) % 2 == 1 ? end - off : end + off);
+        for (std::size_t i = 0; i < displacement.size(); ++i) {
             const auto late = static_cast<std::size_t>(delay);
-            const double seen = i >= late ? way[i - late] : 0;
+            const double seen = i >= late ? displacement[i - late] : 0;
             const double force = seen > 0 && seen < end ? -stiffness * seen : 0;
-            observer.update(Vector3<double>(way[i], 0, 0), Vector3<double>(force, 0, 0), tick);
+            observer.update(Vector3<double>(displacement[i], 0, 0), Vector3<double>(force, 0, 0), tick);
         }
         if (delay == 0) CHECK(observer.least() == 0);
         if (delay == 1) CHECK(observer.energy() < -0.5);
@@ -425,8 +426,8 @@ TEST_CASE("accepted at 0.9 of the bound, refused at 1.1, on every device", "[pas
         const auto device = all[static_cast<std::size_t>(random.index(5))];
         const double hand = random.number(0.0, 5.0);
         auto loop = random_loop(random, 0.5 * hand);
-        const Dissipation there{.hand_damping = hand, .fastest = random.chance(0.5) ? infinity : 0.2};
-        const double bound = passivity(loop, device, there).most_stiffness;
+        const Dissipation there{.hand_damping = hand, .max_speed = random.chance(0.5) ? infinity : 0.2};
+        const double bound = passivity(loop, device, there).max_stiffness;
         if (bound == 0) continue;
         loop.stiffness = 0.9 * bound;
         REQUIRE(passivity(loop, device, there).passive);
@@ -449,11 +450,11 @@ TEST_CASE("friction and a coarse position are counted rightly, whatever the way"
                          .delay = 1e-3 * random.index(3),
                          .negative_stiffness = 0,
                          .off_potential = 0};
-        const double fastest = random.number(0.02, 0.5);
-        const Dissipation there{.hand_damping = random.number(0.0, 1.0), .fastest = fastest};
-        loop.stiffness = passivity(loop, device, there).most_stiffness;
+        const double max_speed = random.number(0.02, 0.5);
+        const Dissipation there{.hand_damping = random.number(0.0, 1.0), .max_speed = max_speed};
+        loop.stiffness = passivity(loop, device, there).max_stiffness;
         if (loop.stiffness == 0) continue;
-        EnergyObserver observer(device.damping + there.hand_damping, device.friction);
+        PassivityObserver observer(device.damping + there.hand_damping, device.friction);
         std::array<double, 5> seen{};
         double position = 0, speed = 0;
         const auto late = static_cast<std::size_t>(std::lround(loop.delay / loop.tick));
@@ -465,17 +466,17 @@ TEST_CASE("friction and a coarse position are counted rightly, whatever the way"
             const double push =
                 depth > 0 ? std::max(loop.stiffness * depth - loop.damping * (at - before) / loop.tick, 0.0) : 0;
             observer.update(Vector3<double>(position, 0, 0), Vector3<double>(push, 0, 0), loop.tick);
-            if (random.chance(0.3)) speed = random.number(-fastest, fastest);
-            if (std::abs(position) > 0.005) speed = position > 0 ? -fastest : fastest;
+            if (random.chance(0.3)) speed = random.number(-max_speed, max_speed);
+            if (std::abs(position) > 0.005) speed = position > 0 ? -max_speed : max_speed;
             position += loop.tick * speed;
         }
-        if (observer.least() < -1e-9 * observer.brought()) FAIL("seed " << seed << ": " << observer.least() << " J");
+        if (observer.least() < -1e-9 * observer.energy_in()) FAIL("seed " << seed << ": " << observer.least() << " J");
     }
 }
 
 TEMPLATE_TEST_CASE("the observer counts what a held force does", "[passivity]", double, float) {
     using S = TestType;
-    EnergyObserver observer;
+    PassivityObserver observer;
     observer.update<S>({0, 0, 0}, {0, 0, 2}, 1e-3);
     CHECK(observer.energy() == 0);
     observer.update<S>({0, 0, S(-0.5)}, {0, 0, 4}, 1e-3);  // half a metre against 2 N
@@ -483,15 +484,15 @@ TEMPLATE_TEST_CASE("the observer counts what a held force does", "[passivity]", 
     observer.update<S>({0, 0, 0}, {0, 0, 0}, 1e-3);  // and back along with 4 N
     CHECK(observer.energy() == -1);
     CHECK(observer.least() == -1);
-    CHECK(observer.brought() == 1);
+    CHECK(observer.energy_in() == 1);
     const S nan = std::numeric_limits<S>::quiet_NaN();
     observer.update<S>({nan, 0, 0}, {0, 0, 0}, 1e-3);
     observer.update<S>({0, 0, 0}, {0, nan, 0}, 1e-3);
     observer.update<S>({0, 0, 0}, {0, 0, 0}, static_cast<double>(nan));
     CHECK(observer.energy() == -1);
-    observer.restart();
+    observer.reset();
     CHECK(observer.energy() == 0);
-    EnergyObserver damped(2, 0.5);
+    PassivityObserver damped(2, 0.5);
     damped.update<S>({0, 0, 0}, {0, 0, 0}, 0.25);
     damped.update<S>({0, 0, S(0.5)}, {0, 0, 0}, 0.25);
     CHECK(damped.energy() == 2 * 0.25 / 0.25 + 0.5 * 0.5);
@@ -521,6 +522,6 @@ TEST_CASE("what is not passive is refused, and the message says what would be", 
           "SampledLoop: off_potential must not be negative [N], got -3");
     CHECK(refused({.stiffness = 1}, {.hand_damping = -1}) ==
           "Dissipation: hand_damping must be finite and not negative [N s/m], got -1");
-    CHECK(refused({.stiffness = 1}, {.hand_damping = 1, .fastest = 0}) ==
+    CHECK(refused({.stiffness = 1}, {.hand_damping = 1, .max_speed = 0}) ==
           "Dissipation: fastest must be positive [m/s], got 0");
 }

@@ -155,7 +155,7 @@ TEST_CASE("a tick that is not right is refused with its number", "[recording][ba
     lost.erase(header_size + 2 * size, size);
     CHECK_THAT(refused(lost), ContainsSubstring("read_recording: checksum of tick 2 of 5 must be "));
     CHECK(refused(bytes + '\0') == "read_recording: the file must end after tick 4 of 5, but goes on beyond 617 bytes");
-    std::string tick(14 * 8 + 1, '\2');  // a sound checksum over a flag that is none
+    std::string tick(14 * 8 + 1, '\2');  // a valid checksum over a flag that is none
     const auto head = header(1, 8, 1, 1);
     tick += bytes_of(crc(head.substr(0, header_size - 4) + tick), 4);
     CHECK(refused(head + tick) == "read_recording: grasping must be 0 or 1, got 2");

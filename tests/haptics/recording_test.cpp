@@ -27,10 +27,10 @@ namespace {
 
 /// A device that now and then says what no device should.
 template <Real S>
-struct FaultyDevice : NullDevice<S> {
-    using NullDevice<S>::NullDevice;
+struct FaultyDevice : ScriptedDevice<S> {
+    using ScriptedDevice<S>::ScriptedDevice;
     [[nodiscard]] Tool<S> read() noexcept {
-        auto tool = NullDevice<S>::read();
+        auto tool = ScriptedDevice<S>::read();
         if (++reads % 97 == 0) tool.position.y() = std::numeric_limits<S>::quiet_NaN();
         if (reads % 89 == 0) tool.radius = S(-1);
         if (reads % 83 == 0) tool.velocity = Vector3<S>::Constant(std::numeric_limits<S>::infinity());
@@ -48,7 +48,8 @@ struct Loop {
         const auto tool = device.read();
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
-        const auto report = solver.step(x, S(1e-3), network, backing, press(tool, contact, grasp), pull(tool, grasp));
+        const auto report =
+            solver.step(x, S(1e-3), network, foundation, press(tool, contact, grasp), pull(tool, grasp));
         tree.refit(x, report.moved);
         const Vector3<S> force = feel({tool, contact, report, grasp});
         device.write(force);
@@ -66,7 +67,7 @@ struct Loop {
 
     TriangleMesh<S> mesh = icosphere<S>({.radius = 0.01, .subdivisions = 1});
     MassSpringNetwork<S, LinearSpring> network{mesh, {}, {.stiffness = S(40)}};
-    VirtualVolumeSprings<S> backing{mesh, {.stiffness = S(8), .damping = S(0.005)}};
+    VirtualVolumeSprings<S> foundation{mesh, {.stiffness = S(8), .damping = S(0.005)}};
     QuasiStaticSolver<S> solver{network, {.layers = 2, .sweeps = 1}};
     AabbTree<S> tree{mesh};
     ContactTracker<S> tracker{mesh};
@@ -81,7 +82,7 @@ Recording<S> recorded(Loop<S>& loop, std::uint64_t seed, int ticks) {
     FaultyDevice<S> device(test::busy_script<S>(seed, 40), {.tick = 1e-3, .radius = 1e-3});
     Recorder<S> recorder(static_cast<std::size_t>(ticks), loop.mesh.vertex_count());
     for (int i = 0; i < ticks; ++i) {
-        if (!device.running()) device.restart();
+        if (!device.running()) device.reset();
         const auto [tool, force] = loop.tick(device);
         recorder.add(tool, force);
     }
@@ -140,11 +141,11 @@ TEMPLATE_TEST_CASE("a recorder keeps the first ticks and counts the others", "[r
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const auto all = test::wild_recording<S>(random, random.index(20));
-        const auto room = static_cast<std::size_t>(1 + random.index(20));
-        Recorder<S> recorder(room, all.vertex_count);
+        const auto capacity = static_cast<std::size_t>(1 + random.index(20));
+        Recorder<S> recorder(capacity, all.vertex_count);
         for (int round = 0; round < 2; ++round) {
             for (const auto& tick : all.ticks) recorder.add(tick.tool, tick.force);
-            const std::size_t kept = (std::min)(room, all.ticks.size());
+            const std::size_t kept = (std::min)(capacity, all.ticks.size());
             REQUIRE(recorder.size() == kept);
             REQUIRE(recorder.missed() == all.ticks.size() - kept);
             auto first = all;
@@ -184,7 +185,7 @@ TEMPLATE_TEST_CASE("a replay hands out tools to the bit and compares forces", "[
             REQUIRE((changed == 0 || device.first_difference() == first));
             const auto& last = recording.ticks.back();
             REQUIRE(identical(RecordedTick<S>{device.read(), last.force}, last));
-            device.restart();
+            device.reset();
             REQUIRE(device.differing() == 0);
         }
     }
@@ -210,7 +211,7 @@ TEMPLATE_TEST_CASE("ticks are identical if all of their bits are", "[recording]"
 }
 
 TEST_CASE("no room, no tick and no vertices are refused", "[recording][bad]") {
-    CHECK(test::refusal([] { Recorder<double> recorder(0, 1); }) == "Recorder: most_ticks must be positive, got 0");
+    CHECK(test::refusal([] { Recorder<double> recorder(0, 1); }) == "Recorder: max_ticks must be positive, got 0");
     CHECK(test::refusal([] { Recorder<float> recorder(1, -1); }) ==
           "Recorder: vertex_count must not be negative, got -1");
     CHECK(test::refusal([] { ReplayDevice<double> device(Recording<double>{}); }) ==

@@ -101,9 +101,9 @@ TEMPLATE_TEST_CASE("depth and normal are distance to the surface at rest and its
             REQUIRE(contact.depth == -contact.gap);
             REQUIRE(norm(contact.normal) == Approx(1).margin(1e-5));
             // Straight to the nearest point and away from it the distance changes by the way.
-            const S height = S(radius) - contact.depth, way = S(-0.5) * height;
-            const auto there = rest({}, ball_at<S>(p + way * contact.normal));
-            REQUIRE(std::abs(there.depth - (contact.depth - way)) <= S(3) * rounding);
+            const S height = S(radius) - contact.depth, displacement = S(-0.5) * height;
+            const auto there = rest({}, ball_at<S>(p + displacement * contact.normal));
+            REQUIRE(std::abs(there.depth - (contact.depth - displacement)) <= S(3) * rounding);
             // Nowhere by more.
             const Vector3<S> aside = S(1e-3) * random.vector<S>();
             REQUIRE(std::abs(rest({}, ball_at<S>(p + aside)).gap - contact.gap) <= norm(aside) + rounding);
@@ -156,7 +156,7 @@ TEST_CASE("a shaft is felt where it is deepest, an open surface from its side an
         const auto contact = rest({}, shaft);
         CHECK(contact.depth == Approx(0.011 - height).margin(1.5e-4));  // flat triangles
         CHECK(dot(contact.normal, up) > 0.98);
-        CHECK(norm<double>(contact.on_axis - height * up) < 3e-3);
+        CHECK(norm<double>(contact.axis_point - height * up) < 3e-3);
     }
 
     const auto flat = RestContact(sheet<double>({.width = 0.02, .height = 0.02, .columns = 10, .rows = 10}));
@@ -198,7 +198,7 @@ TEST_CASE("in slow turns over a membrane some forces give energy, and those with
           "[rest][energy]") {
     const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0, .damping = 0.02});
     const RestContact rest(mesh);
     const SmoothContact smooth(mesh);
     const SpringDamperForce feel{.stiffness = 100};
@@ -214,14 +214,14 @@ TEST_CASE("in slow turns over a membrane some forces give energy, and those with
         ContactTracker tracker(mesh);
         auto x = mesh.positions();
         // With a damper of 0.1 N s/m, four times what the sampling of a spring of 100 N/m takes at this tick. [N s/m]
-        EnergyObserver plain(0.1), smoothed(0.1), at_rest(0.1), reaction(0.1);
+        PassivityObserver plain(0.1), smoothed(0.1), at_rest(0.1), reaction(0.1);
         for (int i = 0; i <= turns * ticks; ++i) {
             const double u = 4.0 * (i % ticks) / ticks;
             const double along = u < 1 ? u : u < 2 ? 1 : u < 3 ? 3 - u : 0;
             const double deep = deepest * (u < 1 ? 1 : u < 2 ? 1 - 0.9 * (u - 1) : u < 3 ? 0.1 : 0.1 + 0.9 * (u - 3));
             const auto tool = ball_at<double>(middle + along * aside + (radius - deep) * up);
             const auto contact = tracker.update(tree, x, tool);
-            const auto report = solver.step(x, tick, network, backing, press(tool, contact));
+            const auto report = solver.step(x, tick, network, foundation, press(tool, contact));
             tree.refit(x, report.moved);
             plain.update(tool.position, feel({tool, contact, report}), tick);
             smoothed.update(tool.position, feel({tool, smooth(contact), report}), tick);
@@ -256,9 +256,9 @@ TEST_CASE("on a body that moves the contact with the surface at rest goes along"
         tree.refit(body.anchors());
         const Vector3<double> p = random.number(0.009, 0.0112) * random.unit_vector();
         const auto still = rest({}, ball_at(p));
-        const auto moved = rest({}, ball_at(pose.point_out(p)), tree, body);
+        const auto moved = rest({}, ball_at(pose.point_to_world(p)), tree, body);
         CHECK(moved.touching() == still.touching());
         CHECK(std::abs(moved.depth - still.depth) <= 1e-15);
-        if (still.touching()) CHECK(norm<double>(moved.normal - pose.direction_out(still.normal)) <= 1e-9);
+        if (still.touching()) CHECK(norm<double>(moved.normal - pose.vector_to_world(still.normal)) <= 1e-9);
     }
 }

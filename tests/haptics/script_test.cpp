@@ -243,7 +243,7 @@ TEST_CASE("random bytes end in waypoints or in a refusal", "[script][bad]") {
 
 TEST_CASE("a script drives a device", "[script]") {
     std::istringstream text("time,x,y,z,grasping\n0,0,0,0.012,0\n1,0,0,0.009,1\n");
-    NullDevice<double> device(read_script<double>(text), {.tick = 0.5, .radius = 1e-3});
+    ScriptedDevice<double> device(read_script<double>(text), {.tick = 0.5, .radius = 1e-3});
     CHECK(device.read().position == Vector3<double>(0, 0, 0.012));
     CHECK(device.read().position.z() == Approx(0.0105));
     CHECK(device.read().grasping);

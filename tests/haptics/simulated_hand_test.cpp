@@ -20,7 +20,7 @@ using test::Random;
 using Vector = Vector3<double>;
 
 static_assert(Hand<SimulatedHand<double>, double> && Hand<SimulatedHand<float>, float>);
-static_assert(Device<NullDevice<double, SimulatedHand<double>>, double>);
+static_assert(Device<ScriptedDevice<double, SimulatedHand<double>>, double>);
 
 namespace {
 
@@ -131,10 +131,10 @@ TEST_CASE("an undamped hand swings for ever, in the time that mass and spring gi
 
 TEST_CASE("a hand without a force follows its script, and one that is pushed gives way", "[hand]") {
     const HandOptions options{.mass = 0.1, .damping = 2, .stiffness = 300};
-    using Device = NullDevice<double, SimulatedHand<double>>;
+    using Device = ScriptedDevice<double, SimulatedHand<double>>;
     Device device({{.time = 0, .position = {1, 0, 0}}, {.time = 4, .position = {1, 0, 0.04}, .grasping = true}},
                   {.radius = 2e-3}, SimulatedHand<double>(options));
-    NullDevice<double> firm({{.time = 0, .position = {1, 0, 0}}, {.time = 4, .position = {1, 0, 0.04}}});
+    ScriptedDevice<double> firm({{.time = 0, .position = {1, 0, 0}}, {.time = 4, .position = {1, 0, 0.04}}});
     const auto first = device.read();
     CHECK(first.position == Vector(1, 0, 0));
     CHECK(first.velocity == Vector(0, 0, 0));
@@ -152,7 +152,7 @@ TEST_CASE("a hand without a force follows its script, and one that is pushed giv
     }
     CHECK(norm<double>(expected.position - Vector(1, 0, 0.04 - 3.0 / 300)) < 1e-8);
     CHECK_FALSE(device.running());
-    device.restart();
+    device.reset();
     CHECK(device.read().position == first.position);
     device.write({0, 0, 0});
     CHECK(norm<double>(device.read().position - first.position) < 1e-4);
@@ -181,8 +181,8 @@ TEST_CASE("a wall swings up at a desk where the theory of sampled loops says so"
         const double growth = test::spectral_radius(loop);
         if (std::abs(growth - 1) < 0.01) continue;  // would take long to see
 
-        NullDevice<double, SimulatedHand<double>> device({{.time = 0}, {.time = 2}}, {.tick = tick},
-                                                         SimulatedHand<double>(options));
+        ScriptedDevice<double, SimulatedHand<double>> device({{.time = 0}, {.time = 2}}, {.tick = tick},
+                                                             SimulatedHand<double>(options));
         device.write({1, 0, 0});
         (void)device.read();
         double first = 0, last = 0;

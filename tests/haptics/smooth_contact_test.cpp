@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/moving_body.hpp>
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/surface/moving_body.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -25,7 +25,7 @@ Contact<S> touching(Index triangle, const Vector3<S>& tool) {
     Contact<S> contact;
     contact.phase = ContactPhase::ongoing;
     contact.triangle = triangle;
-    contact.on_axis = tool;
+    contact.axis_point = tool;
     contact.normal = Vector3<S>(1, 0, 0);
     contact.radius = S(1e-3);
     return contact;
@@ -88,9 +88,10 @@ TEST_CASE("however small the steps of a tool, its normal turns in proportion", "
                 double largest = 0, flat = 0;
                 for (int i = -1; i * step < 1; ++i) {
                     Tool<double> tool{.radius = 1e-3};
-                    const double way = i * step;
+                    const double displacement = i * step;
                     // From outside, then at one height.
-                    tool.position = (i < 0 ? 0.0105 : 0.01 + height) * (std::cos(way) * from + std::sin(way) * across);
+                    tool.position = (i < 0 ? 0.0105 : 0.01 + height) *
+                                    (std::cos(displacement) * from + std::sin(displacement) * across);
                     const auto contact = tracker.update(tree, x, tool);
                     REQUIRE(contact.touching());
                     const auto found = smooth(contact);
@@ -157,13 +158,13 @@ TEST_CASE("what is no contact, or not finite, or has no normal, stays as it is",
     const auto collapsed = smooth(contact, body).normal;
     CHECK((collapsed == contact.normal || std::abs(norm(collapsed) - 1) < 1e-12));
     for (const double far : {0.0, 1e300, -1e300}) {
-        contact.on_axis = {0, far, 0};
+        contact.axis_point = {0, far, 0};
         const auto found = smooth(contact).normal;
         CHECK((found == contact.normal || std::abs(norm(found) - 1) < 1e-12));
     }
-    contact.on_axis.x() = std::numeric_limits<double>::infinity();
+    contact.axis_point.x() = std::numeric_limits<double>::infinity();
     CHECK(smooth(contact).normal == contact.normal);
-    contact.on_axis = {0, 0, 0.0105};  // and it goes on
+    contact.axis_point = {0, 0, 0.0105};  // and it goes on
     CHECK(norm<double>(smooth(contact).normal - Vector3<double>(0, 0, 1)) < 1e-12);
 }
 
@@ -174,15 +175,16 @@ TEST_CASE("a body that moves takes its normals along", "[smooth]") {
         const auto mesh = uneven_ball<double>(random, 2, 0.02);
         const auto smooth = SmoothContact(mesh);
         const auto turn = random.rotation();
-        const Vector3<double> way = 0.01 * random.unit_vector();
+        const Vector3<double> displacement = 0.01 * random.unit_vector();
         MovingBody body(mesh);
         Points<double> x = mesh.positions();
-        const Points<double> anchors = (turn * x).colwise() + way.eigen();
-        REQUIRE((seed % 2 == 0 ? body.move_to(RigidFrame<double>{turn, way}, x) : body.move_to(anchors, 1, x)));
+        const Points<double> anchors = (turn * x).colwise() + displacement.eigen();
+        REQUIRE(
+            (seed % 2 == 0 ? body.move_to(RigidFrame<double>{turn, displacement}, x) : body.move_to(anchors, 1, x)));
         const Vector3<double> tool = 0.0105 * random.unit_vector();
         const auto contact = touching(AabbTree(mesh).closest_point(mesh.positions(), tool).triangle, tool);
         auto seen = contact;
-        seen.on_axis = turn * contact.on_axis + way;
+        seen.axis_point = turn * contact.axis_point + displacement;
         CHECK(norm<double>(smooth(seen, body).normal - turn * smooth(contact).normal) < 1e-9);
     }
 }

@@ -66,8 +66,8 @@ TEST_CASE("a device in millimetres, a scene in metres, a force in newtons", "[un
     CHECK((tool.position - Vector3<double>(0.525, 0.003, -0.252)).cwiseAbs().maxCoeff() <= 1e-12);
     CHECK((tool.velocity - Vector3<double>(-0.01, 0.0625, 0)).cwiseAbs().maxCoeff() <= 1e-12);
     const auto felt = scale.to_device(Newtons({0.012, -0.025, 0}));  // a sclera, a lens capsule
-    CHECK((felt.on_hand.value() - Vector3<double>(-1, 0, 0.48)).cwiseAbs().maxCoeff() <= 1e-12);
-    CHECK(felt.by_tissue == Newtons({0.012, -0.025, 0}));
+    CHECK((felt.device_force.value() - Vector3<double>(-1, 0, 0.48)).cwiseAbs().maxCoeff() <= 1e-12);
+    CHECK(felt.scene_force == Newtons({0.012, -0.025, 0}));
     CHECK(felt.scale == 40);
     CHECK(scale.at_device(NewtonsPerMetre(12)).value() == Approx(120).epsilon(1e-12));
     CHECK(in_metres(NewtonsPerMillimetre(0.5)).value() == 500);
@@ -87,10 +87,10 @@ TEST_CASE("work by the hand is force times motion times the work on the tissue",
         scale.device.origin = random.vector();
         const Millimetres from(random.vector(-100.0, 100.0)), to(random.vector(-100.0, 100.0));
         const Newtons force(random.vector());
-        const double by_hand = dot<double>(in_metres(to - from).value(), scale.to_device(force).on_hand.value());
+        const double by_hand = dot<double>(in_metres(to - from).value(), scale.to_device(force).device_force.value());
         const double in_scene = dot<double>((scale.to_scene(to) - scale.to_scene(from)).value(), force.value());
         REQUIRE(std::abs(by_hand * scale.motion - scale.force * in_scene) <= 1e-12 * scale.force);
-        REQUIRE(norm(scale.to_device(force).on_hand.value()) == Approx(scale.force * norm(force.value())));
+        REQUIRE(norm(scale.to_device(force).device_force.value()) == Approx(scale.force * norm(force.value())));
     }
 }
 

@@ -35,7 +35,7 @@ TEMPLATE_TEST_CASE("at rest two springs in a row are felt", "[coupling]", double
         Random random(static_cast<std::uint64_t>(seed));
         const S tissue = random.number<S>(1, 50), scale = random.number<S>(1, 60), between = random.number<S>(100, 500);
         const S firm = tissue * scale, dt = S(1e-3);
-        const double damping = 1.5 * least_damping(firm, between, dt) + 0.01;
+        const double damping = 1.5 * min_damping(firm, between, dt) + 0.01;
         VirtualCoupling<S> coupling({.stiffness = between, .damping = damping, .scale = scale});
         Tool<S> hand;
         Vector3<S> reaction = Vector3<S>::Zero();
@@ -53,12 +53,12 @@ TEST_CASE("a coupling that restarts is as a new one", "[coupling]") {
     const CouplingOptions options{.stiffness = 300, .damping = 0.02, .scale = 30};
     VirtualCoupling<double> used(options), other(options);
     const auto follows = [&](VirtualCoupling<double>& coupling, std::uint64_t seed) {
-        Random way(seed);
+        Random displacement(seed);
         std::vector<double> numbers{coupling.force().x(), coupling.force().y(), coupling.force().z()};
         for (int i = 0; i < 20; ++i) {
             Tool<double> hand;
-            hand.position = 0.01 * way.vector();
-            const auto tool = coupling.follow(hand, way.vector(), 1e-3);
+            hand.position = 0.01 * displacement.vector();
+            const auto tool = coupling.follow(hand, displacement.vector(), 1e-3);
             for (const auto& v : {tool.position, tool.velocity, coupling.force()}) {
                 numbers.insert(numbers.end(), {v.x(), v.y(), v.z()});
             }
@@ -67,7 +67,7 @@ TEST_CASE("a coupling that restarts is as a new one", "[coupling]") {
     };
     static_cast<void>(follows(used, 1));
     REQUIRE(norm(used.force()) > 0);
-    used.restart();
+    used.reset();
     CHECK(follows(used, 2) == follows(other, 2));
 }
 
@@ -89,8 +89,8 @@ TEST_CASE("however stiff the tissue, the coupling's stiffness decides whether th
         const double dt = 1e-3, between = random.number(100.0, 800.0), scale = random.number(1.0, 50.0);
         const double firm = random.number(0.1, 20.0) * between;
         VirtualCoupling<double> coupling(
-            {.stiffness = between, .damping = least_damping(firm, between, dt), .scale = scale});
-        EnergyObserver observer(between * dt / 2);  // what a spring of that stiffness asks for
+            {.stiffness = between, .damping = min_damping(firm, between, dt), .scale = scale});
+        PassivityObserver observer(between * dt / 2);  // what a spring of that stiffness asks for
         Tool<double> hand;
         hand.position = {0, 0, 0.001};
         Vector3<double> reaction = Vector3<double>::Zero(), speed = Vector3<double>::Zero();
@@ -101,10 +101,10 @@ TEST_CASE("however stiff the tissue, the coupling's stiffness decides whether th
             if (std::abs(hand.position.z()) > 0.005) speed.z() = hand.position.z() > 0 ? -0.3 : 0.3;
             hand.position += dt * speed;
         }
-        if (observer.least() < -1e-9 * observer.brought()) FAIL("seed " << seed << ": " << observer.least() << " J");
+        if (observer.least() < -1e-9 * observer.energy_in()) FAIL("seed " << seed << ": " << observer.least() << " J");
     }
-    CHECK(least_damping(100, 300, 1e-3) == 0);
-    CHECK(least_damping(500, 300, 1e-3) == Approx(0.1));
+    CHECK(min_damping(100, 300, 1e-3) == 0);
+    CHECK(min_damping(500, 300, 1e-3) == Approx(0.1));
 }
 
 TEST_CASE("a coupling lets go of what is no number, and refuses what makes no sense", "[coupling][bad]") {

@@ -108,15 +108,15 @@ TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand allocate noth
 TEST_CASE("nor does a step that several threads share", "[allocation]") {
     const auto mesh = icosphere<float>({.radius = 1, .subdivisions = 4});
     const MassSpringNetwork<float, LinearSpring> network(mesh, {}, {.stiffness = 1});
-    const VirtualVolumeSprings<float> backing(mesh, {.stiffness = 0.1F});
+    const VirtualVolumeSprings<float> foundation(mesh, {.stiffness = 0.1F});
     const ThreadPool pool(3);
-    QuasiStaticSolver solver(network, SolverOptions<float>{.layers = unlimited, .order = VisitOrder::colours},
+    QuasiStaticSolver solver(network, SolverOptions<float>{.layers = unlimited, .order = UpdateOrder::colour_all},
                              BlockStep{}, pool.executor());
     Points<float> x = mesh.positions();
     std::size_t moved = 0;
     const long allocated = allocated_by([&] {
         for (int i = 0; i < cases(200); ++i) {
-            const auto report = solver.step(x, 1e-3F, network, backing, pull(i % 50, Vector3<float>(0, 0, 1.1F)));
+            const auto report = solver.step(x, 1e-3F, network, foundation, pull(i % 50, Vector3<float>(0, 0, 1.1F)));
             moved += report.moved.size();
         }
     });
@@ -150,10 +150,10 @@ TEMPLATE_TEST_CASE("nor do bounds of the error and slopes of the force", "[alloc
         for (int i = 0; i < cases(1000); ++i) {
             const Vector3<S> target = point(loop.mesh.positions(), 7) * (1 + S(1e-4) * static_cast<S>(i % 200));
             const auto held = pull(7, target);
-            const auto report = loop.solver.step(loop.x, S(1e-3), loop.network, loop.backing, held);
-            certified += quick.of(loop.x, loop.network, loop.backing, held).certified();
-            certified += sharp.of(loop.x, loop.network, loop.backing, held).certified();
-            const auto feel = tangent.of(loop.solver.queue().vertices(), loop.x, loop.network, loop.backing, held);
+            const auto report = loop.solver.step(loop.x, S(1e-3), loop.network, loop.foundation, held);
+            certified += quick.of(loop.x, loop.network, loop.foundation, held).certified();
+            certified += sharp.of(loop.x, loop.network, loop.foundation, held).certified();
+            const auto feel = tangent.of(loop.solver.queue().vertices(), loop.x, loop.network, loop.foundation, held);
             found += feel.status == TangentStatus::found;
             used(report.moved.data());
         }

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <memory>
 
-#include <membrane/collision/tool.hpp>
+#include <membrane/contact/tool.hpp>
 #include <membrane/haptics/device.hpp>
 #include <membrane/haptics/handover.hpp>
 #include <membrane/haptics/simulated_hand.hpp>
@@ -35,9 +35,9 @@ struct BothLoops {
         right = right && pose.read().value.position == tool.position && shown == x;
     }
 
-    NullDevice<S, SimulatedHand<S>> device{{{.time = 0}, {.time = 1, .position = {0, 0, 1}}},
-                                           {},
-                                           SimulatedHand<S>({.mass = 0.1, .damping = 2, .stiffness = 300})};
+    ScriptedDevice<S, SimulatedHand<S>> device{{{.time = 0}, {.time = 1, .position = {0, 0, 1}}},
+                                               {},
+                                               SimulatedHand<S>({.mass = 0.1, .damping = 2, .stiffness = 300})};
     Latest<Tool<S>> pose;
     MovedPoints<S> moved{100};
     Points<S> x = Points<S>::Zero(3, 100), shown = x;

@@ -14,7 +14,7 @@
 #include <membrane/haptics/units.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/moved_volume.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 
 #include "support/catch.hpp"
@@ -64,9 +64,9 @@ TEMPLATE_TEST_CASE("contact is found without exceptions", "[noexcept]", double, 
     static_cast<void>([](AabbTree<S>& tree, const ConstPointsRef<S>& x, std::span<const Index> moved,
                          const Vector3<S>& p, S radius, void (*visit)(Index)) {
         static_assert(noexcept(tree.refit(x))&& noexcept(tree.refit(x, moved))&& noexcept(tree.closest_point(x, p)));
-        static_assert(noexcept(tree.first_hit(x, p, p))&& noexcept(tree.touching_sphere(x, p, radius, visit)));
-        static_assert(noexcept(tree.touching_box(x, p, p, visit)));
-        static_assert(noexcept(tree.touching_capsule(x, p, p, radius, visit)));
+        static_assert(noexcept(tree.first_hit(x, p, p))&& noexcept(tree.overlap_sphere(x, p, radius, visit)));
+        static_assert(noexcept(tree.overlap_box(x, p, p, visit)));
+        static_assert(noexcept(tree.overlap_capsule(x, p, p, radius, visit)));
     });
     static_cast<void>([](ContactTracker<S>& tracker, Grasper<S>& grasper, const AabbTree<S>& tree,
                          const ConstPointsRef<S>& x, const Tool<S>& tool, const Contact<S>& contact,
@@ -74,12 +74,13 @@ TEMPLATE_TEST_CASE("contact is found without exceptions", "[noexcept]", double, 
                          const Vector3<S>& p) {
         static_assert(noexcept(tracker.update(tree, x, tool))&& noexcept(tracker.update(tree, x, tool, body)));
         static_assert(noexcept(grasper.update(contact, x, tool, body))&& noexcept(body.velocity_at(p, {}, p)));
-        static_assert(noexcept(tracker.reset())&& noexcept(tracker.tree_checks()));
+        static_assert(noexcept(tracker.reset())&& noexcept(tracker.full_query_count()));
         static_assert(noexcept(grasper.update(contact, x, tool))&& noexcept(grasper.reset()));
         static_assert(noexcept(contact.touching())&& noexcept(Contact<S>::none())&& noexcept(grasp.holding()));
-        static_assert(noexcept(is_sound(tool))&& noexcept(carried_in(tool, frame)));
-        static_assert(noexcept(frame.point_in(p))&& noexcept(frame.point_out(p))&& noexcept(frame.velocity_in(p, p)));
-        static_assert(noexcept(frame.direction_in(p))&& noexcept(frame.direction_out(p)));
+        static_assert(noexcept(is_valid(tool))&& noexcept(to_body_frame(tool, frame)));
+        static_assert(
+            noexcept(frame.point_to_body(p))&& noexcept(frame.point_to_world(p))&& noexcept(frame.velocity_in(p, p)));
+        static_assert(noexcept(frame.vector_to_body(p))&& noexcept(frame.vector_to_world(p)));
     });
     SUCCEED();
 }
@@ -91,15 +92,16 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
     static_cast<void>([](const Network& network, const Volume& volume, const MovingBody<S>& body,
                          const ConstPointsRef<S>& x, const Vector3<S>& p, S s, std::span<const Index> vertices,
                          PropagationQueue& queue) {
-        static_assert(noexcept(network.pull(0, x))&& noexcept(network.tension(0, x))&& noexcept(network.energy(x)));
+        static_assert(noexcept(network.force_on(0, x))&& noexcept(network.tension(0, x))&& noexcept(network.energy(x)));
         static_assert(noexcept(network.springs_of(0))&& noexcept(network.pinned(0))&& noexcept(network.mass(0)));
-        static_assert(noexcept(volume.pull(0, p, p, s))&& noexcept(volume.energy(0, p))&& noexcept(on(body, volume)));
-        static_assert(noexcept(on(body, volume).pull(0, p, p, s))&& noexcept(largest_curvature(network, 0, x)));
+        static_assert(
+            noexcept(volume.force_on(0, p, p, s))&& noexcept(volume.energy(0, p))&& noexcept(on(body, volume)));
+        static_assert(noexcept(on(body, volume).force_on(0, p, p, s))&& noexcept(largest_curvature(network, 0, x)));
         static_assert(noexcept(body.anchors())&& noexcept(body.rotation_at(0)));
         static_assert(
             noexcept(queue.build(network, vertices, 4))&& noexcept(queue.vertices())&& noexcept(queue.layer(0)));
         static_assert(noexcept(queue.contains(0))&& noexcept(queue.clear())&& noexcept(queue.grow(network)));
-        static_assert(noexcept(queue.group(network))&& noexcept(queue.group_ends()));
+        static_assert(noexcept(queue.group(network))&& noexcept(queue.colour_ends()));
     });
     static_cast<void>([](ActiveVertices& active, const Network& network, std::span<const Index> vertices,
                          const SolverOptions<S>& options, bool (*is_balanced)(Index)) {
@@ -107,12 +109,12 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(active.contact_layer())&& noexcept(active.queue()));
         static_assert(noexcept(active.finish(network, is_balanced, {}))&& noexcept(active.clear()));
         static_assert(noexcept(active.wake(0))&& noexcept(active.grow(network, options)));
-        static_assert(noexcept(active.frontier())&& noexcept(active.group_ends()));
+        static_assert(noexcept(active.frontier())&& noexcept(active.colour_ends()));
     });
     static_cast<void>([](PackedVertices<S>& packed, const PropagationQueue& queue, const Network& network,
                          const StepInput<S, Network, Volume>& scene, const AnyExecutor& executor) {
-        static_assert(noexcept(packed.assign(queue.vertices(), queue.group_ends(), network)));
-        static_assert(noexcept(packed.append(queue.vertices(), 0, queue.group_ends(), network)));
+        static_assert(noexcept(packed.assign(queue.vertices(), queue.colour_ends(), network)));
+        static_assert(noexcept(packed.append(queue.vertices(), 0, queue.colour_ends(), network)));
         static_assert(noexcept(packed.vertices(0))&& noexcept(packed.first_of(0))&& noexcept(packed.pack_from(0)));
         static_assert(noexcept(packed.begin_step(scene))&& noexcept(packed.evaluate_residual(0, scene)));
         static_assert(noexcept(packed.template update_pack<true>(0, scene, BlockStep{})));
@@ -127,8 +129,8 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(apply_forces(state, packs))&& noexcept(state.packs.unpack(points)));
         static_assert(noexcept(largest_squared_move(state, vertices)));
     });
-    static_cast<void>([](Predictor<S, 4>& predictor, std::span<const Lead<S>> leads) {
-        static_assert(noexcept(predictor.extrapolation_factor(leads))&& noexcept(predictor.forget()));
+    static_cast<void>([](Predictor<S, 4>& predictor, std::span<const DrivingInput<S>> inputs) {
+        static_assert(noexcept(predictor.extrapolation_factor(inputs))&& noexcept(predictor.forget()));
     });
     static_cast<void>([](const Tool<S>& tool, const Contact<S>& contact, const Grasp<S>& grasp, const Vector3<S>& p,
                          const std::array<Index, 3>& corners, std::span<const Index> vertices) {
@@ -138,9 +140,9 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
     });
     using Solver = QuasiStaticSolver<S, MassStep>;
     static_assert(is_noexcept<decltype(&Solver::template step<Network, Volume>)>);
-    static_assert(is_noexcept<decltype(&Solver::template step<Network, NoVolumeSprings, Press<S>, HeldPoint<S>,
-                                                              HeldVertex<S>, Load<S>, Pinned>)>);
-    static_assert(is_noexcept<decltype(&Solver::template step_until<S (*)(), Network, Volume, Press<S>>)>);
+    static_assert(is_noexcept<decltype(&Solver::template step<Network, NoFoundation, ToolContact<S>, PointAttachment<S>,
+                                                              VertexAttachment<S>, PointLoad<S>, PinnedVertices>)>);
+    static_assert(is_noexcept<decltype(&Solver::template step_until<S (*)(), Network, Volume, ToolContact<S>>)>);
     static_assert(is_noexcept<decltype(&Solver::wake)> && is_noexcept<decltype(&Solver::wake_all)>);
     static_assert(is_noexcept<decltype(&Solver::reset)>);
     using Euler = ExplicitEuler<S>;
@@ -152,15 +154,15 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
 
 TEMPLATE_TEST_CASE("the device is served without exceptions", "[noexcept]", double, float) {
     using S = TestType;
-    static_cast<void>([](NullDevice<S>& device, const Vector3<S>& force, const HapticState<S>& state,
+    static_cast<void>([](ScriptedDevice<S>& device, const Vector3<S>& force, const HapticState<S>& state,
                          const SpringDamperForce& springs, const ReactionForce& reaction) {
         static_assert(noexcept(device.running())&& noexcept(device.read())&& noexcept(device.write(force)));
-        static_assert(noexcept(device.force())&& noexcept(device.time())&& noexcept(device.restart()));
+        static_assert(noexcept(device.force())&& noexcept(device.time())&& noexcept(device.reset()));
         static_assert(noexcept(springs(state))&& noexcept(reaction(state)));
     });
     static_cast<void>([](Recorder<S>& recorder, ReplayDevice<S>& replay, const Tool<S>& tool, const Vector3<S>& force) {
         static_assert(noexcept(recorder.add(tool, force))&& noexcept(recorder.clear())&& noexcept(recorder.missed()));
-        static_assert(noexcept(replay.differing())&& noexcept(replay.first_difference())&& noexcept(replay.restart()));
+        static_assert(noexcept(replay.differing())&& noexcept(replay.first_difference())&& noexcept(replay.reset()));
     });
     SUCCEED();
 }
@@ -173,26 +175,26 @@ TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept
                          const Vector3<S>& p, const Symmetric3<S>& stiffness) {
         static_assert(noexcept(friction(state))&& noexcept(friction.slips()));
         static_assert(noexcept(extrapolated(state))&& noexcept(extrapolated.solved(p, stiffness, p)));
-        static_assert(noexcept(transition(state))&& noexcept(transition.under_way()));
+        static_assert(noexcept(transition(state))&& noexcept(transition.in_transition()));
         static_assert(noexcept(coupling.follow(state.tool, p, S(1)))&& noexcept(coupling(state)));
-        static_assert(noexcept(coupling.force())&& noexcept(coupling.restart()));
+        static_assert(noexcept(coupling.force())&& noexcept(coupling.reset()));
         static_assert(noexcept(smooth(state.contact))&& noexcept(smooth(state.contact, body)));
     });
-    static_cast<void>([](ForceLimiter& limit, EnergyObserver& observer, Watchdog& watchdog, SoftStart& start,
-                         MotorHeat& heat, const Vector3<S>& force) {
-        static_assert(noexcept(limit(force, 0.0, 1))&& noexcept(limit.acted())&& noexcept(limit.warmth()));
-        static_assert(noexcept(limit.share())&& noexcept(limit.device())&& noexcept(limit.restart()));
+    static_cast<void>([](ForceLimiter& limit, PassivityObserver& observer, Watchdog& watchdog, SoftStart& start,
+                         MotorThermalModel& heat, const Vector3<S>& force) {
+        static_assert(noexcept(limit(force, 0.0, 1))&& noexcept(limit.acted())&& noexcept(limit.thermal_load()));
+        static_assert(noexcept(limit.share())&& noexcept(limit.device())&& noexcept(limit.reset()));
         static_assert(noexcept(observer.update(force, force, 1e-3))&& noexcept(observer.energy()));
-        static_assert(noexcept(observer.brought())&& noexcept(observer.least())&& noexcept(observer.restart()));
+        static_assert(noexcept(observer.energy_in())&& noexcept(observer.least())&& noexcept(observer.reset()));
         static_assert(noexcept(watchdog.update(1, 0.0))&& noexcept(start.update(1.0, 0.0)));
-        static_assert(noexcept(heat.add(1.0, 1.0))&& noexcept(heat.most_force()));
+        static_assert(noexcept(heat.add(1.0, 1.0))&& noexcept(heat.max_force()));
     });
     SUCCEED();
 }
 
 TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", double, float) {
     using S = TestType;
-    static_cast<void>([](SimulatedHand<S>& hand, NullDevice<S, SimulatedHand<S>>& device, const Vector3<S>& p) {
+    static_cast<void>([](SimulatedHand<S>& hand, ScriptedDevice<S, SimulatedHand<S>>& device, const Vector3<S>& p) {
         static_assert(noexcept(hand.place(p))&& noexcept(hand.aim(p, p))&& noexcept(hand.move(p, S(1))));
         static_assert(noexcept(hand.position())&& noexcept(hand.velocity()));
         static_assert(noexcept(device.running())&& noexcept(device.read())&& noexcept(device.write(p)));

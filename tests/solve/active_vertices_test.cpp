@@ -5,8 +5,8 @@
 #include <set>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
 #include <membrane/solve/step.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -79,10 +79,10 @@ TEST_CASE("in groups, what is beyond the queue is ordered so that no two that ar
     for (const Index v : {2, 3, 4, 5}) active.wake(v);
     active.arrange(chain.network, List{0}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{0, 1, 2, 4, 3, 5});
-    CHECK(std::ranges::equal(active.group_ends(), std::vector<std::size_t>{4, 6}));
+    CHECK(std::ranges::equal(active.colour_ends(), std::vector<std::size_t>{4, 6}));
     CHECK_FALSE(active.finish(chain.network, unbalanced, {}));
-    active.arrange(chain.network, List{0}, Options{.layers = 1, .order = VisitOrder::arrival});
-    CHECK(active.group_ends().empty());
+    active.arrange(chain.network, List{0}, Options{.layers = 1, .order = UpdateOrder::breadth_first});
+    CHECK(active.colour_ends().empty());
 }
 
 TEST_CASE("beyond the layers no vertex wakes, however far the frontier moves", "[active]") {
@@ -135,7 +135,7 @@ TEST_CASE("a step that is not finished was never arranged", "[active]") {
 
 TEST_CASE("layers as needed: one after the other, and nothing stands still", "[active]") {
     const Chain chain;
-    const Options options{.layers = 3, .layers_as_needed = true};
+    const Options options{.layers = 3, .adaptive_layers = true};
     ActiveVertices active(12);
     active.arrange(chain.network, List{1}, options);
     CHECK(list_of(active.vertices()) == List{1});
@@ -164,7 +164,7 @@ TEST_CASE("layers as needed: one after the other, and nothing stands still", "[a
 
     // Up to the threshold, and to the end of what the springs join.
     for (const Index layers : {0, 1, 2, 9}) {
-        const Options few{.layers = layers, .layers_as_needed = true};
+        const Options few{.layers = layers, .adaptive_layers = true};
         active.arrange(chain.network, List{0}, few);
         while (!active.frontier().empty()) active.grow(chain.network, few);
         CHECK(active.vertices().size() == static_cast<std::size_t>(std::min(layers, 5) + 1));
@@ -177,8 +177,11 @@ TEST_CASE("layers as needed: who there is no room for keeps a turn", "[active]")
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
     for (Index most = 1; most <= 600; most += 7) {
         CAPTURE(most);
-        const Options options{
-            .layers = unlimited, .layers_as_needed = true, .sweeps = 1, .contact_visits = 1, .most_visits = most};
+        const Options options{.layers = unlimited,
+                              .adaptive_layers = true,
+                              .sweeps = 1,
+                              .contact_iterations = 1,
+                              .max_vertex_updates = most};
         ActiveVertices active(162);
         std::set<Index> seen;
         for (int i = 0; i < 2000 && seen.size() < 162; ++i) {
@@ -204,10 +207,10 @@ TEST_CASE("with little room layer 0 comes first, and those awake keep a turn", "
         for (Index n = 1 + random.index(3); n > 0; --n) seeds.push_back(random.index(162));
         const std::set<Index> layer0(seeds.begin(), seeds.end());
         const Options options{
-            .layers = unlimited, .sweeps = 1 + random.index(6), .most_visits = 1 + random.index(1000)};
-        const Index own = static_cast<Index>(layer0.size()) * (options.sweeps * options.contact_visits + 1);
-        const Index spare = std::max((options.most_visits - own) / (options.sweeps + 1), 1);
-        const std::size_t room = layer0.size() + static_cast<std::size_t>(spare);
+            .layers = unlimited, .sweeps = 1 + random.index(6), .max_vertex_updates = 1 + random.index(1000)};
+        const Index own = static_cast<Index>(layer0.size()) * (options.sweeps * options.contact_iterations + 1);
+        const Index spare = std::max((options.max_vertex_updates - own) / (options.sweeps + 1), 1);
+        const std::size_t capacity = layer0.size() + static_cast<std::size_t>(spare);
         active.arrange(network, seeds, options);
         (void)active.finish(network, unbalanced, {});
         std::set<Index> left;
@@ -217,8 +220,8 @@ TEST_CASE("with little room layer 0 comes first, and those awake keep a turn", "
         std::set<Index> seen;
         for (int i = 0; i < 200; ++i) {
             active.arrange(network, seeds, options);
-            REQUIRE(active.vertices().size() <= room);
-            REQUIRE(active.vertices().size() >= std::min(room - room / 4, std::size_t(162)));
+            REQUIRE(active.vertices().size() <= capacity);
+            REQUIRE(active.vertices().size() >= std::min(capacity - capacity / 4, std::size_t(162)));
             REQUIRE(active.contact_layer().size() == layer0.size());
             const auto visits = list_of(active.vertices());
             REQUIRE(std::set<Index>(visits.begin(), visits.end()).size() == visits.size());

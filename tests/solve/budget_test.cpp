@@ -8,10 +8,10 @@
 #include <limits>
 #include <vector>
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -33,13 +33,13 @@ template <class Scalar>
 struct Membrane {
     TriangleMesh<Scalar> mesh = icosphere<Scalar>({.radius = Scalar(radius), .subdivisions = 2});
     MassSpringNetwork<Scalar, LinearSpring> network{mesh, {}, {.stiffness = Scalar(40), .mass = Scalar(1.5e-4)}};
-    VirtualVolumeSprings<Scalar> backing{mesh, {.stiffness = Scalar(8), .damping = Scalar(0.02)}};
+    VirtualVolumeSprings<Scalar> foundation{mesh, {.stiffness = Scalar(8), .damping = Scalar(0.02)}};
 };
 
 /// What a step of a run may cost: parts of what it would cost without an end, and visits.
 struct Budget {
     double time;  // the deadline, as a part of a whole step's looks at the clock
-    Index most_visits;
+    Index max_vertex_updates;
 };
 
 /// Each look at it takes one unit of time; none is late before `end`.
@@ -50,11 +50,11 @@ struct CountingClock {
 
 /// Counts how often it is enforced.
 template <class Scalar>
-struct CountedPress : Press<Scalar> {
+struct CountedPress : ToolContact<Scalar> {
     int* enforced;
     bool enforce(ConstraintContext<Scalar>& context) const noexcept {
         ++*enforced;
-        return Press<Scalar>::enforce(context);
+        return ToolContact<Scalar>::enforce(context);
     }
 };
 
@@ -101,7 +101,7 @@ struct Run {
         enforced = 0;
         const CountedPress<Scalar> presses{press(tool, contact), &enforced};
         const Deadline deadline(CountingClock{&looks}, looks_left);
-        report = solver.step_until(deadline, x, Scalar(dt), membrane.network, membrane.backing, presses);
+        report = solver.step_until(deadline, x, Scalar(dt), membrane.network, membrane.foundation, presses);
         tree.refit(x, report.moved);
         return looks;
     }
@@ -113,7 +113,7 @@ struct Run {
         double sum = 0;
         if (solver.queue().layer_count() == 0) return sum;
         for (const Index v : solver.queue().layer(0)) {
-            sum += double(membrane.network.pull(v, x).stiffness) + 8 + 0.02 / dt;
+            sum += double(membrane.network.force_on(v, x).stiffness) + 8 + 0.02 / dt;
         }
         return sum;
     }
@@ -140,10 +140,10 @@ void check_report(Run<Scalar, Rule>& run, Run<Scalar, Rule> before, const Tool<S
     before.step(tool, no_end);
     REQUIRE_FALSE(before.report.out_of_time);
     if (report.out_of_time) {
-        REQUIRE((report.visits < before.report.visits || run.enforced < before.enforced));
+        REQUIRE((report.vertex_updates < before.report.vertex_updates || run.enforced < before.enforced));
     } else {
         REQUIRE(same_bits(run.x, before.x));
-        REQUIRE(report.visits == before.report.visits);
+        REQUIRE(report.vertex_updates == before.report.vertex_updates);
         REQUIRE(report.converged == before.report.converged);
     }
     const auto& queue = run.solver.queue();
@@ -151,8 +151,9 @@ void check_report(Run<Scalar, Rule>& run, Run<Scalar, Rule> before, const Tool<S
     for (const Index v : queue.vertices()) {
         if (queue.layer_count() > 0 && std::ranges::count(queue.layer(0), v) > 0) continue;
         const Vector3<Scalar> here = point(run.x, v);
-        const Vector3<Scalar> backing = run.membrane.backing.pull(v, here, point(run.start, v), Scalar(dt)).force;
-        beyond = std::max(beyond, double(norm<Scalar>(run.membrane.network.pull(v, run.x).force + backing)));
+        const Vector3<Scalar> foundation =
+            run.membrane.foundation.force_on(v, here, point(run.start, v), Scalar(dt)).force;
+        beyond = std::max(beyond, double(norm<Scalar>(run.membrane.network.force_on(v, run.x).force + foundation)));
     }
     const double rounding = 1e4 * radius * double(std::numeric_limits<Scalar>::epsilon());
     if (run.looks_at_all) REQUIRE(beyond <= double(report.residual) + rounding);
@@ -163,11 +164,11 @@ template <class Scalar>
 SolverOptions<Scalar> random_options(Random& random) {
     constexpr std::array<Index, 4> layers{0, 1, 6, unlimited};
     SolverOptions<Scalar> options{.layers = layers[std::size_t(random.index(4))], .sweeps = 1 + random.index(3)};
-    options.layers_as_needed = random.chance(0.2);
-    options.order =
-        std::array{VisitOrder::arrival, VisitOrder::groups, VisitOrder::colours}[std::size_t(random.index(3))];
+    options.adaptive_layers = random.chance(0.2);
+    options.order = std::array{UpdateOrder::breadth_first, UpdateOrder::colour_layers,
+                               UpdateOrder::colour_all}[std::size_t(random.index(3))];
     options.predict = random.chance(0.7);
-    options.negligible_force = Scalar(1e-6);  // of some 10 mN
+    options.force_tolerance = Scalar(1e-6);  // of some 10 mN
     return options;
 }
 
@@ -183,10 +184,10 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
     const bool by_deadline = random.chance(0.6);
     const double part = by_deadline ? parts[std::size_t(random.index(6))] : 1;
     if (!by_deadline) {
-        options.most_visits = Index(std::exp(random.number(0.0, std::log(2000.0))));
+        options.max_vertex_updates = Index(std::exp(random.number(0.0, std::log(2000.0))));
         options.sweeps = random.chance(0.3) ? 1 : options.sweeps;
     }
-    CAPTURE(int(path), part, options.most_visits, options.layers, options.layers_as_needed, options.sweeps,
+    CAPTURE(int(path), part, options.max_vertex_updates, options.layers, options.adaptive_layers, options.sweeps,
             options.predict, int(options.order));
     Run<Scalar, Rule> cut(scene, options, rule);
 
@@ -198,7 +199,7 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
         forces.push_back(whole.force());
         largest = std::max(largest, whole.force());
     }
-    cut.looks_at_all = by_deadline && !options.layers_as_needed;
+    cut.looks_at_all = by_deadline && !options.adaptive_layers;
     for (std::size_t i = 0; i < strokes.size(); ++i) {
         const auto before = cut;
         cut.tick(strokes[i], by_deadline ? part * looks[i] : no_end);
@@ -217,7 +218,7 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
     CHECK(cut.report.converged);
     CHECK(whole.report.converged);
     // Which vertices have ever been within a few layers depends on the contact of every tick, and so does where they rest.
-    if (options.layers != unlimited && !options.layers_as_needed) return;
+    if (options.layers != unlimited && !options.adaptive_layers) return;
     CHECK(cut.force() == Approx(whole.force()).epsilon(tolerance));
     CHECK(double((cut.x - whole.x).cwiseAbs().maxCoeff()) <= tolerance * whole.depth);
 }
@@ -237,7 +238,7 @@ void check_prediction(const Membrane<Scalar>& scene, std::uint64_t seed, Rule ru
     const auto strokes = tools<Scalar>(path, random);
     auto options = random_options<Scalar>(random);
     options.layers = unlimited;
-    options.layers_as_needed = false;
+    options.adaptive_layers = false;
     options.predict = false;
     Run<Scalar, Rule> unpredicted(scene, options, rule);
     auto other = options;

@@ -6,7 +6,7 @@
 
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/accuracy/error_bound.hpp>
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/catch.hpp"
 
@@ -28,7 +28,7 @@ struct Clamp {
     Index vertex, stays;
     Vector3<double> target;
 
-    [[nodiscard]] bool sound() const noexcept { return true; }
+    [[nodiscard]] bool valid() const noexcept { return true; }
     void begin(ConstraintContext<double>&) const noexcept {}
     [[nodiscard]] bool enforce(ConstraintContext<double>&) const noexcept { return false; }
     [[nodiscard]] Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return {0, 0, 0}; }
@@ -38,7 +38,7 @@ void describe(const Clamp& clamp, Terms& terms) {
     terms.add(ConstraintTerm::hold(clamp.vertex, clamp.target));
     terms.add(ConstraintTerm::pin(clamp.stays));
 }
-static_assert(DescribedConstraint<Clamp> && RestConstraint<Clamp> && !DescribedConstraint<int>);
+static_assert(DescribedConstraint<Clamp> && StaticConstraint<Clamp> && !DescribedConstraint<int>);
 
 }  // namespace
 
@@ -56,12 +56,12 @@ TEST_CASE("constraints say what they hold, load and press", "[constraint_term]")
     REQUIRE(pinned.size() == 2);
     CHECK((pinned[1].kind == Kind::pin && pinned[1].holds() && pinned[1].corners[0] == 8));
 
-    const auto point = terms_of(HeldPoint<float>{0, corners, weights.cast<float>(), target.cast<float>()});
+    const auto point = terms_of(PointAttachment<float>{0, corners, weights.cast<float>(), target.cast<float>()});
     REQUIRE(point.size() == 1);
     CHECK((point[0].kind == Kind::hold_point && point[0].holds() && point[0].corners == corners));
     CHECK((point[0].target == target && point[0].weights == weights));
     CHECK(point[0].share(1) == Approx(0.25 / 0.375));
-    CHECK(terms_of(HeldPoint<double>{}).empty());
+    CHECK(terms_of(PointAttachment<double>{}).empty());
 
     const auto loaded = terms_of(load(corners, weights, target));
     REQUIRE(loaded.size() == 1);
@@ -81,19 +81,19 @@ TEST_CASE("Newton's method and the error bound take a constraint of one's own th
           "[constraint_term]") {
     const auto mesh = icosphere({.radius = 0.01, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 8.0});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0});
     const Points<double>& x = mesh.positions();
     const Clamp clamp{7, 30, 1.001 * point(x, 7)};
     const std::array<Index, 1> stays{30};
 
-    const auto own = equilibrium(x, mesh, network, backing, {}, clamp);
-    const auto known = equilibrium(x, mesh, network, backing, {}, pull(7, clamp.target), pin(stays));
+    const auto own = equilibrium(x, mesh, network, foundation, {}, clamp);
+    const auto known = equilibrium(x, mesh, network, foundation, {}, pull(7, clamp.target), pin(stays));
     REQUIRE((own.converged && known.converged));
     CHECK(own.x == known.x);
     CHECK(own.reactions[0] == known.reactions[0] + known.reactions[1]);
 
     ErrorBound bound(network);
-    const auto error = bound.of(own.x, network, backing, clamp);
+    const auto error = bound.of(own.x, network, foundation, clamp);
     REQUIRE(error.certified());
     CHECK(error.position < 1e-12);
     CHECK((error.reactions[0].centre - own.reactions[0]).norm() <= error.reactions[0].radius);

@@ -7,10 +7,10 @@
 #include <limits>
 #include <vector>
 
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -24,8 +24,8 @@ using namespace membrane;
 using test::Random;
 using test::same_bits;
 
-static_assert(Constraint<HeldPoint<double>, double> && Constraint<HeldVertex<double>, double>);
-static_assert(Constraint<Pinned, double> && Constraint<Load<double>, double>);
+static_assert(Constraint<PointAttachment<double>, double> && Constraint<VertexAttachment<double>, double>);
+static_assert(Constraint<PinnedVertices, double> && Constraint<PointLoad<double>, double>);
 
 namespace {
 
@@ -48,12 +48,12 @@ template <class Law>
 struct Small {
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, Law> network;
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
 
     Small(const Law& law, Random& random, const std::vector<Index>& pinned = {})
         : mesh(icosphere({.radius = 1, .subdivisions = 1})),
           network(mesh, law, {.stiffness = numbers(random), .pinned = pinned}),
-          backing(mesh, {.stiffness = 2.0}) {}
+          foundation(mesh, {.stiffness = 2.0}) {}
 
     static std::vector<double> numbers(Random& random) {
         std::vector<double> stiffness(120);
@@ -66,7 +66,7 @@ struct Small {
 };
 
 constexpr double negligible = 1e-13;
-const SolverOptions<double> to_the_end{.layers = unlimited, .sweeps = 50, .negligible_force = negligible};
+const SolverOptions<double> to_the_end{.layers = unlimited, .sweeps = 50, .force_tolerance = negligible};
 
 /// Runs `check(law)` with every law.
 template <class Check>
@@ -96,7 +96,7 @@ TEST_CASE("what a point of a triangle is held with is what Newton's method finds
             QuasiStaticSolver solver(membrane.network, to_the_end, SafeStep{.omega = 1.3});
             Points<double> x = membrane.mesh.positions();
             const auto held = pull(tool, grasp_of(membrane.mesh, f, weights));
-            const auto report = test::settle(solver, x, dt, membrane.network, membrane.backing, held);
+            const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation, held);
             REQUIRE(report.converged);
             REQUIRE(norm<double>(point_at(triangle_at(x, corners), weights) - target) < 1e-11);
 
@@ -122,7 +122,7 @@ TEST_CASE("a load comes to rest where Newton's method does", "[constraints]") {
 
             QuasiStaticSolver solver(membrane.network, to_the_end, SafeStep{.omega = 1.3});
             Points<double> x = membrane.mesh.positions();
-            const auto report = test::settle(solver, x, dt, membrane.network, membrane.backing,
+            const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation,
                                              load(corners_of(membrane.mesh, f), weights, force),
                                              load(corners_of(membrane.mesh, g), others, other));
             REQUIRE(report.converged);
@@ -149,8 +149,8 @@ TEST_CASE("pins hold vertices where they are, and feel what is pulled elsewhere"
 
         QuasiStaticSolver solver(membrane.network, to_the_end, SafeStep{.omega = 1.3});
         Points<double> x = membrane.mesh.positions();
-        const auto report =
-            test::settle(solver, x, dt, membrane.network, membrane.backing, pin(pinned), pull(pulled, target), pin({}));
+        const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation, pin(pinned),
+                                         pull(pulled, target), pin({}));
         REQUIRE(report.converged);
         REQUIRE(report.reactions.size() == 3);
         for (const Index v : pinned) REQUIRE(point(x, v) == point(membrane.mesh.positions(), v));
@@ -162,7 +162,7 @@ TEST_CASE("pins hold vertices where they are, and feel what is pulled elsewhere"
         REQUIRE((x - expected.x).cwiseAbs().maxCoeff() < 1e-10);
         REQUIRE(norm<double>(report.reactions[1] + expected.holding[0]) < 1e-9);
         Vector3<double> on_pins(0, 0, 0);
-        for (const Index v : pinned) on_pins += membrane.network.pull(v, x).force;
+        for (const Index v : pinned) on_pins += membrane.network.force_on(v, x).force;
         REQUIRE(norm<double>(report.reactions[0] - on_pins) < 1e-12);
         REQUIRE(report.reactions[2] == Vector3<double>(0, 0, 0));
     }
@@ -174,7 +174,7 @@ TEST_CASE("pins seed no queue: where nothing else acts, nothing is visited", "[c
     QuasiStaticSolver solver(membrane.network, to_the_end);
     Points<double> x = membrane.mesh.positions();
     const std::vector<Index> pinned{3, 4, 3};
-    const auto report = solver.step(x, dt, membrane.network, membrane.backing, pin(pinned));
+    const auto report = solver.step(x, dt, membrane.network, membrane.foundation, pin(pinned));
     CHECK(report.converged);
     CHECK(report.moved.empty());
     CHECK(solver.queue().vertices().empty());
@@ -191,9 +191,9 @@ TEST_CASE("a vertex can be held by its place in a triangle, too", "[constraints]
         const Vector3<double> target = point(membrane.mesh.positions(), v) + 0.2 * random.vector();
         QuasiStaticSolver first(membrane.network, to_the_end), second(membrane.network, to_the_end);
         Points<double> x = membrane.mesh.positions(), y = x;
-        const auto by_vertex = test::settle(first, x, dt, membrane.network, membrane.backing, pull(v, target));
+        const auto by_vertex = test::settle(first, x, dt, membrane.network, membrane.foundation, pull(v, target));
         const auto by_point =
-            test::settle(second, y, dt, membrane.network, membrane.backing,
+            test::settle(second, y, dt, membrane.network, membrane.foundation,
                          pull(Tool<double>{.position = target}, grasp_of(membrane.mesh, f, Vector3<double>::Unit(k))));
         REQUIRE((x - y).cwiseAbs().maxCoeff() < 1e-11);
         REQUIRE(norm<double>(by_vertex.reactions[0] - by_point.reactions[0]) < 1e-10);
@@ -205,10 +205,10 @@ TEST_CASE("nothing is held by forceps that hold nothing", "[constraints]") {
     const Small membrane(LinearSpring{}, random);
     QuasiStaticSolver solver(membrane.network, to_the_end);
     Points<double> x = membrane.mesh.positions();
-    const auto report = solver.step(x, dt, membrane.network, membrane.backing,
+    const auto report = solver.step(x, dt, membrane.network, membrane.foundation,
                                     pull(Tool<double>{.position = {5, 5, 5}}, Grasp<double>{}));
     CHECK(report.status == StepStatus::advanced);
-    CHECK(report.visits == 0);
+    CHECK(report.vertex_updates == 0);
     CHECK(report.reactions[0] == Vector3<double>(0, 0, 0));
     CHECK(same_bits(x, membrane.mesh.positions()));
 }
@@ -219,8 +219,8 @@ TEST_CASE("the network's own pins cannot be pulled away", "[constraints]") {
     const Small membrane(LinearSpring{}, random, pinned);
     QuasiStaticSolver solver(membrane.network, to_the_end);
     Points<double> x = membrane.mesh.positions();
-    const auto report =
-        test::settle(solver, x, dt, membrane.network, membrane.backing, pull(7, Vector3<double>(2, 2, 2)), pin(pinned));
+    const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation,
+                                     pull(7, Vector3<double>(2, 2, 2)), pin(pinned));
     CHECK(report.converged);
     CHECK(same_bits(x, membrane.mesh.positions()));
 }
@@ -239,7 +239,7 @@ struct AtRest {
     AtRest(int seed, Index layers)
         : random(static_cast<std::uint64_t>(seed)),
           membrane(LinearSpring{}, random),
-          solver(membrane.network, {.layers = layers, .sweeps = 50, .negligible_force = negligible}),
+          solver(membrane.network, {.layers = layers, .sweeps = 50, .force_tolerance = negligible}),
           x(membrane.mesh.positions()) {}
 
     void push(const std::array<Index, 3>& corners, const Vector3<double>& weights, const Vector3<double>& force) {
@@ -247,18 +247,18 @@ struct AtRest {
     }
     template <class... Constraints>
     StepReport<double> settle(const Constraints&... constraints) {
-        const auto report = test::settle(solver, x, dt, membrane.network, membrane.backing, constraints...);
+        const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation, constraints...);
         REQUIRE(report.converged);
         return report;
     }
-    /// What acts from outside is in balance with the backing, up to what is left unbalanced anywhere: also beyond the
+    /// What acts from outside is in balance with the foundation, up to what is left unbalanced anywhere: also beyond the
     /// layers that were free to move.
     void check_balance(const StepReport<double>& report) const {
         Vector3<double> reactions(0, 0, 0), sum(0, 0, 0);
         double residuals = 0, forces = 0;
         for (Index v = 0; v < 42; ++v) {
-            const Vector3<double> volume = membrane.backing.pull(v, point(x, v), point(x, v), dt).force;
-            const Vector3<double> springs = membrane.network.pull(v, x).force;
+            const Vector3<double> volume = membrane.foundation.force_on(v, point(x, v), point(x, v), dt).force;
+            const Vector3<double> springs = membrane.network.force_on(v, x).force;
             sum += volume;
             forces += norm(volume) + norm(springs);
             if (std::find(held.begin(), held.end(), v) != held.end()) continue;
@@ -340,8 +340,7 @@ TEST_CASE("at rest a pressing tool carries the sum of the volume springs", "[con
             CAPTURE(layers, seed);
             Random random(static_cast<std::uint64_t>(seed));
             const Small membrane(LinearSpring{}, random);
-            QuasiStaticSolver solver(membrane.network,
-                                     {.layers = layers, .sweeps = 50, .negligible_force = negligible});
+            QuasiStaticSolver solver(membrane.network, {.layers = layers, .sweeps = 50, .force_tolerance = negligible});
             AabbTree tree(membrane.mesh);
             ContactTracker tracker(membrane.mesh);
             Points<double> x = membrane.mesh.positions();
@@ -351,7 +350,7 @@ TEST_CASE("at rest a pressing tool carries the sum of the volume springs", "[con
             for (int tick = 0; tick < 3000; ++tick) {
                 tool.position = std::max(1.25 - 0.01 * tick, 1.05) * from;
                 const auto contact = tracker.update(tree, x, tool);
-                report = solver.step(x, dt, membrane.network, membrane.backing, press(tool, contact));
+                report = solver.step(x, dt, membrane.network, membrane.foundation, press(tool, contact));
                 REQUIRE(report.status == StepStatus::advanced);
                 tree.refit(x, report.moved);
                 if (tick > 20 && report.converged) break;
@@ -362,8 +361,8 @@ TEST_CASE("at rest a pressing tool carries the sum of the volume springs", "[con
             Vector3<double> sum(0, 0, 0);
             double residuals = 42 * negligible, forces = 0;
             for (Index v = 0; v < 42; ++v) {
-                const Vector3<double> volume = membrane.backing.pull(v, point(x, v), point(x, v), dt).force;
-                const Vector3<double> springs = membrane.network.pull(v, x).force;
+                const Vector3<double> volume = membrane.foundation.force_on(v, point(x, v), point(x, v), dt).force;
+                const Vector3<double> springs = membrane.network.force_on(v, x).force;
                 sum += volume;
                 forces += norm(volume) + norm(springs);
                 if (!solver.queue().contains(v)) residuals += norm<double>(volume + springs);
@@ -380,31 +379,32 @@ TEMPLATE_TEST_CASE("constraints that make no sense are told from others", "[cons
     const std::array<Index, 3> corners{0, 1, 2};
     const Vector3<S> inside(S(0.2), S(0.3), S(0.5)), somewhere(1, 2, 3);
     const auto held_at = [](const Vector3<S>& weights, const Vector3<S>& target) {
-        return HeldPoint<S>{.triangle = 0, .corners = {0, 1, 2}, .barycentric = weights, .target = target}.sound();
+        return PointAttachment<S>{.triangle = 0, .corners = {0, 1, 2}, .barycentric = weights, .target = target}
+            .valid();
     };
-    CHECK(pull(3, somewhere).sound());
-    CHECK(load(corners, inside, somewhere).sound());
+    CHECK(pull(3, somewhere).valid());
+    CHECK(load(corners, inside, somewhere).valid());
     CHECK(held_at(inside, somewhere));
-    CHECK(HeldPoint<S>{}.sound());
-    CHECK(pin({}).sound());
-    for (int k = 0; k < 3; ++k) CHECK(load<S>(corners, Vector3<S>::Unit(k), somewhere).sound());
+    CHECK(PointAttachment<S>{}.valid());
+    CHECK(pin({}).valid());
+    for (int k = 0; k < 3; ++k) CHECK(load<S>(corners, Vector3<S>::Unit(k), somewhere).valid());
     for (const S bad : {Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity()}) {
         for (int k = 0; k < 3; ++k) {
             CAPTURE(bad, k);
             Vector3<S> wrong = somewhere, weights = inside;
             wrong[k] = weights[k] = bad;
-            CHECK_FALSE(pull(3, wrong).sound());
-            CHECK_FALSE(load(corners, inside, wrong).sound());
-            CHECK_FALSE(load(corners, weights, somewhere).sound());
+            CHECK_FALSE(pull(3, wrong).valid());
+            CHECK_FALSE(load(corners, inside, wrong).valid());
+            CHECK_FALSE(load(corners, weights, somewhere).valid());
             CHECK_FALSE(held_at(inside, wrong));
             CHECK_FALSE(held_at(weights, somewhere));
-            CHECK_FALSE(pull(Tool<S>{.position = wrong}, Grasp<S>{.triangle = 0, .barycentric = inside}).sound());
+            CHECK_FALSE(pull(Tool<S>{.position = wrong}, Grasp<S>{.triangle = 0, .barycentric = inside}).valid());
         }
     }
     for (const Vector3<S>& weights : {Vector3<S>(-S(0.1), S(0.6), S(0.5)), Vector3<S>(S(0.5), S(0.5), S(0.5)),
                                       Vector3<S>(0, 0, 0), Vector3<S>(2, 0, -1), Vector3<S>(S(0.3), S(0.3), S(0.39))}) {
         CAPTURE(weights);
-        CHECK_FALSE(load(corners, weights, somewhere).sound());
+        CHECK_FALSE(load(corners, weights, somewhere).valid());
         CHECK_FALSE(held_at(weights, somewhere));
     }
 }
@@ -413,12 +413,12 @@ namespace {
 
 /// Answers as it is told to, and counts what it is asked.
 struct Told {
-    bool is_sound = true;
+    bool is_valid = true;
     bool mends = false;
     double force = 0;
     Index* begun;
 
-    bool sound() const noexcept { return is_sound; }
+    bool valid() const noexcept { return is_valid; }
     void begin(ConstraintContext<double>&) const noexcept { ++*begun; }
     bool enforce(ConstraintContext<double>&) const noexcept { return mends; }
     Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return {force, 0, 0}; }
@@ -426,7 +426,7 @@ struct Told {
 
 }  // namespace
 
-TEST_CASE("a set of constraints is sound if all are, mends if any does, finite if all forces are") {
+TEST_CASE("a set of constraints is valid if all are, mends if any does, finite if all forces are") {
     StepState<double> work(1, 8);
     const Points<double> positions = Points<double>::Zero(3, 1);
     const ConstPointsRef<double> x = positions;
@@ -443,7 +443,7 @@ TEST_CASE("a set of constraints is sound if all are, mends if any does, finite i
             const Told a{first, first, first ? 1 : nan, &begun}, b{second, second, second ? 2 : nan, &begun};
             const std::array refs{ConstraintRef<double>(a), ConstraintRef<double>(b)};
             const ConstraintList<double> both(context, refs);
-            CHECK(both.sound() == (first && second));
+            CHECK(both.valid() == (first && second));
             CHECK(both.enforce() == (first || second));
             CHECK(both.react(reactions) == (first && second));
             both.begin();
@@ -454,7 +454,7 @@ TEST_CASE("a set of constraints is sound if all are, mends if any does, finite i
     CHECK(reactions[1].x() == 2);
 
     const ConstraintList<double> none(context, {});
-    CHECK(none.sound());
+    CHECK(none.valid());
     CHECK_FALSE(none.enforce());
     CHECK(none.react({}));
 }

@@ -9,11 +9,11 @@
 #include <span>
 #include <vector>
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/collision/grasper.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/grasper.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -35,26 +35,26 @@ struct Scene {
                    : icosphere({.radius = radius, .subdivisions = 1 + random.index(2)})),
           network(mesh, {}, {.stiffness = 40.0, .pinned = random.chance(0.5) ? border(mesh) : std::vector<Index>{}}),
           foundation(40 * std::pow(10.0, random.number(-1.0, 3.0))),
-          backing(mesh, {.stiffness = foundation, .damping = random.chance(0.5) ? 0.02 : 0.0}) {}
+          foundation(mesh, {.stiffness = foundation, .damping = random.chance(0.5) ? 0.02 : 0.0}) {}
 
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, LinearSpring> network;
     double foundation;  // [N/m]
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
 };
 
 SolverOptions<double> random_options(Random& random) {
     constexpr std::array<Index, 4> layers{0, 2, 6, unlimited};
-    constexpr std::array orders{VisitOrder::arrival, VisitOrder::groups, VisitOrder::colours};
+    constexpr std::array orders{UpdateOrder::breadth_first, UpdateOrder::colour_layers, UpdateOrder::colour_all};
     SolverOptions<double> options;
     options.layers = layers[static_cast<std::size_t>(random.index(4))];
-    options.layers_as_needed = random.chance(0.4);
+    options.adaptive_layers = random.chance(0.4);
     options.sweeps = 1 + random.index(8);
-    options.contact_visits = 1 + random.index(6);
+    options.contact_iterations = 1 + random.index(6);
     options.order = orders[static_cast<std::size_t>(random.index(3))];
     options.predict = random.chance(0.7);
-    if (random.chance(0.3)) options.most_visits = 1 + random.index(1000);
-    if (random.chance(0.6)) options.negligible_force = std::pow(10.0, random.number(-7.0, -3.0));
+    if (random.chance(0.3)) options.max_vertex_updates = 1 + random.index(1000);
+    if (random.chance(0.6)) options.force_tolerance = std::pow(10.0, random.number(-7.0, -3.0));
     return options;
 }
 
@@ -123,7 +123,7 @@ struct Run {
         weights = random.barycentric();
         if (random.chance(0.2)) force = 0.02 * random.vector();
         for (int i = random.chance(0.2) ? 3 : 0; i > 0; --i) pins.push_back(random.index(scene.mesh.vertex_count()));
-        tolerance = options.negligible_force > 0 ? options.negligible_force : scene.network.negligible_force();
+        tolerance = options.force_tolerance > 0 ? options.force_tolerance : scene.network.force_tolerance();
     }
 
     void tick(int i) {
@@ -137,7 +137,7 @@ struct Run {
         grasp = grasper.update(contact, x, tool);
         const auto tool_2 = second.at(i - 20);
         const auto contact_2 = has_second ? tracker_2.update(tree, x, tool_2) : Contact<double>::none();
-        report = solver.step(x, dt, scene.network, scene.backing, press(tool, contact, grasp), pull(tool, grasp),
+        report = solver.step(x, dt, scene.network, scene.foundation, press(tool, contact, grasp), pull(tool, grasp),
                              press(tool_2, contact_2), load<double>(corners, weights, force), pin(pins));
         tree.refit(x, report.moved);
         for (const Index v : solver.queue().vertices()) has_taken_part[static_cast<std::size_t>(v)] = 1;
@@ -148,12 +148,12 @@ struct Run {
     /// Beyond a threshold of layers the membrane stands still by design.
     bool may_move(Index v) const {
         if (is_fixed(v)) return false;
-        return options.layers == unlimited || options.layers_as_needed || has_taken_part[static_cast<std::size_t>(v)];
+        return options.layers == unlimited || options.adaptive_layers || has_taken_part[static_cast<std::size_t>(v)];
     }
 
     Vector3<double> internal_force(Index v) const {
         const Vector3<double> here = point(x, v);
-        return scene.network.pull(v, x).force + scene.backing.pull(v, here, here, dt).force;
+        return scene.network.force_on(v, x).force + scene.foundation.force_on(v, here, here, dt).force;
     }
 
     Random random;
@@ -164,7 +164,8 @@ struct Run {
     QuasiStaticSolver<double> solver;
     AabbTree<double> tree{scene.mesh};
     // A second fold that comes to the tool is known at once.
-    ContactTracker<double> tracker{scene.mesh, {.check_every = 1}}, tracker_2{scene.mesh, {.check_every = 1}};
+    ContactTracker<double> tracker{scene.mesh, {.full_query_interval = 1}},
+        tracker_2{scene.mesh, {.full_query_interval = 1}};
     Grasper<double> grasper{scene.mesh};
     Points<double> x = scene.mesh.positions();
     std::vector<char> has_taken_part = std::vector<char>(static_cast<std::size_t>(scene.mesh.vertex_count()), 0);

@@ -7,11 +7,11 @@
 #include <cstdint>
 #include <thread>
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -24,7 +24,7 @@ namespace {
 
 constexpr double radius = 0.01, stiffness = 40, dt = 1e-3;
 
-/// Time that passes only where work is done: with each look at the backing of a vertex, of which a visit takes one, and
+/// Time that passes only where work is done: with each look at the foundation of a vertex, of which a visit takes one, and
 /// with each turn of the tool's touches. No two take the same time, and some ticks are slower than others.
 struct WorkClock {
     explicit WorkClock(std::uint64_t seed) : random(seed) {}
@@ -39,18 +39,18 @@ struct CostlyBacking {
     VirtualVolumeSprings<double> inner;
     WorkClock* clock;
 
-    [[nodiscard]] Pull<double> pull(Index v, const Vector3<double>& position, const Vector3<double>& start,
-                                    double tick) const noexcept {
+    [[nodiscard]] VertexForce<double> force_on(Index v, const Vector3<double>& position, const Vector3<double>& start,
+                                               double tick) const noexcept {
         clock->work(1);
-        return inner.pull(v, position, start, tick);
+        return inner.force_on(v, position, start, tick);
     }
 };
 
 struct CostlyPress {
-    Press<double> inner;
+    ToolContact<double> inner;
     WorkClock* clock;
 
-    [[nodiscard]] bool sound() const noexcept { return inner.sound(); }
+    [[nodiscard]] bool valid() const noexcept { return inner.valid(); }
     void begin(ConstraintContext<double>& context) const noexcept {
         inner.begin(context);
         clock->work(0.5 * static_cast<double>(context.points().size()));
@@ -70,7 +70,7 @@ struct LongEnforcement {
     double time;
     WorkClock* clock;
 
-    [[nodiscard]] bool sound() const noexcept { return true; }
+    [[nodiscard]] bool valid() const noexcept { return true; }
     void begin(ConstraintContext<double>& context) const noexcept {
         for (Index v = 0; v < 100; ++v) {
             context.seed(v);
@@ -102,7 +102,7 @@ struct Rush {
         const auto contact = tracker.update(tree, x, tool);
         const double until = clock.time + clock.speed * time;
         const Deadline deadline([this] { return clock.time; }, until);
-        report = solver.step_until(deadline, x, dt, network, backing, CostlyPress{press(tool, contact), &clock});
+        report = solver.step_until(deadline, x, dt, network, foundation, CostlyPress{press(tool, contact), &clock});
         tree.refit(x, report.moved);
         return (until - clock.time) / clock.speed;
     }
@@ -112,7 +112,7 @@ struct Rush {
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, LinearSpring> network{mesh, LinearSpring{},
                                                     NetworkOptions<double>{.stiffness = stiffness}};
-    CostlyBacking backing{VirtualVolumeSprings<double>(mesh, {.stiffness = 4.0}), &clock};
+    CostlyBacking foundation{VirtualVolumeSprings<double>(mesh, {.stiffness = 4.0}), &clock};
     QuasiStaticSolver<double> solver;
     AabbTree<double> tree{mesh};
     ContactTracker<double> tracker{mesh};
@@ -148,14 +148,14 @@ TEST_CASE("a step is over at its deadline, and has used the time", "[solver][dea
         Random random(static_cast<std::uint64_t>(seed));
         const Index subdivisions = 1;
         Rush rush(static_cast<std::uint64_t>(seed), subdivisions,
-                  {.layers = unlimited, .layers_as_needed = random.chance(0.3), .sweeps = 1'000'000});
+                  {.layers = unlimited, .adaptive_layers = random.chance(0.3), .sweeps = 1'000'000});
         const int ticks = cases(1000, 50'000);
         for (int tick = 0; tick < ticks; ++tick) {
             const double time = random.number(600.0, 1500.0);  // visits
             const double left = rush.tick(time);
             REQUIRE(rush.report.status == StepStatus::advanced);
             REQUIRE(-left <= 32);
-            if (tick == 0 || rush.report.residual <= rush.network.negligible_force()) continue;
+            if (tick == 0 || rush.report.residual <= rush.network.force_tolerance()) continue;
             ++unconverged;
             REQUIRE(left <= 0.1 * time);
         }
@@ -167,8 +167,8 @@ TEST_CASE("time that the last enforcement took is not kept for residual forces",
     WorkClock clock(1);
     const auto mesh = icosphere<double>({.radius = radius, .subdivisions = 2});
     const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = stiffness});
-    const CostlyBacking backing{VirtualVolumeSprings<double>(mesh, {.stiffness = 4.0}), &clock};
-    QuasiStaticSolver<double> solver(network, {.layers = unlimited, .sweeps = 1, .contact_visits = 1});
+    const CostlyBacking foundation{VirtualVolumeSprings<double>(mesh, {.stiffness = 4.0}), &clock};
+    QuasiStaticSolver<double> solver(network, {.layers = unlimited, .sweeps = 1, .contact_iterations = 1});
     Points<double> x = mesh.positions();
     const double enforcement = 5000, rest = 2000;  // updates and residual forces take a thousand
     for (int tick = 0; tick < 40; ++tick) {
@@ -176,7 +176,7 @@ TEST_CASE("time that the last enforcement took is not kept for residual forces",
         const Vector3<double> force(1e-3 * (1 + tick % 2), 0, 0);
         const Deadline deadline([&] { return clock.time; }, clock.time + 2 * enforcement + rest);
         const auto report =
-            solver.step_until(deadline, x, dt, network, backing, LongEnforcement{force, enforcement, &clock});
+            solver.step_until(deadline, x, dt, network, foundation, LongEnforcement{force, enforcement, &clock});
         REQUIRE(report.status == StepStatus::advanced);
         if (tick > 1) CHECK_FALSE(report.out_of_time);  // the first steps find out what things cost
     }

@@ -7,8 +7,8 @@
 #include <numbers>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/moved_volume.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -29,13 +29,13 @@ template <class S>
 struct Reference {
     TriangleMesh<S> mesh;
     MassSpringNetwork<S, LinearSpring> network;
-    VirtualVolumeSprings<S> backing;
+    VirtualVolumeSprings<S> foundation;
 
     explicit Reference(const ReferenceRow& row, S radius = 1, S factor = 1)
         : mesh(icosphere<S>({.radius = static_cast<double>(radius), .subdivisions = row.integer("level")})),
           network(mesh, LinearSpring{},
                   {.stiffness = stiffnesses(mesh, radius, factor, row), .mass = mass(factor, row)}),
-          backing(mesh, {.stiffness = factor * static_cast<S>(row.number("k_volume"))}) {}
+          foundation(mesh, {.stiffness = factor * static_cast<S>(row.number("k_volume"))}) {}
 
     static std::vector<S> stiffnesses(const TriangleMesh<S>& mesh, S radius, S factor, const ReferenceRow& row) {
         const Adjacency adjacency(mesh);
@@ -80,21 +80,21 @@ bool is_slow(const ReferenceRow& row) { return cases(20, 20) < 20 && row.integer
 /// in a long run, with the first.
 template <class S, class Check>
 void with_each_rule(const Reference<S>& membrane, const SolverOptions<S>& options, Check check) {
-    const auto ordered = [&](VisitOrder order) {
+    const auto ordered = [&](UpdateOrder order) {
         auto other = options;
         other.order = order;
         return QuasiStaticSolver(membrane.network, other, BlockStep{});
     };
-    SECTION("block steps in groups") { check(ordered(VisitOrder::groups)); }
+    SECTION("block steps in groups") { check(ordered(UpdateOrder::colour_layers)); }
     if (membrane.mesh.vertex_count() > 200 && cases(1, 2) == 1) return;
-    SECTION("in the order of arrival") { check(ordered(VisitOrder::arrival)); }
-    SECTION("by colours") { check(ordered(VisitOrder::colours)); }
+    SECTION("in the order of arrival") { check(ordered(UpdateOrder::breadth_first)); }
+    SECTION("by colours") { check(ordered(UpdateOrder::colour_all)); }
     SECTION("the rule as published") { check(QuasiStaticSolver(membrane.network, options, MassStep{})); }
     SECTION("safe steps") { check(QuasiStaticSolver(membrane.network, options, SafeStep{.omega = 1})); }
     SECTION("long safe steps") { check(QuasiStaticSolver(membrane.network, options, SafeStep{.omega = 1.9})); }
 }
 
-SolverOptions<double> to_the_end(Index layers) { return {.layers = layers, .sweeps = 50, .negligible_force = 1e-14}; }
+SolverOptions<double> to_the_end(Index layers) { return {.layers = layers, .sweeps = 50, .force_tolerance = 1e-14}; }
 
 /// The force that holds a vertex, component by component: what is zero in the table is the residual of both.
 void check_force(const Vector3<double>& found, const ReferenceRow& row, const std::string& number) {
@@ -120,13 +120,13 @@ TEST_CASE("one held vertex: every row of the reference", "[equilibria]") {
                 StepReport<double> report;
                 for (int i = 1; i <= increments; ++i) {
                     const auto target = membrane.raised(held, row.number("delta") * i / increments);
-                    report = test::settle(solver, x, dt, membrane.network, membrane.backing, pull(held, target));
+                    report = test::settle(solver, x, dt, membrane.network, membrane.foundation, pull(held, target));
                     REQUIRE(report.converged);
                 }
                 CHECK(report.residual < 1e-11);
                 const Vector3<double> outward = point(membrane.mesh.positions(), held);
                 CHECK(-dot(report.reactions[0], outward) == Approx(row.number("holding_force")).epsilon(1e-8));
-                CHECK(membrane.energy(x, membrane.backing) == Approx(row.number("energy")).epsilon(1e-10));
+                CHECK(membrane.energy(x, membrane.foundation) == Approx(row.number("energy")).epsilon(1e-10));
                 PropagationQueue all(membrane.mesh.vertex_count());
                 all.build(membrane.network, std::array{held}, unlimited);
                 for (const Index distance : {1, 2, 4, 8}) {
@@ -150,10 +150,10 @@ TEST_CASE("mixed springs, two held vertices, anchors that moved: every row of th
             const Reference<double> membrane(row);
             const Points<double>& initial = membrane.mesh.positions();
             const auto anchors_at = [&](double part) -> Points<double> {
-                Eigen::Matrix3d way = Eigen::Matrix3d::Zero();
-                if (row.integer("anchors") == 1) way(0, 1) = 1;
-                if (row.integer("anchors") == 2) way.diagonal() << 1, -0.5, -0.5;
-                return initial + part * row.number("amount") * way * initial;
+                Eigen::Matrix3d displacement = Eigen::Matrix3d::Zero();
+                if (row.integer("anchors") == 1) displacement(0, 1) = 1;
+                if (row.integer("anchors") == 2) displacement.diagonal() << 1, -0.5, -0.5;
+                return initial + part * row.number("amount") * displacement * initial;
             };
             const int held = row.integer("held");
             std::array<Index, 2> vertices{};
@@ -168,7 +168,7 @@ TEST_CASE("mixed springs, two held vertices, anchors that moved: every row of th
                 Points<double> x = initial;
                 StepReport<double> report;
                 MovingBody body(membrane.mesh);
-                const auto volume = on(body, membrane.backing);
+                const auto volume = on(body, membrane.foundation);
                 for (int i = 1; i <= increments; ++i) {
                     const double part = static_cast<double>(i) / increments;
                     REQUIRE(body.move_to(anchors_at(part), dt, x));
@@ -199,19 +199,19 @@ TEST_CASE("the reference on a sphere of a centimetre, with springs of 40 N/m", "
         CAPTURE(row.line());
         const Reference<double> membrane(row, radius, factor);
         const Index held = membrane.vertex_at({0, 1, std::numbers::phi});
-        QuasiStaticSolver solver(membrane.network, {.layers = unlimited, .sweeps = 50, .negligible_force = 1e-12});
+        QuasiStaticSolver solver(membrane.network, {.layers = unlimited, .sweeps = 50, .force_tolerance = 1e-12});
         Points<double> x = membrane.mesh.positions();
         StepReport<double> report;
         for (int i = 1; i <= increments; ++i) {
             const auto target = membrane.raised(held, row.number("delta") * i / increments);
-            report = test::settle(solver, x, dt, membrane.network, membrane.backing, pull(held, target));
+            report = test::settle(solver, x, dt, membrane.network, membrane.foundation, pull(held, target));
             REQUIRE(report.converged);
         }
         const Vector3<double> outward = point(membrane.mesh.positions(), held) / radius;
         const double force = row.number("holding_force") * radius * factor;
         CHECK(-dot(report.reactions[0], outward) == Approx(force).epsilon(1e-8));
         const double energy = row.number("energy") * radius * radius * factor;
-        CHECK(membrane.energy(x, membrane.backing) == Approx(energy).epsilon(1e-9));
+        CHECK(membrane.energy(x, membrane.foundation) == Approx(energy).epsilon(1e-9));
     }
 }
 
@@ -227,18 +227,18 @@ TEST_CASE("the reference in float, as near as float comes", "[equilibria]") {
         StepReport<float> report;
         for (int i = 1; i <= increments; ++i) {
             const auto target = membrane.raised(held, row.number("delta") * i / increments);
-            report =
-                test::settle(solver, x, static_cast<float>(dt), membrane.network, membrane.backing, pull(held, target));
+            report = test::settle(solver, x, static_cast<float>(dt), membrane.network, membrane.foundation,
+                                  pull(held, target));
             REQUIRE(report.converged);
         }
         // A force that is negligible beside the others moves a vertex so far: 64 epsilon k / k_volume.
-        REQUIRE(report.residual <= membrane.network.negligible_force());
-        const double error = membrane.network.negligible_force() / row.number("k_volume");
+        REQUIRE(report.residual <= membrane.network.force_tolerance());
+        const double error = membrane.network.force_tolerance() / row.number("k_volume");
         REQUIRE(error < 1e-4);
         const Vector3<float> outward = point(membrane.mesh.positions(), held);
         const double force = static_cast<double>(-dot(report.reactions[0], outward));
         CHECK(std::abs(force - row.number("holding_force")) <= error * (row.number("k") + row.number("k_volume")));
-        const double energy = static_cast<double>(membrane.energy(x, membrane.backing));
+        const double energy = static_cast<double>(membrane.energy(x, membrane.foundation));
         CHECK(std::abs(energy - row.number("energy")) <= error * error * row.number("k") + 1e-4 * energy);
         PropagationQueue all(membrane.mesh.vertex_count());
         all.build(membrane.network, std::array{held}, unlimited);

@@ -7,8 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/moved_volume.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -90,7 +90,7 @@ TEST_CASE("one damped spring follows its closed form, with an error of first ord
             Points<double> x = mesh.positions(), velocity = zeros<double>(3);
             x(0, 1) += 0.1;
             for (int i = 1; i <= steps; ++i) {
-                REQUIRE(euler.step(x, velocity, dt, network, NoVolumeSprings{}));
+                REQUIRE(euler.step(x, velocity, dt, network, NoFoundation{}));
                 see(i, (x(0, 1) - 1) / 0.1);
             }
             CHECK(point(x, 0) == Vector3<double>(0, 0, 0));
@@ -103,17 +103,18 @@ TEST_CASE("a damped volume spring follows its closed form, too", "[euler]") {
     const double m = 0.3, k = 20, d = 0.7;
     const auto mesh = right_triangle<double>();
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 0.0, .mass = m, .pinned = {0, 2}});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = k, .damping = d});
-    const Vector3<double> way(0.3, -0.2, 0.6);
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = k, .damping = d});
+    const Vector3<double> displacement(0.3, -0.2, 0.6);
     check_first_order(
         m, d, k,
         [&](double dt, int steps, auto see) {
             ExplicitEuler euler(network);
             Points<double> x = mesh.positions(), velocity = zeros<double>(3);
-            x.col(1) += way;
+            x.col(1) += displacement;
             for (int i = 1; i <= steps; ++i) {
-                REQUIRE(euler.step(x, velocity, dt, network, backing));
-                see(i, dot<double>(point(x, 1) - backing.anchors().col(1), way) / squared_norm(way));
+                REQUIRE(euler.step(x, velocity, dt, network, foundation));
+                see(i,
+                    dot<double>(point(x, 1) - foundation.anchors().col(1), displacement) / squared_norm(displacement));
             }
         },
         0.3);  // where it passes its anchor, the length has a kink
@@ -132,14 +133,14 @@ TEMPLATE_TEST_CASE("(2) and (3): the force changes the velocity, the new velocit
         for (S& d : viscosity) d = random.number<S>(0, 1);
         const MassSpringNetwork network(mesh, ExponentialSpring{},
                                         {.stiffness = S(3), .mass = mass, .viscosity = viscosity, .pinned = {5, 30}});
-        const VirtualVolumeSprings backing(mesh, {.stiffness = S(2), .damping = S(0.3)});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = S(2), .damping = S(0.3)});
         const Points<S> x0 = test::jittered(mesh.positions(), S(0.1), random);
         const Points<S> v0 = test::jittered(zeros<S>(count), S(1), random);
         const Points<S> external = test::jittered(zeros<S>(count), S(1), random);
         Points<S> x = x0, velocity = v0;
         ExplicitEuler euler(network);
         const S dt = S(0.01), tolerance = 100 * std::numeric_limits<S>::epsilon();
-        REQUIRE(euler.step(x, velocity, dt, network, backing, external));
+        REQUIRE(euler.step(x, velocity, dt, network, foundation, external));
         S residual = 0;
         for (Index v = 0; v < count; ++v) {
             if (network.pinned(v)) {
@@ -150,7 +151,7 @@ TEMPLATE_TEST_CASE("(2) and (3): the force changes the velocity, the new velocit
             const Vector3<S> u = point(x0, v) - point(mesh.positions(), v), speed = point(v0, v);
             const S rate = (norm(u) - norm<S>(u - dt * speed)) / dt;  // of the length
             const Vector3<S> volume = -S(2) * u - S(0.3) * rate / norm(u) * u;
-            const Vector3<S> force = network.pull(v, x0).force + volume + point(external, v);
+            const Vector3<S> force = network.force_on(v, x0).force + volume + point(external, v);
             const Vector3<S> new_speed = speed + dt / network.mass(v) * (force - network.viscosity(v) * speed);
             REQUIRE(norm<S>(point(velocity, v) - new_speed) <= 10 * tolerance);
             REQUIRE(norm<S>(point(x, v) - (point(x0, v) + dt * point(velocity, v))) <= tolerance);
@@ -161,8 +162,8 @@ TEMPLATE_TEST_CASE("(2) and (3): the force changes the velocity, the new velocit
         // No external force is one of zero.
         Points<S> other = x0, other_velocity = v0;
         x = x0, velocity = v0;
-        REQUIRE(euler.step(x, velocity, dt, network, backing));
-        REQUIRE(euler.step(other, other_velocity, dt, network, backing, zeros<S>(count)));
+        REQUIRE(euler.step(x, velocity, dt, network, foundation));
+        REQUIRE(euler.step(other, other_velocity, dt, network, foundation, zeros<S>(count)));
         REQUIRE(same_bits(x, other));
         REQUIRE(same_bits(velocity, other_velocity));
     }
@@ -176,7 +177,7 @@ TEST_CASE("free in space, momentum and the way of the middle are kept", "[euler]
     Points<double> x = test::jittered(mesh.positions(), 0.05, random);
     Points<double> velocity = test::jittered(zeros<double>(162), 0.5, random);
     const Vector3<double> middle = x.rowwise().mean(), speed = velocity.rowwise().mean();
-    for (int i = 0; i < 1000; ++i) REQUIRE(euler.step(x, velocity, 1e-3, network, NoVolumeSprings{}));
+    for (int i = 0; i < 1000; ++i) REQUIRE(euler.step(x, velocity, 1e-3, network, NoFoundation{}));
     CHECK(norm<double>(velocity.rowwise().mean() - speed) < 1e-13);
     CHECK(norm<double>(x.rowwise().mean() - (middle + speed)) < 1e-12);
 }
@@ -184,7 +185,7 @@ TEST_CASE("free in space, momentum and the way of the middle are kept", "[euler]
 TEST_CASE("anchors that move take the membrane along", "[euler]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 5.0, .mass = 0.1, .viscosity = 0.5});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 2.0, .damping = 0.2});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 2.0, .damping = 0.2});
     ExplicitEuler euler(network);
     MovingBody body(mesh);
     Random random(1);
@@ -192,7 +193,7 @@ TEST_CASE("anchors that move take the membrane along", "[euler]") {
     for (int i = 0; i < 4000; ++i) {
         if (i < 100) anchors.row(0).array() += 0.003;
         REQUIRE(body.move_to(anchors, 0.01, x));
-        REQUIRE(euler.step(x, velocity, 0.01, network, on(body, backing)));
+        REQUIRE(euler.step(x, velocity, 0.01, network, on(body, foundation)));
     }
     CHECK((x - anchors).cwiseAbs().maxCoeff() < 1e-9);
 }
@@ -203,13 +204,13 @@ TEMPLATE_TEST_CASE("a step that cannot be made leaves everything as it was", "[e
     Random random(1);
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = S(3), .mass = S(1), .viscosity = S(0.1)});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = S(2), .damping = S(0.3)});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = S(2), .damping = S(0.3)});
     ExplicitEuler euler(network);
     const Points<S> good_x = test::jittered(mesh.positions(), S(0.1), random);
     const Points<S> good_velocity = test::jittered(zeros<S>(42), S(1), random);
     const auto refused = [&](const Points<S>& x0, const Points<S>& v0, S dt, const Points<S>& external) {
         Points<S> x = x0, velocity = v0;
-        const bool done = euler.step(x, velocity, dt, network, backing, external);
+        const bool done = euler.step(x, velocity, dt, network, foundation, external);
         return !done && same_bits(x, x0) && same_bits(velocity, v0);
     };
     const Points<S> none = zeros<S>(42);
@@ -235,8 +236,8 @@ TEMPLATE_TEST_CASE("a step that cannot be made leaves everything as it was", "[e
     // What was refused is forgotten: the next step is as if nothing had been.
     Points<S> x = good_x, velocity = good_velocity, other = good_x, other_velocity = good_velocity;
     ExplicitEuler fresh(network);
-    REQUIRE(euler.step(x, velocity, S(0.01), network, backing));
-    REQUIRE(fresh.step(other, other_velocity, S(0.01), network, backing));
+    REQUIRE(euler.step(x, velocity, S(0.01), network, foundation));
+    REQUIRE(fresh.step(other, other_velocity, S(0.01), network, foundation));
     CHECK(same_bits(x, other));
 }
 
@@ -247,7 +248,7 @@ TEST_CASE("a step beyond stability blows up, and is refused before it is no numb
     ExplicitEuler euler(network);
     Points<double> x = test::jittered(mesh.positions(), 0.1, random), velocity = zeros<double>(42);
     int steps = 0;
-    while (steps < 100'000 && euler.step(x, velocity, 10.0, network, NoVolumeSprings{})) ++steps;
+    while (steps < 100'000 && euler.step(x, velocity, 10.0, network, NoFoundation{})) ++steps;
     CHECK(steps > 10);
     CHECK(steps < 100'000);
     CHECK(is_finite(x));
@@ -275,8 +276,8 @@ TEST_CASE("explicit Euler owns what it knows, and works in anybody's memory", "[
     Eigen::Map<Eigen::Matrix3Xf, 0, Eigen::OuterStride<>> w(buffer.data() + 3, 3, 42, Eigen::OuterStride<>(8));
     y = x, w = velocity;
     for (int i = 0; i < 100; ++i) {
-        REQUIRE(copy.step(x, velocity, 0.01F, other_network, NoVolumeSprings{}));
-        REQUIRE(moved.step(y, w, 0.01F, other_network, NoVolumeSprings{}));
+        REQUIRE(copy.step(x, velocity, 0.01F, other_network, NoFoundation{}));
+        REQUIRE(moved.step(y, w, 0.01F, other_network, NoFoundation{}));
     }
     CHECK(same_bits(x, Points<float>(y)));
     CHECK(same_bits(velocity, Points<float>(w)));
@@ -284,8 +285,8 @@ TEST_CASE("explicit Euler owns what it knows, and works in anybody's memory", "[
     CHECK(buffer[8 * 41 + 7] == -1.0F);
     using Step =
         bool (ExplicitEuler<float>::*)(PointsRef<float>, PointsRef<float>, float,
-                                       const MassSpringNetwork<float, LinearSpring>&, const NoVolumeSprings&) noexcept;
-    CHECK(Step(&ExplicitEuler<float>::step<MassSpringNetwork<float, LinearSpring>, NoVolumeSprings>) != nullptr);
+                                       const MassSpringNetwork<float, LinearSpring>&, const NoFoundation&) noexcept;
+    CHECK(Step(&ExplicitEuler<float>::step<MassSpringNetwork<float, LinearSpring>, NoFoundation>) != nullptr);
 }
 
 #ifndef NDEBUG
@@ -294,7 +295,7 @@ TEST_CASE("points of the wrong count are a broken precondition", "[euler][bad]")
     ExplicitEuler euler(network);
     Points<double> right = zeros<double>(12), fewer = zeros<double>(11);
     const auto run = [&](Points<double>& x, Points<double>& velocity) {
-        return test::in_child([&] { (void)euler.step(x, velocity, 0.01, network, NoVolumeSprings{}); }).signal;
+        return test::in_child([&] { (void)euler.step(x, velocity, 0.01, network, NoFoundation{}); }).signal;
     };
     CHECK(run(right, right) == 0);
     CHECK(run(fewer, right) == SIGABRT);

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -71,13 +71,13 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
     std::vector<S> stiffness(120);
     for (S& each : stiffness) each = k(random.number<S>(S(0.5), 2));
     const NetworkOptions<S> springs{.stiffness = stiffness, .mass = k(S(1e-5))};
-    const VolumeOptions<S> volume{.stiffness = k(random.number<S>(S(0.3), 1)), .damping = k(S(2e-4))};
+    const VolumeSpringOptions<S> volume{.stiffness = k(random.number<S>(S(0.3), 1)), .damping = k(S(2e-4))};
     const bool pressing = seed % 4 == 0;
     const S rounding = 4 * std::numeric_limits<S>::epsilon() * (1 + norm(units.origin));
     GuardedLoop<S, Rule> loop({start, unit_sphere<S>().triangles()}, springs, volume,
                               {.layers = pressing ? unlimited : 3,
                                .sweeps = 4,
-                               .negligible_force = k(units.size) * (std::max)(rounding, S(1e-13))});
+                               .force_tolerance = k(units.size) * (std::max)(rounding, S(1e-13))});
     const auto& sphere = unit_sphere<S>();
     const auto corners = [&](Index f) {
         return std::array<Index, 3>{sphere.triangles()(0, f), sphere.triangles()(1, f), sphere.triangles()(2, f)};
@@ -104,7 +104,7 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
         before = loop.x;
         tool.position = at((1 + radius + (pressing ? -in : S(1))) * from);
         report = loop.tick(tool, pull(held, at(target)), load<S>(corners(loaded), weights, force),
-                           HeldPoint<S>{grasped, corners(grasped), weights, at(place)});
+                           PointAttachment<S>{grasped, corners(grasped), weights, at(place)});
         REQUIRE(report.status == StepStatus::advanced);
     }
     Outcome<S> outcome{(loop.x / units.size).colwise() - units.origin.eigen(), {}};
@@ -205,7 +205,7 @@ TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, a
         const auto expected = scene_of<S, BlockStep>(seed, {}), found = scene_of<S, BlockStep>(seed, units);
         if (++seen; !(expected.settled && found.settled)) continue;
         ++settled;
-        const double left = 2 * 1e-13 / 0.3;  // of both: the least negligible force against the softest backing
+        const double left = 2 * 1e-13 / 0.3;  // of both: the least negligible force against the softest foundation
         REQUIRE(found.distance_to(expected) < (sizeof(S) == 4 ? 100 : 1000) * spacing + left);
     }
     CHECK(accepted > 0);

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <membrane/mesh/normals.hpp>
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/normals.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -58,7 +58,7 @@ std::array<Index, 3> corners_of(const TriangleMesh<S>& mesh, Index f) {
 
 namespace {
 
-/// What springs and backing store [J], and the size of what rounding the positions makes of it.
+/// What springs and foundation store [J], and the size of what rounding the positions makes of it.
 template <class Loop>
 std::array<double, 2> energy_of(const Loop& loop) {
     double sum = 0, size = 0;
@@ -68,12 +68,12 @@ std::array<double, 2> energy_of(const Loop& loop) {
         size += stiffness * (1 + length) * (std::abs(stretch) + 1e-7);
     };
     for (const auto& spring : loop.network.springs()) {
-        const double length = norm(reach_of(spring, x)), rest = static_cast<double>(spring.rest_length);
+        const double length = norm(edge_vector(spring, x)), rest = static_cast<double>(spring.rest_length);
         add(static_cast<double>(spring.stiffness), length - rest, length);
     }
     for (Index v = 0; v < loop.mesh.vertex_count(); ++v) {
-        const double length = (x.col(v) - loop.backing.anchors().col(v).template cast<double>()).norm();
-        add(static_cast<double>(loop.backing.stiffness(v)), length, length);
+        const double length = (x.col(v) - loop.foundation.anchors().col(v).template cast<double>()).norm();
+        add(static_cast<double>(loop.foundation.stiffness(v)), length, length);
     }
     return {sum, size};
 }
@@ -95,10 +95,10 @@ void mistreat(int seed) {
     const Vector3<S> force = static_cast<S>(std::pow(10, decades * random.number(-0.5, 0.5))) * random.vector<S>();
     const auto weights = random.barycentric<S>();
     Tool<S> tool{.position = S(1.4) * random.unit_vector<S>(), .radius = random.number<S>(0, S(0.3))};
-    const Vector3<S> way = (S(0.8) * random.unit_vector<S>() - tool.position) / 10;
+    const Vector3<S> displacement = (S(0.8) * random.unit_vector<S>() - tool.position) / 10;
     for (int tick = 0; tick < 12; ++tick) {
-        tool.position += way;
-        (void)loop.tick(tool, pull(v, target), HeldPoint<S>{held, corners_of(mesh, held), weights, place},
+        tool.position += displacement;
+        (void)loop.tick(tool, pull(v, target), PointAttachment<S>{held, corners_of(mesh, held), weights, place},
                         load<S>(corners_of(mesh, loaded), weights, force), pin(pins));
     }
     (void)loop.step();  // the damping of what let go belongs to this tick
@@ -126,7 +126,7 @@ TEMPLATE_TEST_CASE("stiffnesses twelve powers of ten apart come to a safe outcom
 
 namespace {
 
-/// The largest eigenvalue of any vertex's own 3 x 3 block at rest, with a backing of stiffness `volume`.
+/// The largest eigenvalue of any vertex's own 3 x 3 block at rest, with a foundation of stiffness `volume`.
 template <class S>
 double largest_block(const TriangleMesh<S>& mesh, const std::vector<S>& stiffness, double volume) {
     const Adjacency adjacency(mesh);
@@ -166,7 +166,7 @@ TEMPLATE_TEST_CASE("for any dt the rule as published converges below two over th
         CAPTURE(dt, part);
         const NetworkOptions<S> springs{.stiffness = stiffness,
                                         .mass = static_cast<S>(static_cast<double>(dt * dt) / (part * limit))};
-        const SolverOptions<S> options{.layers = unlimited, .sweeps = 10, .negligible_force = S(1e-30)};
+        const SolverOptions<S> options{.layers = unlimited, .sweeps = 10, .force_tolerance = S(1e-30)};
         GuardedLoop<S, MassStep> loop(mesh, springs, {.stiffness = volume}, options);
         // Near rest, so that the eigenvalues stay what they are there.
         const Points<S> start = test::jittered(mesh.positions(), S(1e-3), random);
@@ -224,7 +224,7 @@ Vector3<S> exact_place(const GuardedLoop<S>& loop, Random& random) {
         case 0: return triangle.a;
         case 1: return (triangle.a + triangle.b) / 2;
         case 2: return point_at<S>(triangle, {S(0.25), S(0.25), S(0.5)});
-        default: return point(loop.backing.anchors(), random.index(loop.mesh.vertex_count()));
+        default: return point(loop.foundation.anchors(), random.index(loop.mesh.vertex_count()));
     }
 }
 
@@ -251,7 +251,7 @@ TEMPLATE_TEST_CASE("a tool exactly on a vertex, an edge, a face or an anchor div
                 if (random.chance(0.5)) tool.axis = exact_place(loop, random) - tool.position;
             }
             const Index v = random.index(mesh.vertex_count());
-            const Vector3<S> anchor = point(loop.backing.anchors(), v);
+            const Vector3<S> anchor = point(loop.foundation.anchors(), v);
             REQUIRE(loop.tick(tool, pull(v, anchor)).status == StepStatus::advanced);
         }
     }
@@ -296,9 +296,10 @@ TEMPLATE_TEST_CASE("triangles of next to no height and springs of no length divi
             const S above = S(0.3) - S(0.05) * static_cast<S>(tick);
             tool.position = (1 + above) * point(mesh.positions(), near) + Vector3<S>(0, 0, above);
             const Vector3<S> place = point(mesh.positions(), corners_of(mesh, f)[1]) + Vector3<S>(0, 0, S(0.1));
-            const auto report = loop.tick(tool, HeldPoint<S>{f, corners_of(mesh, f), random.barycentric<S>(), place},
-                                          load<S>(corners_of(mesh, random.index(mesh.triangle_count())),
-                                                  random.barycentric<S>(), S(0.1) * random.vector<S>()));
+            const auto report =
+                loop.tick(tool, PointAttachment<S>{f, corners_of(mesh, f), random.barycentric<S>(), place},
+                          load<S>(corners_of(mesh, random.index(mesh.triangle_count())), random.barycentric<S>(),
+                                  S(0.1) * random.vector<S>()));
             REQUIRE(report.status == StepStatus::advanced);
             const test::FloatingPointTraps armed;
             normals.update(loop.x, report.moved);

@@ -6,16 +6,16 @@
 #include <string>
 
 #include <Eigen/Geometry>
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/collision/grasper.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/grasper.hpp>
 #include <membrane/haptics/force_policy.hpp>
 #include <membrane/haptics/rest_contact.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
-#include <membrane/mesh/moving_body.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/moved_volume.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/model/moved_volume.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/moving_body.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -34,12 +34,12 @@ struct Membrane {
     Membrane(const TriangleMesh<double>& shape, bool pins, Index layers = unlimited)
         : mesh(shape),
           network(mesh, LinearSpring{}, {.stiffness = 40.0, .pinned = pins ? border(mesh) : std::vector<Index>{}}),
-          solver(network, {.layers = layers, .sweeps = 4, .negligible_force = 1e-13}) {}
+          solver(network, {.layers = layers, .sweeps = 4, .force_tolerance = 1e-13}) {}
 
     void tick(const Tool<double>& tool) {
         contact = tracker.update(tree, x, tool);
         grasp = grasper.update(contact, x, tool);
-        report = solver.step(x, dt, network, backing, press(tool, contact, grasp), membrane::pull(tool, grasp));
+        report = solver.step(x, dt, network, foundation, press(tool, contact, grasp), membrane::pull(tool, grasp));
         end(tool, smooth(contact));
     }
     void tick_on_body(const Tool<double>& tool, const RigidFrame<double>& pose, Told told) {
@@ -47,14 +47,14 @@ struct Membrane {
             REQUIRE(body.move_to(pose, x));
         } else {
             Points<double> anchors = mesh.positions();
-            for (Index v = 0; v < anchors.cols(); ++v) anchors.col(v) = pose.point_out(point(mesh.positions(), v));
+            for (Index v = 0; v < anchors.cols(); ++v) anchors.col(v) = pose.point_to_world(point(mesh.positions(), v));
             REQUIRE(body.move_to(anchors, dt, x));
         }
         tree.refit(x);
         contact = tracker.update(tree, x, tool, body);
         grasp = grasper.update(contact, x, tool, body);
         report =
-            solver.step(x, dt, network, on(body, backing), press(tool, contact, grasp), membrane::pull(tool, grasp));
+            solver.step(x, dt, network, on(body, foundation), press(tool, contact, grasp), membrane::pull(tool, grasp));
         end(tool, smooth(contact, body));
     }
     void end(const Tool<double>& tool, const Contact<double>& smooth_contact) {
@@ -66,7 +66,7 @@ struct Membrane {
 
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, LinearSpring> network;
-    VirtualVolumeSprings<double> backing{mesh, VolumeOptions<double>{.stiffness = 8, .damping = 0.02}};
+    VirtualVolumeSprings<double> foundation{mesh, VolumeSpringOptions<double>{.stiffness = 8, .damping = 0.02}};
     QuasiStaticSolver<double> solver;
     AabbTree<double> tree{mesh};
     ContactTracker<double> tracker{mesh};
@@ -81,8 +81,8 @@ struct Membrane {
 };
 
 Tool<double> in_world(Tool<double> tool, const RigidFrame<double>& pose) {
-    tool.position = pose.point_out(tool.position);
-    tool.velocity = pose.direction_out(tool.velocity) + pose.velocity_at(tool.position);
+    tool.position = pose.point_to_world(tool.position);
+    tool.velocity = pose.vector_to_world(tool.velocity) + pose.velocity_at(tool.position);
     return tool;
 }
 
@@ -109,13 +109,13 @@ const char* const phases[] = {"press", "slide", "grasp", "pull"};
 struct Difference {
     Difference(const Membrane& rest, const Membrane& moved, const RigidFrame<double>& pose) {
         const auto off = [&](const Vector3<double>& at_rest, const Vector3<double>& now) {
-            return norm<double>(pose.direction_out(at_rest) - now) / (std::max)(norm(at_rest), 5e-3);
+            return norm<double>(pose.vector_to_world(at_rest) - now) / (std::max)(norm(at_rest), 5e-3);
         };
         force = off(rest.force, moved.force);
         felt = off(rest.felt, moved.felt);
         depth = std::abs(rest.contact.depth - moved.contact.depth) / radius;
         for (Index v = 0; v < rest.x.cols(); ++v) {
-            const double here = norm<double>(pose.point_out(point(rest.x, v)) - point(moved.x, v));
+            const double here = norm<double>(pose.point_to_world(point(rest.x, v)) - point(moved.x, v));
             positions = std::max(positions, here / radius);
         }
     }
@@ -137,9 +137,10 @@ const Scene scenes[] = {
 /// Turns by 20 degrees and shifts by some millimetres in half a second, smoothly.
 RigidFrame<double> smooth_motion(double time) {
     const double s = std::min(time / 0.5, 1.0), u = s * s * (3 - 2 * s), rate = 6 * s * (1 - s) / 0.5;
-    const Vector3<double> axis = Vector3<double>(1, 1, 0.3).normalized(), way(2e-3, 1e-3, -1e-3);
+    const Vector3<double> axis = Vector3<double>(1, 1, 0.3).normalized(), displacement(2e-3, 1e-3, -1e-3);
     const double angle = 20 * 3.14159265358979 / 180;
-    return {Eigen::AngleAxisd(angle * u, axis.eigen()).toRotationMatrix(), u * way, rate * way, rate * angle * axis};
+    return {Eigen::AngleAxisd(angle * u, axis.eigen()).toRotationMatrix(), u * displacement, rate * displacement,
+            rate * angle * axis};
 }
 
 }  // namespace
@@ -209,7 +210,7 @@ TEST_CASE("a still tool on a body that moves feels the same, seen from the body 
     for (int tick = 0; tick <= 600; ++tick) {
         const auto pose = smooth_motion(tick * dt);
         const Tool<double> tool{.position = {0.3e-3, 0.5e-3, 0.0094}, .radius = 1e-3};
-        inside.tick(carried_in(tool, pose));
+        inside.tick(to_body_frame(tool, pose));
         outside.tick_on_body(tool, pose, Told::pose);
         CAPTURE(tick);
         const Difference difference(inside, outside, pose);
@@ -238,7 +239,7 @@ TEST_CASE("the contact with the surface at rest goes with its body", "[moving]")
         const auto there = rest({}, in_world(tool, pose), tree, body), here = rest({}, tool);
         const Vector3<double> felt = feel({in_world(tool, pose), there, {}});
         REQUIRE(std::abs(there.depth - here.depth) <= 1e-15);
-        REQUIRE(norm<double>(felt - pose.direction_out(feel({tool, here, {}}))) <= 1e-12);
+        REQUIRE(norm<double>(felt - pose.vector_to_world(feel({tool, here, {}}))) <= 1e-12);
     }
 }
 
@@ -249,7 +250,7 @@ TEST_CASE("a membrane goes with its body, pinned or not, at no visit where it is
         const Tool<double> far{.position = {1, 1, 1}, .radius = 1e-3};
         for (int tick = 0; tick <= 100; ++tick) {
             moved.tick_on_body(far, smooth_motion(5 * tick * dt), tick % 2 == 0 ? Told::pose : Told::anchors);
-            REQUIRE(moved.report.visits == 0);
+            REQUIRE(moved.report.vertex_updates == 0);
             REQUIRE(moved.x == moved.body.anchors());
         }
     }
@@ -262,7 +263,7 @@ TEST_CASE("a body that swells: the membrane comes to the rest that it has on it"
         const auto move_to = [&](double swollen) {
             const Points<double> anchors = (1 + swollen) * scene.mesh.positions();
             REQUIRE(moved.body.move_to(anchors, dt, moved.x));
-            moved.report = moved.solver.step(moved.x, dt, moved.network, on(moved.body, moved.backing));
+            moved.report = moved.solver.step(moved.x, dt, moved.network, on(moved.body, moved.foundation));
             REQUIRE(moved.report.status == StepStatus::advanced);
         };
         for (int tick = 0; tick <= 100; ++tick) move_to(1e-3 * tick);
@@ -271,20 +272,20 @@ TEST_CASE("a body that swells: the membrane comes to the rest that it has on it"
         REQUIRE(moved.report.converged);
         CHECK(moved.body.deformations() == 100);
         for (Index v = 0; v < moved.x.cols(); ++v) {
-            const auto springs = moved.network.pull(v, moved.x).force;
-            const Vector3<double> backing = -8 * (point(moved.x, v) - 1.1 * point(scene.mesh.positions(), v));
+            const auto springs = moved.network.force_on(v, moved.x).force;
+            const Vector3<double> foundation = -8 * (point(moved.x, v) - 1.1 * point(scene.mesh.positions(), v));
             if (moved.network.pinned(v)) {
                 REQUIRE(norm<double>(point(moved.x, v) - 1.1 * point(scene.mesh.positions(), v)) <= 1e-15);
             } else {
-                REQUIRE(norm<double>(springs + backing) <= 1e-12);
+                REQUIRE(norm<double>(springs + foundation) <= 1e-12);
             }
         }
         // What pins hold at the border pushes back with the sum of all other forces.
         if (!scene.pins) continue;
         const auto rim = border(scene.mesh);
-        const auto report = moved.solver.step(moved.x, dt, moved.network, on(moved.body, moved.backing), pin(rim));
+        const auto report = moved.solver.step(moved.x, dt, moved.network, on(moved.body, moved.foundation), pin(rim));
         Vector3<double> sum = Vector3<double>::Zero();
-        for (const Index v : rim) sum += moved.network.pull(v, moved.x).force;
+        for (const Index v : rim) sum += moved.network.force_on(v, moved.x).force;
         CHECK(norm<double>(report.reactions[0] - sum) <= 1e-12);
         CHECK(norm(sum) > 1e-3);
     }
@@ -300,7 +301,7 @@ TEST_CASE("a refused step leaves the membrane where its body took it", "[moving]
         if (tick % 7 == 3) {
             REQUIRE(moved.body.move_to(pose, moved.x));
             const Points<double> before = moved.x;
-            CHECK(moved.solver.step(moved.x, 0, moved.network, on(moved.body, moved.backing)).status ==
+            CHECK(moved.solver.step(moved.x, 0, moved.network, on(moved.body, moved.foundation)).status ==
                   StepStatus::bad_time_step);
             CHECK(moved.x == before);
         }
@@ -320,16 +321,16 @@ TEST_CASE("after reset on a moved body a solver is as new", "[moving]") {
         used.tick_on_body(in_world(stroke_at(tick), pose), pose, Told::pose);
     }
     REQUIRE(used.body.move_to(anchors, dt, used.x));
-    QuasiStaticSolver<double> fresh(used.network, {.layers = 6, .sweeps = 4, .negligible_force = 1e-13});
+    QuasiStaticSolver<double> fresh(used.network, {.layers = 6, .sweeps = 4, .force_tolerance = 1e-13});
     used.solver.reset();
     Points<double> x = used.x;
     for (int tick = 0; tick < 5; ++tick) {
-        const auto volume = on(used.body, used.backing);
+        const auto volume = on(used.body, used.foundation);
         const auto a =
             used.solver.step(used.x, dt, used.network, volume, membrane::pull(3, Vector3<double>(0, 0, 0.012)));
         const auto b = fresh.step(x, dt, used.network, volume, membrane::pull(3, Vector3<double>(0, 0, 0.012)));
         REQUIRE(used.x == x);
-        REQUIRE(a.visits == b.visits);
+        REQUIRE(a.vertex_updates == b.vertex_updates);
         REQUIRE(a.reactions[0] == b.reactions[0]);
     }
 }

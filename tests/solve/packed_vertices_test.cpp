@@ -8,10 +8,10 @@
 #include <vector>
 
 #include <membrane/core/thread_pool.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/moved_volume.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -25,31 +25,31 @@ using test::same_bits;
 
 namespace {
 
-/// A backing that keeps its springs to itself: its vertices are updated one by one.
+/// A foundation that keeps its springs to itself: its vertices are updated one by one.
 template <class Volume>
 struct Opaque {
     Volume volume;
 
     template <Real S>
-    Pull<S> pull(Index v, const Vector3<S>& position, const Vector3<S>& start, S dt) const noexcept {
-        return volume.pull(v, position, start, dt);
+    VertexForce<S> force_on(Index v, const Vector3<S>& position, const Vector3<S>& start, S dt) const noexcept {
+        return volume.force_on(v, position, start, dt);
     }
 };
 static_assert(UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, VirtualVolumeSprings<double>>);
-static_assert(UpdatesInLanes<float, SafeStep, MassSpringNetwork<float, LinearSpring>, NoVolumeSprings>);
+static_assert(UpdatesInLanes<float, SafeStep, MassSpringNetwork<float, LinearSpring>, NoFoundation>);
 static_assert(UpdatesInLanes<float, MassStep, MassSpringNetwork<float, LinearSpring>,
                              MovedVolume<VirtualVolumeSprings<float>, float>>);
 static_assert(
     !UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Opaque<VirtualVolumeSprings<double>>>);
-static_assert(!UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, ExponentialSpring>, NoVolumeSprings>);
+static_assert(!UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, ExponentialSpring>, NoFoundation>);
 
-/// A mesh with holes, springs and backing of all kinds, some left out.
+/// A mesh with holes, springs and foundation of all kinds, some left out.
 template <Real S>
 struct Membrane {
     explicit Membrane(Random& random)
         : mesh(test::with_holes(test::random_surface<S>(random), random).mesh()),
           network(mesh, {}, springs(random)),
-          backing(mesh, volume(random)) {}
+          foundation(mesh, volume(random)) {}
 
     NetworkOptions<S> springs(Random& random) const {
         std::vector<S> stiffness(Adjacency(mesh).edges().size());
@@ -59,7 +59,7 @@ struct Membrane {
         for (S& m : mass) m = S(1e-6) * random.number(S(20), S(80));
         return {.stiffness = stiffness, .mass = mass, .pinned = {random.index(mesh.vertex_count())}};
     }
-    VolumeOptions<S> volume(Random& random) const {
+    VolumeSpringOptions<S> volume(Random& random) const {
         std::vector<S> stiffness(static_cast<std::size_t>(mesh.vertex_count()));
         for (S& k : stiffness) k = random.number(S(0.1), S(2));
         return {.stiffness = stiffness, .damping = random.chance(0.5) ? S(0) : random.number(S(1e-4), S(1e-2))};
@@ -67,7 +67,7 @@ struct Membrane {
 
     TriangleMesh<S> mesh;
     MassSpringNetwork<S, LinearSpring> network;
-    VirtualVolumeSprings<S> backing;
+    VirtualVolumeSprings<S> foundation;
 };
 
 /// Does its tasks in any order.
@@ -99,7 +99,7 @@ Points<S> play(const Membrane<S>& membrane, const Rule& rule, const Volume& volu
             x, S(1e-3), membrane.network, volume, pull(v, target), pin({&still, 1}),
             load<S>({corners[0], corners[1], corners[2]}, random.barycentric<S>(), S(0.1) * random.vector<S>()));
         log.insert(log.end(), {static_cast<double>(report.status),
-                               report.status == StepStatus::advanced ? static_cast<double>(report.visits) : 0.0,
+                               report.status == StepStatus::advanced ? static_cast<double>(report.vertex_updates) : 0.0,
                                static_cast<double>(report.residual), static_cast<double>(report.moved.size()),
                                static_cast<double>(norm(report.total_reaction()))});
     }
@@ -113,19 +113,20 @@ void check_same(const Rule& rule) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Membrane<S> membrane(random);
-        const SolverOptions<S> options{.layers = random.chance(0.2) ? unlimited : random.index(8),
-                                       .sweeps = 1 + random.index(4),
-                                       .contact_visits = 1 + random.index(3),
-                                       .order = random.chance(0.3) ? VisitOrder::colours : VisitOrder::groups,
-                                       .most_visits = random.chance(0.2) ? random.index(200) + 1 : unlimited,
-                                       .most_in_groups = random.chance(0.2) ? random.index(100) : unlimited};
+        const SolverOptions<S> options{
+            .layers = random.chance(0.2) ? unlimited : random.index(8),
+            .sweeps = 1 + random.index(4),
+            .contact_iterations = 1 + random.index(3),
+            .order = random.chance(0.3) ? UpdateOrder::colour_all : UpdateOrder::colour_layers,
+            .max_vertex_updates = random.chance(0.2) ? random.index(200) + 1 : unlimited,
+            .max_packed_vertices = random.chance(0.2) ? random.index(100) : unlimited};
         std::vector<double> in_lanes, one_by_one;
         if (random.chance(0.2)) {
-            const auto x = play(membrane, rule, NoVolumeSprings{}, options, seed, in_lanes);
-            REQUIRE(same_bits(x, play(membrane, rule, Opaque<NoVolumeSprings>{}, options, seed, one_by_one)));
+            const auto x = play(membrane, rule, NoFoundation{}, options, seed, in_lanes);
+            REQUIRE(same_bits(x, play(membrane, rule, Opaque<NoFoundation>{}, options, seed, one_by_one)));
         } else {
-            const Opaque<VirtualVolumeSprings<S>> opaque{membrane.backing};
-            const auto x = play(membrane, rule, membrane.backing, options, seed, in_lanes);
+            const Opaque<VirtualVolumeSprings<S>> opaque{membrane.foundation};
+            const auto x = play(membrane, rule, membrane.foundation, options, seed, in_lanes);
             REQUIRE(same_bits(x, play(membrane, rule, opaque, options, seed, one_by_one)));
         }
         REQUIRE(in_lanes == one_by_one);
@@ -144,13 +145,14 @@ void check_same_shared_out(const Rule& rule) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Membrane<S> membrane(random);
-        const SolverOptions<S> options{.layers = random.chance(0.5) ? unlimited : random.index(8),
-                                       .sweeps = 1 + random.index(4),
-                                       .order = random.chance(0.7) ? VisitOrder::colours : VisitOrder::groups};
+        const SolverOptions<S> options{
+            .layers = random.chance(0.5) ? unlimited : random.index(8),
+            .sweeps = 1 + random.index(4),
+            .order = random.chance(0.7) ? UpdateOrder::colour_all : UpdateOrder::colour_layers};
         std::vector<double> alone, in_any_order, in_threads;
-        const auto x = play(membrane, rule, membrane.backing, options, seed, alone);
-        REQUIRE(same_bits(x, play(membrane, rule, membrane.backing, options, seed, in_any_order, AnyOrder{})));
-        REQUIRE(same_bits(x, play(membrane, rule, membrane.backing, options, seed, in_threads, pool.executor())));
+        const auto x = play(membrane, rule, membrane.foundation, options, seed, alone);
+        REQUIRE(same_bits(x, play(membrane, rule, membrane.foundation, options, seed, in_any_order, AnyOrder{})));
+        REQUIRE(same_bits(x, play(membrane, rule, membrane.foundation, options, seed, in_threads, pool.executor())));
         REQUIRE(alone == in_any_order);
         REQUIRE(alone == in_threads);
         for (std::size_t i = 0; i < alone.size(); i += 5) advanced += alone[i] == 0 ? 1 : 0;
@@ -191,18 +193,18 @@ TEMPLATE_TEST_CASE("there are as many groups as there is room for, in packs", "[
         for (Index v = 0; v < vertices; ++v) {
             if (random.chance(0.5)) active.insert(v);
         }
-        VertexGroups others(vertices);
+        VertexColouring others(vertices);
         others.add(network, active, queue.vertices().size(), active.items().size());
         PackedVertices<S> packed(network, capacity);
         for (int again = 0; again < 2; ++again) {
-            packed.assign(queue.vertices(), queue.group_ends(), network);
+            packed.assign(queue.vertices(), queue.colour_ends(), network);
             const std::size_t of_queue = packed.size();
             const bool is_whole = of_queue == queue.vertices().size();
             packed.append(active.items(), queue.vertices().size(), others.ends(), network);
             REQUIRE(packed.size() <= static_cast<std::size_t>(capacity));
             if (capacity == vertices) REQUIRE(packed.size() == active.items().size());
             if (!is_whole) REQUIRE(packed.size() == of_queue);
-            std::vector<std::size_t> ends(queue.group_ends().begin(), queue.group_ends().end());
+            std::vector<std::size_t> ends(queue.colour_ends().begin(), queue.colour_ends().end());
             if (is_whole) ends.insert(ends.end(), others.ends().begin(), others.ends().end());
             std::size_t number = 0, pack = 0;
             IndexSet expected(vertices);
@@ -238,7 +240,7 @@ TEMPLATE_TEST_CASE("the residual forces of packs are those of their vertices, to
         queue.build(membrane.network, {&first, 1}, 4);
         queue.group(membrane.network);
         PackedVertices<S> packed(membrane.network);
-        packed.assign(queue.vertices(), queue.group_ends(), membrane.network);
+        packed.assign(queue.vertices(), queue.colour_ends(), membrane.network);
         const Points<S> start_points = membrane.mesh.positions();
         const ConstPointsRef<S> start = start_points;
         StepState<S> state(vertices, 0);
@@ -252,8 +254,8 @@ TEMPLATE_TEST_CASE("the residual forces of packs are those of their vertices, to
             state.row(state.force, v).set(random.vector<S>(), S(0));
         }
         const ConstPointsRef<S> now = state.positions();
-        const StepInput<S, decltype(membrane.network), decltype(membrane.backing)> scene{
-            start, now, S(1e-3), membrane.network, membrane.backing, state};
+        const StepInput<S, decltype(membrane.network), decltype(membrane.foundation)> scene{
+            start, now, S(1e-3), membrane.network, membrane.foundation, state};
         packed.begin_step(scene);
         for (std::size_t p = 0; p < packed.count(); ++p) {
             packed.evaluate_residual(p, scene);

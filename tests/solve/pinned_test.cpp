@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/catch.hpp"
@@ -20,7 +20,7 @@ using test::same_bits;
 namespace {
 
 const TriangleMesh<double> mesh = icosphere<double>({.radius = 0.01, .subdivisions = 2});
-const VirtualVolumeSprings<double> backing(mesh, {.stiffness = 4.0, .damping = 0.02});
+const VirtualVolumeSprings<double> foundation(mesh, {.stiffness = 4.0, .damping = 0.02});
 
 auto network_with(std::vector<Index> pinned) {
     return MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 40.0, .pinned = std::move(pinned)});
@@ -36,7 +36,7 @@ std::vector<Index> some_vertices(Random& random) {
 
 SolverOptions<double> options_of(Random& random) {
     return {.layers = random.chance(0.3) ? unlimited : random.index(4),
-            .layers_as_needed = random.chance(0.3),
+            .adaptive_layers = random.chance(0.3),
             .sweeps = 1 + random.index(3)};
 }
 
@@ -55,10 +55,10 @@ TEST_CASE("a solver does not care what another network than that of the step has
             if (random.chance(0.2)) v = random.index(mesh.vertex_count());
             if (random.chance(0.2)) one.wake_all(), two.wake_all();
             const Vector3<double> target = point(mesh.positions(), v) + random.vector(-2e-3, 2e-3);
-            const auto step = one.step(x, 1e-3, network, backing, pull(v, target));
-            const auto again = two.step(y, 1e-3, network, backing, pull(v, target));
+            const auto step = one.step(x, 1e-3, network, foundation, pull(v, target));
+            const auto again = two.step(y, 1e-3, network, foundation, pull(v, target));
             REQUIRE(same_bits(x, y));
-            REQUIRE(step.visits == again.visits);
+            REQUIRE(step.vertex_updates == again.vertex_updates);
             REQUIRE(step.converged == again.converged);
         }
     }
@@ -76,18 +76,18 @@ TEST_CASE("what the network of the step pins does not move, whatever went before
         const Index v = random.index(mesh.vertex_count());
         for (int tick = 0; tick < 6; ++tick) {  // on its way, with something to predict
             const Vector3<double> target = (1 + 0.02 * tick) * point(mesh.positions(), v);
-            REQUIRE(solver.step(x, 1e-3, free, backing, pull(v, target)).status == StepStatus::advanced);
+            REQUIRE(solver.step(x, 1e-3, free, foundation, pull(v, target)).status == StepStatus::advanced);
         }
         const auto before = x;
         for (int tick = 6; tick < 200; ++tick) {
             if (tick == 9) solver.wake_all();
             const Vector3<double> target = (1 + 0.02 * (tick < 12 ? tick : 12)) * point(mesh.positions(), v);
-            const auto report = solver.step(x, 1e-3, network, backing, pull(v, target));
+            const auto report = solver.step(x, 1e-3, network, foundation, pull(v, target));
             REQUIRE(report.status == StepStatus::advanced);
             for (const Index fixed : pinned) REQUIRE(same_bits(point(x, fixed), point(before, fixed)));
         }
         for (int tick = 0; tick < 3000; ++tick) {  // and does not keep the others from their rest
-            const auto report = solver.step(x, 1e-3, network, backing);
+            const auto report = solver.step(x, 1e-3, network, foundation);
             if (report.converged) break;
             REQUIRE(tick < 2999);
         }

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include <membrane/accuracy/trial.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -27,16 +27,16 @@ using test::same_bits;
 
 namespace {
 
-using Leads = std::array<Lead<double>, 2>;
+using Leads = std::array<DrivingInput<double>, 2>;
 
-Lead<double> at(double x, double y = 0) { return LeadPoint<double>{{x, y, 0}}; }
+DrivingInput<double> at(double x, double y = 0) { return InputSample<double>{{x, y, 0}}; }
 
 constexpr double radius = 0.01, stiffness = 40, dt = 1e-3;  // [m], [N/m], [s]
 
 struct Membrane {
     TriangleMesh<double> mesh = icosphere({.radius = radius, .subdivisions = 2});
     MassSpringNetwork<double, LinearSpring> network{mesh, {}, {.stiffness = stiffness}};
-    VirtualVolumeSprings<double> backing{mesh, {.stiffness = stiffness / 4}};
+    VirtualVolumeSprings<double> foundation{mesh, {.stiffness = stiffness / 4}};
 };
 
 /// A tool of 3 mm, 1.5 mm deep after 30 ticks, slides along at 50 mm/s.
@@ -55,7 +55,7 @@ std::vector<Tool<double>> slide(Index ticks) {
 struct Witness {
     Points<double>* seen;
 
-    bool sound() const noexcept { return true; }
+    bool valid() const noexcept { return true; }
     void hold(ConstraintContext<double>& context) const noexcept {
         for (Index v = 0; v < seen->cols(); ++v) seen->col(v) = context.position(v);
     }
@@ -76,7 +76,7 @@ struct Led {
     template <class... Others>
     StepReport<double> stay(const Others&... others) {
         const Vector3<double> from = point(membrane.mesh.positions(), 0);
-        return solver.step(x, dt, membrane.network, membrane.backing, Witness{&begin},
+        return solver.step(x, dt, membrane.network, membrane.foundation, Witness{&begin},
                            pull(0, Vector3<double>((1 + 0.02 * ticks) * from)), others...);
     }
     Index neighbour() const { return membrane.network.springs_of(0)[0].other; }
@@ -101,7 +101,7 @@ TEST_CASE("nothing is expected before something has gone on for two steps") {
 }
 
 TEST_CASE("what is expected is how far the lead goes on along its last way, less what it turns") {
-    const auto expected = [](const Lead<double>& next) {
+    const auto expected = [](const DrivingInput<double>& next) {
         Predictor<double, 2> predictor;
         static_cast<void>(predictor.extrapolation_factor(Leads{at(1)}));
         static_cast<void>(predictor.extrapolation_factor(Leads{at(3)}));
@@ -131,14 +131,16 @@ TEST_CASE("of several leads the one that goes on least counts, those that stay d
     CHECK(predictor.extrapolation_factor(Leads{at(7), at(2.5)}) == 1);
     CHECK(predictor.extrapolation_factor(Leads{at(8), std::nullopt}) == 0);
     CHECK(predictor.extrapolation_factor(Leads{at(9), std::nullopt}) == 1);
-    CHECK(predictor.extrapolation_factor(std::span<const Lead<double>>()) == 0);
-    CHECK(predictor.extrapolation_factor(std::span<const Lead<double>>()) == 0);
+    CHECK(predictor.extrapolation_factor(std::span<const DrivingInput<double>>()) == 0);
+    CHECK(predictor.extrapolation_factor(std::span<const DrivingInput<double>>()) == 0);
 }
 
 TEST_CASE("a way longer than the lead says lets one expect nothing, nor does the one after it") {
     const auto expected = [](double first, double second) {
         Predictor<double, 1> predictor;
-        const auto no_farther = [](double x) { return std::array{Lead<double>(LeadPoint<double>{{x, 0, 0}, 2})}; };
+        const auto no_farther = [](double x) {
+            return std::array{DrivingInput<double>(InputSample<double>{{x, 0, 0}, 2})};
+        };
         static_cast<void>(predictor.extrapolation_factor(no_farther(0)));
         static_cast<void>(predictor.extrapolation_factor(no_farther(first)));
         return predictor.extrapolation_factor(no_farther(first + second));
@@ -177,12 +179,12 @@ TEST_CASE("what converges by itself converges with the prediction") {
 TEST_CASE("a tool that slides on is felt with a third of the error, or less") {
     const Membrane membrane;
     const Stroke<double> stroke(membrane.mesh, slide(90), dt);
-    const auto rests = equilibria(membrane.mesh, membrane.network, membrane.backing, stroke, 6);
-    REQUIRE(rests.size() == 15);
+    const auto references = equilibria(membrane.mesh, membrane.network, membrane.foundation, stroke, 6);
+    REQUIRE(references.size() == 15);
     const auto error = [&](Index sweeps, bool predict) {
         const SolverOptions<double> options{
-            .layers = unlimited, .sweeps = sweeps, .contact_visits = 4, .predict = predict};
-        return trial(membrane.mesh, membrane.network, membrane.backing, stroke, rests, options).force_error;
+            .layers = unlimited, .sweeps = sweeps, .contact_iterations = 4, .predict = predict};
+        return trial(membrane.mesh, membrane.network, membrane.foundation, stroke, references, options).force_error;
     };
     for (const Index sweeps : {1, 2, 4}) {
         CAPTURE(sweeps);
@@ -195,9 +197,9 @@ TEST_CASE("a step begins where its vertices were on their way to, if what leads 
     for (int tick = 0; tick < 3; ++tick) led.go_on();
     const Points<double> before = led.x;
     led.go_on();
-    const Points<double> way = led.x - before, there = led.x + way;
+    const Points<double> displacement = led.x - before, there = led.x + displacement;
     led.go_on();
-    CHECK(way.col(led.neighbour()).norm() > 1e-3 * radius);
+    CHECK(displacement.col(led.neighbour()).norm() > 1e-3 * radius);
     CHECK((led.begin.rightCols(161) - there.rightCols(161)).norm() <= 1e-12 * radius);
 
     const Points<double> last = led.x;
@@ -220,7 +222,7 @@ TEST_CASE("a step that is refused is not predicted, nor the next one") {
     for (int tick = 0; tick < 4; ++tick) led.go_on();
     const Points<double> before = led.x;
     const Vector3<double> somewhere = Vector3<double>::Zero();
-    CHECK(led.go_on(pull(no_index, somewhere)).status == StepStatus::bad_input);
+    CHECK(led.go_on(pull(no_index, somewhere)).status == StepStatus::invalid_input);
     CHECK(same_bits(led.x, before));
     led.go_on();
     CHECK(same_bits(led.begin, before));

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -149,7 +149,7 @@ TEST_CASE("a queue by hand", "[queue]") {
     CHECK(queue.vertices().empty());
     CHECK(queue.layer_count() == 0);
 
-    // Pinned vertices are in nobody's way but stop the force.
+    // PinnedVertices vertices are in nobody's way but stop the force.
     const MassSpringNetwork wall(mesh, LinearSpring{}, {.stiffness = 1.0, .pinned = {3, 4, 5}});
     queue.build(wall, std::vector<Index>{4, 1}, unlimited);
     CHECK(vertices(queue.vertices()) == std::vector<Index>{1, 0, 2});
@@ -196,18 +196,18 @@ TEST_CASE("every layer is ordered in groups, whatever was there before", "[queue
         queue.group(network);
         queue.build(network, seeds, layers);
         plain.build(network, seeds, layers);
-        REQUIRE(queue.group_ends().empty());
+        REQUIRE(queue.colour_ends().empty());
         queue.group(network);
 
         IndexSet expected(vertices);
-        VertexGroups groups(vertices);
+        VertexColouring groups(vertices);
         for (const Index v : plain.vertices()) expected.insert(v);
         std::size_t begin = 0;
         for (Index k = 0; k < plain.layer_count(); begin += plain.layer(k++).size()) {
             groups.add(network, expected, begin, begin + plain.layer(k).size());
         }
         REQUIRE(std::ranges::equal(queue.vertices(), expected.items()));
-        REQUIRE(std::ranges::equal(queue.group_ends(), groups.ends()));
+        REQUIRE(std::ranges::equal(queue.colour_ends(), groups.ends()));
     }
 }
 
@@ -226,9 +226,9 @@ TEST_CASE("or all beyond the first together, which makes one layer of them", "[q
         if (queue.layer_count() == 0) continue;
         REQUIRE(std::ranges::is_permutation(queue.layer(0), plain.layer(0)));
         REQUIRE(std::ranges::is_permutation(queue.vertices(), plain.vertices()));
-        REQUIRE(std::ranges::count(queue.group_ends(), queue.layer(0).size()) == 1);
+        REQUIRE(std::ranges::count(queue.colour_ends(), queue.layer(0).size()) == 1);
         std::size_t begin = 0;
-        for (const std::size_t end : queue.group_ends()) {
+        for (const std::size_t end : queue.colour_ends()) {
             const auto group = queue.vertices().subspan(begin, end - begin);
             for (const Index v : group) {
                 for (const auto& spring : network.springs_of(v)) {

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -38,12 +38,12 @@ using Linear = MassSpringNetwork<S, LinearSpring>;
 
 std::set<Index> set_of(std::span<const Index> vertices) { return {vertices.begin(), vertices.end()}; }
 
-/// A unit sphere of 162 vertices with its backing.
+/// A unit sphere of 162 vertices with its foundation.
 template <class S>
 struct Sphere {
     TriangleMesh<S> mesh = icosphere<S>({.radius = 1, .subdivisions = 2});
     Linear<S> network{mesh, LinearSpring{}, NetworkOptions<S>{.stiffness = S(1), .mass = S(1)}};
-    VirtualVolumeSprings<S> backing{mesh, VolumeOptions<S>{.stiffness = S(0.5)}};
+    VirtualVolumeSprings<S> foundation{mesh, VolumeSpringOptions<S>{.stiffness = S(0.5)}};
 
     Vector3<S> raised(Index v, S by) const { return (1 + by) * point(mesh.positions(), v); }
     /// Largest force on a vertex that is not in `held`.
@@ -51,8 +51,9 @@ struct Sphere {
         S largest = 0;
         for (Index v = 0; v < 162; ++v) {
             if (held.count(v) > 0) continue;
-            const auto springs = network.pull(v, x).force;
-            largest = std::max(largest, norm<S>(springs + backing.pull(v, point(x, v), point(x, v), S(1)).force));
+            const auto springs = network.force_on(v, x).force;
+            largest =
+                std::max(largest, norm<S>(springs + foundation.force_on(v, point(x, v), point(x, v), S(1)).force));
         }
         return largest;
     }
@@ -79,10 +80,10 @@ TEST_CASE("one sweep moves a chain as (4) says, vertex by vertex in the queue's 
 
     const double dt = 0.2;
     Points<double> x = mesh.positions();  // one unit apart along x
-    QuasiStaticSolver solver(network, {.layers = 3, .sweeps = 1, .negligible_force = 1e-300}, MassStep{});
+    QuasiStaticSolver solver(network, {.layers = 3, .sweeps = 1, .force_tolerance = 1e-300}, MassStep{});
     // Vertex 0 is held half a unit along the chain: spring 0 - 1 pushes.
     const Vector3<double> target = point(x, 0) + Vector3<double>(0.5, 0, 0);
-    const auto report = solver.step(x, dt, network, NoVolumeSprings{}, pull(0, target));
+    const auto report = solver.step(x, dt, network, NoFoundation{}, pull(0, target));
     CHECK(set_of(solver.queue().vertices()) == std::set<Index>{0, 1, 2, 3});
 
     // Vertex 1 sees 0 where it is held and 2 at rest: F = 30 * 0.5. Each next one sees what came before it.
@@ -104,7 +105,7 @@ TEST_CASE("one sweep moves a chain as (4) says, vertex by vertex in the queue's 
     CHECK(report.status == StepStatus::advanced);
     CHECK_FALSE(report.converged);
     CHECK(set_of(report.moved) == std::set<Index>{0, 1, 2, 3});
-    CHECK(report.visits == 3 + 4);  // the free three, and a last look at all four
+    CHECK(report.vertex_updates == 3 + 4);  // the free three, and a last look at all four
     // What is left: 0 - 1 is short by 0.3, 1 - 2 by 0.16, 2 - 3 by 0.024, and 3 - 4 by 0.016.
     CHECK(report.reactions[0].x() == Approx(-30 * (0.5 - d1)));
     CHECK(report.residual == Approx(std::max({30 * (0.5 - d1) - 20 * (d1 - d2), 20 * (d1 - d2) - 50 * (d2 - d3),
@@ -130,8 +131,8 @@ void sweep_by_hand(Points<S>& x, S dt, const Linear<S>& network, const Volume& v
                 force += tension / length * reach;
                 stiffness += std::max(end.stiffness, tension / length);
             }
-            const auto backing = volume.pull(v, point(x, v), point(start, v), dt);
-            x.col(v) += compliance(v, stiffness + backing.stiffness) * (force + backing.force);
+            const auto foundation = volume.force_on(v, point(x, v), point(start, v), dt);
+            x.col(v) += compliance(v, stiffness + foundation.stiffness) * (force + foundation.force);
         }
     }
 }
@@ -147,18 +148,18 @@ TEMPLATE_TEST_CASE("a step is the sweeps over the queue, with either rule", "[so
         std::vector<S> mass(162);
         for (S& m : mass) m = random.number<S>(4, 6);
         const Linear<S> network(mesh, LinearSpring{}, {.stiffness = S(1), .mass = mass, .pinned = {random.index(162)}});
-        const VirtualVolumeSprings backing(mesh, {.stiffness = S(0.5), .damping = S(0.2)});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = S(0.5), .damping = S(0.2)});
         const S dt = S(0.8), omega = random.number<S>(S(0.5), S(1.9));
         const Index layers = 1 + random.index(5), sweeps = 1 + random.index(4);
         const Index v = random.index(162), w = random.index(162);
         if (network.pinned(v) || network.pinned(w)) continue;
-        const SolverOptions<S> options{.layers = layers, .sweeps = sweeps, .negligible_force = S(1e-30)};
+        const SolverOptions<S> options{.layers = layers, .sweeps = sweeps, .force_tolerance = S(1e-30)};
         const Points<S> x0 = test::jittered(mesh.positions(), S(0.02), random);
         const Vector3<S> target = point(x0, v) + S(0.2) * random.vector<S>();
         const Vector3<S> other = point(x0, w) + S(0.2) * random.vector<S>();
         const auto check = [&](auto solver, auto compliance) {
             Points<S> x = x0, expected = x0;
-            const auto report = solver.step(x, dt, network, backing, pull(v, target), pull(w, other));
+            const auto report = solver.step(x, dt, network, foundation, pull(v, target), pull(w, other));
             REQUIRE(report.status == StepStatus::advanced);
             expected.col(v) = target;
             expected.col(w) = other;
@@ -166,7 +167,7 @@ TEMPLATE_TEST_CASE("a step is the sweeps over the queue, with either rule", "[so
             for (const Index u : solver.queue().vertices()) order.push_back(u);
             // The damping is measured from where vertices were before the step: for the held ones, too, but they do
             // not move in a sweep.
-            sweep_by_hand<S>(expected, dt, network, backing, order, {v, w}, sweeps, compliance);
+            sweep_by_hand<S>(expected, dt, network, foundation, order, {v, w}, sweeps, compliance);
             REQUIRE((x - expected).cwiseAbs().maxCoeff() <= 100 * std::numeric_limits<S>::epsilon());
         };
         check(QuasiStaticSolver(network, options, MassStep{}), [&](Index u, S) { return dt * dt / network.mass(u); });
@@ -188,13 +189,14 @@ TEST_CASE("in a step from rest nothing outside the queue moves by a bit", "[solv
             if (random.chance(0.1)) k = 0;
         }
         const Linear<double> network(mesh, LinearSpring{}, {.stiffness = stiffness});
-        const VirtualVolumeSprings backing(mesh, {.stiffness = 0.5});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = 0.5});
         QuasiStaticSolver solver(network, {.layers = random.index(4), .sweeps = 1 + random.index(5)});
         const Index v = random.index(mesh.vertex_count()), w = random.index(mesh.vertex_count());
         const double size = (surface.x.rowwise().maxCoeff() - surface.x.rowwise().minCoeff()).maxCoeff();
         Points<double> x = mesh.positions();
-        const auto report = solver.step(x, 1e-3, network, backing, pull(v, point(x, v) + 0.1 * size * random.vector()),
-                                        pull(w, point(x, w) + 0.1 * size * random.vector()));
+        const auto report =
+            solver.step(x, 1e-3, network, foundation, pull(v, point(x, v) + 0.1 * size * random.vector()),
+                        pull(w, point(x, w) + 0.1 * size * random.vector()));
         REQUIRE(report.status == StepStatus::advanced);
         // Two seeds in one queue; what is said to have moved is what has.
         const auto seeds = solver.queue().layer(0);
@@ -213,31 +215,31 @@ TEST_CASE("at rest nothing is visited and nothing moves", "[solver][queue]") {
     const Sphere<double> sphere;
     QuasiStaticSolver solver(sphere.network, {.layers = 4, .sweeps = 4});
     Points<double> x = sphere.mesh.positions();
-    const auto untouched = solver.step(x, 1e-3, sphere.network, sphere.backing);
+    const auto untouched = solver.step(x, 1e-3, sphere.network, sphere.foundation);
     CHECK(untouched.converged);
-    CHECK(untouched.visits == 0);
+    CHECK(untouched.vertex_updates == 0);
     CHECK(untouched.residual == 0);
 
     const Vector3<double> target = sphere.raised(7, 0.2);
-    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.backing, pull(7, target)).converged);
+    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation, pull(7, target)).converged);
     // Held still, the queue is looked at and nothing moves.
     Points<double> before = x;
     for (int i = 0; i < 10; ++i) {
-        const auto held = solver.step(x, 1e-3, sphere.network, sphere.backing, pull(7, target));
+        const auto held = solver.step(x, 1e-3, sphere.network, sphere.foundation, pull(7, target));
         CHECK(held.converged);
         CHECK(held.moved.empty());
-        CHECK(held.visits <= 2 * static_cast<Index>(solver.queue().vertices().size()));
+        CHECK(held.vertex_updates <= 2 * static_cast<Index>(solver.queue().vertices().size()));
         CHECK(same_bits(x, before));
     }
     // Let go, it comes back to rest, and then costs nothing.
-    CHECK_FALSE(solver.step(x, 1e-3, sphere.network, sphere.backing).converged);
-    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.backing).converged);
-    CHECK(sphere.residual(x) <= sphere.network.negligible_force());
+    CHECK_FALSE(solver.step(x, 1e-3, sphere.network, sphere.foundation).converged);
+    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
+    CHECK(sphere.residual(x) <= sphere.network.force_tolerance());
     before = x;
     for (int i = 0; i < 10; ++i) {
-        const auto rest = solver.step(x, 1e-3, sphere.network, sphere.backing);
+        const auto rest = solver.step(x, 1e-3, sphere.network, sphere.foundation);
         CHECK(rest.converged);
-        CHECK(rest.visits == 0);
+        CHECK(rest.vertex_updates == 0);
         CHECK(rest.moved.empty());
         CHECK(same_bits(x, before));
     }
@@ -248,29 +250,30 @@ TEST_CASE("what a moving seed leaves behind relaxes all the way", "[solver][queu
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Sphere<double> sphere;
-        const Index most_visits = random.chance(0.5) ? unlimited : 200 + random.index(500);
-        CAPTURE(most_visits);
-        QuasiStaticSolver solver(sphere.network,
-                                 {.layers = random.index(5), .sweeps = 1 + random.index(4), .most_visits = most_visits},
-                                 SafeStep{.omega = random.number(0.8, 1.8)});
+        const Index max_vertex_updates = random.chance(0.5) ? unlimited : 200 + random.index(500);
+        CAPTURE(max_vertex_updates);
+        QuasiStaticSolver solver(
+            sphere.network,
+            {.layers = random.index(5), .sweeps = 1 + random.index(4), .max_vertex_updates = max_vertex_updates},
+            SafeStep{.omega = random.number(0.8, 1.8)});
         Points<double> x = sphere.mesh.positions();
         // A path over the mesh, from neighbour to neighbour, a few ticks at each vertex.
         Index v = random.index(162);
         for (int i = 0; i < 40; ++i) {
             for (int tick = random.index(3); tick >= 0; --tick) {
                 const auto report =
-                    solver.step(x, 1e-3, sphere.network, sphere.backing, pull(v, sphere.raised(v, -0.2)));
+                    solver.step(x, 1e-3, sphere.network, sphere.foundation, pull(v, sphere.raised(v, -0.2)));
                 REQUIRE(report.status == StepStatus::advanced);
             }
             const auto ends = sphere.network.springs_of(v);
             v = ends[static_cast<std::size_t>(random.index(static_cast<Index>(ends.size())))].other;
         }
-        const auto report = test::settle(solver, x, 1e-3, sphere.network, sphere.backing);
+        const auto report = test::settle(solver, x, 1e-3, sphere.network, sphere.foundation);
         REQUIRE(report.converged);
         // A vertex that no layer ever reached may have a little from each of its neighbours.
-        REQUIRE(sphere.residual(x) <= 6 * sphere.network.negligible_force());
+        REQUIRE(sphere.residual(x) <= 6 * sphere.network.force_tolerance());
         REQUIRE((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() < 1e-7);
-        REQUIRE(solver.step(x, 1e-3, sphere.network, sphere.backing).visits == 0);
+        REQUIRE(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates == 0);
     }
 }
 
@@ -283,14 +286,14 @@ TEST_CASE("a load or a held point that is taken away leaves nothing behind", "[s
     const auto check = [&](const auto& constraint) {
         QuasiStaticSolver solver(sphere.network, {.layers = 3, .sweeps = 4});
         Points<double> x = sphere.mesh.positions();
-        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.backing, constraint).converged);
+        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation, constraint).converged);
         REQUIRE((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() > 0.01);
-        REQUIRE_FALSE(solver.step(x, 1e-3, sphere.network, sphere.backing).converged);
-        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.backing).converged);
+        REQUIRE_FALSE(solver.step(x, 1e-3, sphere.network, sphere.foundation).converged);
+        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
         REQUIRE((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() < 1e-7);
     };
     check(load<double>(corners, weights, 0.2 * place));
-    check(HeldPoint<double>{5, corners, weights, 1.2 * place});
+    check(PointAttachment<double>{5, corners, weights, 1.2 * place});
 }
 
 TEST_CASE("a step visits no more than it may, and its seeds in any case", "[solver][queue]") {
@@ -299,21 +302,21 @@ TEST_CASE("a step visits no more than it may, and its seeds in any case", "[solv
         Random random(static_cast<std::uint64_t>(seed));
         const Sphere<double> sphere;
         const Index sweeps = 1 + random.index(5), most = 1 + random.index(300);
-        QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = sweeps, .most_visits = most});
+        QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = sweeps, .max_vertex_updates = most});
         Points<double> x = sphere.mesh.positions();
         for (int i = 0; i < 30; ++i) {
             const Index v = random.index(162), w = random.index(162);
-            const auto report = solver.step(x, 1e-3, sphere.network, sphere.backing, pull(v, sphere.raised(v, 0.1)),
+            const auto report = solver.step(x, 1e-3, sphere.network, sphere.foundation, pull(v, sphere.raised(v, 0.1)),
                                             pull(w, sphere.raised(w, -0.1)));
             REQUIRE(report.status == StepStatus::advanced);
-            REQUIRE(report.visits <= std::max(most, 3 * (sweeps + 1)));
+            REQUIRE(report.vertex_updates <= std::max(most, 3 * (sweeps + 1)));
             REQUIRE(point(x, w) == sphere.raised(w, -0.1));
         }
         int ticks = 0;
         for (bool done = false; !done; ++ticks) {
             REQUIRE(ticks < 1'000'000);
-            const auto report = solver.step(x, 1e-3, sphere.network, sphere.backing);
-            REQUIRE(report.visits <= std::max(most, sweeps + 1));
+            const auto report = solver.step(x, 1e-3, sphere.network, sphere.foundation);
+            REQUIRE(report.vertex_updates <= std::max(most, sweeps + 1));
             done = report.converged;
         }
         REQUIRE((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() < 1e-7);
@@ -327,29 +330,30 @@ TEST_CASE("what layer 0 is visited more often is taken off the rest", "[solver][
         const Sphere<double> sphere;
         const Index sweeps = 1 + random.index(5), visits = 1 + random.index(6), most = 1 + random.index(500);
         QuasiStaticSolver solver(
-            sphere.network, {.layers = unlimited, .sweeps = sweeps, .contact_visits = visits, .most_visits = most});
+            sphere.network,
+            {.layers = unlimited, .sweeps = sweeps, .contact_iterations = visits, .max_vertex_updates = most});
         Points<double> x = sphere.mesh.positions();
         const auto triangle = sphere.mesh.triangles().col(random.index(320));
         const std::array<Index, 3> corners{triangle[0], triangle[1], triangle[2]};
         for (int i = 0; i < 30; ++i) {
-            const auto report = solver.step(x, 1e-3, sphere.network, sphere.backing,
+            const auto report = solver.step(x, 1e-3, sphere.network, sphere.foundation,
                                             load<double>(corners, random.barycentric(), 0.1 * random.vector()));
             REQUIRE(report.status == StepStatus::advanced);
-            REQUIRE(report.visits <= std::max(most, 3 * (sweeps * visits + 1) + sweeps + 1));
+            REQUIRE(report.vertex_updates <= std::max(most, 3 * (sweeps * visits + 1) + sweeps + 1));
         }
     }
 }
 
 TEST_CASE("a step that may not visit all of its queue does not call it converged", "[solver][queue]") {
     const Sphere<double> sphere;
-    QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 4, .most_visits = 100});
+    QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 4, .max_vertex_updates = 100});
     Points<double> x = sphere.mesh.positions();
     for (int i = 0; i < 2000; ++i) {
-        const auto report = solver.step(x, 1e-3, sphere.network, sphere.backing, pull(3, sphere.raised(3, 0.2)));
-        if (report.converged) REQUIRE(sphere.residual(x, {3}) <= sphere.network.negligible_force());
+        const auto report = solver.step(x, 1e-3, sphere.network, sphere.foundation, pull(3, sphere.raised(3, 0.2)));
+        if (report.converged) REQUIRE(sphere.residual(x, {3}) <= sphere.network.force_tolerance());
     }
     // What it left undone is not forgotten when the seed goes.
-    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.backing).converged);
+    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
     CHECK((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() < 1e-7);
 }
 
@@ -363,15 +367,15 @@ TEST_CASE("converged says that no vertex that may move is out of balance", "[sol
         Points<double> x = sphere.mesh.positions();
         for (int i = 0; i < 400; ++i) {
             const Index v = (i / 200) * 50;
-            const auto report = solver.step(x, 1e-3, sphere.network, sphere.backing, pull(v, sphere.raised(v, 0.2)));
+            const auto report = solver.step(x, 1e-3, sphere.network, sphere.foundation, pull(v, sphere.raised(v, 0.2)));
             const double residual = sphere.residual(x, {v});
             REQUIRE(report.residual == Approx(residual).margin(1e-15));
-            if (report.converged) REQUIRE(residual <= sphere.network.negligible_force());
+            if (report.converged) REQUIRE(residual <= sphere.network.force_tolerance());
         }
         const auto hold = pull(50, sphere.raised(50, 0.2));
-        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.backing, hold).converged);
+        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation, hold).converged);
         for (int i = 0; i < 10; ++i) {
-            REQUIRE(solver.step(x, 1e-3, sphere.network, sphere.backing, hold).converged);
+            REQUIRE(solver.step(x, 1e-3, sphere.network, sphere.foundation, hold).converged);
         }
     }
 }
@@ -381,35 +385,36 @@ TEST_CASE("vertices are woken by name, or all at once", "[solver]") {
     QuasiStaticSolver solver(sphere.network, {.layers = 0, .sweeps = 4});
     Points<double> x = sphere.mesh.positions();
     x.col(9) *= 1.1;
-    CHECK(solver.step(x, 1e-3, sphere.network, sphere.backing).visits == 0);  // nobody has told it
+    CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates == 0);  // nobody has told it
     const std::vector<Index> moved{9};
     solver.wake(moved);
-    CHECK(solver.step(x, 1e-3, sphere.network, sphere.backing).visits > 0);
+    CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates > 0);
     // Its neighbours were never looked at; to have them follow, wake them.
     solver.wake_all();
-    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.backing).converged);
+    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
     CHECK((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() < 1e-7);
     x.col(9) *= 1.1;
     solver.wake_all();
     solver.reset();
-    CHECK(solver.step(x, 1e-3, sphere.network, sphere.backing).visits == 0);
+    CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates == 0);
     CHECK(solver.queue().vertices().empty());
 }
 
 TEST_CASE("what is remembered is a cache: to drop it changes no equilibrium", "[solver]") {
     const Sphere<double> sphere;
-    const SolverOptions<double> options{.layers = unlimited, .sweeps = 10, .negligible_force = 1e-13};
+    const SolverOptions<double> options{.layers = unlimited, .sweeps = 10, .force_tolerance = 1e-13};
     QuasiStaticSolver first(sphere.network, options), second(sphere.network, options);
     Points<double> x = sphere.mesh.positions(), y = x;
     const std::array<Index, 3> corners{sphere.mesh.triangles()(0, 5), sphere.mesh.triangles()(1, 5),
                                        sphere.mesh.triangles()(2, 5)};
-    const HeldPoint<double> held{5, corners, {0.2, 0.3, 0.5}, 1.2 * point_at(triangle_at(x, corners), {0.2, 0.3, 0.5})};
-    const auto report = test::settle(first, x, 1e-3, sphere.network, sphere.backing, held);
+    const PointAttachment<double> held{
+        5, corners, {0.2, 0.3, 0.5}, 1.2 * point_at(triangle_at(x, corners), {0.2, 0.3, 0.5})};
+    const auto report = test::settle(first, x, 1e-3, sphere.network, sphere.foundation, held);
     REQUIRE(report.converged);
     StepReport<double> other;
     for (int i = 0; i < 2000; ++i) {
         if (i < 500 && i % 7 == 0) second.reset();
-        other = second.step(y, 1e-3, sphere.network, sphere.backing, held);
+        other = second.step(y, 1e-3, sphere.network, sphere.foundation, held);
     }
     REQUIRE(other.converged);
     CHECK((x - y).cwiseAbs().maxCoeff() < 1e-11);
@@ -422,23 +427,23 @@ TEST_CASE("a single vertex recovers in the time k_d / k_v, whatever the number o
     const double k = 8, d = 0.02, dt = 1e-3;
     const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
     const Linear<double> network(mesh, LinearSpring{}, {.stiffness = 0.0});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = k, .damping = d});
-    const Vector3<double> way(0.03, -0.05, 0.08);
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = k, .damping = d});
+    const Vector3<double> displacement(0.03, -0.05, 0.08);
     for (const double omega : {1.0, 1.5}) {
         for (const Index sweeps : {1, 2, 5, 50}) {
             if (omega != 1 && sweeps < 50) continue;  // only the exact step needs no second one
             CAPTURE(omega, sweeps);
-            QuasiStaticSolver solver(network, {.layers = 2, .sweeps = sweeps, .negligible_force = 1e-15},
+            QuasiStaticSolver solver(network, {.layers = 2, .sweeps = sweeps, .force_tolerance = 1e-15},
                                      SafeStep{.omega = omega});
             Points<double> x = mesh.positions();
-            x.col(5) += way;
+            x.col(5) += displacement;
             solver.wake_all();
             double expected = 1;
             for (int tick = 0; tick < 20; ++tick) {
-                (void)solver.step(x, dt, network, backing);
+                (void)solver.step(x, dt, network, foundation);
                 expected /= 1 + k * dt / d;  // the closed form of implicit Euler
                 const Vector3<double> left = point(x, 5) - point(mesh.positions(), 5);
-                REQUIRE(norm<double>(left - expected * way) < 1e-12);
+                REQUIRE(norm<double>(left - expected * displacement) < 1e-12);
             }
         }
     }
@@ -450,18 +455,19 @@ TEST_CASE("a whole membrane recovers in that time, too, and all the way", "[solv
     const double k = 8, d = 0.02, dt = 1e-3;
     const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
     const Linear<double> network(mesh, LinearSpring{}, {.stiffness = 1.0});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = k, .damping = d});
-    const Vector3<double> way(0.03, -0.05, 0.08);
-    QuasiStaticSolver solver(network, {.layers = 2, .sweeps = 100, .negligible_force = 1e-12});
-    Points<double> x = mesh.positions().colwise() + way.eigen();
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = k, .damping = d});
+    const Vector3<double> displacement(0.03, -0.05, 0.08);
+    QuasiStaticSolver solver(network, {.layers = 2, .sweeps = 100, .force_tolerance = 1e-12});
+    Points<double> x = mesh.positions().colwise() + displacement.eigen();
     solver.wake_all();
     double expected = 1;
     for (int tick = 0; tick < 40; ++tick) {
-        (void)solver.step(x, dt, network, backing);
+        (void)solver.step(x, dt, network, foundation);
         expected /= 1 + k * dt / d;
-        REQUIRE((x - (mesh.positions().colwise() + (expected * way).eigen())).cwiseAbs().maxCoeff() < 2e-3 * norm(way));
+        REQUIRE((x - (mesh.positions().colwise() + (expected * displacement).eigen())).cwiseAbs().maxCoeff() <
+                2e-3 * norm(displacement));
     }
-    const auto report = test::settle(solver, x, dt, network, backing);
+    const auto report = test::settle(solver, x, dt, network, foundation);
     REQUIRE(report.converged);
     CHECK((x - mesh.positions()).cwiseAbs().maxCoeff() < 1e-10);
 }
@@ -476,15 +482,15 @@ TEST_CASE("damping delays what is left behind, and does not keep it from coming 
         for (int i = 0; i < 100; ++i) {
             (void)solver.step(x, 1e-3, sphere.network, damped, pull(7, sphere.raised(7, 0.2)));
         }
-        double way = 1;
+        double displacement = 1;
         for (int i = 0; i < 20'000; ++i) {
             const auto report = solver.step(x, 1e-3, sphere.network, damped);
             const double now = (x - sphere.mesh.positions()).norm();
-            REQUIRE(now <= way + 1e-12);
-            way = now;
+            REQUIRE(now <= displacement + 1e-12);
+            displacement = now;
             if (report.converged) break;
         }
-        CHECK(way < 1e-6);
+        CHECK(displacement < 1e-6);
     }
 }
 
@@ -498,7 +504,7 @@ template <class S, class Rule, class Step>
 StepStatus status_of_refused(const Sphere<S>& sphere, QuasiStaticSolver<S, Rule> solver, Step bad_step) {
     Points<S> x = sphere.mesh.positions();
     const auto good_step = [&](auto& the_solver, Points<S>& at) {
-        return the_solver.step(at, S(0.1), sphere.network, sphere.backing, pull(7, sphere.raised(7, S(0.1))));
+        return the_solver.step(at, S(0.1), sphere.network, sphere.foundation, pull(7, sphere.raised(7, S(0.1))));
     };
     for (int i = 0; i < 5; ++i) REQUIRE(good_step(solver, x).status == StepStatus::advanced);
     auto spared = solver;
@@ -519,17 +525,17 @@ StepStatus status_of_refused(const Sphere<S>& sphere, QuasiStaticSolver<S, Rule>
 /// A constraint of each kind that makes sense; all in one step, so that a step is compiled once for them.
 template <class S>
 struct OneOfEach {
-    HeldVertex<S> pulled = pull(20, Vector3<S>(1, 1, 1));
-    Pinned pinned = pin({});
-    Load<S> loaded = load({3, 4, 5}, Vector3<S>(S(0.2), S(0.3), S(0.5)), Vector3<S>(0, 0, S(0.01)));
-    HeldPoint<S> held{};
-    Press<S> pressed = press(Tool<S>{.position = {0, 0, 2}, .radius = S(0.1)}, Contact<S>::none());
+    VertexAttachment<S> pulled = pull(20, Vector3<S>(1, 1, 1));
+    PinnedVertices pinned = pin({});
+    PointLoad<S> loaded = load({3, 4, 5}, Vector3<S>(S(0.2), S(0.3), S(0.5)), Vector3<S>(0, 0, S(0.01)));
+    PointAttachment<S> held{};
+    ToolContact<S> pressed = press(Tool<S>{.position = {0, 0, 2}, .radius = S(0.1)}, Contact<S>::none());
 
-    void take(const HeldVertex<S>& other) { pulled = other; }
-    void take(const Pinned& other) { pinned = other; }
-    void take(const Load<S>& other) { loaded = other; }
-    void take(const HeldPoint<S>& other) { held = other; }
-    void take(const Press<S>& other) { pressed = other; }
+    void take(const VertexAttachment<S>& other) { pulled = other; }
+    void take(const PinnedVertices& other) { pinned = other; }
+    void take(const PointLoad<S>& other) { loaded = other; }
+    void take(const PointAttachment<S>& other) { held = other; }
+    void take(const ToolContact<S>& other) { pressed = other; }
 };
 
 }  // namespace
@@ -541,7 +547,7 @@ TEMPLATE_TEST_CASE("a bad time step is refused, and nothing has moved", "[solver
     for (const S dt : {S(0), -S(0), S(-1e-3), Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity()}) {
         CAPTURE(dt);
         CHECK(status_of_refused(sphere, QuasiStaticSolver(sphere.network), [&](auto& solver, Points<S>& x) {
-                  return solver.step(x, dt, sphere.network, sphere.backing, pull(3, sphere.raised(3, S(0.1))));
+                  return solver.step(x, dt, sphere.network, sphere.foundation, pull(3, sphere.raised(3, S(0.1))));
               }) == StepStatus::bad_time_step);
     }
 }
@@ -552,7 +558,7 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
     using Limits = std::numeric_limits<S>;
     const Sphere<S> sphere;
     const auto step = [&](auto& solver, Points<S>& x, const OneOfEach<S>& all) {
-        return solver.step(x, S(0.1), sphere.network, sphere.backing, pull(3, sphere.raised(3, S(0.1))), all.pulled,
+        return solver.step(x, S(0.1), sphere.network, sphere.foundation, pull(3, sphere.raised(3, S(0.1))), all.pulled,
                            all.pinned, all.loaded, all.held, all.pressed);
     };
     QuasiStaticSolver spared(sphere.network);
@@ -563,7 +569,7 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
         all.take(constraint);
         return status_of_refused(sphere, QuasiStaticSolver(sphere.network), [&](auto& solver, Points<S>& x) {
                    return step(solver, x, all);
-               }) == StepStatus::bad_input;
+               }) == StepStatus::invalid_input;
     };
     const Vector3<S> inside(S(0.2), S(0.3), S(0.5)), somewhere(1, 1, 1);
     for (const Index wrong :
@@ -573,7 +579,7 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
         CHECK(refused(pull(wrong, somewhere)));
         CHECK(refused(pin(list)));
         CHECK(refused(load({3, 4, wrong}, inside, somewhere)));
-        CHECK(refused(HeldPoint<S>{0, {wrong, 3, 4}, inside, somewhere}));
+        CHECK(refused(PointAttachment<S>{0, {wrong, 3, 4}, inside, somewhere}));
     }
     for (const S bad : {Limits::quiet_NaN(), Limits::infinity(), -Limits::infinity()}) {
         CAPTURE(bad);
@@ -581,8 +587,8 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
         CHECK(refused(pull(5, wrong)));
         CHECK(refused(load({3, 4, 5}, inside, wrong)));
         CHECK(refused(load({3, 4, 5}, wrong, somewhere)));
-        CHECK(refused(HeldPoint<S>{0, {3, 4, 5}, inside, wrong}));
-        CHECK(refused(HeldPoint<S>{0, {3, 4, 5}, wrong, somewhere}));
+        CHECK(refused(PointAttachment<S>{0, {3, 4, 5}, inside, wrong}));
+        CHECK(refused(PointAttachment<S>{0, {3, 4, 5}, wrong, somewhere}));
         CHECK(refused(press(Tool<S>{.position = wrong}, Contact<S>::none())));
         CHECK(refused(press(Tool<S>{.position = somewhere, .velocity = wrong}, Contact<S>::none())));
     }
@@ -599,18 +605,18 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
     CHECK(refused_with([](auto& c) { c.corners[1] = no_index; }));
     CHECK(refused_with([](auto& c) { c.corners[2] = 162; }));
     CHECK(refused_with([](auto& c) { c.gap = Limits::quiet_NaN(); }));
-    CHECK(refused_with([](auto& c) { c.on_axis.x() = Limits::infinity(); }));
+    CHECK(refused_with([](auto& c) { c.axis_point.x() = Limits::infinity(); }));
     CHECK(refused_with([](auto& c) { c.radius = 0; }));
-    const std::vector<TouchedTriangle> elsewhere{{0, {0, 1, 162}}};
-    CHECK(refused_with([&](auto& c) { c.touched = elsewhere; }));
-    CHECK(refused_with([&](auto& c) { c.watched = elsewhere; }));
+    const std::vector<ContactTriangle> elsewhere{{0, {0, 1, 162}}};
+    CHECK(refused_with([&](auto& c) { c.triangles = elsewhere; }));
+    CHECK(refused_with([&](auto& c) { c.candidates = elsewhere; }));
     const std::vector<ContactPoint<S>> points_elsewhere{{0, 0, {0, 1, 162}}};
     CHECK(refused_with([&](auto& c) { c.points = points_elsewhere; }));
     Contact<S> made_up;
     made_up.phase = ContactPhase::ongoing;
     CHECK(refused(press(tool, made_up)));
     CHECK(refused(load({3, 4, 5}, Vector3<S>(S(-0.5), S(1), S(0.5)), somewhere)));
-    CHECK(refused(HeldPoint<S>{0, {3, 4, 5}, Vector3<S>(S(0.5), S(0.5), S(0.5)), somewhere}));
+    CHECK(refused(PointAttachment<S>{0, {3, 4, 5}, Vector3<S>(S(0.5), S(0.5), S(0.5)), somewhere}));
 }
 
 TEMPLATE_TEST_CASE("positions that are no numbers are refused, and nothing has moved", "[solver][bad]", double, float) {
@@ -625,8 +631,8 @@ TEMPLATE_TEST_CASE("positions that are no numbers are refused, and nothing has m
             const Points<S> before = x;
             QuasiStaticSolver solver(sphere.network, {.layers = unlimited});
             const auto report =
-                solver.step(x, S(0.1), sphere.network, sphere.backing, pull(7, sphere.raised(7, S(0.1))));
-            CHECK(report.status == StepStatus::bad_input);
+                solver.step(x, S(0.1), sphere.network, sphere.foundation, pull(7, sphere.raised(7, S(0.1))));
+            CHECK(report.status == StepStatus::invalid_input);
             CHECK(same_bits(x, before));
         }
     }
@@ -637,8 +643,8 @@ TEMPLATE_TEST_CASE("a target so far off that forces are no numbers is bad input"
     const Sphere<S> sphere;
     const Vector3<S> far(0, (std::numeric_limits<S>::max)(), 0);
     CHECK(status_of_refused(sphere, QuasiStaticSolver(sphere.network), [&](auto& solver, Points<S>& x) {
-              return solver.step(x, S(0.1), sphere.network, sphere.backing, pull(3, far));
-          }) == StepStatus::bad_input);
+              return solver.step(x, S(0.1), sphere.network, sphere.foundation, pull(3, far));
+          }) == StepStatus::invalid_input);
 }
 
 namespace {
@@ -661,7 +667,7 @@ TEMPLATE_TEST_CASE("a rule that runs away is called unstable, and nothing has mo
     const MassSpringNetwork network(sphere.mesh, Runaway{}, NetworkOptions<S>{.stiffness = S(1)});
     QuasiStaticSolver runs_away(network, {.sweeps = 50}, SafeStep{});
     CHECK(status_of_refused(sphere, runs_away, [&](auto& solver, Points<S>& x) {
-              return solver.step(x, S(0.1), network, sphere.backing, pull(3, sphere.raised(3, S(0.02))));
+              return solver.step(x, S(0.1), network, sphere.foundation, pull(3, sphere.raised(3, S(0.02))));
           }) == StepStatus::unstable);
 }
 
@@ -670,22 +676,22 @@ TEST_CASE("waking what is no vertex wakes nobody", "[solver][bad]") {
     QuasiStaticSolver solver(sphere.network);
     solver.wake(std::vector<Index>{-1, 162, std::numeric_limits<Index>::max(), std::numeric_limits<Index>::min()});
     Points<double> x = sphere.mesh.positions();
-    CHECK(solver.step(x, 1e-3, sphere.network, sphere.backing).visits == 0);
+    CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates == 0);
 }
 
 TEMPLATE_TEST_CASE("more touches than there is room for are refused, and nothing has moved", "[solver][bad]", double,
                    float) {
     using S = TestType;
     const Sphere<S> sphere;
-    const HeldPoint<S> first{0, {3, 4, 5}, {S(0.2), S(0.3), S(0.5)}, {0, 0, 1}};
-    const HeldPoint<S> second{1, {6, 7, 8}, {S(0.2), S(0.3), S(0.5)}, {0, 1, 0}};
-    CHECK(status_of_refused(sphere, QuasiStaticSolver(sphere.network, {.most_touches = 1}),
+    const PointAttachment<S> first{0, {3, 4, 5}, {S(0.2), S(0.3), S(0.5)}, {0, 0, 1}};
+    const PointAttachment<S> second{1, {6, 7, 8}, {S(0.2), S(0.3), S(0.5)}, {0, 1, 0}};
+    CHECK(status_of_refused(sphere, QuasiStaticSolver(sphere.network, {.max_contact_points = 1}),
                             [&](auto& solver, Points<S>& x) {
-                                return solver.step(x, S(0.1), sphere.network, sphere.backing, first, second);
-                            }) == StepStatus::too_many_touches);
-    QuasiStaticSolver roomy(sphere.network, {.most_touches = 2});
+                                return solver.step(x, S(0.1), sphere.network, sphere.foundation, first, second);
+                            }) == StepStatus::too_many_contact_points);
+    QuasiStaticSolver roomy(sphere.network, {.max_contact_points = 2});
     Points<S> x = sphere.mesh.positions();
-    CHECK(roomy.step(x, S(0.1), sphere.network, sphere.backing, first, second).status == StepStatus::advanced);
+    CHECK(roomy.step(x, S(0.1), sphere.network, sphere.foundation, first, second).status == StepStatus::advanced);
 }
 
 TEMPLATE_TEST_CASE("wild targets come to a safe outcome", "[solver][bad]", double, float) {
@@ -699,14 +705,14 @@ TEMPLATE_TEST_CASE("wild targets come to a safe outcome", "[solver][bad]", doubl
         for (int i = 0; i < 20; ++i) {
             const Points<S> before = x;
             const auto report =
-                solver.step(x, S(0.1), sphere.network, sphere.backing, pull(7, Vector3<S>(far, 0, far)));
+                solver.step(x, S(0.1), sphere.network, sphere.foundation, pull(7, Vector3<S>(far, 0, far)));
             REQUIRE(is_finite(x));
             REQUIRE(is_finite(report.residual));
             REQUIRE(is_finite(report.reactions[0]));
             if (report.status != StepStatus::advanced) REQUIRE(same_bits(x, before));
         }
-        // Let go, it comes back: the backing is half as stiff as a spring.
-        const auto report = test::settle(solver, x, S(0.1), sphere.network, sphere.backing);
+        // Let go, it comes back: the foundation is half as stiff as a spring.
+        const auto report = test::settle(solver, x, S(0.1), sphere.network, sphere.foundation);
         REQUIRE(report.status == StepStatus::advanced);
         REQUIRE(is_finite(x));
     }
@@ -722,17 +728,18 @@ TEMPLATE_TEST_CASE("options out of range are refused by name", "[solver][bad]", 
     };
     const std::string name = "QuasiStaticSolver: ";
     CHECK(refused({}) == "");
-    CHECK(refused({.layers = 0, .sweeps = 1, .most_visits = 1, .negligible_force = 0, .most_touches = 0}) == "");
-    CHECK(refused({.layers = unlimited, .sweeps = 1000, .most_visits = unlimited}) == "");
+    CHECK(refused({.layers = 0, .sweeps = 1, .max_vertex_updates = 1, .force_tolerance = 0, .max_contact_points = 0}) ==
+          "");
+    CHECK(refused({.layers = unlimited, .sweeps = 1000, .max_vertex_updates = unlimited}) == "");
     CHECK(refused({.layers = -1}) == name + "layers must be at least 0, got -1");
     CHECK(refused({.sweeps = 0}) == name + "sweeps must be at least 1, got 0");
     CHECK(refused({.sweeps = -4}) == name + "sweeps must be at least 1, got -4");
-    CHECK(refused({.most_visits = 0}) == name + "most_visits must be at least 1, got 0");
-    CHECK(refused({.most_touches = -1}) == name + "most_touches must be at least 0, got -1");
-    const std::string force = name + "negligible_force must be finite and not negative [N], got ";
-    CHECK(refused({.negligible_force = -1}) == force + "-1");
-    CHECK(refused({.negligible_force = Limits::quiet_NaN()}) == force + "nan");
-    CHECK(refused({.negligible_force = Limits::infinity()}) == force + "inf");
+    CHECK(refused({.max_vertex_updates = 0}) == name + "max_vertex_updates must be at least 1, got 0");
+    CHECK(refused({.max_contact_points = -1}) == name + "max_contact_points must be at least 0, got -1");
+    const std::string force = name + "force_tolerance must be finite and not negative [N], got ";
+    CHECK(refused({.force_tolerance = -1}) == force + "-1");
+    CHECK(refused({.force_tolerance = Limits::quiet_NaN()}) == force + "nan");
+    CHECK(refused({.force_tolerance = Limits::infinity()}) == force + "inf");
     CHECK(test::refusal([&] { QuasiStaticSolver solver(network, {}, MassStep{}); }) ==
           name + "the rule needs masses [kg], the network has none");
     CHECK(test::refusal([&] { QuasiStaticSolver solver(network, {}, SafeStep{.omega = 2}); }) ==
@@ -745,9 +752,9 @@ TEST_CASE("points of another count, and networks of another membrane, are broken
     const Linear<double> other(icosphere({.subdivisions = 1}), LinearSpring{}, {.stiffness = 1.0});
     QuasiStaticSolver solver(sphere.network);
     Points<double> x = sphere.mesh.positions(), fewer = x.leftCols(161);
-    CHECK(test::in_child([&] { (void)solver.step(x, 0.1, sphere.network, NoVolumeSprings{}); }).signal == 0);
-    CHECK(test::in_child([&] { (void)solver.step(fewer, 0.1, sphere.network, NoVolumeSprings{}); }).signal == SIGABRT);
-    CHECK(test::in_child([&] { (void)solver.step(x, 0.1, other, NoVolumeSprings{}); }).signal == SIGABRT);
+    CHECK(test::in_child([&] { (void)solver.step(x, 0.1, sphere.network, NoFoundation{}); }).signal == 0);
+    CHECK(test::in_child([&] { (void)solver.step(fewer, 0.1, sphere.network, NoFoundation{}); }).signal == SIGABRT);
+    CHECK(test::in_child([&] { (void)solver.step(x, 0.1, other, NoFoundation{}); }).signal == SIGABRT);
 }
 #endif
 
@@ -767,14 +774,14 @@ template <class S, class Rule>
 Outcome<S> scaled_run(S factor, S size, const Rule& rule) {
     const auto mesh = icosphere<S>({.radius = static_cast<double>(size), .subdivisions = 2});
     const Linear<S> network(mesh, LinearSpring{}, {.stiffness = factor, .mass = factor / 10});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = S(0.5) * factor, .damping = S(0.05) * factor});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = S(0.5) * factor, .damping = S(0.05) * factor});
     QuasiStaticSolver solver(network, {.layers = 4, .sweeps = 4}, rule);
     Points<S> x = mesh.positions();
     const Vector3<S> target = S(1.2) * point(x, 7), force = factor * size * Vector3<S>(0, S(0.3), S(0.1));
     const std::array<Index, 3> corners{mesh.triangles()(0, 99), mesh.triangles()(1, 99), mesh.triangles()(2, 99)};
     StepReport<S> report;
     for (int i = 0; i < 40; ++i) {
-        report = solver.step(x, S(0.1), network, backing, pull(7, target),
+        report = solver.step(x, S(0.1), network, foundation, pull(7, target),
                              load(corners, Vector3<S>(S(0.25), S(0.25), S(0.5)), force));
         REQUIRE(report.status == StepStatus::advanced);
     }
@@ -812,7 +819,7 @@ namespace {
 /// All of a user's parts.
 struct Parts {
     Sphere<double> sphere;
-    VirtualVolumeSprings<double> damped{sphere.mesh, VolumeOptions<double>{.stiffness = 0.5, .damping = 0.05}};
+    VirtualVolumeSprings<double> damped{sphere.mesh, VolumeSpringOptions<double>{.stiffness = 0.5, .damping = 0.05}};
     QuasiStaticSolver<double> solver{sphere.network, SolverOptions<double>{.layers = 3, .sweeps = 3}};
     Points<double> x = sphere.mesh.positions();
     Index at = 0;
@@ -822,7 +829,7 @@ struct Parts {
                                            sphere.mesh.triangles()(2, at % 320)};
         const Vector3<double> weights(0.2, 0.3, 0.5);
         const auto place = point_at(triangle_at(sphere.mesh.positions(), corners), weights);
-        const HeldPoint<double> held{at % 320, corners, weights, 1.1 * place};
+        const PointAttachment<double> held{at % 320, corners, weights, 1.1 * place};
         const Index v = (7 * at) % 162;
         (void)solver.step(x, 1e-3, sphere.network, damped, held, pull(v, sphere.raised(v, -0.1)));
         ++at;
@@ -868,8 +875,8 @@ TEST_CASE("a step works in anybody's memory and touches nothing else there", "[s
     Points<float> x = sphere.mesh.positions();
     QuasiStaticSolver first(sphere.network), second(sphere.network);
     for (int i = 0; i < 20; ++i) {
-        (void)first.step(x, 0.1F, sphere.network, sphere.backing, pull(7, sphere.raised(7, 0.1F)));
-        (void)second.step(y, 0.1F, sphere.network, sphere.backing, pull(7, sphere.raised(7, 0.1F)));
+        (void)first.step(x, 0.1F, sphere.network, sphere.foundation, pull(7, sphere.raised(7, 0.1F)));
+        (void)second.step(y, 0.1F, sphere.network, sphere.foundation, pull(7, sphere.raised(7, 0.1F)));
     }
     CHECK(same_bits(x, Points<float>(y)));
     for (std::size_t i = 0; i < buffer.size(); ++i) {
@@ -882,7 +889,7 @@ TEST_CASE("sixteen constraints act in one step", "[solver]") {
     QuasiStaticSolver solver(sphere.network, {.layers = 1});
     Points<double> x = sphere.mesh.positions();
     const auto at = [&](Index v) { return pull(v, sphere.raised(v, 0.1)); };
-    const auto report = solver.step(x, 0.1, sphere.network, sphere.backing, at(0), at(1), at(2), at(3), at(4), at(5),
+    const auto report = solver.step(x, 0.1, sphere.network, sphere.foundation, at(0), at(1), at(2), at(3), at(4), at(5),
                                     at(6), at(7), at(8), at(9), at(10), at(11), at(20), at(30), at(40), at(50));
     CHECK(report.status == StepStatus::advanced);
     REQUIRE(report.reactions.size() == 16);

@@ -8,12 +8,12 @@
 #include <vector>
 
 #include <Eigen/Geometry>
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/collision/grasper.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/grasper.hpp>
 #include <membrane/haptics/device.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -52,7 +52,7 @@ struct Membrane {
     template <class Volume>
     std::pair<double, double> play(const std::vector<Waypoint<double>>& script, double tool_radius,
                                    const Volume& volume) {
-        NullDevice<double> device(script, {.tick = dt, .radius = tool_radius});
+        ScriptedDevice<double> device(script, {.tick = dt, .radius = tool_radius});
         double largest = 0;
         while (device.running()) {
             const auto tool = device.read();
@@ -96,12 +96,12 @@ TEST_CASE("with volume springs of a hundredth of the springs the shape comes bac
                 CAPTURE(subdivisions, part, seed);
                 test::Random random(static_cast<std::uint64_t>(seed));
                 Membrane membrane(subdivisions);
-                const VirtualVolumeSprings backing(membrane.mesh,
-                                                   {.stiffness = part * stiffness, .damping = part * 0.1});
-                const auto pressed = membrane.play(press_script(random.unit_vector(), 2e-3), 2e-3, backing);
+                const VirtualVolumeSprings foundation(membrane.mesh,
+                                                      {.stiffness = part * stiffness, .damping = part * 0.1});
+                const auto pressed = membrane.play(press_script(random.unit_vector(), 2e-3), 2e-3, foundation);
                 REQUIRE(pressed.first > 0.15);
                 REQUIRE(pressed.second < 1e-6);
-                const auto pulled = membrane.play(pull_script(random.unit_vector(), 5e-4), 5e-4, backing);
+                const auto pulled = membrane.play(pull_script(random.unit_vector(), 5e-4), 5e-4, foundation);
                 REQUIRE(pulled.first > 0.15);
                 REQUIRE(pulled.second < 1e-6);
             }
@@ -116,10 +116,10 @@ TEST_CASE("without volume springs the shape does not come back from a press", "[
             test::Random random(static_cast<std::uint64_t>(seed));
             const Vector3<double> from = random.unit_vector();
             Membrane pressed(subdivisions), pulled(subdivisions);
-            const auto after_press = pressed.play(press_script(from, 2e-3), 2e-3, NoVolumeSprings{});
+            const auto after_press = pressed.play(press_script(from, 2e-3), 2e-3, NoFoundation{});
             REQUIRE(after_press.first > 0.1);
             CHECK(after_press.second > 0.01);
-            const auto after_pull = pulled.play(pull_script(from, 5e-4), 5e-4, NoVolumeSprings{});
+            const auto after_pull = pulled.play(pull_script(from, 5e-4), 5e-4, NoFoundation{});
             REQUIRE(after_pull.first > 0.1);
             WARN("without volume springs, " << pressed.mesh.vertex_count() << " vertices: off by " << after_press.second
                                             << " R after the press, " << after_pull.second << " R after the pull");
@@ -131,23 +131,23 @@ namespace {
 
 /// A tool that is somewhere else every ten ticks, in the sphere or up to a million radii away.
 std::vector<Tool<double>> jumping_tool(test::Random& random) {
-    std::vector<Tool<double>> way;
+    std::vector<Tool<double>> displacement;
     Tool<double> tool{.position = {0, 0, 5 * radius}};
     if (random.chance(0.8)) tool.radius = radius * 0.02 * std::pow(50, random.number());
     for (int tick = 0; tick < 40; ++tick) {
         const double far = random.chance(0.5) ? 1 : std::pow(10, random.number(-1.0, 6.0));
         if (tick % 10 == 9) tool.position = radius * far * random.vector();
-        way.push_back(tool);
+        displacement.push_back(tool);
     }
-    return way;
+    return displacement;
 }
 
 }  // namespace
 
-TEST_CASE("after a tool that jumps anywhere, the membrane comes back where its backing is as stiff as its springs",
+TEST_CASE("after a tool that jumps anywhere, the membrane comes back where its foundation is as stiff as its springs",
           "[recovery]") {
     const Membrane fresh(2);
-    const VirtualVolumeSprings backing(fresh.mesh, {.stiffness = stiffness});
+    const VirtualVolumeSprings foundation(fresh.mesh, {.stiffness = stiffness});
     for (int seed = 1; seed <= cases(240, 20'000); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -159,14 +159,14 @@ TEST_CASE("after a tool that jumps anywhere, the membrane comes back where its b
             {
                 const test::FloatingPointTraps traps;
                 const auto contact = membrane.tracker.update(membrane.tree, x, tool);
-                report = membrane.solver.step(x, dt, membrane.network, backing, press(tool, contact));
+                report = membrane.solver.step(x, dt, membrane.network, foundation, press(tool, contact));
             }
             REQUIRE(is_finite(x));
             if (report.status != StepStatus::advanced) REQUIRE(x == before);
             for (const auto& reaction : report.reactions) REQUIRE(is_finite(reaction));
             membrane.tree.refit(x, report.moved);
         }
-        REQUIRE(test::settle(membrane.solver, x, dt, membrane.network, backing).converged);
+        REQUIRE(test::settle(membrane.solver, x, dt, membrane.network, foundation).converged);
         REQUIRE((x - membrane.mesh.positions()).cwiseAbs().maxCoeff() < 1e-6 * radius);
     }
 }
@@ -176,18 +176,19 @@ TEST_CASE("a tool that jumps through the membrane drags it along with a force th
     for (const double backing_stiffness : {4.0, 8.0, 40.0}) {
         CAPTURE(backing_stiffness);
         Membrane membrane(3);
-        const VirtualVolumeSprings backing(membrane.mesh, {.stiffness = backing_stiffness, .damping = 0.02});
+        const VirtualVolumeSprings foundation(membrane.mesh, {.stiffness = backing_stiffness, .damping = 0.02});
         Vector3<double> force;
         for (int tick = 0; tick < 50; ++tick) {
             Tool<double> tool{.position = {0, 0, 0.02}, .radius = 1e-3};
             if (tick > 0) tool.position = {0.003, 0.002, -0.012};
             const auto contact = membrane.tracker.update(membrane.tree, membrane.x, tool);
-            const auto report = membrane.solver.step(membrane.x, dt, membrane.network, backing, press(tool, contact));
+            const auto report =
+                membrane.solver.step(membrane.x, dt, membrane.network, foundation, press(tool, contact));
             REQUIRE(report.status == StepStatus::advanced);
             membrane.tree.refit(membrane.x, report.moved);
             force = report.reactions[0];
         }
-        // What springs and backing of a hundred vertices can pull with over that way.
+        // What springs and foundation of a hundred vertices can pull with over that way.
         CHECK(norm(force) < 100 * (stiffness + backing_stiffness) * 0.032);
         CHECK((membrane.x - membrane.mesh.positions()).cwiseAbs().maxCoeff() < 2 * 0.032);
     }

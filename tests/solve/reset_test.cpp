@@ -6,11 +6,11 @@
 #include <limits>
 #include <vector>
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/collision/grasper.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/grasper.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -37,7 +37,7 @@ template <Real S>
 struct Sphere {
     TriangleMesh<S> mesh = icosphere<S>({.radius = 1, .subdivisions = 2});
     MassSpringNetwork<S, LinearSpring> network{mesh, {}, {.stiffness = S(40), .mass = S(1e-3), .pinned = {7, 8}}};
-    VirtualVolumeSprings<S> backing{mesh, {.stiffness = S(8), .damping = S(0.02)}};
+    VirtualVolumeSprings<S> foundation{mesh, {.stiffness = S(8), .damping = S(0.02)}};
 };
 
 /// A sphere in a user's loop.
@@ -53,7 +53,7 @@ struct Loop {
         Contact<S> contact;
         Grasp<S> grasp;
         StepReport<S> report;
-        Index tree_checks;
+        Index full_query_count;
     };
     Outcome tick(Random& random) {
         place = direction<double>(place + 0.15 * random.vector(), place);
@@ -68,11 +68,11 @@ struct Loop {
         const auto weight = random.vector<S>(S(-0.1), S(0.1));
         const Index held = random.chance(0.5) ? 20 : 21;
         const Vector3<S> target = random.number<S>(S(0.95), S(1.05)) * point(sphere.mesh.positions(), held);
-        const int most_reads = random.index(12);
+        const int max_reads = random.index(12);
         const bool hurries = random.chance(0.3);
 
-        Outcome now{.contact = tracker.update(tree, x, tool), .grasp = {}, .report = {}, .tree_checks = 0};
-        now.tree_checks = tracker.tree_checks();
+        Outcome now{.contact = tracker.update(tree, x, tool), .grasp = {}, .report = {}, .full_query_count = 0};
+        now.full_query_count = tracker.full_query_count();
         now.grasp = grasper.update(now.contact, x, tool);
         solver.wake(woken);
         const auto step = [&](auto take) {
@@ -80,13 +80,13 @@ struct Loop {
                         load<S>({0, 1, 2}, {S(0.5), S(0.25), S(0.25)}, weight));
         };
         int reads = 0;
-        const Deadline deadline([&reads] { return ++reads; }, most_reads);
-        now.report =
-            hurries
-                ? step([&](const auto&... all) {
-                      return solver.step_until(deadline, x, dt, sphere.network, sphere.backing, all...);
-                  })
-                : step([&](const auto&... all) { return solver.step(x, dt, sphere.network, sphere.backing, all...); });
+        const Deadline deadline([&reads] { return ++reads; }, max_reads);
+        now.report = hurries ? step([&](const auto&... all) {
+            return solver.step_until(deadline, x, dt, sphere.network, sphere.foundation, all...);
+        })
+                             : step([&](const auto&... all) {
+                                   return solver.step(x, dt, sphere.network, sphere.foundation, all...);
+                               });
         tree.refit(x, now.report.moved);
         return now;
     }
@@ -104,7 +104,7 @@ struct Loop {
 
     QuasiStaticSolver<S, Rule> solver;
     AabbTree<S> tree{sphere.mesh};
-    ContactTracker<S> tracker{sphere.mesh, {.check_every = 3}};
+    ContactTracker<S> tracker{sphere.mesh, {.full_query_interval = 3}};
     Grasper<S> grasper{sphere.mesh};
     Points<S> x = sphere.mesh.positions();
     std::vector<Index> pins{30, 31};
@@ -115,21 +115,21 @@ struct Loop {
 
 template <Real S>
 bool same(const Contact<S>& a, const Contact<S>& b) {
-    const auto listed = [](const TouchedTriangle& f, const TouchedTriangle& g) { return f.triangle == g.triangle; };
+    const auto listed = [](const ContactTriangle& f, const ContactTriangle& g) { return f.triangle == g.triangle; };
     const auto same_point = [](const ContactPoint<S>& p, const ContactPoint<S>& q) {
         return p.triangle == q.triangle && p.feature == q.feature && p.gap == q.gap && same_bits(p.normal, q.normal);
     };
     return a.phase == b.phase && a.triangle == b.triangle && a.gap == b.gap && a.depth == b.depth &&
-           a.crossed == b.crossed && same_bits(a.point, b.point) && same_bits(a.normal, b.normal) &&
+           a.tunnelled == b.tunnelled && same_bits(a.point, b.point) && same_bits(a.normal, b.normal) &&
            std::equal(a.touched.begin(), a.touched.end(), b.touched.begin(), b.touched.end(), listed) &&
-           std::equal(a.watched.begin(), a.watched.end(), b.watched.begin(), b.watched.end(), listed) &&
+           std::equal(a.candidates.begin(), a.candidates.end(), b.candidates.begin(), b.candidates.end(), listed) &&
            std::equal(a.points.begin(), a.points.end(), b.points.begin(), b.points.end(), same_point);
 }
 
 template <Real S>
 bool same(const StepReport<S>& a, const StepReport<S>& b) {
     return a.status == b.status && a.converged == b.converged && a.out_of_time == b.out_of_time &&
-           a.residual == b.residual && a.visits == b.visits &&
+           a.residual == b.residual && a.vertex_updates == b.vertex_updates &&
            std::equal(a.moved.begin(), a.moved.end(), b.moved.begin(), b.moved.end()) &&
            std::equal(a.reactions.begin(), a.reactions.end(), b.reactions.begin(), b.reactions.end(),
                       [](const auto& one, const auto& other) { return same_bits(one, other); });
@@ -138,11 +138,11 @@ bool same(const StepReport<S>& a, const StepReport<S>& b) {
 template <Real S>
 SolverOptions<S> some_options(Random& random) {
     return {.layers = random.index(4),
-            .layers_as_needed = random.chance(0.25),
+            .adaptive_layers = random.chance(0.25),
             .sweeps = 1 + random.index(3),
-            .order = static_cast<VisitOrder>(random.index(3)),
+            .order = static_cast<UpdateOrder>(random.index(3)),
             .predict = random.chance(0.7),
-            .most_visits = random.chance(0.3) ? 100 + random.index(300) : unlimited};
+            .max_vertex_updates = random.chance(0.3) ? 100 + random.index(300) : unlimited};
 }
 
 template <Real S, class Rule>
@@ -155,13 +155,13 @@ void check_resets(const AnyExecutor& executor = {}) {
         Loop<S, Rule> used(options, executor), fresh(options, executor);
         for (int tick = random.index(100); tick > 0; --tick) static_cast<void>(used.tick(random));
         used.reset();
-        const Index checks = used.tracker.tree_checks();
+        const Index checks = used.tracker.full_query_count();
         Random other = random;
         for (int tick = 0; tick < 60; ++tick) {
             CAPTURE(tick);
             const auto a = used.tick(random), b = fresh.tick(other);
             REQUIRE(same(a.contact, b.contact));
-            REQUIRE(a.tree_checks - checks == b.tree_checks);
+            REQUIRE(a.full_query_count - checks == b.full_query_count);
             REQUIRE(a.grasp.triangle == b.grasp.triangle);
             REQUIRE(same(a.report, b.report));
             REQUIRE(same_bits(used.x, fresh.x));

@@ -7,10 +7,10 @@
 #include <limits>
 #include <vector>
 
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -102,19 +102,19 @@ Index middle(Index squares) { return ((squares + 1) * (squares + 1) - 1) / 2; }
 
 struct Slide {
     Index squares;
-    double radius, depth;             // [m]
-    Vector3<double> axis, from, way;  // of the tool's foot [m]
+    double radius, depth;                      // [m]
+    Vector3<double> axis, from, displacement;  // of the tool's foot [m]
 };
 
 struct Felt {
-    double largest = 0, jump = 0, at_rest = 0, unrest = 0;  // [N]
-    double pace = 0;                                        // of the tool [m]
+    double largest = 0, jump = 0, at_rest = 0, merit = 0;  // [N]
+    double pace = 0;                                       // of the tool [m]
 };
 
 /// Straight in, along, and then still.
 template <class S>
 Felt feel(Scene<S>& scene, const Slide& slide) {
-    constexpr int in = 100, along = 300, still = 200, watched = 100;
+    constexpr int in = 100, along = 300, still = 200, candidates = 100;
     const double edge = 0.02 * (2 + std::sqrt(2.0)) / (3 * slide.squares), point_radius = 0.01 * edge;
     const double height = std::max(slide.radius, point_radius);
     Felt felt;
@@ -123,7 +123,8 @@ Felt feel(Scene<S>& scene, const Slide& slide) {
     for (int i = 0; i < in + along + still; ++i) {
         const double down = slide.depth * std::min(1.0, i / double(in));
         const double part = std::clamp((i - in) / double(along), 0.0, 1.0);
-        Tool<double> tool{.position = slide.from + part * slide.way, .axis = slide.axis, .radius = slide.radius};
+        Tool<double> tool{
+            .position = slide.from + part * slide.displacement, .axis = slide.axis, .radius = slide.radius};
         tool.position.z() += height - down;
         const Vector3<double> force = scene.tick(tool);
         if (i > 0) {
@@ -131,13 +132,13 @@ Felt feel(Scene<S>& scene, const Slide& slide) {
             felt.pace = std::max(felt.pace, (tool.position - last_position).norm());
         }
         felt.largest = std::max(felt.largest, force.norm());
-        if (i >= in + along + still - watched) {
+        if (i >= in + along + still - candidates) {
             low = std::min(low, force.norm());
             felt.at_rest = std::max(felt.at_rest, force.norm());
         }
         last = force, last_position = tool.position;
     }
-    felt.unrest = felt.at_rest - low;
+    felt.merit = felt.at_rest - low;
     return felt;
 }
 
@@ -147,7 +148,7 @@ constexpr double default_stiffness = detail::support_factor * (6 * spring + back
 /// No more than what a tick of motion does to a stiff contact, which bears on several vertices.
 void check(const Felt& felt) {
     CHECK(felt.jump < 6 * default_stiffness * felt.pace);
-    CHECK(felt.unrest <= 1e-3 * felt.at_rest);
+    CHECK(felt.merit <= 1e-3 * felt.at_rest);
     CHECK(felt.at_rest > 0);
 }
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include <Eigen/Core>
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -23,14 +23,14 @@ using test::Random;
 
 namespace {
 
-/// A sphere of 42 vertices at rest: random springs, a backing of a hundredth to ten times as much, random masses.
+/// A sphere of 42 vertices at rest: random springs, a foundation of a hundredth to ten times as much, random masses.
 struct Scene {
     explicit Scene(int seed) : Scene(Random(static_cast<std::uint64_t>(seed))) {}
     explicit Scene(Random random)
         : mesh(test::jittered(icosphere({.radius = 1, .subdivisions = 1}).positions(), 0.05, random),
                icosphere({.radius = 1, .subdivisions = 1}).triangles()),
           network(mesh, {}, {.stiffness = numbers(120, 0.2, 5, random), .mass = numbers(42, 0.5, 2, random)}),
-          backing(mesh, {.stiffness = std::pow(10, random.number(-2.0, 1.0))}) {}
+          foundation(mesh, {.stiffness = std::pow(10, random.number(-2.0, 1.0))}) {}
 
     static std::vector<double> numbers(std::size_t count, double low, double high, Random& random) {
         std::vector<double> values(count);
@@ -38,10 +38,10 @@ struct Scene {
         return values;
     }
 
-    /// Second derivative of the energy of springs and backing at rest: no spring has a tension.
+    /// Second derivative of the energy of springs and foundation at rest: no spring has a tension.
     [[nodiscard]] Eigen::MatrixXd hessian() const {
         const Index n = 3 * mesh.vertex_count();
-        Eigen::MatrixXd h = backing.stiffness(0) * Eigen::MatrixXd::Identity(n, n);
+        Eigen::MatrixXd h = foundation.stiffness(0) * Eigen::MatrixXd::Identity(n, n);
         for (const auto& spring : network.springs()) {
             const Eigen::Vector3d u =
                 (mesh.positions().col(spring.second) - mesh.positions().col(spring.first)).normalized();
@@ -57,12 +57,12 @@ struct Scene {
 
     [[nodiscard]] Vector3<double> force(Index v, const Points<double>& x) const {
         const Vector3<double> here = point(x, v);
-        return network.pull(v, x).force + backing.pull(v, here, here, 1.0).force;
+        return network.force_on(v, x).force + foundation.force_on(v, here, here, 1.0).force;
     }
 
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, LinearSpring> network;
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
 };
 
 std::vector<double> stiffnesses(const Scene& scene) {
@@ -95,9 +95,9 @@ double limit_near(double theory, Diverges diverges) {
     return low;
 }
 
-/// A start a millionth away from rest, along `way`.
-Points<double> start_along(const Scene& scene, const Eigen::VectorXd& way) {
-    const Points<double> moved = Eigen::Map<const Points<double>>(way.data(), 3, scene.mesh.vertex_count());
+/// A start a millionth away from rest, along `displacement`.
+Points<double> start_along(const Scene& scene, const Eigen::VectorXd& displacement) {
+    const Points<double> moved = Eigen::Map<const Points<double>>(displacement.data(), 3, scene.mesh.vertex_count());
     return scene.mesh.positions() + 1e-6 / moved.cwiseAbs().maxCoeff() * moved;
 }
 
@@ -111,14 +111,14 @@ TEST_CASE("explicit Euler diverges beyond dt sqrt(largest eigenvalue of M^-1 H) 
         for (Index v = 0; v < 42; ++v) root.segment<3>(3 * v).setConstant(std::sqrt(scene.network.mass(v)));
         const Eigen::MatrixXd scaled =
             (scene.hessian().array().colwise() / root.array()).rowwise() / root.transpose().array();
-        const auto [largest, way] = test::largest_eigenpair(scaled);
+        const auto [largest, displacement] = test::largest_eigenpair(scaled);
         const double theory = 2 / std::sqrt(largest);
-        const Points<double> start = start_along(scene, way.cwiseQuotient(root));
+        const Points<double> start = start_along(scene, displacement.cwiseQuotient(root));
         const double found = limit_near(theory, [&](double dt) {
             ExplicitEuler euler(scene.network);
             Points<double> velocity = Points<double>::Zero(3, 42);
             const auto move = [&](Points<double>& x) {
-                (void)euler.step(x, velocity, dt, scene.network, scene.backing);
+                (void)euler.step(x, velocity, dt, scene.network, scene.foundation);
             };
             return grows(scene, start, move, 1000);
         });
@@ -131,9 +131,9 @@ TEST_CASE("moving all vertices at once by F dt^2 / m diverges beyond dt^2 / m = 
     for (int seed = 1; seed <= cases(15, 500); ++seed) {
         CAPTURE(seed);
         const Scene scene(seed);
-        const auto [largest, way] = test::largest_eigenpair(scene.hessian());
+        const auto [largest, displacement] = test::largest_eigenpair(scene.hessian());
         const double theory = 2 / largest;
-        const Points<double> start = start_along(scene, way);
+        const Points<double> start = start_along(scene, displacement);
         const double found = limit_near(theory, [&](double compliance) {
             const auto move = [&](Points<double>& x) {
                 const Points<double> before = x;
@@ -169,17 +169,17 @@ TEST_CASE(
         const Eigen::MatrixXd h = scene.hessian();
         double largest = 0;
         Index worst = 0;
-        Eigen::VectorXd way = Eigen::VectorXd::Zero(126);
+        Eigen::VectorXd displacement = Eigen::VectorXd::Zero(126);
         for (Index v = 0; v < 42; ++v) {
             const auto [value, axis] = test::largest_eigenpair(h.block<3, 3>(3 * v, 3 * v));
             if (value <= largest) continue;
             largest = value;
             worst = v;
-            way.setZero();
-            way.segment<3>(3 * v) = axis;
+            displacement.setZero();
+            displacement.segment<3>(3 * v) = axis;
         }
         const double theory = 2 / largest;
-        const Points<double> start = start_along(scene, way);
+        const Points<double> start = start_along(scene, displacement);
         // By hand, without the solver's own look at the blocks.
         const auto moves = [&](double compliance, Index first, Index last) {
             return [&scene, compliance, first, last](Points<double>& x) {
@@ -202,7 +202,7 @@ TEST_CASE(
             QuasiStaticSolver solver(network, {.layers = unlimited, .sweeps = 1}, MassStep{});
             Points<double> x = start;
             solver.wake_all();
-            return solver.step(x, 1.0, network, scene.backing).status;
+            return solver.step(x, 1.0, network, scene.foundation).status;
         };
         CHECK(status_at(0.999 * theory) == StepStatus::advanced);
         CHECK(status_at(1.001 * theory) == StepStatus::unstable);

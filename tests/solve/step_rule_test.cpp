@@ -10,8 +10,8 @@
 #include <type_traits>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
@@ -62,18 +62,19 @@ TEMPLATE_TEST_CASE("a contact stiffens a block along its normal alone", "[rule]"
         vertex.stiffness = random.number(S(1), S(10));
         vertex.size = random.number(S(0.1), S(10));
         vertex.force = random.vector(S(-1), S(1));
-        for (int i = 0; i < 3; ++i) vertex.relief += outer<S>(vertex.stiffness / 4, random.unit_vector<S>());
+        for (int i = 0; i < 3; ++i)
+            vertex.stiffness_reduction += outer<S>(vertex.stiffness / 4, random.unit_vector<S>());
         vertex.touched = true;
         const auto without = BlockStep{}.compliance(vertex);
         vertex.contact_stiffness = std::pow(S(10), random.number(S(-2), S(2)));
         vertex.stiffness += vertex.contact_stiffness;
         vertex.contact_normal = random.unit_vector<S>();
         const auto with = BlockStep{}.compliance(vertex);
-        // (H^-1 + ...)^-1 = H + s n n^T: for the force that moves the vertex by `way` with the contact.
-        const Vector3<S> force = random.vector(S(-1), S(1)), way = with * force;
+        // (H^-1 + ...)^-1 = H + s n n^T: for the force that moves the vertex by `displacement` with the contact.
+        const Vector3<S> force = random.vector(S(-1), S(1)), displacement = with * force;
         const Vector3<S> of_contact =
-            vertex.contact_stiffness * dot(vertex.contact_normal, way) * vertex.contact_normal;
-        REQUIRE(norm<S>(without * Vector3<S>(force - of_contact) - way) <= slack * (1 + norm(way)));
+            vertex.contact_stiffness * dot(vertex.contact_normal, displacement) * vertex.contact_normal;
+        REQUIRE(norm<S>(without * Vector3<S>(force - of_contact) - displacement) <= slack * (1 + norm(displacement)));
     }
 }
 
@@ -97,8 +98,8 @@ namespace {
 long double distance(const Vector3<double>& a, const Vector3<double>& b) {
     long double sum = 0;
     for (int k = 0; k < 3; ++k) {
-        const long double way = static_cast<long double>(a[k]) - static_cast<long double>(b[k]);
-        sum += way * way;
+        const long double displacement = static_cast<long double>(a[k]) - static_cast<long double>(b[k]);
+        sum += displacement * displacement;
     }
     return std::sqrt(sum);
 }
@@ -111,7 +112,7 @@ struct OddNetwork {
     OddNetwork(Random& random, const Law& law, const TriangleMesh<double>& mesh)
         : decades(random.number(0.0, 6.0)),
           network(mesh, law, {.stiffness = stiffnesses(30, 0.1, random), .rest_length = rest_lengths(random)}),
-          backing(mesh, {.stiffness = stiffnesses(12, 0.3, random), .damping = stiffnesses(12, 0.5, random)}) {}
+          foundation(mesh, {.stiffness = stiffnesses(12, 0.3, random), .damping = stiffnesses(12, 0.5, random)}) {}
 
     std::vector<double> stiffnesses(int count, double none, Random& random) const {
         std::vector<double> values(static_cast<std::size_t>(count));
@@ -124,17 +125,17 @@ struct OddNetwork {
         return values;
     }
 
-    /// What springs and backing of `v` store and damping takes, less the work of `force`, and the size of its terms.
+    /// What springs and foundation of `v` store and damping takes, less the work of `force`, and the size of its terms.
     struct Energy {
         long double sum = 0, size = 0;
         void add(long double term) { sum += term, size += std::abs(term); }
     };
     Energy energy(Index v, const Points<double>& x, const Vector3<double>& start, const Vector3<double>& force) const {
         Energy total;
-        const Vector3<double> here = point(x, v), anchor = point(backing.anchors(), v);
+        const Vector3<double> here = point(x, v), anchor = point(foundation.anchors(), v);
         const long double u = distance(here, anchor), change = u - distance(start, anchor);
-        total.add(backing.stiffness(v) * u * u / 2);
-        total.add(backing.damping(v) / dt * change * change / 2);
+        total.add(foundation.stiffness(v) * u * u / 2);
+        total.add(foundation.damping(v) / dt * change * change / 2);
         for (int k = 0; k < 3; ++k) {
             total.add(-static_cast<long double>(force[k]) * (static_cast<long double>(here[k]) - start[k]));
         }
@@ -152,7 +153,7 @@ struct OddNetwork {
 
     double decades;
     MassSpringNetwork<double, Law> network;
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
 };
 
 /// Twelve vertices, jittered or tangled up.
@@ -166,8 +167,8 @@ void no_visit_raises_the_energy(const Rule& rule, const Law& law, int seed) {
     Random random(static_cast<std::uint64_t>(seed));
     static const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     const OddNetwork<Law> odd(random, law, mesh);
-    QuasiStaticSolver solver(odd.network, {.layers = 0, .sweeps = 1, .negligible_force = 1e-290, .most_touches = 0},
-                             rule);
+    QuasiStaticSolver solver(odd.network,
+                             {.layers = 0, .sweeps = 1, .force_tolerance = 1e-290, .max_contact_points = 0}, rule);
     Points<double> x = odd_positions(mesh, random);
     for (int visit = 0; visit < 4; ++visit) {
         const std::array<Index, 1> vertex{random.index(12)};
@@ -177,9 +178,9 @@ void no_visit_raises_the_energy(const Rule& rule, const Law& law, int seed) {
         const Vector3<double> start = point(x, vertex[0]), none = Vector3<double>::Zero();
         solver.reset();
         solver.wake(vertex);
-        const auto report = solver.step(x, OddNetwork<Law>::dt, odd.network, odd.backing);
+        const auto report = solver.step(x, OddNetwork<Law>::dt, odd.network, odd.foundation);
         REQUIRE(report.status == StepStatus::advanced);
-        REQUIRE(report.visits == 2);  // one, and a last look
+        REQUIRE(report.vertex_updates == 2);  // one, and a last look
         const auto before = odd.energy(vertex[0], from, start, none), after = odd.energy(vertex[0], x, start, none);
         REQUIRE(after.sum <= before.sum + 64 * std::numeric_limits<double>::epsilon() * before.size);
         for (Index v = 0; v < 12; ++v) {
@@ -219,18 +220,18 @@ TEMPLATE_TEST_CASE("whole steps of safe visits never raise the energy", "[rule]"
         Random random(static_cast<std::uint64_t>(seed));
         const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
-        const VirtualVolumeSprings backing(mesh, {.stiffness = random.number()});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = random.number()});
         QuasiStaticSolver solver(network, {.sweeps = 1 + random.index(5), .order = test::order_of(seed)},
                                  TestType{random.number(0.1, 1.99)});
         Points<double> x = test::jittered(mesh.positions(), 0.3, random);
         const auto energy = [&] {
             double sum = network.energy(x);
-            for (Index v = 0; v < mesh.vertex_count(); ++v) sum += backing.energy(v, point(x, v));
+            for (Index v = 0; v < mesh.vertex_count(); ++v) sum += foundation.energy(v, point(x, v));
             return sum;
         };
         solver.wake_all();
         for (double before = energy(); before > 1e-9;) {
-            const auto report = solver.step(x, 0.1, network, backing);
+            const auto report = solver.step(x, 0.1, network, foundation);
             REQUIRE(report.status == StepStatus::advanced);
             if (report.converged) break;
             const double now = energy();
@@ -266,7 +267,7 @@ TEMPLATE_TEST_CASE("the rule as published converges up to its limit, and is refu
     const auto with_mass = [&](S mass) {
         return MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = S(1), .mass = mass});
     };
-    const VirtualVolumeSprings backing(mesh, {.stiffness = volume});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = volume});
     S limit = std::numeric_limits<S>::max();
     for (Index v = 0; v < 162; ++v) {
         limit = std::min(limit, limit_of<S>(with_mass(1), v, mesh.positions(), volume));
@@ -280,7 +281,7 @@ TEMPLATE_TEST_CASE("the rule as published converges up to its limit, and is refu
         QuasiStaticSolver solver(network, {.layers = unlimited, .sweeps = 10}, MassStep{});
         Points<S> x = start;
         solver.wake_all();
-        const auto report = test::settle(solver, x, dt, network, backing);
+        const auto report = test::settle(solver, x, dt, network, foundation);
         REQUIRE(report.status == StepStatus::advanced);
         REQUIRE(report.converged);
         REQUIRE((x - mesh.positions()).cwiseAbs().maxCoeff() <
@@ -292,13 +293,13 @@ TEMPLATE_TEST_CASE("the rule as published converges up to its limit, and is refu
         QuasiStaticSolver solver(network, {.layers = unlimited, .sweeps = 10}, MassStep{});
         Points<S> x = start;
         solver.wake_all();
-        const auto report = solver.step(x, dt, network, backing);
+        const auto report = solver.step(x, dt, network, foundation);
         CHECK(report.status == StepStatus::unstable);
         CHECK_FALSE(report.converged);
         CHECK(report.moved.empty());
         CHECK(same_bits(x, start));
         // A smaller time step, and it goes on.
-        CHECK(solver.step(x, dt * std::sqrt(S(0.5) / part), network, backing).status == StepStatus::advanced);
+        CHECK(solver.step(x, dt * std::sqrt(S(0.5) / part), network, foundation).status == StepStatus::advanced);
     }
 }
 
@@ -314,7 +315,7 @@ TEST_CASE("beyond its limit the rule as published does diverge: the refusal is n
         const auto network = with_part(part);
         Points<double> x = mesh.positions();
         x.col(0) = Vector3<double>(1e-6, 0, 0);
-        for (int i = 0; i < 3000; ++i) x.col(0) += dt * dt / network.mass(0) * network.pull(0, x).force;
+        for (int i = 0; i < 3000; ++i) x.col(0) += dt * dt / network.mass(0) * network.force_on(0, x).force;
         return norm(point(x, 0));
     };
     CHECK(largest_way(0.99) < 1e-9);
@@ -326,14 +327,14 @@ TEST_CASE("beyond its limit the rule as published does diverge: the refusal is n
         Points<double> x = mesh.positions();
         x.col(0) = Vector3<double>(1e-6, 0, 0);
         solver.wake_all();
-        CHECK(solver.step(x, dt, network, NoVolumeSprings{}).status == status);
+        CHECK(solver.step(x, dt, network, NoFoundation{}).status == status);
     }
 }
 
 TEST_CASE("dt of the rule as published from a millionth to a thousand seconds comes to a safe outcome", "[rule][bad]") {
     const auto mesh = icosphere({.radius = 0.01, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 1e-4});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0, .damping = 0.02});
     const Vector3<double> target = 1.2 * point(mesh.positions(), 7);
     for (double dt = 1e-6; dt <= 1e3; dt *= 3) {
         CAPTURE(dt);
@@ -342,13 +343,13 @@ TEST_CASE("dt of the rule as published from a millionth to a thousand seconds co
         Points<double> x = mesh.positions(), y = x;
         for (int i = 0; i < 200; ++i) {
             const Points<double> before = x;
-            const auto report = published.step(x, dt, network, backing, pull(7, target));
+            const auto report = published.step(x, dt, network, foundation, pull(7, target));
             REQUIRE(is_finite(x));
             if (report.status != StepStatus::advanced) {
                 REQUIRE(report.status == StepStatus::unstable);
                 REQUIRE(same_bits(x, before));
             }
-            REQUIRE(safe.step(y, dt, network, backing, pull(7, target)).status == StepStatus::advanced);
+            REQUIRE(safe.step(y, dt, network, foundation, pull(7, target)).status == StepStatus::advanced);
         }
         REQUIRE((y - mesh.positions()).cwiseAbs().maxCoeff() < 0.0021);
     }
@@ -369,13 +370,13 @@ struct HalfStep {
 TEST_CASE("a rule of one's own finds the same equilibrium", "[rule]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
-    const VirtualVolumeSprings backing(mesh, {.stiffness = 0.5});
-    const SolverOptions<double> options{.negligible_force = 1e-13};
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 0.5});
+    const SolverOptions<double> options{.force_tolerance = 1e-13};
     const Vector3<double> target = 1.2 * point(mesh.positions(), 7);
     QuasiStaticSolver own(network, options, HalfStep{});
     QuasiStaticSolver stock(network, options);
     Points<double> x = mesh.positions(), y = x;
-    REQUIRE(test::settle(own, x, 0.1, network, backing, pull(7, target)).converged);
-    REQUIRE(test::settle(stock, y, 0.1, network, backing, pull(7, target)).converged);
+    REQUIRE(test::settle(own, x, 0.1, network, foundation, pull(7, target)).converged);
+    REQUIRE(test::settle(stock, y, 0.1, network, foundation, pull(7, target)).converged);
     CHECK((x - y).cwiseAbs().maxCoeff() < 1e-11);
 }

@@ -11,16 +11,16 @@ using membrane::SolverOptions;
 TEST_CASE("solver options out of range are refused by name") {
     const auto refused = [](SolverOptions<double> options) { return test::refusal([&] { options.check(); }); };
     CHECK(refused({}).empty());
-    CHECK(refused({.layers = membrane::unlimited, .sweeps = 1000000, .most_visits = 1}).empty());
+    CHECK(refused({.layers = membrane::unlimited, .sweeps = 1000000, .max_vertex_updates = 1}).empty());
     CHECK(refused({.layers = -1}) == "QuasiStaticSolver: layers must be at least 0, got -1");
     CHECK(refused({.sweeps = 0}) == "QuasiStaticSolver: sweeps must be at least 1, got 0");
-    CHECK(refused({.most_visits = 0}) == "QuasiStaticSolver: most_visits must be at least 1, got 0");
-    CHECK(refused({.most_touches = -5}) == "QuasiStaticSolver: most_touches must be at least 0, got -5");
-    CHECK(refused({.most_in_groups = -1}) == "QuasiStaticSolver: most_in_groups must be at least 0, got -1");
+    CHECK(refused({.max_vertex_updates = 0}) == "QuasiStaticSolver: max_vertex_updates must be at least 1, got 0");
+    CHECK(refused({.max_contact_points = -5}) == "QuasiStaticSolver: max_contact_points must be at least 0, got -5");
+    CHECK(refused({.max_packed_vertices = -1}) == "QuasiStaticSolver: max_packed_vertices must be at least 0, got -1");
     for (const double bad :
          {-1e-9, std::numeric_limits<double>::infinity(), std::numeric_limits<double>::quiet_NaN()}) {
-        CHECK_THAT(refused({.negligible_force = bad}),
-                   ContainsSubstring("QuasiStaticSolver: negligible_force must be finite and not negative [N], got "));
+        CHECK_THAT(refused({.force_tolerance = bad}),
+                   ContainsSubstring("QuasiStaticSolver: force_tolerance must be finite and not negative [N], got "));
         CHECK_THAT(refused({.rigid_stiffness = bad}),
                    ContainsSubstring("QuasiStaticSolver: rigid_stiffness must be finite and not negative [N/m], got "));
     }
@@ -32,5 +32,5 @@ TEST_CASE("a report begins as a step that did nothing") {
     CHECK_FALSE(report.converged);
     CHECK(report.moved.empty());
     CHECK(report.reactions.empty());
-    CHECK(report.visits == 0);
+    CHECK(report.vertex_updates == 0);
 }

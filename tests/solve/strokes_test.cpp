@@ -4,11 +4,11 @@
 #include <cmath>
 #include <utility>
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -62,7 +62,7 @@ struct Membrane {
 
     TriangleMesh<S> mesh;
     MassSpringNetwork<S, LinearSpring> network{mesh, {}, {.stiffness = S(40)}};
-    VirtualVolumeSprings<S> backing{mesh, {.stiffness = S(8), .damping = S(0.02)}};
+    VirtualVolumeSprings<S> foundation{mesh, {.stiffness = S(8), .damping = S(0.02)}};
 };
 
 struct Outcome {
@@ -73,20 +73,21 @@ struct Outcome {
 
 template <class S>
 Outcome play(const Membrane<S>& membrane, const Stroke& stroke, const SolverOptions<S>& options) {
-    constexpr int most_ticks_after = 2000;
+    constexpr int max_ticks_after = 2000;
     QuasiStaticSolver<S> solver(membrane.network, options);
     AabbTree<S> tree(membrane.mesh);
     ContactTracker<S> tracker(membrane.mesh);
     Points<S> x = membrane.mesh.positions();
     Outcome outcome;
-    for (int t = 0; t < stroke.ticks() + most_ticks_after && !outcome.at_rest; ++t) {
+    for (int t = 0; t < stroke.ticks() + max_ticks_after && !outcome.at_rest; ++t) {
         const Tool<S> tool = stroke.at<S>(t);
         const auto contact = tracker.update(tree, x, tool);
-        const auto report = solver.step(x, S(Stroke::tick), membrane.network, membrane.backing, press(tool, contact));
+        const auto report =
+            solver.step(x, S(Stroke::tick), membrane.network, membrane.foundation, press(tool, contact));
         tree.refit(x, report.moved);
         outcome.advanced = outcome.advanced && report.status == StepStatus::advanced;
         outcome.force = std::max(outcome.force, double(norm(report.reactions[0])));
-        for (const auto& touched : contact.touched) {
+        for (const auto& touched : contact.triangles) {
             const Vector3<S> other_end = tool.position + tool.axis;
             const auto nearest = closest_to_segment(triangle_at(x, touched.corners), tool.position, other_end);
             const double distance = std::sqrt(double(nearest.on_triangle.squared_distance));
@@ -115,7 +116,7 @@ TEMPLATE_TEST_CASE(
             const auto k = static_cast<std::size_t>(i);
             const Stroke stroke{shapes[k % 3], depths[k / 3 % 4], speeds[k / 12]};
             CAPTURE(subdivisions, i, stroke.depth, stroke.speed);
-            const double exact = play<S>(membrane, stroke, {.layers = 12, .sweeps = 6, .contact_visits = 8}).force;
+            const double exact = play<S>(membrane, stroke, {.layers = 12, .sweeps = 6, .contact_iterations = 8}).force;
             for (const auto& [layers, sweeps] : {std::pair{6, 2}, {3, 1}}) {
                 CAPTURE(layers, sweeps);
                 const Outcome outcome = play<S>(membrane, stroke, {.layers = layers, .sweeps = sweeps});
@@ -136,7 +137,7 @@ TEMPLATE_TEST_CASE("a shaft dragged through a mesh much finer than itself stays 
     for (const auto& [depth, speed] : {std::pair{1.5e-3, 0.1}, {2e-3, 0.05}}) {
         CAPTURE(depth, speed);
         const Stroke stroke{Shape::shaft, depth, speed};
-        const double exact = play<S>(membrane, stroke, {.layers = 12, .sweeps = 6, .contact_visits = 8}).force;
+        const double exact = play<S>(membrane, stroke, {.layers = 12, .sweeps = 6, .contact_iterations = 8}).force;
         const Outcome outcome = play<S>(membrane, stroke, {.layers = 6, .sweeps = 2});
         CHECK(outcome.advanced);
         CHECK(outcome.at_rest);

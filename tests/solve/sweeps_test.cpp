@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/solve/sweeps.hpp>
 
-#include <membrane/mesh/shapes.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/catch.hpp"
@@ -12,13 +12,13 @@ using test::same_bits;
 
 namespace {
 
-/// A backing that keeps its springs to itself: its vertices are updated one by one.
+/// A foundation that keeps its springs to itself: its vertices are updated one by one.
 template <Real S>
 struct Opaque {
     VirtualVolumeSprings<S> volume;
 
-    Pull<S> pull(Index v, const Vector3<S>& position, const Vector3<S>& start, S dt) const noexcept {
-        return volume.pull(v, position, start, dt);
+    VertexForce<S> force_on(Index v, const Vector3<S>& position, const Vector3<S>& start, S dt) const noexcept {
+        return volume.force_on(v, position, start, dt);
     }
 };
 
@@ -28,7 +28,7 @@ struct LatePull {
     Index first, later;
     Vector3<S> force;
 
-    bool sound() const noexcept { return true; }
+    bool valid() const noexcept { return true; }
     void begin(ConstraintContext<S>& context) const noexcept {
         context.seed(first);
         context.add_force(first, force);
@@ -48,9 +48,9 @@ TEMPLATE_TEST_CASE("a force that comes beyond layer 0 while constraints are enfo
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 3});
     const MassSpringNetwork<S, LinearSpring> network(mesh, {}, {.stiffness = S(1)});
-    const VirtualVolumeSprings<S> backing(mesh, {.stiffness = S(0.1)});
-    const Opaque<S> opaque{backing};
-    for (const VisitOrder order : {VisitOrder::groups, VisitOrder::colours}) {
+    const VirtualVolumeSprings<S> foundation(mesh, {.stiffness = S(0.1)});
+    const Opaque<S> opaque{foundation};
+    for (const UpdateOrder order : {UpdateOrder::colour_layers, UpdateOrder::colour_all}) {
         QuasiStaticSolver<S> in_lanes(network, {.layers = 6, .order = order}), one_by_one = in_lanes;
         Points<S> x = mesh.positions(), y = x;
         PropagationQueue queue(mesh.vertex_count());
@@ -59,9 +59,9 @@ TEMPLATE_TEST_CASE("a force that comes beyond layer 0 while constraints are enfo
         const Index later = queue.layer(4).front();
         const LatePull<S> late{first, later, S(0.01) * point(x, later)};
         for (int tick = 0; tick < 5; ++tick) {
-            const auto report = in_lanes.step(x, S(1e-3), network, backing, late);
+            const auto report = in_lanes.step(x, S(1e-3), network, foundation, late);
             REQUIRE(report.status == StepStatus::advanced);
-            REQUIRE(one_by_one.step(y, S(1e-3), network, opaque, late).visits == report.visits);
+            REQUIRE(one_by_one.step(y, S(1e-3), network, opaque, late).vertex_updates == report.vertex_updates);
             REQUIRE(same_bits(x, y));
         }
         CHECK(norm(point(x, later)) > S(1.001));

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/network/volume_springs.hpp>
+#include <membrane/model/volume_springs.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -24,7 +24,7 @@ struct MidStep {
     explicit MidStep(std::uint64_t seed, const Law& law = {})
         : random(seed),
           network(mesh, law, {.stiffness = 3.0, .mass = 0.5}),
-          backing(mesh, {.stiffness = 2.0, .damping = 0.3}),
+          foundation(mesh, {.stiffness = 2.0, .damping = 0.3}),
           state(42, 4),
           start(test::jittered(mesh.positions(), 0.1, random)),
           x(test::jittered(start, 0.05, random)),
@@ -39,18 +39,18 @@ struct MidStep {
     Random random;
     TriangleMesh<double> mesh = icosphere({.radius = 1, .subdivisions = 1});
     MassSpringNetwork<double, Law> network;
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
     StepState<double> state;
     Points<double> start, x;
     ConstPointsRef<double> start_ref{start}, now_ref{state.positions()};
     Index v;
     Vector3<double> force = random.vector();
-    StepInput<double, MassSpringNetwork<double, Law>, VirtualVolumeSprings<double>> scene{start_ref, now_ref, 0.1,
-                                                                                          network,   backing, state};
+    StepInput<double, MassSpringNetwork<double, Law>, VirtualVolumeSprings<double>> scene{start_ref, now_ref,    0.1,
+                                                                                          network,   foundation, state};
 };
 
 struct Blocks {
-    static constexpr bool needs_relief = true;
+    static constexpr bool needs_majoriser = true;
 };
 struct Numbers {};
 
@@ -61,10 +61,10 @@ TEST_CASE("the state of a vertex has all that pulls on it", "[update]") {
         CAPTURE(seed);
         MidStep<LinearSpring> step(static_cast<std::uint64_t>(seed));
         const Index v = step.v;
-        const auto springs = step.network.pull(v, step.x);
-        const auto backing = step.backing.pull(v, point(step.x, v), point(step.start, v), 0.1);
-        const Vector3<double> force = springs.force + backing.force + step.force;
-        const double stiffness = springs.stiffness + backing.stiffness + 7;
+        const auto springs = step.network.force_on(v, step.x);
+        const auto foundation = step.foundation.force_on(v, point(step.x, v), point(step.start, v), 0.1);
+        const Vector3<double> force = springs.force + foundation.force + step.force;
+        const double stiffness = springs.stiffness + foundation.stiffness + 7;
 
         REQUIRE(norm<double>(pull_on(step.scene, v).force - force) < 1e-13);
         REQUIRE(pull_on(step.scene, v).stiffness == Approx(stiffness));
@@ -75,14 +75,15 @@ TEST_CASE("the state of a vertex has all that pulls on it", "[update]") {
             REQUIRE(state.dt == 0.1);
             REQUIRE_FALSE(state.touched);
         }
-        REQUIRE(state_of<Numbers>(step.scene, v).relief.trace() == 0);
-        REQUIRE(state_of<Blocks>(step.scene, v).relief.trace() == step.network.curved_pull(v, step.x).relief.trace());
+        REQUIRE(state_of<Numbers>(step.scene, v).stiffness_reduction.trace() == 0);
+        REQUIRE(state_of<Blocks>(step.scene, v).stiffness_reduction.trace() ==
+                step.network.majoriser(v, step.x).stiffness_reduction.trace());
         step.state.seeds.insert(v);
         REQUIRE(state_of<Blocks>(step.scene, v).touched);
 
         // What damping holds back is no rest.
         const Vector3<double> lasting =
-            springs.force + step.force - 2.0 * (point(step.x, v) - point(step.backing.anchors(), v));
+            springs.force + step.force - 2.0 * (point(step.x, v) - point(step.foundation.anchors(), v));
         REQUIRE(norm<double>(undamped_force(step.scene, v, force) - lasting) < 1e-13);
     }
 }
@@ -95,19 +96,19 @@ TEST_CASE("a displacement on which springs stiffen is halved until the energy do
         const auto check = [&](auto& step) {
             const Index v = step.v;
             const Vector3<double> pull = pull_on(step.scene, v).force;
-            const Vector3<double> way = step.random.number(0.0, 0.5) * direction<double>(pull, pull);
-            const Vector3<double> found = backtracked<BlockStep>(step.scene, v, way);
+            const Vector3<double> displacement = step.random.number(0.0, 0.5) * direction<double>(pull, pull);
+            const Vector3<double> found = backtracked<BlockStep>(step.scene, v, displacement);
             const auto others = others_on(step.scene, v);
             const auto energy = [&](const Vector3<double>& by) {
                 return step.network.energy_change(v, by, step.x).change - dot<double>(others.force, by) +
                        others.stiffness * squared_norm(by) / 2;
             };
-            REQUIRE(backtracked<MassStep>(step.scene, v, way) == way);
-            if (found == way) return;
+            REQUIRE(backtracked<MassStep>(step.scene, v, displacement) == displacement);
+            if (found == displacement) return;
             ++halved;
-            const double times = std::log2(norm(way) / norm(found));
+            const double times = std::log2(norm(displacement) / norm(found));
             REQUIRE(times == Approx(std::round(times)));
-            REQUIRE(norm<double>(cross(way, found)) < 1e-12);
+            REQUIRE(norm<double>(cross(displacement, found)) < 1e-12);
             REQUIRE(energy(found) <= energy({0, 0, 0}) + 1e-12);
             REQUIRE(energy(2 * found) > energy({0, 0, 0}));
         };

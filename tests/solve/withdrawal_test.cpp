@@ -8,12 +8,12 @@
 #include <vector>
 
 #include <Eigen/Geometry>
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/collision/grasper.hpp>
-#include <membrane/collision/winding_number.hpp>
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/grasper.hpp>
+#include <membrane/contact/winding_number.hpp>
+#include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -34,7 +34,7 @@ struct Scene {
     TriangleMesh<double> mesh;
     std::vector<Index> rim;  // its border
     MassSpringNetwork<double, LinearSpring> network;
-    VirtualVolumeSprings<double> backing;
+    VirtualVolumeSprings<double> foundation;
     QuasiStaticSolver<double> solver;
     AabbTree<double> tree;
     ContactTracker<double> tracker;
@@ -47,18 +47,18 @@ struct Scene {
         : mesh(surface),
           rim(border(mesh)),
           network(mesh, LinearSpring{}, {.stiffness = 40, .pinned = pinned ? rim : std::vector<Index>{}}),
-          backing(mesh, {.stiffness = 8, .damping = 0.02}),
+          foundation(mesh, {.stiffness = 8, .damping = 0.02}),
           solver(network, {.layers = 6, .sweeps = 2}),
           tree(mesh),
           tracker(mesh),
           grasper(mesh),
           x(mesh.positions()),
-          edge(Neighbourhood<double>(mesh).mean_edge()) {}
+          edge(LocalSurface<double>(mesh).mean_edge()) {}
 
     StepReport<double> tick(const Tool<double>& tool) {
         contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
-        const auto report = solver.step(x, dt, network, backing, press(tool, contact, grasp), pull(tool, grasp));
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact, grasp), pull(tool, grasp));
         REQUIRE(report.status == StepStatus::advanced);
         tree.refit(x, report.moved);
         return report;
@@ -113,12 +113,14 @@ struct Stroke {
     }
 };
 
-int ticks_for(const Point& way, double speed) { return std::max(1, static_cast<int>(way.norm() / speed / dt)); }
+int ticks_for(const Point& displacement, double speed) {
+    return std::max(1, static_cast<int>(displacement.norm() / speed / dt));
+}
 
 bool overlaps(const Scene& scene, const Tool<double>& tool) {
     bool any = false;
-    scene.tree.touching_capsule(scene.mesh.positions(), tool.position, tool.position + tool.axis, tool.radius + 1e-5,
-                                [&](Index) { any = true; });
+    scene.tree.overlap_capsule(scene.mesh.positions(), tool.position, tool.position + tool.axis, tool.radius + 1e-5,
+                               [&](Index) { any = true; });
     return any;
 }
 
@@ -231,7 +233,7 @@ Stroke dragged_over_border(test::Random& random) {
     return stroke;
 }
 
-double longest_edge(const Scene& scene) {
+double max_edge(const Scene& scene) {
     double longest = 0;
     for (const auto& spring : scene.network.springs()) {
         longest = std::max(longest, norm<double>(scene.x.col(spring.second) - scene.x.col(spring.first)));
@@ -241,7 +243,7 @@ double longest_edge(const Scene& scene) {
 
 /// Whether no point of a shaft's axis is inside a closed surface.
 bool axis_is_outside(const Scene& scene, const Tool<double>& tool) {
-    const Neighbourhood<double> surface(scene.mesh);
+    const LocalSurface<double> surface(scene.mesh);
     return scene.tree.first_hit(scene.x, tool.position, Point(tool.position + tool.axis)).triangle == no_index &&
            winding_number(surface, scene.tree, scene.x, tool.position) == 0;
 }
@@ -261,7 +263,7 @@ Dragged drag_over_border(Scene scene, int seed) {
     Dragged left;
     for (int tick = 0; tick <= stroke.gone; ++tick) {
         scene.tick(stroke.at(tick));
-        left.longest = std::max(left.longest, longest_edge(scene));
+        left.longest = std::max(left.longest, max_edge(scene));
     }
     left.comes_back = scene.comes_back(stroke.at(stroke.gone), 2100);
     return left;

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include <membrane/mesh/triangle.hpp>
+#include <membrane/surface/triangle.hpp>
 
 /// The same questions as `mesh/triangle.hpp` and the tree answer, by other means and one triangle after the other. Works
 /// for any number type that Eigen takes: `long double` for accuracy, 64-bit integers where an answer must be exact.
@@ -158,12 +158,12 @@ double squared_distance_to_all(const Positions& x, const membrane::Triangles& tr
     return least;
 }
 
-/// The triangles of which `touches(triangle)` says so, ascending.
+/// The triangles of which `contacts(triangle)` says so, ascending.
 template <class Number, class Positions, class Touches>
-std::vector<membrane::Index> all_that(const Positions& x, const membrane::Triangles& triangles, Touches touches) {
+std::vector<membrane::Index> all_that(const Positions& x, const membrane::Triangles& triangles, Touches contacts) {
     std::vector<membrane::Index> found;
     for (membrane::Index f = 0; f < triangles.cols(); ++f) {
-        if (touches(brute_triangle<Number>(membrane::triangle_at(x, triangles.col(f))))) found.push_back(f);
+        if (contacts(brute_triangle<Number>(membrane::triangle_at(x, triangles.col(f))))) found.push_back(f);
     }
     return found;
 }

@@ -31,19 +31,21 @@ Eigen::Vector3d nearest_weights(const Eigen::Matrix3d& corners, const Eigen::Vec
     return best;
 }
 
-Eigen::Vector2d nearest_along(const Eigen::Vector3d& p, const Eigen::Vector3d& way, const Eigen::Vector3d& q,
+Eigen::Vector2d nearest_along(const Eigen::Vector3d& p, const Eigen::Vector3d& displacement, const Eigen::Vector3d& q,
                               const Eigen::Vector3d& other_way) {
     const auto clamped = [](double along) { return std::clamp(along, 0.0, 1.0); };
     std::vector<Eigen::Vector2d> candidates;
     for (const double end : {0.0, 1.0}) {
-        candidates.emplace_back(end, clamped((p + end * way - q).dot(other_way) / other_way.squaredNorm()));
-        candidates.emplace_back(clamped((q + end * other_way - p).dot(way) / way.squaredNorm()), end);
+        candidates.emplace_back(end, clamped((p + end * displacement - q).dot(other_way) / other_way.squaredNorm()));
+        candidates.emplace_back(clamped((q + end * other_way - p).dot(displacement) / displacement.squaredNorm()), end);
     }
-    Eigen::Matrix<double, 3, 2> ways;
-    ways << way, -other_way;
-    const Eigen::Vector2d inside = ways.colPivHouseholderQr().solve(q - p);
+    Eigen::Matrix<double, 3, 2> displacements;
+    displacements << displacement, -other_way;
+    const Eigen::Vector2d inside = displacements.colPivHouseholderQr().solve(q - p);
     if (inside.minCoeff() > 0 && inside.maxCoeff() < 1) candidates.push_back(inside);
-    const auto distance = [&](const Eigen::Vector2d& at) { return (p + at[0] * way - q - at[1] * other_way).norm(); };
+    const auto distance = [&](const Eigen::Vector2d& at) {
+        return (p + at[0] * displacement - q - at[1] * other_way).norm();
+    };
     return *std::min_element(candidates.begin(), candidates.end(),
                              [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
 }
@@ -84,7 +86,7 @@ std::vector<Eigen::Index> coordinates_of(const std::vector<Eigen::Index>& vertic
 }
 
 Eigen::VectorXd PressedMembrane::forces(const Eigen::Matrix3Xd& x) const {
-    Eigen::Matrix3Xd sum = backing * (anchors - x);
+    Eigen::Matrix3Xd sum = foundation * (anchors - x);
     for (const auto& spring : springs) {
         const Eigen::Vector3d reach = x.col(spring.second) - x.col(spring.first);
         const Eigen::Vector3d pull = spring.stiffness * (1 - spring.rest_length / reach.norm()) * reach;
@@ -102,8 +104,8 @@ std::vector<Feature> features_near(const PressedMembrane& membrane, const Eigen:
         for (const auto& triangle : membrane.triangles.colwise()) {
             Eigen::Matrix3d corners;
             for (int k = 0; k < 3; ++k) corners.col(k) = x.col(triangle[k]);
-            const auto add = [&](int part, const Eigen::Vector3d& weights, const Eigen::Vector3d& on_axis) {
-                Feature feature{i, part, {}, {}, on_axis - corners * weights, tool.radius};
+            const auto add = [&](int part, const Eigen::Vector3d& weights, const Eigen::Vector3d& axis_point) {
+                Feature feature{i, part, {}, {}, axis_point - corners * weights, tool.radius};
                 std::map<Eigen::Index, double> weight_of;  // sorts
                 for (int k = 0; k < 3; ++k) {
                     if (weights[k] > 0) weight_of[triangle[k]] = weights[k];
@@ -152,24 +154,25 @@ Eigen::MatrixXd gap_curvature(const PressedMembrane& membrane, const Eigen::Matr
     const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - normal * normal.transpose()) / feature.reach.norm();
     const auto weights = Eigen::Map<const Eigen::VectorXd>(feature.weights.data(), count);
 
-    Eigen::MatrixXd ways(3, slides), shares = Eigen::MatrixXd::Zero(count, slides);  // of the point, of its weights
+    Eigen::MatrixXd displacements(3, slides),
+        shares = Eigen::MatrixXd::Zero(count, slides);  // of the point, of its weights
     for (Eigen::Index s = 0; s + 1 < count; ++s) {
-        ways.col(s) = x.col(feature.vertices[static_cast<std::size_t>(s) + 1]) - x.col(feature.vertices[0]);
+        displacements.col(s) = x.col(feature.vertices[static_cast<std::size_t>(s) + 1]) - x.col(feature.vertices[0]);
         shares(0, s) = -1;
         shares(s + 1, s) = 1;
     }
-    if (feature.part == 2) ways.col(slides - 1) = -membrane.tools[feature.tool].axis;
+    if (feature.part == 2) displacements.col(slides - 1) = -membrane.tools[feature.tool].axis;
 
     Eigen::MatrixXd held(3 * count, 3 * count), mixed(3 * count, slides);
     for (Eigen::Index i = 0; i < count; ++i) {
         for (Eigen::Index j = 0; j < count; ++j) held.block<3, 3>(3 * i, 3 * j) = weights[i] * weights[j] * across;
-        mixed.middleRows<3>(3 * i) = weights[i] * across * ways - normal * shares.row(i);
+        mixed.middleRows<3>(3 * i) = weights[i] * across * displacements - normal * shares.row(i);
     }
     if (slides == 0) return held;
-    return held - mixed * (ways.transpose() * across * ways).ldlt().solve(mixed.transpose());
+    return held - mixed * (displacements.transpose() * across * displacements).ldlt().solve(mixed.transpose());
 }
 
-Eigen::VectorXd least_not_negative(const Eigen::MatrixXd& W, const Eigen::VectorXd& q) {
+Eigen::VectorXd smallest_non_negative(const Eigen::MatrixXd& W, const Eigen::VectorXd& q) {
     Eigen::VectorXd y = Eigen::VectorXd::Zero(q.size());
     const double slack = 1e-15 * q.lpNorm<Eigen::Infinity>();
     std::vector<Eigen::Index> free;
@@ -214,7 +217,7 @@ Eigen::LLT<Eigen::MatrixXd> factors_of(Eigen::MatrixXd H, double shift) {
 PressedState at_rest(const PressedMembrane& membrane, const Eigen::Matrix3Xd& start, const NewtonOptions& options) {
     PressedState state{start, {}, false};
     std::map<Feature::Name, double> pressure_of;  // [N]
-    for (int i = 0; i < options.most_steps && !state.converged; ++i) {
+    for (int i = 0; i < options.max_steps && !state.converged; ++i) {
         const auto features = features_near(membrane, state.x, options.far);
         Eigen::MatrixXd H = membrane.stiffness(state.x), J = gap_gradients(features, state.x.size());
         Eigen::VectorXd F = membrane.forces(state.x), gaps(J.rows());
@@ -233,14 +236,14 @@ PressedState at_rest(const PressedMembrane& membrane, const Eigen::Matrix3Xd& st
             J.col(row).setZero();
             F[row] = 0;
         }
-        const auto factors = factors_of(H, membrane.backing);
+        const auto factors = factors_of(H, membrane.foundation);
         const Eigen::MatrixXd answers = factors.solve(J.transpose());
         const Eigen::VectorXd alone = factors.solve(F);
-        const Eigen::VectorXd pressures = least_not_negative(J * answers, gaps + J * alone);
-        const Eigen::Matrix3Xd way = (alone + answers * pressures).reshaped(3, state.x.cols());
+        const Eigen::VectorXd pressures = smallest_non_negative(J * answers, gaps + J * alone);
+        const Eigen::Matrix3Xd displacement = (alone + answers * pressures).reshaped(3, state.x.cols());
 
-        const double length = way.colwise().norm().maxCoeff();
-        state.x += std::min(1.0, options.longest_step / length) * way;
+        const double length = displacement.colwise().norm().maxCoeff();
+        state.x += std::min(1.0, options.max_step / length) * displacement;
         state.converged = length < 1e-12;
         pressure_of.clear();
         state.reactions.assign(membrane.tools.size(), Eigen::Vector3d::Zero());

@@ -7,16 +7,16 @@
 
 #include <Eigen/Core>
 
-#include <membrane/collision/tool.hpp>
-#include <membrane/mesh/triangle_mesh.hpp>
-#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/contact/tool.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 /// Where a membrane of linear springs rests on tools, found in another way than the solver's: all vertices at once, by
 /// Newton's method, each feature of the surface near a tool being an inequality with a curvature of its own (sequential
 /// quadratic programming [Nocedal06] 18). Dense, and with its own geometry.
 ///
 ///     const test::PressedMembrane membrane{mesh.triangles(), springs, mesh.positions(), 0.3, {tool}};
-///     const auto rest = test::at_rest(membrane, start, {.far = edge / 2, .longest_step = tool.radius / 2});
+///     const auto rest = test::at_rest(membrane, start, {.far = edge / 2, .max_step = tool.radius / 2});
 ///     CHECK((rest.x - x).cwiseAbs().maxCoeff() < 1e-6);
 namespace test {
 
@@ -41,8 +41,8 @@ struct Feature {
 /// Weights of the point of a triangle (corners in columns) that is nearest to `q`.
 Eigen::Vector3d nearest_weights(const Eigen::Matrix3d& corners, const Eigen::Vector3d& q);
 
-/// How far along, 0 to 1, the segments from `p` by `way` and from `q` by `other_way` are nearest to one another.
-Eigen::Vector2d nearest_along(const Eigen::Vector3d& p, const Eigen::Vector3d& way, const Eigen::Vector3d& q,
+/// How far along, 0 to 1, the segments from `p` by `displacement` and from `q` by `other_way` are nearest to one another.
+Eigen::Vector2d nearest_along(const Eigen::Vector3d& p, const Eigen::Vector3d& displacement, const Eigen::Vector3d& q,
                               const Eigen::Vector3d& other_way);
 
 /// Distance of a triangle (corners in columns) from the tool's axis.
@@ -59,16 +59,16 @@ struct PressedMembrane {
     membrane::Triangles triangles;
     std::vector<membrane::Spring<double>> springs;
     Eigen::Matrix3Xd anchors;
-    double backing;  // [N/m]
+    double foundation;  // [N/m]
     std::vector<Tool> tools;
     std::vector<Eigen::Index> pinned = {};
 
-    /// Springs and backing on each vertex, x y z each [N].
+    /// Springs and foundation on each vertex, x y z each [N].
     Eigen::VectorXd forces(const Eigen::Matrix3Xd& x) const;
 
-    /// Second derivative of the energy of springs and backing [N/m].
+    /// Second derivative of the energy of springs and foundation [N/m].
     Eigen::MatrixXd stiffness(const Eigen::Matrix3Xd& x) const {
-        Eigen::MatrixXd sum = backing * Eigen::MatrixXd::Identity(x.size(), x.size());
+        Eigen::MatrixXd sum = foundation * Eigen::MatrixXd::Identity(x.size(), x.size());
         for (const auto& spring : springs) {
             const Eigen::Vector3d along = (x.col(spring.second) - x.col(spring.first)).normalized();
             const double across = 1 - spring.rest_length / (x.col(spring.second) - x.col(spring.first)).norm();
@@ -95,12 +95,12 @@ Eigen::MatrixXd gap_gradients(const std::vector<Feature>& features, Eigen::Index
 Eigen::MatrixXd gap_curvature(const PressedMembrane& membrane, const Eigen::Matrix3Xd& x, const Feature& feature);
 
 /// The y >= 0 of least y.W y / 2 + q.y, for W positive semidefinite [Lawson74].
-Eigen::VectorXd least_not_negative(const Eigen::MatrixXd& W, const Eigen::VectorXd& q);
+Eigen::VectorXd smallest_non_negative(const Eigen::MatrixXd& W, const Eigen::VectorXd& q);
 
 struct NewtonOptions {
-    double far;           // what is at most this far from a tool is looked at [m]
-    double longest_step;  // of a vertex [m]
-    int most_steps = 60;
+    double far;       // what is at most this far from a tool is looked at [m]
+    double max_step;  // of a vertex [m]
+    int max_steps = 60;
 };
 
 /// A membrane at rest on its tools.

@@ -7,7 +7,7 @@
 
 #include <Eigen/Core>
 #include <membrane/accuracy/convexity.hpp>
-#include <membrane/mesh/shapes.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -29,12 +29,12 @@ void bounds_hold_nearby(double share) {
         const auto mesh = icosphere<double>({.radius = 1, .subdivisions = 1});
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0, .pinned = {7}});
         const double stiffness = std::pow(10, random.number(-1.5, 0.5));
-        const VirtualVolumeSprings backing(mesh, {.stiffness = stiffness});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = stiffness});
         const Points<double> x = jittered(mesh.positions(), std::pow(10, random.number(-4.0, -1.0)), random);
         const Index held = 8 + random.index(30);
         const double radius = std::pow(10, random.number(-6.0, -1.5));
-        RestProblem problem(network);
-        REQUIRE(problem.take(x, network, backing, pull(held, point(x, held))) == ProblemStatus::sound);
+        EquilibriumProblem problem(network);
+        REQUIRE(problem.take(x, network, foundation, pull(held, point(x, held))) == ProblemStatus::valid);
         Model model(problem);
         const double bound = model.around(problem, radius);
         CAPTURE(stiffness, radius, bound);

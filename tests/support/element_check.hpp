@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include <membrane/core/lanes.hpp>
-#include <membrane/network/elements.hpp>
+#include <membrane/model/elements.hpp>
 
 #include "support/catch.hpp"
 #include "support/eigenvalues.hpp"
@@ -23,10 +23,10 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
                    Random& random) {
     const double h = 1e-5 * size;
     for (std::size_t i = 0; i < E::corner_count; ++i) {
-        const auto pull = element.pull(x, i);
-        const auto moved = [&](const membrane::Vector3<double>& way) {
+        const auto pull = element.force_on(x, i);
+        const auto moved = [&](const membrane::Vector3<double>& displacement) {
             auto there = x;
-            there[i] += way;
+            there[i] += displacement;
             return there;
         };
         for (Eigen::Index k = 0; k < 3; ++k) {
@@ -34,14 +34,14 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
             const double slope = (element.energy(moved(by)) - element.energy(moved(-by))) / (2 * h);
             REQUIRE(std::abs(pull.force[k] + slope) < 1e-7 * energy / size);
         }
-        const membrane::Vector3<double> way = random.number(0.0, 0.3) * size * random.unit_vector();
-        const auto change = element.energy_change(x, i, way);
-        const double difference = element.energy(moved(way)) - element.energy(x);
+        const membrane::Vector3<double> displacement = random.number(0.0, 0.3) * size * random.unit_vector();
+        const auto change = element.energy_change(x, i, displacement);
+        const double difference = element.energy(moved(displacement)) - element.energy(x);
         REQUIRE(std::abs(change.change - difference) < 1e-12 * energy + 1e-15 * change.size);
         REQUIRE(eigenvalues_of(dense(pull.curvature))[0] > -1e-12 * energy / (size * size));
         membrane::Corners<float, E::corner_count> y;
         for (std::size_t k = 0; k < y.size(); ++k) y[k] = x[k].template cast<float>();
-        const auto single = element.pull(y, i);
+        const auto single = element.force_on(y, i);
         REQUIRE((single.force.template cast<double>() - pull.force).norm() < 1e-4 * energy / size);
     }
 }
@@ -53,12 +53,13 @@ void check_second_derivative(const E& element, const membrane::Corners<double, E
     const double h = 1e-5 * size;
     for (std::size_t i = 0; i < E::corner_count; ++i) {
         for (std::size_t j = 0; j < E::corner_count; ++j) {
-            const Eigen::Matrix3d block = element.second_derivative(x, i, j);
+            const Eigen::Matrix3d block = element.hessian_block(x, i, j);
             for (Eigen::Index k = 0; k < 3; ++k) {
                 auto before = x, after = x;
                 before[j][k] -= h;
                 after[j][k] += h;
-                const Eigen::Vector3d slope = (element.pull(before, i).force - element.pull(after, i).force) / (2 * h);
+                const Eigen::Vector3d slope =
+                    (element.force_on(before, i).force - element.force_on(after, i).force) / (2 * h);
                 REQUIRE((slope - block.col(k)).norm() < 1e-7 * energy / (size * size));
             }
         }
@@ -69,7 +70,7 @@ void check_second_derivative(const E& element, const membrane::Corners<double, E
 template <class E, class InLanes>
 void check_lanes(const std::array<E, membrane::Lanes<double>::count>& elements,
                  const std::array<membrane::Corners<double, E::corner_count>, membrane::Lanes<double>::count>& x,
-                 const membrane::Vector3<double>& way, const InLanes& in_lanes) {
+                 const membrane::Vector3<double>& displacement, const InLanes& in_lanes) {
     using Wide = membrane::Lanes<double>;
     const auto together = in_lanes(elements);
     const auto lanes = [](const auto& number_of) { return Wide::of([&](std::size_t l) { return number_of(l); }); };
@@ -77,19 +78,19 @@ void check_lanes(const std::array<E, membrane::Lanes<double>::count>& elements,
     for (std::size_t i = 0; i < places.size(); ++i) {
         for (Eigen::Index k = 0; k < 3; ++k) places[i][k] = lanes([&](std::size_t l) { return x[l][i][k]; });
     }
-    const membrane::Vector3<Wide> ways(way[0], way[1], way[2]);
+    const membrane::Vector3<Wide> displacements(displacement[0], displacement[1], displacement[2]);
     const auto energy = together.energy(places);
     for (std::size_t i = 0; i < places.size(); ++i) {
-        const auto pull = together.pull(places, i);
-        const auto change = together.energy_change(places, i, ways);
+        const auto pull = together.force_on(places, i);
+        const auto change = together.energy_change(places, i, displacements);
         for (std::size_t l = 0; l < Wide::count; ++l) {
-            const auto alone = elements[l].pull(x[l], i);
+            const auto alone = elements[l].force_on(x[l], i);
             for (Eigen::Index k = 0; k < 3; ++k) REQUIRE(pull.force[k][l] == alone.force[k]);
             const auto& a = pull.curvature;
             const auto& b = alone.curvature;
             REQUIRE((a.xx[l] == b.xx && a.yy[l] == b.yy && a.zz[l] == b.zz));
             REQUIRE((a.xy[l] == b.xy && a.xz[l] == b.xz && a.yz[l] == b.yz));
-            const auto changes = elements[l].energy_change(x[l], i, way);
+            const auto changes = elements[l].energy_change(x[l], i, displacement);
             REQUIRE((change.change[l] == changes.change && change.size[l] == changes.size));
             REQUIRE(energy[l] == elements[l].energy(x[l]));
         }

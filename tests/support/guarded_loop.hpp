@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
 
 #include "support/bits.hpp"
 #include "support/catch.hpp"
@@ -20,9 +20,9 @@ namespace test {
 template <membrane::Real S, class Rule = membrane::BlockStep>
 struct GuardedLoop {
     GuardedLoop(const membrane::TriangleMesh<S>& surface, const membrane::NetworkOptions<S>& springs,
-                const membrane::VolumeOptions<S>& volume, const membrane::SolverOptions<S>& options = {},
+                const membrane::VolumeSpringOptions<S>& volume, const membrane::SolverOptions<S>& options = {},
                 const Rule& rule = {})
-        : mesh(surface), network(mesh, {}, springs), backing(mesh, volume), solver(network, options, rule) {}
+        : mesh(surface), network(mesh, {}, springs), foundation(mesh, volume), solver(network, options, rule) {}
 
     /// Tool, step and boxes.
     template <class... Constraints>
@@ -32,7 +32,7 @@ struct GuardedLoop {
         {
             const FloatingPointTraps armed(traps);
             contact = tracker.update(tree, x, tool);
-            report = solver.step(x, dt, network, backing, membrane::press(tool, contact), constraints...);
+            report = solver.step(x, dt, network, foundation, membrane::press(tool, contact), constraints...);
             tree.refit(x, report.moved);
         }
         check(report, before);
@@ -46,7 +46,7 @@ struct GuardedLoop {
         membrane::StepReport<S> report;
         {
             const FloatingPointTraps armed(traps);
-            report = solver.step(x, dt, network, backing, constraints...);
+            report = solver.step(x, dt, network, foundation, constraints...);
             tree.refit(x, report.moved);
         }
         check(report, before);
@@ -55,7 +55,7 @@ struct GuardedLoop {
 
     membrane::TriangleMesh<S> mesh;
     membrane::MassSpringNetwork<S, membrane::LinearSpring> network;
-    membrane::VirtualVolumeSprings<S> backing;
+    membrane::VirtualVolumeSprings<S> foundation;
     membrane::QuasiStaticSolver<S, Rule> solver;
     membrane::AabbTree<S> tree{mesh};
     membrane::ContactTracker<S> tracker{mesh};

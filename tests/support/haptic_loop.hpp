@@ -49,13 +49,13 @@ struct HapticLoop {
 
     explicit HapticLoop(std::uint64_t seed)
         : network(mesh, {}, {.stiffness = S(40)}),
-          backing(mesh, {.stiffness = S(8), .damping = S(0.005)}),
-          solver(network, {.layers = 3, .sweeps = 1, .negligible_force = S(1e-6)}),
+          foundation(mesh, {.stiffness = S(8), .damping = S(0.005)}),
+          solver(network, {.layers = 3, .sweeps = 1, .force_tolerance = S(1e-6)}),
           device(at_desk(busy_script<S>(seed, 40)), {.tick = dt, .radius = 1e-3},
                  membrane::SimulatedHand<S>({.mass = 0.1, .damping = 4, .stiffness = 300})) {}
 
     void tick(const Mishap& mishap = {}) noexcept {
-        if (!device.running()) device.restart();
+        if (!device.running()) device.reset();
         now += dt + mishap.late;
         const auto hand = in_scene(device.read(), mishap);
         if (!mishap.frozen) simulate(policy == 3 ? coupling.follow(hand, reaction, S(dt)) : hand);
@@ -64,8 +64,8 @@ struct HapticLoop {
         observer.update(hand.position, felt, dt);
         if (recorder.missed() > 100) recorder.clear();
         recorder.add(hand, felt);
-        const auto on_hand = scale.to_device(membrane::Newtons(felt.template cast<double>())).on_hand;
-        device.write(on_hand.value().template cast<S>());
+        const auto device_force = scale.to_device(membrane::Newtons(felt.template cast<double>())).device_force;
+        device.write(device_force.value().template cast<S>());
         draw(hand);
         ++ticks;
     }
@@ -74,7 +74,7 @@ struct HapticLoop {
 
     membrane::TriangleMesh<S> mesh = membrane::icosphere<S>({.radius = 0.01, .subdivisions = 2});
     membrane::MassSpringNetwork<S, membrane::LinearSpring> network;
-    membrane::VirtualVolumeSprings<S> backing;
+    membrane::VirtualVolumeSprings<S> foundation;
     membrane::QuasiStaticSolver<S> solver;
     membrane::AabbTree<S> tree{mesh};
     membrane::ContactTracker<S> tracker{mesh};
@@ -93,7 +93,7 @@ struct HapticLoop {
     membrane::VirtualCoupling<S> coupling{{.stiffness = 200, .damping = 0.2, .scale = 5}};
     membrane::SpringDamperForce spring{.stiffness = 100, .damping = 0.5};
     membrane::ForceLimiter limit{membrane::devices::touch};
-    membrane::EnergyObserver observer;
+    membrane::PassivityObserver observer;
     membrane::Recorder<S> recorder{1000, mesh.vertex_count()};
 
     /// The hand goes twice as far as the tool, elsewhere and turned.
@@ -103,7 +103,7 @@ struct HapticLoop {
         s.device.origin = {0, 0, 0.002};
         return s;
     }();
-    membrane::NullDevice<S, membrane::SimulatedHand<S>> device;
+    membrane::ScriptedDevice<S, membrane::SimulatedHand<S>> device;
     membrane::MovedPoints<S> moved{mesh.vertex_count()};
     membrane::Latest<membrane::Tool<S>> pose;
     membrane::Points<S> shown = x;
@@ -119,7 +119,7 @@ struct HapticLoop {
     std::vector<membrane::Waypoint<S>> at_desk(std::vector<membrane::Waypoint<S>> script) const {
         for (auto& waypoint : script) {
             const membrane::Vector3<double> place = waypoint.position.template cast<double>();
-            waypoint.position = (scale.device.point_in(place) / scale.motion).template cast<S>();
+            waypoint.position = (scale.device.point_to_body(place) / scale.motion).template cast<S>();
         }
         return script;
     }
@@ -137,7 +137,7 @@ struct HapticLoop {
     void simulate(const membrane::Tool<S>& tool) noexcept {
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
-        const auto report = solver.step(x, S(dt), network, backing, press(tool, contact, grasp), pull(tool, grasp));
+        const auto report = solver.step(x, S(dt), network, foundation, press(tool, contact, grasp), pull(tool, grasp));
         tree.refit(x, report.moved);
         normals.update(x, report.moved);
         moved.publish(report.moved, x, now);
@@ -150,9 +150,9 @@ struct HapticLoop {
         if (ticks % 5 == 0) extrapolate.solved(reaction, membrane::diagonal3(S(20)), tool.position);
         const membrane::HapticState<S> state{tool, smooth(contact), report, grasp};
         const membrane::HapticState<S> undeformed{tool, rest(contact, tool), report, grasp};
-        const std::array<V, 5> ways{paper(state), react(state), extrapolate(state), coupling(state),
-                                    spring(undeformed)};
-        asked = ways[static_cast<std::size_t>(policy)];
+        const std::array<V, 5> displacements{paper(state), react(state), extrapolate(state), coupling(state),
+                                             spring(undeformed)};
+        asked = displacements[static_cast<std::size_t>(policy)];
         pushed[static_cast<std::size_t>(policy)] += asked.isZero(0) ? 0 : 1;
         if (!contact.touching() && !grasp.holding() && ticks % 500 < 250) policy = ticks / 500 % 5;
         touching += contact.touching();

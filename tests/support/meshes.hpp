@@ -8,8 +8,8 @@
 #include <numeric>
 #include <vector>
 
-#include <membrane/mesh/shapes.hpp>
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/surface/shapes.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 #include "support/random.hpp"
 #include "support/refusal.hpp"

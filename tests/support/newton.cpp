@@ -18,15 +18,15 @@ Eigen::VectorXd newton(const std::function<Eigen::VectorXd(const Eigen::VectorXd
             before[i] -= h;
             jacobian.col(i) = (residual(after) - residual(before)) / (2 * h);
         }
-        const Eigen::VectorXd way = -solve(jacobian, here);
+        const Eigen::VectorXd displacement = -solve(jacobian, here);
         double step = 1;
-        Eigen::VectorXd there = residual(x + way);
+        Eigen::VectorXd there = residual(x + displacement);
         while (!(there.norm() < here.norm()) && step > 1e-10) {
             step /= 2;
-            there = residual(x + step * way);
+            there = residual(x + step * displacement);
         }
         if (!(there.norm() < here.norm())) return x;  // no nearer than rounding lets it
-        x += step * way;
+        x += step * displacement;
         here = there;
     }
     return x;

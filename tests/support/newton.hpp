@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 
 #include <membrane/core/types.hpp>
-#include <membrane/network/spring_law.hpp>
+#include <membrane/model/spring_law.hpp>
 
 /// The equilibrium of a small membrane found in another way than the solver's: all free vertices at once, by Newton's
 /// method with a dense Jacobian from differences. Forces are summed here, from energies that the network does not see.

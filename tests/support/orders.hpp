@@ -11,9 +11,10 @@ namespace test {
 /// An order of visits for each seed, all of them in turn: what holds in one must hold in every one.
 ///
 ///     QuasiStaticSolver solver(network, {.order = test::order_of(seed)});
-[[nodiscard]] inline membrane::VisitOrder order_of(int seed) {
-    using membrane::VisitOrder;
-    return std::array{VisitOrder::groups, VisitOrder::arrival, VisitOrder::colours}[static_cast<std::size_t>(seed) % 3];
+[[nodiscard]] inline membrane::UpdateOrder order_of(int seed) {
+    using membrane::UpdateOrder;
+    return std::array{UpdateOrder::colour_layers, UpdateOrder::breadth_first,
+                      UpdateOrder::colour_all}[static_cast<std::size_t>(seed) % 3];
 }
 
 }  // namespace test

@@ -7,7 +7,7 @@ namespace test {
 
 /// Steps of `dt` until nothing is left to do, or `most` of them; the last one's report.
 ///
-///     const auto report = test::settle(solver, x, dt, network, backing, membrane::pull(v, target));
+///     const auto report = test::settle(solver, x, dt, network, foundation, membrane::pull(v, target));
 ///     REQUIRE(report.converged);
 template <class Solver, class Positions, class Network, class Volume, class... Constraints>
 auto settle_within(int most, Solver& solver, Positions& x, typename Network::Scalar dt, const Network& network,

@@ -7,9 +7,9 @@
 
 #include <Eigen/SparseCholesky>
 
-#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/model/mass_spring_network.hpp>
 
-/// Where linear springs and a backing balance, found in another way than the library's: all free vertices at once, by
+/// Where linear springs and a foundation balance, found in another way than the library's: all free vertices at once, by
 /// Newton's method with sparse factors. Forces and stiffness are summed here.
 namespace test {
 
@@ -21,8 +21,8 @@ namespace test {
 class StillMembrane {
   public:
     template <class Network>
-    StillMembrane(const Network& network, const membrane::Points<double>& anchors, double backing)
-        : backing_(static_cast<std::size_t>(anchors.cols()), backing),
+    StillMembrane(const Network& network, const membrane::Points<double>& anchors, double foundation)
+        : backing_(static_cast<std::size_t>(anchors.cols()), foundation),
           anchors_(anchors),
           load_(membrane::Points<double>::Zero(3, anchors.cols())),
           fixed_(backing_.size(), 0) {
@@ -37,11 +37,11 @@ class StillMembrane {
 
     void fix(membrane::Index v) { fixed_[static_cast<std::size_t>(v)] = 1; }
     void release(membrane::Index v) { fixed_[static_cast<std::size_t>(v)] = 0; }
-    void back(double backing) { std::fill(backing_.begin(), backing_.end(), backing); }
-    void back(membrane::Index v, double backing) { backing_[static_cast<std::size_t>(v)] = backing; }
+    void back(double foundation) { std::fill(backing_.begin(), backing_.end(), foundation); }
+    void back(membrane::Index v, double foundation) { backing_[static_cast<std::size_t>(v)] = foundation; }
     void load(membrane::Index v, const Eigen::Vector3d& force) { load_.col(v) += force; }
 
-    /// Springs, backing and loads on every vertex.
+    /// Springs, foundation and loads on every vertex.
     membrane::Points<double> forces(const membrane::Points<double>& x) const;
 
     /// Second derivative of the energy by the free vertices; zero rows and ones on the diagonal for the others.

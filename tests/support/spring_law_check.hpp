@@ -6,7 +6,7 @@
 #include <sstream>
 #include <string>
 
-#include <membrane/network/spring_law.hpp>
+#include <membrane/model/spring_law.hpp>
 
 #include "support/random.hpp"
 
@@ -28,10 +28,10 @@ struct CubicSpring {
     }
 };
 
-/// What is wrong with `law`, for lengths up to `most_strain` beyond rest and down to nothing; empty if it is sound:
+/// What is wrong with `law`, for lengths up to `max_strain` beyond rest and down to nothing; empty if it is valid:
 /// nothing at rest, tension the derivative of energy and stiffness that of tension, all finite for every finite length.
 template <membrane::SpringLaw<double> Law>
-std::string check_spring_law(const Law& law, double most_strain = 1) {
+std::string check_spring_law(const Law& law, double max_strain = 1) {
     Random random(1);
     std::ostringstream wrong;
     for (int n = 0; n < 1000 && wrong.str().empty(); ++n) {
@@ -44,7 +44,7 @@ std::string check_spring_law(const Law& law, double most_strain = 1) {
         const auto near = [](double a, double b, double size) { return std::abs(a - b) <= 1e-6 * size; };
 
         if (const auto r = at(rest); r.tension != 0 || r.energy != 0) say("tension or energy", rest, r.tension, 0);
-        const double length = rest * random.number(0.01, 1 + most_strain), h = 1e-5 * rest;
+        const double length = rest * random.number(0.01, 1 + max_strain), h = 1e-5 * rest;
         const auto here = at(length), before = at(length - h), after = at(length + h);
         const double slope = (after.energy - before.energy) / (2 * h);
         if (!near(here.tension, slope, std::abs(here.tension) + k * rest)) say("tension", length, here.tension, slope);

@@ -16,7 +16,7 @@ namespace test {
 ///
 ///     {
 ///         const test::FloatingPointTraps traps;
-///         report = solver.step(x, dt, network, backing);
+///         report = solver.step(x, dt, network, foundation);
 ///     }
 class FloatingPointTraps {
   public:

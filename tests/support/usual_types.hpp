@@ -5,9 +5,9 @@
 
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/mesh/moving_body.hpp>
-#include <membrane/network/foundation_springs.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/moved_volume.hpp>
+#include <membrane/surface/moving_body.hpp>
 
 // What most programs here are made of, compiled once, in a library: a file that includes this first leaves it to the
 // library, but for functions that are inline. Nothing of accuracy/ is here: its inline functions would have every file
@@ -38,11 +38,11 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
     PREFIX membrane::TriangleMesh<SCALAR>::TriangleMesh(const Eigen::MatrixBase<membrane::Points<SCALAR>>&,      \
                                                         const Eigen::MatrixBase<membrane::Triangles>&);          \
     PREFIX membrane::Adjacency::Adjacency(const membrane::TriangleMesh<SCALAR>&);                                \
-    PREFIX class membrane::NullDevice<SCALAR>;                                                                   \
+    PREFIX class membrane::ScriptedDevice<SCALAR>;                                                               \
     PREFIX class membrane::VertexNormals<SCALAR>;                                                                \
     PREFIX class membrane::MovingBody<SCALAR>;                                                                   \
-    PREFIX class membrane::Neighbourhood<SCALAR>;                                                                \
-    PREFIX class membrane::BoxTree<SCALAR>;                                                                      \
+    PREFIX class membrane::LocalSurface<SCALAR>;                                                                 \
+    PREFIX class membrane::WideBvh<SCALAR>;                                                                      \
     PREFIX class membrane::AabbTree<SCALAR>;                                                                     \
     PREFIX class membrane::ContactTracker<SCALAR>;                                                               \
     PREFIX class membrane::Grasper<SCALAR>;                                                                      \
@@ -55,8 +55,8 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
     PREFIX class membrane::ContactPacks<SCALAR>;                                                                 \
     PREFIX struct membrane::StepState<SCALAR>;                                                                   \
     PREFIX class membrane::ConstraintContext<SCALAR>;                                                            \
-    PREFIX struct membrane::Press<SCALAR>;                                                                       \
-    PREFIX struct membrane::HeldPoint<SCALAR>;                                                                   \
+    PREFIX struct membrane::ToolContact<SCALAR>;                                                                 \
+    PREFIX struct membrane::PointAttachment<SCALAR>;                                                             \
     PREFIX struct membrane::SolverOptions<SCALAR>;                                                               \
     PREFIX membrane::TriangleMesh<SCALAR> membrane::icosphere<SCALAR>(const membrane::IcosphereOptions&);        \
     PREFIX membrane::TriangleMesh<SCALAR> membrane::sheet<SCALAR>(const membrane::SheetOptions&);                \
@@ -65,7 +65,7 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
     MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, BlockStep);                                                            \
     MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, MassStep);                                                             \
     MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, SafeStep);                                                             \
-    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, membrane::NoVolumeSprings);                                   \
+    MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, membrane::NoFoundation);                                      \
     MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep,                                                               \
                         membrane::MovedVolume<membrane::VirtualVolumeSprings<SCALAR>, SCALAR>)
 

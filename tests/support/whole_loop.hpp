@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <membrane/membrane.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/moved_volume.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 
 #include "support/random.hpp"
@@ -51,16 +51,17 @@ template <membrane::Real S>
 struct WholeLoop {
     explicit WholeLoop(std::uint64_t seed)
         : network(mesh, {}, {.stiffness = S(40)}),
-          backing(mesh, {.stiffness = S(8), .damping = S(0.005)}),
-          solver(network, {.layers = 3, .sweeps = 1, .negligible_force = S(1e-6)}),
+          foundation(mesh, {.stiffness = S(8), .damping = S(0.005)}),
+          solver(network, {.layers = 3, .sweeps = 1, .force_tolerance = S(1e-6)}),
           device(busy_script<S>(seed, 40), {.tick = 1e-3, .radius = 1e-3}) {}
 
     void tick() noexcept {
-        if (!device.running()) device.restart();
+        if (!device.running()) device.reset();
         const auto tool = device.read();
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
-        const auto report = solver.step(x, S(1e-3), network, backing, press(tool, contact, grasp), pull(tool, grasp));
+        const auto report =
+            solver.step(x, S(1e-3), network, foundation, press(tool, contact, grasp), pull(tool, grasp));
         tree.refit(x, report.moved);
         normals.update(x, report.moved);
         device.write(feel({tool, contact, report, grasp}));
@@ -70,14 +71,14 @@ struct WholeLoop {
 
     membrane::TriangleMesh<S> mesh = membrane::icosphere<S>({.radius = 0.01, .subdivisions = 2});
     membrane::MassSpringNetwork<S, membrane::LinearSpring> network;
-    membrane::VirtualVolumeSprings<S> backing;
+    membrane::VirtualVolumeSprings<S> foundation;
     membrane::QuasiStaticSolver<S> solver;
     membrane::AabbTree<S> tree{mesh};
     membrane::ContactTracker<S> tracker{mesh};
     membrane::Grasper<S> grasper{mesh};
     membrane::VertexNormals<S> normals{mesh};
     membrane::SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
-    membrane::NullDevice<S> device;
+    membrane::ScriptedDevice<S> device;
     membrane::Points<S> x = mesh.positions();
     int touching = 0, holding = 0;  // ticks
 };
@@ -88,18 +89,18 @@ template <membrane::Real S>
 struct OddLoop {
     explicit OddLoop(std::uint64_t seed)
         : network(mesh, {}, {.stiffness = S(40), .mass = S(1e-3), .viscosity = S(1e-3), .pinned = {7, 8}}),
-          backing(mesh, {.stiffness = S(8), .damping = S(0.02)}),
-          solver(network, {.layers = 6, .layers_as_needed = true, .sweeps = 2, .most_visits = 300}),
+          foundation(mesh, {.stiffness = S(8), .damping = S(0.02)}),
+          solver(network, {.layers = 6, .adaptive_layers = true, .sweeps = 2, .max_vertex_updates = 300}),
           published(network, {}, membrane::MassStep{}),
           euler(network),
-          grasper(mesh, {.whole_vertex = true}),
+          grasper(mesh, {.snap_to_vertex = true}),
           device(busy_script<S>(seed, 40), {.tick = 1e-3, .radius = 5e-4}) {}
 
     void tick() noexcept {
         const int now = ticks++;
-        if (!device.running()) device.restart();
+        if (!device.running()) device.reset();
         move_body(now);
-        auto tool = carried_in(device.read(), eye);
+        auto tool = to_body_frame(device.read(), eye);
         tool.axis = 2 * tool.position;
         auto other = tool;
         other.position = -tool.position;
@@ -112,14 +113,14 @@ struct OddLoop {
         int reads = 0;
         const membrane::Deadline deadline([&reads] { return ++reads; }, now % 10);
         const auto report =
-            solver.step_until(deadline, x, now % 1000 == 500 ? S(0) : S(1e-3), network, on(body, backing),
+            solver.step_until(deadline, x, now % 1000 == 500 ? S(0) : S(1e-3), network, on(body, foundation),
                               press(tool, contacts[0]), press(other, contacts[1], grasp), pull(other, grasp),
                               membrane::load<S>({0, 1, 2}, {S(0.5), S(0.25), S(0.25)}, {0, 0, S(-1e-3)}),
                               membrane::pull(3, membrane::point(anchors, 3)), membrane::pin(pins));
         tree.refit(x, report.moved);
         normals.update(x, report.moved);
         refused += report.status != membrane::StepStatus::advanced;
-        device.write(eye.direction_out(feel({other, contacts[1], report, grasp})));
+        device.write(eye.vector_to_world(feel({other, contacts[1], report, grasp})));
         if (now % 500 == 250) start_afresh(now);
         if (now % 100 == 0) recover();
     }
@@ -145,16 +146,16 @@ struct OddLoop {
 
     /// The published rule and explicit Euler bring the membrane back.
     void recover() noexcept {
-        const auto report = published.step(x, S(1e-3), network, membrane::NoVolumeSprings{});
+        const auto report = published.step(x, S(1e-3), network, membrane::NoFoundation{});
         refused += report.status != membrane::StepStatus::advanced;
-        refused += !euler.step(x, velocity, S(1e-4), network, backing);
-        refused += !euler.step(x, velocity, S(1e-4), network, backing, external);
+        refused += !euler.step(x, velocity, S(1e-4), network, foundation);
+        refused += !euler.step(x, velocity, S(1e-4), network, foundation, external);
         tree.refit(x);
     }
 
     membrane::TriangleMesh<S> mesh = membrane::icosphere<S>({.radius = 0.01, .subdivisions = 2});
     membrane::MassSpringNetwork<S, membrane::ExponentialSpring> network;
-    membrane::VirtualVolumeSprings<S> backing;
+    membrane::VirtualVolumeSprings<S> foundation;
     membrane::QuasiStaticSolver<S> solver;
     membrane::QuasiStaticSolver<S, membrane::MassStep> published;
     membrane::ExplicitEuler<S> euler;
@@ -163,7 +164,7 @@ struct OddLoop {
     membrane::Grasper<S> grasper;
     membrane::VertexNormals<S> normals{mesh};
     membrane::ReactionForce feel{.scale = 30};
-    membrane::NullDevice<S> device;
+    membrane::ScriptedDevice<S> device;
     membrane::RigidFrame<S> eye;
     std::vector<membrane::Index> pins{20, 30, 20};
     membrane::MovingBody<S> body{mesh};

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include <membrane/membrane.hpp>
-#include <membrane/network/moved_volume.hpp>
+#include <membrane/model/moved_volume.hpp>
 
 #include "support/bits.hpp"
 #include "support/catch.hpp"
@@ -49,7 +49,7 @@ struct Tick {
     membrane::RigidFrame<S> pose;
     membrane::Vector3<S> target, force;
     std::array<membrane::Vector3<S>, 2> weights;
-    membrane::HeldPoint<S> held;
+    membrane::PointAttachment<S> held;
 };
 
 /// A loop of all parts runs a few ticks, one of them with one wild number among what is handed in. Whatever that was,
@@ -61,7 +61,7 @@ void hand_in_wild_number(int seed) {
     Random random(static_cast<std::uint64_t>(seed));
     static const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
     static const MassSpringNetwork<S, LinearSpring> network(mesh, {}, {.stiffness = S(1)});
-    static const VirtualVolumeSprings<S> backing(mesh, {.stiffness = S(0.5), .damping = S(0.001)});
+    static const VirtualVolumeSprings<S> foundation(mesh, {.stiffness = S(0.5), .damping = S(0.001)});
     QuasiStaticSolver<S> solver(network, {.layers = random.chance(0.5) ? 2 : unlimited});
     AabbTree<S> tree(mesh);
     ContactTracker<S> tracker(mesh);
@@ -131,12 +131,12 @@ void hand_in_wild_number(int seed) {
             switch (which) {
                 case 14: contact.gap = wild; break;
                 case 15: contact.normal[k] = wild; break;
-                case 16: contact.on_axis[k] = wild; break;
-                case 17: contact.before[k] = wild; break;
+                case 16: contact.axis_point[k] = wild; break;
+                case 17: contact.previous_axis_point[k] = wild; break;
                 default: break;
             }
             const auto grasp = grasper.update(contact, now.x, now.tool, body);
-            report = solver.step(now.x, now.dt, network, on(body, backing), press(now.tool, contact, grasp),
+            report = solver.step(now.x, now.dt, network, on(body, foundation), press(now.tool, contact, grasp),
                                  membrane::pull(now.tool, grasp), membrane::pull(v, now.target), now.held,
                                  load(corners(g), now.weights[1], now.force));
             tree.refit(now.x, report.moved);
@@ -149,7 +149,7 @@ void hand_in_wild_number(int seed) {
         // What every step looks at is refused by name.
         const bool looked_at = which >= 0 && (which <= 10 || (which >= 14 && touching));
         if (looked_at && !is_finite(wild)) {
-            REQUIRE(report.status == (which == 0 ? StepStatus::bad_time_step : StepStatus::bad_input));
+            REQUIRE(report.status == (which == 0 ? StepStatus::bad_time_step : StepStatus::invalid_input));
         }
         // At the end, too, unless the membrane has been taken to where no mesh may be.
         const bool goes_on = tame || (tick == 9 && x.cwiseAbs().maxCoeff() < S(1e6));

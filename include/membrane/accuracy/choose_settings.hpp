@@ -16,27 +16,27 @@
 ///
 ///     #include <membrane/accuracy/choose_settings.hpp>
 ///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: a tool for each tick of 1 ms
-///     const auto choice = membrane::choose_settings(mesh, network, backing, stroke, {.force_error = 0.01});
+///     const auto choice = membrane::choose_settings(mesh, network, foundation, stroke, {.force_error = 0.01});
 ///     if (!choice.met) ...                                                    // nothing that was tried is enough
 ///     auto solver = membrane::QuasiStaticSolver(network, choice.options);
 namespace membrane {
 
 /// What is wanted, one of the two.
-struct Wanted {
+struct Requirement {
     double force_error = 0;  ///< at the most, see `Outcome`: the cheapest setting that keeps it
     double time = 0;         ///< of a tick, at the most [s]: the most accurate setting that keeps it
 };
 
 /// What is tried: every number of layers with every number of sweeps and of contact visits.
 template <Real Scalar>
-struct ExperimentOptions {
+struct GridSearchOptions {
     std::vector<Index> layers = {1, 2, 3, 4, 6, 8, 12, 16};
     std::vector<Index> sweeps = {1, 2, 3, 4, 6, 8, 12, 16};
-    std::vector<Index> contact_visits = {1, 2, 4, 8};
+    std::vector<Index> contact_iterations = {1, 2, 4, 8};
     SolverOptions<Scalar> others = {};  ///< the options besides these
     double margin = 1.8;                ///< the error in the experiment is below the wanted one by this factor
     Index every = 1;                    ///< errors are taken in every so many ticks: fewer equilibria
-    Index plays = 3;                    ///< of each setting; the shortest time counts
+    Index repetitions = 3;              ///< of each setting; the shortest time counts
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
@@ -44,7 +44,7 @@ struct ExperimentOptions {
 
 /// The chosen setting, and what the experiment has measured of it.
 template <Real Scalar>
-struct Choice : Outcome {
+struct ChosenSettings : Outcome {
     SolverOptions<Scalar> options;
     bool met = false;  ///< what was wanted is kept; if not, this is what came nearest to it
 };
@@ -63,23 +63,23 @@ struct Choice : Outcome {
 /// @throws InvalidInput for a wanted error or time that is not positive, none or both of them, an option out of its range,
 /// a history in which no force is felt or that has no equilibrium, and for what `trial` and `equilibria` refuse. Offline.
 /// Cost: an `equilibrium` for each tick that is judged, and some 30 to 300 times the history.
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History,
-          StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
-[[nodiscard]] Choice<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const Network& network,
-                                             const Volume& volume, const History& history, const Wanted& wanted,
-                                             const std::type_identity_t<ExperimentOptions<Scalar>>& experiment = {},
-                                             const Rule& rule = {}, const Clock& clock = {});
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
+          CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
+[[nodiscard]] ChosenSettings<Scalar> choose_settings(
+    const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume, const History& history,
+    const Requirement& wanted, const std::type_identity_t<GridSearchOptions<Scalar>>& experiment = {},
+    const Rule& rule = {}, const Clock& clock = {});
 
 /// The same by any trial: `attempt(options)` gives the `Outcome` of these options.
 template <Real Scalar, class Attempt>
-[[nodiscard]] Choice<Scalar> choose_settings(const ExperimentOptions<Scalar>& experiment, const Wanted& wanted,
-                                             Attempt attempt);
+[[nodiscard]] ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experiment,
+                                                     const Requirement& wanted, Attempt attempt);
 
 namespace detail {
 
 inline constexpr std::string_view choose_name = "choose_settings";
 
-inline void check(const Wanted& wanted) {
+inline void check(const Requirement& wanted) {
     if ((wanted.force_error != 0) == (wanted.time != 0)) {
         refuse(choose_name, "either a force_error or a time must be wanted, got ", wanted.force_error, " and ",
                wanted.time, " s");
@@ -94,26 +94,26 @@ inline void check(const Wanted& wanted) {
 template <Real Scalar>
 [[nodiscard]] bool covers(const SolverOptions<Scalar>& setting, const SolverOptions<Scalar>& other) noexcept {
     return setting.layers >= other.layers && setting.sweeps >= other.sweeps &&
-           setting.contact_visits >= other.contact_visits;
+           setting.contact_iterations >= other.contact_iterations;
 }
 
 /// All settings of the experiment, roughly from the cheapest to the dearest.
 template <Real Scalar>
-[[nodiscard]] std::vector<SolverOptions<Scalar>> settings_of(const ExperimentOptions<Scalar>& experiment) {
+[[nodiscard]] std::vector<SolverOptions<Scalar>> settings_of(const GridSearchOptions<Scalar>& experiment) {
     std::vector<SolverOptions<Scalar>> settings;
     for (const Index layers : experiment.layers) {
         for (const Index sweeps : experiment.sweeps) {
-            for (const Index contact_visits : experiment.contact_visits) {
+            for (const Index contact_iterations : experiment.contact_iterations) {
                 settings.push_back(experiment.others);
                 settings.back().layers = layers;
                 settings.back().sweeps = sweeps;
-                settings.back().contact_visits = contact_visits;
+                settings.back().contact_iterations = contact_iterations;
             }
         }
     }
     const auto work = [](const SolverOptions<Scalar>& setting) {  // rings grow evenly in a mesh of triangles
         const double rings = setting.layers;
-        return setting.sweeps * (4.0 * setting.contact_visits + 3 * rings * (rings + 2));
+        return setting.sweeps * (4.0 * setting.contact_iterations + 3 * rings * (rings + 2));
     };
     std::stable_sort(settings.begin(), settings.end(), [&](const auto& a, const auto& b) { return work(a) < work(b); });
     return settings;
@@ -123,38 +123,39 @@ template <Real Scalar>
 template <Real Scalar>
 class Search {
   public:
-    Search(const ExperimentOptions<Scalar>& experiment, const Wanted& wanted)
+    Search(const GridSearchOptions<Scalar>& experiment, const Requirement& wanted)
         : layers_(experiment.layers),
           time_wanted_(wanted.time > 0),
-          most_error_(wanted.force_error / experiment.margin),
-          most_time_(time_wanted_ ? wanted.time : std::numeric_limits<double>::infinity()) {}
+          max_error_(wanted.force_error / experiment.margin),
+          max_time_(time_wanted_ ? wanted.time : std::numeric_limits<double>::infinity()) {}
 
     /// Whether the ones before tell that this cannot be better: fewer layers are all there are, less of everything was
     /// too dear, more of everything not enough, or enough for the time.
     [[nodiscard]] bool is_needless(const SolverOptions<Scalar>& setting) const noexcept {
         return std::any_of(layers_.begin(), layers_.end(),
                            [&](Index fewer) { return fewer < setting.layers && fewer >= all_layers_; }) ||
-               std::any_of(tried_.begin(), tried_.end(), [&](const Choice<Scalar>& other) {
+               std::any_of(tried_.begin(), tried_.end(), [&](const ChosenSettings<Scalar>& other) {
                    if (!other.advanced) return false;
-                   return (covers(setting, other.options) && other.time >= most_time_) ||
+                   return (covers(setting, other.options) && other.time >= max_time_) ||
                           (covers(other.options, setting) && other.met == time_wanted_);
                });
     }
 
     void add(const SolverOptions<Scalar>& setting, const Outcome& outcome) {
-        Choice<Scalar> now{outcome, setting, false};
-        now.met = now.advanced && (time_wanted_ ? now.time <= most_time_ : now.force_error <= most_error_);
+        ChosenSettings<Scalar> now{outcome, setting, false};
+        now.met = now.advanced && (time_wanted_ ? now.time <= max_time_ : now.force_error <= max_error_);
         if (tried_.empty() || is_better(now, best_)) best_ = now;
-        if (!time_wanted_ && now.met) most_time_ = best_.time;
+        if (!time_wanted_ && now.met) max_time_ = best_.time;
         if (now.layers_reached < setting.layers) all_layers_ = now.layers_reached;
         tried_.push_back(now);
     }
 
-    [[nodiscard]] const Choice<Scalar>& best() const noexcept { return best_; }
+    [[nodiscard]] const ChosenSettings<Scalar>& best() const noexcept { return best_; }
 
   private:
     // What is wanted before all, then the error if time is no matter, or the time if the error is none.
-    [[nodiscard]] bool is_better(const Choice<Scalar>& now, const Choice<Scalar>& other) const noexcept {
+    [[nodiscard]] bool is_better(const ChosenSettings<Scalar>& now,
+                                 const ChosenSettings<Scalar>& other) const noexcept {
         if (now.met != other.met) return now.met;
         const bool by_error = time_wanted_ == now.met;
         return by_error ? now.force_error < other.force_error : now.time < other.time;
@@ -162,16 +163,16 @@ class Search {
 
     std::vector<Index> layers_;  // to be tried
     Index all_layers_ = unlimited;
-    std::vector<Choice<Scalar>> tried_;
-    Choice<Scalar> best_;
+    std::vector<ChosenSettings<Scalar>> tried_;
+    ChosenSettings<Scalar> best_;
     bool time_wanted_;
-    double most_error_, most_time_;  // most_time_ [s]: wanted, or that of the best
+    double max_error_, max_time_;  // max_time_ [s]: wanted, or that of the best
 };
 
 }  // namespace detail
 
 template <Real Scalar>
-void ExperimentOptions<Scalar>::check() const {
+void GridSearchOptions<Scalar>::check() const {
     const auto check_numbers = [](const std::vector<Index>& numbers, Index least, std::string_view name) {
         if (numbers.empty()) refuse(detail::choose_name, name, " must hold a number to try, got none");
         for (const Index number : numbers) {
@@ -182,17 +183,18 @@ void ExperimentOptions<Scalar>::check() const {
     };
     check_numbers(layers, 0, "layers");
     check_numbers(sweeps, 1, "sweeps");
-    check_numbers(contact_visits, 1, "contact_visits");
+    check_numbers(contact_iterations, 1, "contact_iterations");
     others.check();
     if (!is_finite(margin) || !(margin >= 1)) {
         refuse(detail::choose_name, "margin must be finite and at least 1, got ", margin);
     }
     if (every < 1) refuse(detail::choose_name, "every must be at least 1, got ", every);
-    if (plays < 1) refuse(detail::choose_name, "plays must be at least 1, got ", plays);
+    if (repetitions < 1) refuse(detail::choose_name, "repetitions must be at least 1, got ", repetitions);
 }
 
 template <Real Scalar, class Attempt>
-Choice<Scalar> choose_settings(const ExperimentOptions<Scalar>& experiment, const Wanted& wanted, Attempt attempt) {
+ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experiment, const Requirement& wanted,
+                                       Attempt attempt) {
     detail::check(wanted);
     experiment.check();
     const auto settings = detail::settings_of(experiment);
@@ -200,7 +202,7 @@ Choice<Scalar> choose_settings(const ExperimentOptions<Scalar>& experiment, cons
     if (wanted.force_error > 0) {  // first with how many sweeps it can be done at all
         const auto most = settings.back();
         for (const auto& setting : settings) {
-            if (setting.layers != most.layers || setting.contact_visits != most.contact_visits) continue;
+            if (setting.layers != most.layers || setting.contact_iterations != most.contact_iterations) continue;
             search.add(setting, attempt(setting));
             if (search.best().met) break;
         }
@@ -212,22 +214,22 @@ Choice<Scalar> choose_settings(const ExperimentOptions<Scalar>& experiment, cons
     return search.best();
 }
 
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History,
-          StepRule<Scalar> Rule, class Clock>
-Choice<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
-                               const History& history, const Wanted& wanted,
-                               const std::type_identity_t<ExperimentOptions<Scalar>>& experiment, const Rule& rule,
-                               const Clock& clock) {
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
+          CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule, class Clock>
+ChosenSettings<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
+                                       const History& history, const Requirement& wanted,
+                                       const std::type_identity_t<GridSearchOptions<Scalar>>& experiment,
+                                       const Rule& rule, const Clock& clock) {
     detail::check(wanted);
     experiment.check();
-    const auto rests = equilibria(mesh, network, volume, history, experiment.every);
-    if (std::none_of(rests.begin(), rests.end(), [](const TickAtRest& rest) { return rest.force > 0; })) {
+    const auto references = equilibria(mesh, network, volume, history, experiment.every);
+    if (std::none_of(references.begin(), references.end(), [](const ReferenceTick& rest) { return rest.force > 0; })) {
         refuse(detail::choose_name, "the history must have a tick with a force that is felt, got none in equilibrium");
     }
     return choose_settings(experiment, wanted, [&](const SolverOptions<Scalar>& options) {
-        auto outcome = trial(mesh, network, volume, history, rests, options, rule, clock);
-        for (Index play = 1; play < experiment.plays && outcome.advanced; ++play) {
-            const double time = trial(mesh, network, volume, history, rests, options, rule, clock).time;
+        auto outcome = trial(mesh, network, volume, history, references, options, rule, clock);
+        for (Index play = 1; play < experiment.repetitions && outcome.advanced; ++play) {
+            const double time = trial(mesh, network, volume, history, references, options, rule, clock).time;
             outcome.time = (std::min)(outcome.time, time);
         }
         return outcome;

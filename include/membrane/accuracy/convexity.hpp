@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include <membrane/accuracy/rest_problem.hpp>
+#include <membrane/accuracy/equilibrium_problem.hpp>
 #include <membrane/core/symmetric3.hpp>
 
 /// How convex the energy of a membrane is, not only where it is but in a whole neighbourhood.
@@ -19,10 +19,10 @@ namespace membrane {
 
 /// Gives a lower bound of the smallest eigenvalue of the stiffness at every state in which each free vertex is within
 /// `radius` [m] of the problem's centre and what is held is in its place; not above zero where it knows none. Where it
-/// is above, each spring has a `least_stiffness` there. What the compiler cannot see: the bound holds, with rounding.
+/// is above, each spring has a `min_stiffness` there. What the compiler cannot see: the bound holds, with rounding.
 template <class Model>
-concept ConvexityModel = std::copyable<Model> && std::constructible_from<Model, const RestProblem&> &&
-    requires(Model& model, const RestProblem& problem, double radius) {
+concept ConvexityModel = std::copyable<Model> && std::constructible_from<Model, const EquilibriumProblem&> &&
+    requires(Model& model, const EquilibriumProblem& problem, double radius) {
     { model.around(problem, radius) }
     noexcept->std::same_as<double>;
 };
@@ -32,10 +32,10 @@ namespace detail {
 template <class Model>
 consteval bool check_convexity_model() noexcept {
     static_assert(std::copyable<Model>, "ConvexityModel: must be copyable");
-    static_assert(std::constructible_from<Model, const RestProblem&>,
-                  "ConvexityModel: must have a constructor from const RestProblem&");
+    static_assert(std::constructible_from<Model, const EquilibriumProblem&>,
+                  "ConvexityModel: must have a constructor from const EquilibriumProblem&");
     static_assert(ConvexityModel<Model>,
-                  "ConvexityModel: around(const RestProblem&, double radius) noexcept must return double");
+                  "ConvexityModel: around(const EquilibriumProblem&, double radius) noexcept must return double");
     return ConvexityModel<Model>;
 }
 
@@ -51,37 +51,38 @@ concept CheckedConvexityModel = detail::check_convexity_model<Model>();
 /// w > 0 of the vertices, |a - b|^2 <= (1 + w_b / w_a) |a|^2 + (1 + w_a / w_b) |b|^2. With that a 3 x 3 block for each
 /// vertex is left, and no eigenvalue of the whole is below the smallest of theirs. The weights that make the blocks
 /// even are the best; some rounds of the power method come near them (Collatz and Wielandt [Varga62]), and the bound
-/// holds for all. What springs that pull do for others is left out: where the backing is soft beside the springs,
+/// holds for all. What springs that pull do for others is left out: where the foundation is soft beside the springs,
 /// `FactoredConvexity` finds more.
 class BlockConvexity {
   public:
     /// Cost: O(V + springs) memory.
-    explicit BlockConvexity(const RestProblem& problem);
+    explicit BlockConvexity(const EquilibriumProblem& problem);
 
     /// Online. Cost: O(V + springs) for each of at most 24 rounds.
-    [[nodiscard]] double around(const RestProblem& problem, double radius) noexcept;
+    [[nodiscard]] double around(const EquilibriumProblem& problem, double radius) noexcept;
 
   private:
     struct Push {  // of a spring between free vertices
         std::size_t first, second;
         Symmetric3<double> block;
     };
-    static constexpr int most_rounds = 24;
+    static constexpr int max_rounds = 24;
 
-    bool gather(const RestProblem& problem, double radius) noexcept;
-    double sum_up(const RestProblem& problem) noexcept;
+    bool gather(const EquilibriumProblem& problem, double radius) noexcept;
+    double sum_up(const EquilibriumProblem& problem) noexcept;
     void balance(double least) noexcept;
 
     std::vector<Push> pushes_;
     std::size_t push_count_ = 0;
-    std::vector<Symmetric3<double>> own_, blocks_;  // of each vertex: backing and springs to what is fixed; minus all
-    std::vector<double> own_sizes_, sizes_;         // of each vertex, the numbers that make up its block
-    std::vector<double> weights_, least_;           // of each vertex: w, its eigenvalue
-    double most_ = 0;                               // of the backing
+    std::vector<Symmetric3<double>> own_,
+        blocks_;                             // of each vertex: foundation and springs to what is fixed; minus all
+    std::vector<double> own_sizes_, sizes_;  // of each vertex, the numbers that make up its block
+    std::vector<double> weights_, least_;    // of each vertex: w, its eigenvalue
+    double most_ = 0;                        // of the foundation
 };
 static_assert(ConvexityModel<BlockConvexity>);
 
-inline BlockConvexity::BlockConvexity(const RestProblem& problem)
+inline BlockConvexity::BlockConvexity(const EquilibriumProblem& problem)
     : pushes_(problem.springs().size()),
       own_(static_cast<std::size_t>(problem.vertex_count())),
       blocks_(own_),
@@ -90,11 +91,11 @@ inline BlockConvexity::BlockConvexity(const RestProblem& problem)
       weights_(own_.size()),
       least_(own_.size()) {}
 
-inline double BlockConvexity::around(const RestProblem& problem, double radius) noexcept {
+inline double BlockConvexity::around(const EquilibriumProblem& problem, double radius) noexcept {
     if (!gather(problem, radius)) return -std::numeric_limits<double>::infinity();
     std::fill(weights_.begin(), weights_.end(), 1.0);
     double best = sum_up(problem);
-    for (int round = 1; round < most_rounds && push_count_ > 0; ++round) {
+    for (int round = 1; round < max_rounds && push_count_ > 0; ++round) {
         balance(best);
         const double now = sum_up(problem);
         if (!(now > best + 0.01 * std::abs(best))) return (std::max)(best, now);
@@ -104,18 +105,18 @@ inline double BlockConvexity::around(const RestProblem& problem, double radius) 
 }
 
 // False where a spring may become too short.
-inline bool BlockConvexity::gather(const RestProblem& problem, double radius) noexcept {
+inline bool BlockConvexity::gather(const EquilibriumProblem& problem, double radius) noexcept {
     push_count_ = 0;
     most_ = 0;
     for (Index v = 0; v < problem.vertex_count(); ++v) {
         own_[static_cast<std::size_t>(v)] = diagonal3(problem.support(v));
-        own_sizes_[static_cast<std::size_t>(v)] = 3 * (problem.backing(v) + std::abs(problem.support(v)));
-        most_ = (std::max)(most_, problem.backing(v));
+        own_sizes_[static_cast<std::size_t>(v)] = 3 * (problem.foundation(v) + std::abs(problem.support(v)));
+        most_ = (std::max)(most_, problem.foundation(v));
     }
     for (const auto& spring : problem.springs()) {
         const int ends = problem.free_ends(spring);
         if (ends == 0) continue;
-        const auto least = least_stiffness(spring, reach_of(spring, problem.centre()), ends * radius);
+        const auto least = min_stiffness(spring, edge_vector(spring, problem.centre()), ends * radius);
         if (!least) return false;
         const auto first = static_cast<std::size_t>(spring.first), second = static_cast<std::size_t>(spring.second);
         if (ends == 1) {
@@ -130,7 +131,7 @@ inline bool BlockConvexity::gather(const RestProblem& problem, double radius) no
 }
 
 // The smallest eigenvalue of any vertex.
-inline double BlockConvexity::sum_up(const RestProblem& problem) noexcept {
+inline double BlockConvexity::sum_up(const EquilibriumProblem& problem) noexcept {
     constexpr double rounding = 1e-7;  // of an eigenvalue in closed form, twice
     for (std::size_t v = 0; v < own_.size(); ++v) {
         blocks_[v] = -1.0 * own_[v];

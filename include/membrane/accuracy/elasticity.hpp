@@ -8,25 +8,26 @@
 
 #include <membrane/accuracy/newton_system.hpp>
 #include <membrane/core/symmetric3.hpp>
-#include <membrane/network/mass_spring_network.hpp>
-#include <membrane/network/volume_springs.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/model/volume_springs.hpp>
 
 namespace membrane {
 
-/// Springs and backing where the membrane is.
+/// Springs and foundation where the membrane is.
 struct ElasticState {
-    Points<double> x;                 ///< 3 x V [m]
-    Points<double> springs, backing;  ///< force on each vertex, by springs and elements and by the backing, 3 x V [N]
-    double energy = 0;                ///< of springs and elements [J]
-    double largest_force = 0;         ///< of a single spring, or on a vertex by an element or the backing [N]
+    Points<double> x;  ///< 3 x V [m]
+    Points<double> springs,
+        foundation;            ///< force on each vertex, by springs and elements and by the foundation, 3 x V [N]
+    double energy = 0;         ///< of springs and elements [J]
+    double largest_force = 0;  ///< of a single spring, or on a vertex by an element or the foundation [N]
 };
 
 /// A membrane without time, in double whatever its scalar: its springs by their law, its elements, if it is a `Tissue`, its
-/// backing as it pulls in a tick without end, in which no damping is left. A linear backing that says its anchors and, in
+/// foundation as it pulls in a tick without end, in which no damping is left. A linear foundation that says its anchors and, in
 /// double, its `curvature` is evaluated by these; any other one in its own scalar.
 ///
 ///     Elasticity elasticity(network, volume);
-///     const auto state = elasticity.at(x);                    // state.springs + state.backing [N]
+///     const auto state = elasticity.at(x);                    // state.springs + state.foundation [N]
 ///     elasticity.add_stiffness(state, system);
 template <class Network, class Volume>
 class Elasticity {
@@ -39,16 +40,16 @@ class Elasticity {
     /// O(V + springs + elements).
     [[nodiscard]] ElasticState at(const Points<double>& x);
 
-    /// Adds the second derivative of the energy to H, exact for springs and for a backing that is linear: alike in all
-    /// directions, or as its `curvature(v)` says. Else as much as the backing says its curvature is at the most.
+    /// Adds the second derivative of the energy to H, exact for springs and for a foundation that is linear: alike in all
+    /// directions, or as its `curvature(v)` says. Else as much as the foundation says its curvature is at the most.
     void add_stiffness(const ElasticState& state, NewtonSystem& system) const;
 
-    /// How much more energy `b` holds than `a` [J]; of the backing by the trapezium rule, exact where it is linear.
+    /// How much more energy `b` holds than `a` [J]; of the foundation by the trapezium rule, exact where it is linear.
     [[nodiscard]] double energy_change(const ElasticState& a, const ElasticState& b) const {
-        return (b.energy - a.energy) - (a.backing + b.backing).cwiseProduct(b.x - a.x).sum() / 2;
+        return (b.energy - a.energy) - (a.foundation + b.foundation).cwiseProduct(b.x - a.x).sum() / 2;
     }
 
-    /// The largest of the springs' stiffnesses, and the backing's [N/m].
+    /// The largest of the springs' stiffnesses, and the foundation's [N/m].
     [[nodiscard]] double largest_stiffness(const ElasticState& state) const;
 
   private:
@@ -61,7 +62,7 @@ class Elasticity {
     void for_each_element(const Points<double>& x, Act act) const {
         network_.for_each_element([&](const auto& placed) { act(placed, placed.where(x)); });
     }
-    /// What the backing does to a vertex near `place`: its force changes by `stiffness` times the way from there.
+    /// What the foundation does to a vertex near `place`: its force changes by `stiffness` times the way from there.
     struct LinearPull {
         Vector3<double> place, force;  // [m], [N]
         Symmetric3<double> stiffness;  // [N/m]
@@ -81,7 +82,7 @@ ElasticState Elasticity<Network, Volume>::at(const Points<double>& x) {
     for_each_element(x, [&](const auto& placed, const auto& corners) {
         state.energy += placed.element.energy(corners);
         for (std::size_t i = 0; i < corners.size(); ++i) {
-            const Vector3<double> force = placed.element.pull(corners, i).force;
+            const Vector3<double> force = placed.element.force_on(corners, i).force;
             state.springs.col(placed.corners[i]) += force;
             state.largest_force = (std::max)(state.largest_force, norm(force));
         }
@@ -95,9 +96,9 @@ void Elasticity<Network, Volume>::pull_back(ElasticState& state) {
     if (!is_linear || backing_.empty()) ask_backing(state.x);
     for (Index v = 0; v < state.x.cols(); ++v) {
         const auto& pull = backing_[static_cast<std::size_t>(v)];
-        const Vector3<double> way = point(state.x, v) - pull.place;
-        const Vector3<double> force = pull.force - pull.stiffness * way;
-        state.backing.col(v) = force;
+        const Vector3<double> displacement = point(state.x, v) - pull.place;
+        const Vector3<double> force = pull.force - pull.stiffness * displacement;
+        state.foundation.col(v) = force;
         state.largest_force = (std::max)(state.largest_force, norm(force));
     }
 }
@@ -119,7 +120,7 @@ void Elasticity<Network, Volume>::ask_backing(const Points<double>& x) {
             const Vector3<double> here = point(x, v);
             if (!first && norm<double>(here - pull.place) <= 64 * spacing) continue;
             const Vector3<Scalar> place = here.template cast<Scalar>();
-            const auto answer = volume_.pull(v, place, place, std::numeric_limits<Scalar>::infinity());
+            const auto answer = volume_.force_on(v, place, place, std::numeric_limits<Scalar>::infinity());
             pull = {place.template cast<double>(), answer.force.template cast<double>(),
                     curvature(v, answer.stiffness)};
         }
@@ -140,7 +141,7 @@ void Elasticity<Network, Volume>::add_stiffness(const ElasticState& state, Newto
     for_each_element(state.x, [&](const auto& placed, const auto& corners) {
         for (std::size_t i = 0; i < corners.size(); ++i) {
             for (std::size_t j = 0; j <= i; ++j) {
-                system.add(placed.corners[i], placed.corners[j], placed.element.second_derivative(corners, i, j));
+                system.add(placed.corners[i], placed.corners[j], placed.element.hessian_block(corners, i, j));
             }
         }
     });
@@ -154,7 +155,7 @@ double Elasticity<Network, Volume>::largest_stiffness(const ElasticState& state)
     double largest = 0;
     for_each_element(state.x, [&](const auto& placed, const auto& corners) {
         for (std::size_t i = 0; i < corners.size(); ++i) {
-            largest = (std::max)(largest, largest_eigenvalue(placed.element.pull(corners, i).curvature));
+            largest = (std::max)(largest, largest_eigenvalue(placed.element.force_on(corners, i).curvature));
         }
     });
     for (const auto& pull : backing_) largest = (std::max)(largest, largest_eigenvalue(pull.stiffness));

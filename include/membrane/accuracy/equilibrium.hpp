@@ -8,15 +8,15 @@
 #include <vector>
 
 #include <membrane/accuracy/elasticity.hpp>
-#include <membrane/accuracy/rest_scene.hpp>
-#include <membrane/accuracy/rest_search.hpp>
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/accuracy/equilibrium_scene.hpp>
+#include <membrane/accuracy/equilibrium_solver.hpp>
 #include <membrane/solve/propagation_queue.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 /// Where the membrane really comes to rest, and what it then pushes back with: the reference for one's own scenes.
 ///
 ///     #include <membrane/accuracy/equilibrium.hpp>
-///     const auto rest = membrane::equilibrium(x, mesh, network, backing, {}, press(tool, contact),
+///     const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact),
 ///                                             membrane::pull(7, target));
 ///     if (!rest.converged) ...
 ///     (x - rest.x).colwise().norm().maxCoeff();                              // error of a step's positions [m]
@@ -24,23 +24,24 @@
 namespace membrane {
 
 /// The equilibrium near `x` (3 x V [m]) under the constraints of a step, to the last digits of a double, whatever the
-/// scalar of network and backing (a backing of one's own that is not linear, see `VolumeModel`, is evaluated in its own);
+/// scalar of network and foundation (a foundation of one's own that is not linear, see `FoundationModel`, is evaluated in its own);
 /// reactions are as in `StepReport`. Not `converged` if none was found: then `x` is how far it came.
 ///
 /// All vertices at once by Newton's method, with exact second derivatives and sparse factors; what is near a tool is
 /// an inequality with a curvature of its own, sequential quadratic programming [Nocedal06] 18. A line search on the
 /// energy, and on the deepest overlap with a weight that makes the penalty exact, leads there from afar. Tools press the
-/// whole surface, not only `contact.touched`; of a contact it uses where it is, its normal and its radius. A tool that
+/// whole surface, not only `contact.triangles`; of a contact it uses where it is, its normal and its radius. A tool that
 /// is far in comes from outside, in as many increments as it is half radii deep. Where nothing can move, a tool may
 /// overlap and a point need not be held. What is fixed does not yield to a tool: beside it this is the limit of a step's
 /// forces for an ever larger `SolverOptions::rigid_stiffness`; where all corners are fixed, no tool presses here.
 ///
 /// Where a membrane can rest in several ways, the start decides, and increments may.
 ///
-/// @throws InvalidInput for points that are not one finite for each vertex, a mesh, network and backing that do not
-/// belong together, an option out of its range, a constraint that is not sound. Offline.
+/// @throws InvalidInput for points that are not one finite for each vertex, a mesh, network and foundation that do not
+/// belong together, an option out of its range, a constraint that is not valid. Offline.
 /// Cost: some 5 to 20 sparse factorisations for each increment.
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedRestConstraint... Constraints>
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
+          CheckedStaticConstraint... Constraints>
 [[nodiscard]] Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
                                       const EquilibriumOptions& options, const Constraints&... constraints);
@@ -58,7 +59,7 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
     check_count(network.vertex_count(), mesh.vertex_count(), "the network");
     check_count(x.cols(), mesh.vertex_count(), "x");
     if constexpr (requires { volume.anchors().cols(); }) {
-        check_count(volume.anchors().cols(), mesh.vertex_count(), "the backing");
+        check_count(volume.anchors().cols(), mesh.vertex_count(), "the foundation");
     }
     for (Index v = 0; v < x.cols(); ++v) {
         for (Index k = 0; k < 3; ++k) {
@@ -67,14 +68,14 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
                    " must be finite [m], got ", x(k, v));
         }
         const auto here = point(x, v);
-        if (is_finite(volume.pull(v, here, here, std::numeric_limits<Scalar>::infinity()).force)) continue;
-        refuse(equilibrium_name, "the backing of vertex ", v,
+        if (is_finite(volume.force_on(v, here, here, std::numeric_limits<Scalar>::infinity()).force)) continue;
+        refuse(equilibrium_name, "the foundation of vertex ", v,
                " must pull with a finite force [N], got one that is not");
     }
 }
 
 /// Where the constraints say that a force enters, and what tools touch at the start.
-[[nodiscard]] inline std::vector<Index> seeds_of(const RestScene& scene, const Triangles& triangles,
+[[nodiscard]] inline std::vector<Index> seeds_of(const EquilibriumScene& scene, const Triangles& triangles,
                                                  const Points<double>& x) {
     std::vector<Index> seeds = scene.seeds();
     for (const auto& pressing : scene.tools()) {
@@ -89,7 +90,8 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
 
 }  // namespace detail
 
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedRestConstraint... Constraints>
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
+          CheckedStaticConstraint... Constraints>
 Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, const TriangleMesh<Scalar>& mesh,
                         const Network& network, const Volume& volume, const EquilibriumOptions& options,
                         const Constraints&... constraints) {
@@ -98,7 +100,7 @@ Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, c
     std::vector<unsigned char> fixed(static_cast<std::size_t>(network.vertex_count()));
     for (Index v = 0; v < network.vertex_count(); ++v) fixed[static_cast<std::size_t>(v)] = network.pinned(v) ? 1 : 0;
     const Points<double> start = x.template cast<double>();
-    RestScene scene(start, fixed);
+    EquilibriumScene scene(start, fixed);
     std::size_t count = 0;
     ((scene.turn_to(count++), describe(constraints, scene)), ...);
 
@@ -109,7 +111,7 @@ Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, c
         if (stays || scene.fixed(v)) fixed[static_cast<std::size_t>(v)] = 1;
     }
     const Elasticity elasticity(network, volume);
-    return RestSearch(start, mesh.triangles(), elasticity, scene, fixed, options).run(count);
+    return EquilibriumSolver(start, mesh.triangles(), elasticity, scene, fixed, options).run(count);
 }
 
 }  // namespace membrane

@@ -9,29 +9,29 @@
 #include <type_traits>
 #include <vector>
 
+#include <membrane/accuracy/contact_bounds.hpp>
 #include <membrane/accuracy/convexity.hpp>
+#include <membrane/accuracy/equilibrium_problem.hpp>
 #include <membrane/accuracy/error_report.hpp>
-#include <membrane/accuracy/linearised.hpp>
-#include <membrane/accuracy/pressed_places.hpp>
-#include <membrane/accuracy/rest_problem.hpp>
+#include <membrane/accuracy/stiffness_operator.hpp>
 
 /// How far a membrane is from rest, proven.
 ///
 ///     membrane::ErrorBound bound(network);                                          // offline: allocates all it needs
-///     const auto report = solver.step(x, dt, network, backing, membrane::pull(7, target));
-///     const auto error = bound.of(x, network, backing, membrane::pull(7, target));
+///     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
+///     const auto error = bound.of(x, network, foundation, membrane::pull(7, target));
 ///     if (error.certified()) {
 ///         error.position                                                            // no vertex is farther off [m]
-///         error.reactions[0].farthest_from(report.reactions[0])                     // the force is no farther off [N]
+///         error.reactions[0].max_distance_to(report.reactions[0])                     // the force is no farther off [N]
 ///     }
 ///
 /// With a tool in contact, from the equilibrium that Newton's method found:
-///     const auto rest = membrane::equilibrium(x, mesh, network, backing, {}, press(tool, contact));
-///     const auto error = bound.of(rest, x, mesh, network, backing, press(tool, contact));
+///     const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
+///     const auto error = bound.of(rest, x, mesh, network, foundation, press(tool, contact));
 namespace membrane {
 
 struct ErrorBoundOptions {
-    Index refinements = 200;  ///< products with the stiffness at the most; soft backings need more
+    Index cg_iterations = 200;  ///< products with the stiffness at the most; soft backings need more
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
@@ -40,7 +40,7 @@ struct ErrorBoundOptions {
 /// Proves how far a membrane of linear springs is from rest, whoever brought it where it is, and whether the solver
 /// has moved all of its vertices or some: the equilibrium meant is that of all that is free.
 ///
-/// Let E be the energy of springs, backing and loads, x the state (with what is held in its place), and C all states
+/// Let E be the energy of springs, foundation and loads, x the state (with what is held in its place), and C all states
 /// whose free vertices are within rho of x: a convex set. If the stiffness has no eigenvalue below mu > 0 on C, as
 /// `Convexity` shows, then (grad E(a) - grad E(b)) . (a - b) >= mu |a - b|^2 for a and b in C, which so has one
 /// equilibrium at the most. Take any y, its unbalanced forces r = -grad E(y), and the ball B around it of radius
@@ -59,7 +59,7 @@ struct ErrorBoundOptions {
 ///
 /// Where tools press, y and the pressures there are those of an equilibrium found before, r is what is left over with
 /// them, and mu a bound for the stiffness less what pressures may take away. What they do to the energy beyond that is
-/// work across gaps and overlaps, no more than some w (`PressedPlaces`): mu |x - y|^2 <= |r| |x - y| + w for an
+/// work across gaps and overlaps, no more than some w (`ContactBounds`): mu |x - y|^2 <= |r| |x - y| + w for an
 /// equilibrium x in C, and two in C are one. The least point of E outside the tools within a ball B in C around y is one:
 /// if it were on the surface, a force would hold it there, which only adds to the left side; so e, the radius, is where
 /// both sides are equal. (What the force adds to the pressures there is outweighed too while e is below the least
@@ -79,22 +79,22 @@ class ErrorBound {
 
     /// Of the state `x` (3 x V [m]) under the constraints of a step. Online.
     /// Cost: O(V + springs) for each refinement, and what `Convexity` costs, as a rule twice or three times.
-    template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar>... Constraints>
+    template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] ErrorReport of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                  const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                  const Constraints&... constraints) noexcept;
 
     /// The same with tools in contact; `rest` is the equilibrium of just these. No tool may touch what is held, nor a
     /// vertex that another may touch, and no point of a triangle be held beside.
-    /// @throws InvalidInput for a constraint that is not sound. Offline.
-    template <Real Scalar, class Law, LinearBacking Volume, RestConstraint... Constraints>
+    /// @throws InvalidInput for a constraint that is not valid. Offline.
+    template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
     [[nodiscard]] ErrorReport of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                  const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
                                  const Volume& volume, const Constraints&... constraints);
 
   private:
-    static constexpr std::size_t most_constraints = StepState<double>::max_constraints;
-    static constexpr int most_attempts = 4;
+    static constexpr std::size_t max_constraints = StepState<double>::max_constraints;
+    static constexpr int max_attempts = 4;
 
     void open(std::size_t constraint_count) noexcept;
     template <class... Constraints>
@@ -106,18 +106,19 @@ class ErrorBound {
     bool convex_within(double radius) noexcept;
     [[nodiscard]] double enclosure() const noexcept;
     template <class C>
-    [[nodiscard]] EnclosedForce enclose_reaction(const C& constraint, std::size_t& tool) noexcept;
+    [[nodiscard]] ForceEnclosure enclose_reaction(const C& constraint, std::size_t& tool) noexcept;
 
     ErrorBoundOptions options_;
-    RestProblem problem_;
-    Linearised stiffness_;
+    EquilibriumProblem problem_;
+    StiffnessOperator stiffness_;
     Convexity convexity_;
-    PressedPlaces pressed_;
-    Points<double> y_, force_, rest_, way_;  // y, its forces on all vertices, those that are unbalanced, a step
+    ContactBounds pressed_;
+    Points<double> y_, force_, rest_,
+        displacement_;  // y, its forces on all vertices, those that are unbalanced, a step
     std::vector<double> magnitude_, weights_, slopes_;
     double distance_ = 0, unbalanced_ = 0, radius_ = -1;  // of y: from x [m], norm of the forces [N]; of C [m]
     ErrorReport error_;
-    std::array<EnclosedForce, most_constraints> reactions_{};
+    std::array<ForceEnclosure, max_constraints> reactions_{};
 };
 
 template <Real Scalar, class Law>
@@ -126,7 +127,7 @@ template <Real Scalar, class Law>
 ErrorBound(const MassSpringNetwork<Scalar, Law>&, const ErrorBoundOptions&) -> ErrorBound<>;
 
 inline void ErrorBoundOptions::check() const {
-    if (refinements < 1) refuse("ErrorBound", "refinements must be at least 1, got ", refinements);
+    if (cg_iterations < 1) refuse("ErrorBound", "cg_iterations must be at least 1, got ", cg_iterations);
 }
 
 template <CheckedConvexityModel Convexity>
@@ -140,19 +141,19 @@ ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network,
       y_(Points<double>::Zero(3, network.vertex_count())),
       force_(y_),
       rest_(y_),
-      way_(y_),
+      displacement_(y_),
       magnitude_(static_cast<std::size_t>(network.vertex_count())),
       weights_(magnitude_),
       slopes_(magnitude_) {}
 
 template <CheckedConvexityModel Convexity>
-template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar>... Constraints>
+template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar>... Constraints>
 ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                       const Constraints&... constraints) noexcept {
     open(sizeof...(Constraints));
     switch (problem_.take(x, network, volume, constraints...)) {
-        case ProblemStatus::sound: locate(); break;
+        case ProblemStatus::valid: locate(); break;
         case ProblemStatus::contact: error_.status = BoundStatus::contact; return error_;
         case ProblemStatus::unsupported: error_.status = BoundStatus::unsupported; return error_;
         default: return error_;
@@ -161,25 +162,25 @@ ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<
 }
 
 template <CheckedConvexityModel Convexity>
-template <Real Scalar, class Law, LinearBacking Volume, RestConstraint... Constraints>
+template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
 ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
                                       const Volume& volume, const Constraints&... constraints) {
     open(sizeof...(Constraints));
     const ProblemStatus status = problem_.take(x, network, volume, constraints...);
     if (rest.x.cols() != x.cols() || mesh.vertex_count() != x.cols() || !is_finite(rest.x)) return error_;
-    if (status == ProblemStatus::bad_input) return error_;
+    if (status == ProblemStatus::invalid_input) return error_;
     if (status == ProblemStatus::unsupported || !problem_.places().empty()) {
         error_.status = BoundStatus::unsupported;
         return error_;
     }
-    RestScene scene(problem_.given(), std::vector<unsigned char>(magnitude_.size()));
+    EquilibriumScene scene(problem_.given(), std::vector<unsigned char>(magnitude_.size()));
     (describe(constraints, scene), ...);
-    for (const auto& touch : rest.touches) {
+    for (const auto& touch : rest.contacts) {
         if (touch.tool >= scene.tools().size()) return error_;
     }
     y_ = rest.x;
-    pressed_.take(problem_, mesh.triangles(), y_, scene.tools(), rest.touches);
+    pressed_.take(problem_, mesh.triangles(), y_, scene.tools(), rest.contacts);
     look();
     error_.estimate = distance_;
     enclose();
@@ -198,7 +199,7 @@ void ErrorBound<Convexity>::open(std::size_t constraint_count) noexcept {
 template <CheckedConvexityModel Convexity>
 template <class... Constraints>
 ErrorReport ErrorBound<Convexity>::report(const Constraints&... constraints) noexcept {
-    static_assert(sizeof...(Constraints) <= most_constraints, "16 constraints at most, as in a step");
+    static_assert(sizeof...(Constraints) <= max_constraints, "16 constraints at most, as in a step");
     [[maybe_unused]] std::size_t i = 0, tool = 0;
     ((reactions_[i++] = enclose_reaction(constraints, tool)), ...);
     return error_;
@@ -211,7 +212,7 @@ void ErrorBound<Convexity>::locate() noexcept {
     y_ = problem_.centre();
     problem_.places().settle(y_);
     look();
-    error_.status = BoundStatus::did_not_refine;
+    error_.status = BoundStatus::not_converged;
     for (double before = std::numeric_limits<double>::infinity(); unbalanced_ < before / 2;) {
         before = unbalanced_;
         const bool convex = refine();
@@ -223,7 +224,7 @@ void ErrorBound<Convexity>::locate() noexcept {
             error_.status = BoundStatus::not_convex;
             return;
         }
-        if (enclosure() <= 0.01 * distance_ || error_.refinements >= options_.refinements) break;
+        if (enclosure() <= 0.01 * distance_ || error_.cg_iterations >= options_.cg_iterations) break;
     }
     enclose();
 }
@@ -231,13 +232,13 @@ void ErrorBound<Convexity>::locate() noexcept {
 // A radius for C that the bound it gives is not above.
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::enclose() noexcept {
-    error_.status = BoundStatus::did_not_refine;
+    error_.status = BoundStatus::not_converged;
     if (radius_ < 0 && !convex_within(1.05 * distance_ + pressed_.overlap())) {
         error_.status = BoundStatus::not_convex;
         return;
     }
-    for (int attempt = 0; !(distance_ + enclosure() <= radius_ && enclosure() <= pressed_.most_radius()); ++attempt) {
-        if (attempt == most_attempts || !convex_within(1.125 * (distance_ + enclosure()))) return;
+    for (int attempt = 0; !(distance_ + enclosure() <= radius_ && enclosure() <= pressed_.max_radius()); ++attempt) {
+        if (attempt == max_attempts || !convex_within(1.125 * (distance_ + enclosure()))) return;
     }
     error_.status = BoundStatus::certified;
     error_.position = (1 + 1e-12) * (distance_ + enclosure());
@@ -247,11 +248,12 @@ void ErrorBound<Convexity>::enclose() noexcept {
 template <CheckedConvexityModel Convexity>
 bool ErrorBound<Convexity>::refine() noexcept {
     stiffness_.at(problem_, y_);
-    way_.setZero();
-    const auto report = stiffness_.solve(problem_, rest_, way_,
-                                         {.tolerance = 1e-2, .iterations = options_.refinements - error_.refinements});
-    error_.refinements += report.iterations;
-    y_ += way_;
+    displacement_.setZero();
+    const auto report =
+        stiffness_.solve(problem_, rest_, displacement_,
+                         {.tolerance = 1e-2, .iterations = options_.cg_iterations - error_.cg_iterations});
+    error_.cg_iterations += report.iterations;
+    y_ += displacement_;
     problem_.places().settle(y_);
     return report.convex;
 }
@@ -292,15 +294,15 @@ double ErrorBound<Convexity>::enclosure() const noexcept {
     const double mu = error_.convexity;
     const double half = (unbalanced_ + (slip > 0 ? stiffness_.largest() * slip : 0.0)) / (2 * mu);
     const double radius = half + std::sqrt(half * half + pressed_.work() / mu);
-    return (1 + 1e-9) * ((std::max)(radius, pressed_.least_radius()) + slip);
+    return (1 + 1e-9) * ((std::max)(radius, pressed_.min_radius()) + slip);
 }
 
 // A spring between vertices of shares a and b adds (a - b) times its change of force.
 template <CheckedConvexityModel Convexity>
 template <class C>
-EnclosedForce ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::size_t& tool) noexcept {
+ForceEnclosure ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::size_t& tool) noexcept {
     std::fill(weights_.begin(), weights_.end(), 0.0);
-    EnclosedForce result{Vector3<double>::Zero(), 0};
+    ForceEnclosure result{Vector3<double>::Zero(), 0};
     bool varies = false;
     for_each_term(constraint, [&](const ConstraintTerm& term) {
         if (term.kind == ConstraintTerm::Kind::load) result.centre -= term.force;
@@ -311,7 +313,7 @@ EnclosedForce ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::
     });
     if (!varies) return result;
     for (std::size_t v = 0; v < weights_.size(); ++v)
-        slopes_[v] = weights_[v] * problem_.backing(static_cast<Index>(v));
+        slopes_[v] = weights_[v] * problem_.foundation(static_cast<Index>(v));
     for (const auto& spring : problem_.springs()) {
         const auto a = static_cast<std::size_t>(spring.first), b = static_cast<std::size_t>(spring.second);
         const double slope = spring.stiffness * std::abs(weights_[a] - weights_[b]);

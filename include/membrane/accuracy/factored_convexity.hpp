@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <limits>
 
-#include <membrane/accuracy/block_factors.hpp>
+#include <membrane/accuracy/block_cholesky.hpp>
 #include <membrane/accuracy/convexity.hpp>
 
 /// The sharper of two looks at how convex the energy of a membrane is, for soft backings.
@@ -15,25 +15,26 @@
 namespace membrane {
 
 /// Puts the bounds of all springs together in one matrix and factorises it. Springs that pull hold those that push: it
-/// finds convexity where the backing alone would not do, and takes some five to ten times as long as `BlockConvexity`.
+/// finds convexity where the foundation alone would not do, and takes some five to ten times as long as `BlockConvexity`.
 class FactoredConvexity {
   public:
     /// Offline. Cost for a mesh: O(V log V) memory.
-    explicit FactoredConvexity(const RestProblem& problem) : factors_(problem.vertex_count(), problem.springs()) {}
+    explicit FactoredConvexity(const EquilibriumProblem& problem)
+        : factors_(problem.vertex_count(), problem.springs()) {}
 
     /// Online. Cost for a mesh: O(V^1.5), up to five times.
-    [[nodiscard]] double around(const RestProblem& problem, double radius) noexcept;
+    [[nodiscard]] double around(const EquilibriumProblem& problem, double radius) noexcept;
 
   private:
-    bool gather(const RestProblem& problem, double radius) noexcept;
+    bool gather(const EquilibriumProblem& problem, double radius) noexcept;
 
-    BlockFactors factors_;
+    BlockCholesky factors_;
     double even_ =
         0;  // energy of an even shift of all that is free, by square of length: no smallest eigenvalue is above
 };
 static_assert(ConvexityModel<FactoredConvexity>);
 
-inline double FactoredConvexity::around(const RestProblem& problem, double radius) noexcept {
+inline double FactoredConvexity::around(const EquilibriumProblem& problem, double radius) noexcept {
     constexpr double none = -std::numeric_limits<double>::infinity();
     if (!gather(problem, radius)) return none;
     for (const double part : {0.5, 0.125, 0.01, 1e-4}) {
@@ -43,7 +44,7 @@ inline double FactoredConvexity::around(const RestProblem& problem, double radiu
 }
 
 // False where a spring may become too short.
-inline bool FactoredConvexity::gather(const RestProblem& problem, double radius) noexcept {
+inline bool FactoredConvexity::gather(const EquilibriumProblem& problem, double radius) noexcept {
     factors_.open();
     double sum = 0;
     Index free = 0;
@@ -57,7 +58,7 @@ inline bool FactoredConvexity::gather(const RestProblem& problem, double radius)
         const auto& spring = problem.springs()[s];
         const int ends = problem.free_ends(spring);
         if (ends == 0) continue;
-        const auto least = least_stiffness(spring, reach_of(spring, problem.centre()), ends * radius);
+        const auto least = min_stiffness(spring, edge_vector(spring, problem.centre()), ends * radius);
         if (!least) return false;
         const auto block = block_of(*least);
         for (const Index v : {spring.first, spring.second}) {

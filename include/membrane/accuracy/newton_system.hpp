@@ -84,8 +84,8 @@ class NewtonSystem {
 };
 
 /// The y of least y.Wy / 2 + q.y with y >= 0 but for `equality`, W the `coupling`, positive semidefinite [Lawson74].
-[[nodiscard]] inline Eigen::VectorXd least_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
-                                                       const std::vector<unsigned char>& equality);
+[[nodiscard]] inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
+                                                           const std::vector<unsigned char>& equality);
 
 inline NewtonSystem::NewtonSystem(const std::vector<unsigned char>& fixed) {
     for (const auto is_fixed : fixed) {
@@ -234,7 +234,7 @@ inline Eigen::VectorXd NewtonSystem::multipliers_of(const std::vector<std::size_
         q[i] = can_change(row) ? row.value + change(row, alone) : 0;
         equality.push_back(row.equality ? 1 : 0);
     }
-    return least_multipliers((coupling + coupling.transpose()) / 2, q, equality);
+    return estimated_multipliers((coupling + coupling.transpose()) / 2, q, equality);
 }
 
 inline double NewtonSystem::change(const ConstraintRow& row, const Eigen::Ref<const Eigen::VectorXd>& step) const {
@@ -255,8 +255,8 @@ inline bool NewtonSystem::can_change(const ConstraintRow& row) const noexcept {
 namespace detail {
 
 /// Least y.Wy / 2 + q.y over the y that are zero where nothing is at `work`.
-[[nodiscard]] inline Eigen::VectorXd least_at_work(Eigen::MatrixXd coupling, Eigen::VectorXd q,
-                                                   const std::vector<unsigned char>& work) {
+[[nodiscard]] inline Eigen::VectorXd min_awake(Eigen::MatrixXd coupling, Eigen::VectorXd q,
+                                               const std::vector<unsigned char>& work) {
     for (Eigen::Index i = 0; i < q.size(); ++i) {
         if (work[static_cast<std::size_t>(i)] != 0) continue;
         coupling.row(i).setZero();
@@ -269,13 +269,13 @@ namespace detail {
 
 }  // namespace detail
 
-inline Eigen::VectorXd least_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
-                                         const std::vector<unsigned char>& equality) {
+inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
+                                             const std::vector<unsigned char>& equality) {
     const double slack = 1e-15 * q.lpNorm<Eigen::Infinity>();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(q.size());
     std::vector<unsigned char> work = equality;
     for (Eigen::Index round = 0; round < 10 * (q.size() + 1); ++round) {
-        const Eigen::VectorXd best = detail::least_at_work(coupling, q, work);
+        const Eigen::VectorXd best = detail::min_awake(coupling, q, work);
         double part = 1;
         Eigen::Index first = no_index;  // to come to zero on the way there
         for (Eigen::Index i = 0; i < q.size(); ++i) {

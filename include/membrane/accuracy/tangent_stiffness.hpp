@@ -6,13 +6,13 @@
 #include <type_traits>
 #include <vector>
 
-#include <membrane/accuracy/linearised.hpp>
-#include <membrane/accuracy/rest_problem.hpp>
+#include <membrane/accuracy/equilibrium_problem.hpp>
+#include <membrane/accuracy/stiffness_operator.hpp>
 
 /// How stiff a membrane feels to whoever holds it.
 ///
 ///     membrane::TangentStiffness tangent(network);                                  // offline: allocates all it needs
-///     const auto feel = tangent.of(solver.queue().vertices(), x, network, backing, membrane::pull(7, target));
+///     const auto feel = tangent.of(solver.queue().vertices(), x, network, foundation, membrane::pull(7, target));
 ///     if (feel.status == TangentStatus::found) largest_eigenvalue(feel.stiffness);  // [N/m]
 namespace membrane {
 
@@ -30,11 +30,11 @@ enum class TangentStatus {
     not_converged,  ///< more iterations are needed
     contact,        ///< a tool touches: not treated
     unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that is held otherwise
-    bad_input,    ///< a number is not finite, an index names no vertex, counts do not agree
+    invalid_input,  ///< a number is not finite, an index names no vertex, counts do not agree
 };
 
 struct TangentReport {
-    TangentStatus status = TangentStatus::bad_input;
+    TangentStatus status = TangentStatus::invalid_input;
     Symmetric3<double> stiffness;  ///< the reaction of the first constraint changes by -`stiffness` d [N/m]
     Index iterations = 0;          ///< in all three directions
 };
@@ -54,13 +54,13 @@ class TangentStiffness {
     /// For `held`, one of the constraints of a step (pins name each vertex once), the others staying where they are,
     /// and all vertices free that none of them holds. Damping is left out. Online.
     /// Cost: O(V + springs) for each iteration.
-    template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
+    template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
     [[nodiscard]] TangentReport of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                    const Held& held, const Others&... others) noexcept;
 
     /// The same with only the vertices in `free` free, as a solver has it whose queue this is.
-    template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
+    template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
     [[nodiscard]] TangentReport of(std::span<const Index> free, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                    const Held& held, const Others&... others) noexcept;
@@ -72,9 +72,9 @@ class TangentStiffness {
     [[nodiscard]] Vector3<double> answer(int direction) noexcept;
 
     TangentOptions options_;
-    RestProblem problem_;
-    Linearised stiffness_;
-    Points<double> shift_, force_, way_;
+    EquilibriumProblem problem_;
+    StiffnessOperator stiffness_;
+    Points<double> shift_, force_, displacement_;
     std::vector<double> shares_;  // of each vertex in the reaction
     TangentReport report_;
 };
@@ -94,30 +94,30 @@ TangentStiffness::TangentStiffness(const MassSpringNetwork<Scalar, Law>& network
       stiffness_(problem_),
       shift_(Points<double>::Zero(3, network.vertex_count())),
       force_(shift_),
-      way_(shift_),
+      displacement_(shift_),
       shares_(static_cast<std::size_t>(network.vertex_count())) {}
 
-template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
+template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
 TangentReport TangentStiffness::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                    const Held& held, const Others&... others) noexcept {
     return condense(problem_.take(x, network, volume, held, others...), held);
 }
 
-template <Real Scalar, class Law, LinearBacking Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
+template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
 TangentReport TangentStiffness::of(std::span<const Index> free, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                    const Held& held, const Others&... others) noexcept {
     const auto status = problem_.take(x, network, volume, held, others...);
-    return condense(status == ProblemStatus::sound ? problem_.fix_all_but(free) : status, held);
+    return condense(status == ProblemStatus::valid ? problem_.fix_all_but(free) : status, held);
 }
 
 inline TangentStatus TangentStiffness::status_of(ProblemStatus status) noexcept {
     switch (status) {
-        case ProblemStatus::sound: return TangentStatus::found;
+        case ProblemStatus::valid: return TangentStatus::found;
         case ProblemStatus::contact: return TangentStatus::contact;
         case ProblemStatus::unsupported: return TangentStatus::unsupported;
-        default: return TangentStatus::bad_input;
+        default: return TangentStatus::invalid_input;
     }
 }
 
@@ -139,12 +139,12 @@ inline Vector3<double> TangentStiffness::answer(int direction) noexcept {
     shift_.setZero();
     for (Index v = 0; v < problem_.vertex_count(); ++v) shift_(direction, v) = shares_[static_cast<std::size_t>(v)];
     stiffness_.multiply(problem_, shift_, force_);
-    way_.setZero();
-    const auto solved = stiffness_.solve(problem_, force_, way_, {options_.tolerance, options_.iterations});
+    displacement_.setZero();
+    const auto solved = stiffness_.solve(problem_, force_, displacement_, {options_.tolerance, options_.iterations});
     report_.iterations += solved.iterations;
     if (!solved.convex) report_.status = TangentStatus::not_stable;
     if (!solved.converged && report_.status == TangentStatus::found) report_.status = TangentStatus::not_converged;
-    shift_ -= way_;
+    shift_ -= displacement_;
     stiffness_.multiply(problem_, shift_, force_);
     Vector3<double> sum = Vector3<double>::Zero();
     for (Index v = 0; v < problem_.vertex_count(); ++v) sum += shares_[static_cast<std::size_t>(v)] * point(force_, v);

@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/collision/contact_point.hpp>
-#include <membrane/mesh/box.hpp>
+#include <membrane/contact/contact_point.hpp>
+#include <membrane/surface/box.hpp>
 
 /// The contact points of tools with a whole surface, and how their gaps change as it moves.
 ///
@@ -55,8 +55,8 @@ struct ToolPoint : ContactPoint<double> {
 
 /// The largest part, up to 1, of a `step` (3 x V [m]) in which no triangle can reach the axis of a tool: none of its
 /// corners goes as far as it is away.
-[[nodiscard]] inline double safe_part(const Triangles& triangles, const Points<double>& x, const Points<double>& step,
-                                      std::span<const Tool<double>> tools);
+[[nodiscard]] inline double collision_free_step(const Triangles& triangles, const Points<double>& x,
+                                                const Points<double>& step, std::span<const Tool<double>> tools);
 
 /// Whether the tool's axis meets a triangle that is not fixed with all its corners: there it has no gap.
 [[nodiscard]] inline bool is_pierced(const Triangles& triangles, const Points<double>& x, const Tool<double>& tool,
@@ -155,14 +155,15 @@ inline bool is_pierced(const Triangles& triangles, const Points<double>& x, cons
     return false;
 }
 
-inline double safe_part(const Triangles& triangles, const Points<double>& x, const Points<double>& step,
-                        std::span<const Tool<double>> tools) {
+inline double collision_free_step(const Triangles& triangles, const Points<double>& x, const Points<double>& step,
+                                  std::span<const Tool<double>> tools) {
     constexpr double caution = 0.8;
     double part = 1;
     for (const auto& tool : tools) {
         for (const auto& corners : triangles.colwise()) {
-            const auto triangle = triangle_at(x, corners), way = triangle_at(step, corners);
-            const double most = std::sqrt((std::max)({squared_norm(way.a), squared_norm(way.b), squared_norm(way.c)}));
+            const auto triangle = triangle_at(x, corners), displacement = triangle_at(step, corners);
+            const double most = std::sqrt(
+                (std::max)({squared_norm(displacement.a), squared_norm(displacement.b), squared_norm(displacement.c)}));
             if (most == 0 || detail::is_far(triangle, tool, part * most / caution)) continue;
             part = (std::min)(part, caution * distance_from_axis(triangle, tool) / most);
         }

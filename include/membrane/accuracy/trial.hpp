@@ -16,16 +16,16 @@
 #include <vector>
 
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/collision/contact_tracker.hpp>
-#include <membrane/collision/grasper.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/grasper.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
 /// What a setting of the solver costs, and how far off it is, in a scene of one's own.
 ///
 ///     #include <membrane/accuracy/trial.hpp>
 ///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: a tool for each tick of 1 ms
-///     const auto rests = membrane::equilibria(mesh, network, backing, stroke);
-///     const auto outcome = membrane::trial(mesh, network, backing, stroke, rests, {.layers = 6, .sweeps = 2});
+///     const auto references = membrane::equilibria(mesh, network, foundation, stroke);
+///     const auto outcome = membrane::trial(mesh, network, foundation, stroke, references, {.layers = 6, .sweeps = 2});
 ///     outcome.force_error;                                                    // as a part of the force
 ///     outcome.time;                                                           // of a tick [s]
 namespace membrane {
@@ -36,7 +36,7 @@ template <class Constraints, class Scalar>
 inline constexpr bool are_constraints = false;
 template <class... Each, class Scalar>
 inline constexpr bool are_constraints<std::tuple<Each...>, Scalar> = ((Constraint<Each, Scalar> &&
-                                                                       RestConstraint<Each>)&&...);
+                                                                       StaticConstraint<Each>)&&...);
 
 }  // namespace detail
 
@@ -70,7 +70,7 @@ consteval bool check_load_history() noexcept {
         "LoadHistory: dt() const must return Scalar [s]");
     static_assert(LoadHistory<History, Scalar>,
                   "LoadHistory: history(Index tick, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) "
-                  "must return a std::tuple of what is a Constraint and a RestConstraint");
+                  "must return a std::tuple of what is a Constraint and a StaticConstraint");
     return LoadHistory<History, Scalar>;
 }
 
@@ -85,7 +85,7 @@ template <Real Scalar>
 class Stroke {
   public:
     /// A tool for each tick of `dt` [s], on the mesh as it stands there.
-    /// @throws InvalidInput for no tools, one that is not sound, or a `dt` that is not finite and positive
+    /// @throws InvalidInput for no tools, one that is not valid, or a `dt` that is not finite and positive
     Stroke(const TriangleMesh<Scalar>& mesh, const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
            std::type_identity_t<Scalar> dt);
 
@@ -93,8 +93,8 @@ class Stroke {
     [[nodiscard]] Scalar dt() const noexcept { return dt_; }
 
     /// The contact of the tick, and what the forceps hold. The contact is valid until the next call.
-    [[nodiscard]] std::tuple<Press<Scalar>, HeldPoint<Scalar>> operator()(Index tick, const ConstPointsRef<Scalar>& x,
-                                                                          std::span<const Index> moved) noexcept;
+    [[nodiscard]] std::tuple<ToolContact<Scalar>, PointAttachment<Scalar>> operator()(
+        Index tick, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
   private:
     std::vector<Tool<Scalar>> tools_;
@@ -106,7 +106,7 @@ class Stroke {
 static_assert(LoadHistory<Stroke<float>, float> && LoadHistory<Stroke<double>, double>);
 
 /// Where the membrane rests in a tick, and what it pushes back with.
-struct TickAtRest {
+struct ReferenceTick {
     Index tick;
     Points<double> x;                        ///< 3 x V [m]
     std::vector<Vector3<double>> reactions;  ///< for each constraint in turn [N]
@@ -115,12 +115,13 @@ struct TickAtRest {
 
 /// The equilibrium of every tick, or of every `every`-th, each from the tick before; the solver, with many sweeps,
 /// follows the history between them. A tick for which none was found is left out. Equilibria know no damping: a setting
-/// is off by what a damped backing lags behind.
+/// is off by what a damped foundation lags behind.
 /// @throws InvalidInput for what `equilibrium` refuses, a history without ticks, or an `every` below 1. Offline.
 /// Cost: an `equilibrium` for each tick of the result.
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History>
-[[nodiscard]] std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network,
-                                                 const Volume& volume, History history, Index every = 1);
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
+          CheckedLoadHistory<Scalar> History>
+[[nodiscard]] std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network,
+                                                    const Volume& volume, History history, Index every = 1);
 
 /// What a setting comes to. Forces that count are those that somebody feels: all but what loads and pins answer with.
 struct Outcome {
@@ -128,7 +129,7 @@ struct Outcome {
     double position_error = 0;  ///< of the vertex that is the farthest off, root mean square over the ticks [m]
     double time = 0;            ///< of a tick in which a force is felt, contact and step, on average [s]
     Index layers_reached = 0;   ///< by the queue: fewer than asked for where the mesh ends before
-    Index judged = 0;           ///< ticks that the errors are of
+    Index ticks_compared = 0;   ///< ticks that the errors are of
     bool advanced = true;       ///< no step was refused; if one was, errors and time are infinite
 };
 
@@ -140,13 +141,13 @@ struct SteadySeconds {
 };
 
 /// Plays `history` with a solver of these options, from the mesh at rest, each tick from where the one before ended, and
-/// sets it against `rests`. `clock()` gives the time [s].
-/// @throws InvalidInput for options that the solver refuses, and `rests` of another scene. Offline.
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History,
-          StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
+/// sets it against `references`. `clock()` gives the time [s].
+/// @throws InvalidInput for options that the solver refuses, and `references` of another scene. Offline.
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
+          CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
-                            History history, std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options,
-                            const Rule& rule = {}, const Clock& clock = {});
+                            History history, std::span<const ReferenceTick> references,
+                            const SolverOptions<Scalar>& options, const Rule& rule = {}, const Clock& clock = {});
 
 namespace detail {
 
@@ -183,13 +184,14 @@ void check_history(std::string_view component, const History& history) {
 
 /// What is summed up over a trial.
 struct TrialSums {
-    double errors = 0, squares = 0;  // of forces [N^2]
-    double ways = 0;                 // of the farthest vertices [m^2]
-    double time = 0;                 // of the ticks with a force [s]
-    Index judged = 0, felt = 0;      // ticks
+    double errors = 0, squares = 0;      // of forces [N^2]
+    double displacements = 0;            // of the farthest vertices [m^2]
+    double time = 0;                     // of the ticks with a force [s]
+    Index ticks_compared = 0, felt = 0;  // ticks
 
     template <class Constraints, class Reactions, class Positions>
-    void judge(const TickAtRest& rest, const Constraints& constraints, const Reactions& reactions, const Positions& x) {
+    void judge(const ReferenceTick& rest, const Constraints& constraints, const Reactions& reactions,
+               const Positions& x) {
         if (rest.x.cols() != x.cols() || rest.reactions.size() != reactions.size()) {
             refuse("trial", "the rest of tick ", rest.tick, " must have ", x.cols(), " vertices and ", reactions.size(),
                    " reactions, got ", rest.x.cols(), " and ", rest.reactions.size());
@@ -198,17 +200,17 @@ struct TrialSums {
             return (reactions[i].template cast<double>() - rest.reactions[i]).squaredNorm();
         });
         squares += rest.force * rest.force;
-        ways += (x.template cast<double>() - rest.x).colwise().squaredNorm().maxCoeff();
-        ++judged;
+        displacements += (x.template cast<double>() - rest.x).colwise().squaredNorm().maxCoeff();
+        ++ticks_compared;
     }
 
     [[nodiscard]] Outcome outcome(Index layers) const {
         const auto part = [](double sum, double of) { return sum == 0 ? 0.0 : sum / of; };
         return {.force_error = std::sqrt(part(errors, squares)),
-                .position_error = std::sqrt(part(ways, judged)),
+                .position_error = std::sqrt(part(displacements, ticks_compared)),
                 .time = part(time, felt),
                 .layers_reached = layers,
-                .judged = judged};
+                .ticks_compared = ticks_compared};
     }
 };
 
@@ -221,7 +223,7 @@ Stroke<Scalar>::Stroke(const TriangleMesh<Scalar>& mesh,
     : tools_(tools.begin(), tools.end()), dt_(dt), tree_(mesh), tracker_(mesh), grasper_(mesh) {
     detail::check_history<Scalar>("Stroke", *this);
     for (std::size_t tick = 0; tick < tools_.size(); ++tick) {
-        if (!is_sound(tools_[tick])) {
+        if (!is_valid(tools_[tick])) {
             refuse("Stroke", "the tool of tick ", tick,
                    " must be finite, its radius not negative, got one that is not");
         }
@@ -229,8 +231,8 @@ Stroke<Scalar>::Stroke(const TriangleMesh<Scalar>& mesh,
 }
 
 template <Real Scalar>
-std::tuple<Press<Scalar>, HeldPoint<Scalar>> Stroke<Scalar>::operator()(Index tick, const ConstPointsRef<Scalar>& x,
-                                                                        std::span<const Index> moved) noexcept {
+std::tuple<ToolContact<Scalar>, PointAttachment<Scalar>> Stroke<Scalar>::operator()(
+    Index tick, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
     const auto& tool = tools_[static_cast<std::size_t>(tick)];
     tree_.refit(x, moved);
     const auto contact = tracker_.update(tree_, x, tool);
@@ -238,15 +240,16 @@ std::tuple<Press<Scalar>, HeldPoint<Scalar>> Stroke<Scalar>::operator()(Index ti
     return {press(tool, contact, grasp), pull(tool, grasp)};
 }
 
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History>
-std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
-                                   History history, Index every) {
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
+          CheckedLoadHistory<Scalar> History>
+std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
+                                      History history, Index every) {
     detail::check_history<Scalar>("equilibria", history);
     if (every < 1) refuse("equilibria", "every must be at least 1, got ", every);
     std::vector<Index> all(static_cast<std::size_t>(mesh.vertex_count()));
     std::iota(all.begin(), all.end(), 0);
     QuasiStaticSolver<Scalar> between(network, {.layers = unlimited, .sweeps = 16});
-    std::vector<TickAtRest> rests;
+    std::vector<ReferenceTick> references;
     Points<Scalar> x = mesh.positions();
     for (Index tick = 0; tick < history.ticks(); ++tick) {
         const auto constraints = history(tick, x, all);
@@ -258,19 +261,19 @@ std::vector<TickAtRest> equilibria(const TriangleMesh<Scalar>& mesh, const Netwo
                     detail::sum_of_felt(constraints, [&](std::size_t i) { return rest.reactions[i].squaredNorm(); }));
                 x = rest.x.template cast<Scalar>();
                 between.wake_all();
-                rests.push_back({tick, std::move(rest.x), std::move(rest.reactions), force});
+                references.push_back({tick, std::move(rest.x), std::move(rest.reactions), force});
                 continue;
             }
         }
         apply([&](const auto&... each) { static_cast<void>(between.step(x, history.dt(), network, volume, each...)); });
     }
-    return rests;
+    return references;
 }
 
-template <Real Scalar, ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume, CheckedLoadHistory<Scalar> History,
-          StepRule<Scalar> Rule, class Clock>
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
+          CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule, class Clock>
 Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume, History history,
-              std::span<const TickAtRest> rests, const SolverOptions<Scalar>& options, const Rule& rule,
+              std::span<const ReferenceTick> references, const SolverOptions<Scalar>& options, const Rule& rule,
               const Clock& clock) {
     detail::check_history<Scalar>("trial", history);
     QuasiStaticSolver<Scalar, Rule> solver(network, options, rule);
@@ -278,7 +281,7 @@ Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Vo
     std::vector<Index> moved;
     detail::TrialSums sums;
     Index layers = 0;
-    auto rest = rests.begin();
+    auto rest = references.begin();
     for (Index tick = 0; tick < history.ticks(); ++tick) {
         const double begin = clock();
         const auto constraints = history(tick, x, moved);
@@ -296,10 +299,10 @@ Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Vo
             sums.time += end - begin;
             ++sums.felt;
         }
-        if (rest == rests.end() || rest->tick != tick) continue;
+        if (rest == references.end() || rest->tick != tick) continue;
         sums.judge(*rest++, constraints, report.reactions, x);
     }
-    if (sums.judged == 0 || rest != rests.end()) {
+    if (sums.ticks_compared == 0 || rest != references.end()) {
         refuse("trial", "rests must be of ticks of the history, one at least, in their order, got others");
     }
     return sums.outcome(layers);

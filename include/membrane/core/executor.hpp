@@ -10,7 +10,7 @@
 /// Who does what may be done at the same time.
 ///
 ///     const auto in_my_pool = [&pool](membrane::Index count, const auto& task) { pool.for_each(count, task); };
-///     auto solver = membrane::QuasiStaticSolver(network, {.order = membrane::VisitOrder::colours}, rule, in_my_pool);
+///     auto solver = membrane::QuasiStaticSolver(network, {.order = membrane::UpdateOrder::colour_all}, rule, in_my_pool);
 namespace membrane {
 
 namespace detail {

@@ -13,8 +13,8 @@ namespace membrane {
 
 /// One number for all, or one number for each vertex or spring.
 ///
-///     VolumeOptions<double> uniform{.stiffness = 8.0};
-///     VolumeOptions<double> graded{.stiffness = std::vector<double>{8.0, 9.5, 11.0}};
+///     VolumeSpringOptions<double> uniform{.stiffness = 8.0};
+///     VolumeSpringOptions<double> graded{.stiffness = std::vector<double>{8.0, 9.5, 11.0}};
 template <Real Scalar>
 class Field {
   public:

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include <membrane/core/bounded_list.hpp>
+#include <membrane/core/fixed_vector.hpp>
 
 namespace membrane {
 
@@ -56,7 +56,7 @@ class IndexSet {
 
   private:
     std::vector<std::uint32_t> mark_;  // i is in the set where mark_[i] == current_
-    BoundedList<Index> items_;
+    FixedVector<Index> items_;
     std::uint32_t current_ = 1;
 };
 

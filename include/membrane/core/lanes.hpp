@@ -228,8 +228,8 @@ class Lanes {
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
 /// choice ? yes : no, in every lane.
-template <Number N, class Choice>
-[[nodiscard]] N select(const Choice& choice, const N& yes, const N& no) noexcept {
+template <Number N, class ChosenSettings>
+[[nodiscard]] N select(const ChosenSettings& choice, const N& yes, const N& no) noexcept {
     if constexpr (Real<N>)
         return choice ? yes : no;
     else

@@ -12,7 +12,7 @@ namespace membrane {
 ///
 ///     membrane::Symmetric3<double> stiffness = membrane::diagonal3(8.0);            // [N/m]
 ///     stiffness += membrane::outer(40.0, u);                                        // 40 u u^T
-///     const auto way = inverse(stiffness) * force;                                  // [m]
+///     const auto displacement = inverse(stiffness) * force;                                  // [m]
 template <Number Scalar>
 struct Symmetric3 {
     Scalar xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;

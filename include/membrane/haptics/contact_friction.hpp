@@ -61,21 +61,21 @@ requires CheckedForcePolicy<Policy, Scalar> Vector3<Scalar> ContactFriction<Poli
     const HapticState<Scalar>& state) noexcept {
     const Vector3<Scalar> force = policy_(state);
     const auto& [tool, contact, report, grasp] = state;
-    const bool touches = contact.touching() && !grasp.holding();
-    if (!touches || !sticks_) anchor_ = tool.position;
-    sticks_ = touches && is_finite(tool.position) && is_finite(contact.normal) && is_finite(force);
+    const bool contacts = contact.touching() && !grasp.holding();
+    if (!contacts || !sticks_) anchor_ = tool.position;
+    sticks_ = contacts && is_finite(tool.position) && is_finite(contact.normal) && is_finite(force);
     slips_ = false;
     if (!sticks_) return force;
 
     const Scalar load = (std::max)(dot(force, contact.normal), Scalar(0));
     const Scalar farthest = coefficient_ * load / stiffness_;
-    Vector3<Scalar> way = tool.position - anchor_;
-    way -= dot(way, contact.normal) * contact.normal;
-    const Scalar length = norm(way);
+    Vector3<Scalar> displacement = tool.position - anchor_;
+    displacement -= dot(displacement, contact.normal) * contact.normal;
+    const Scalar length = norm(displacement);
     slips_ = length > farthest;
-    if (slips_) way *= farthest / length;
-    anchor_ = tool.position - way;
-    const Vector3<Scalar> both = force - stiffness_ * way;
+    if (slips_) displacement *= farthest / length;
+    anchor_ = tool.position - displacement;
+    const Vector3<Scalar> both = force - stiffness_ * displacement;
     sticks_ = is_finite(both) && is_finite(anchor_);
     return sticks_ ? both : force;
 }

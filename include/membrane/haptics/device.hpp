@@ -9,11 +9,11 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/collision/tool.hpp>
+#include <membrane/contact/tool.hpp>
 
 /// Where the tool comes from and the force goes to.
 ///
-///     membrane::NullDevice<double> device({{.time = 0, .position = {0, 0, 0.012}}, {.time = 1, .position = {0, 0, 0.009}}},
+///     membrane::ScriptedDevice<double> device({{.time = 0, .position = {0, 0, 0.012}}, {.time = 1, .position = {0, 0, 0.009}}},
 ///                                         {.tick = 1e-3, .radius = 1e-3});
 ///     while (device.running()) { const auto tool = device.read(); ...; device.write(force); }
 namespace membrane {
@@ -76,7 +76,7 @@ struct NullDeviceOptions {
     double radius = 0;   ///< of the tool [m]
 };
 
-/// What holds the tool of a `NullDevice`: `place` puts it somewhere, at rest; `aim` says where it should be now and at
+/// What holds the tool of a `ScriptedDevice`: `place` puts it somewhere, at rest; `aim` says where it should be now and at
 /// which velocity that moves; `move` lets a time go by under a force. Then it is at `position`, with `velocity`.
 template <class H, class Scalar>
 concept Hand = Real<Scalar> && std::copyable<H> &&
@@ -139,7 +139,7 @@ concept CheckedHand = detail::check_hand<H, Scalar>();
 
 /// Is where it should be, whatever the force. One that gives way: `SimulatedHand`.
 template <Real Scalar>
-class FirmHand {
+class IdealHand {
   public:
     void place(const Vector3<Scalar>& position) noexcept { aim(position, Vector3<Scalar>::Zero()); }
     void aim(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
@@ -155,17 +155,17 @@ class FirmHand {
     Vector3<Scalar> position_ = Vector3<Scalar>::Zero(), velocity_ = Vector3<Scalar>::Zero();
 };
 
-static_assert(Hand<FirmHand<float>, float> && Hand<FirmHand<double>, double>);
+static_assert(Hand<IdealHand<float>, float> && Hand<IdealHand<double>, double>);
 
 /// A device without a device: its tool follows a script in straight lines from waypoint to waypoint, at the velocity
 /// that takes, whatever force is written. Held by another hand, it follows as far as that hand lets it: from rest at the
 /// first waypoint, under the force that was written last before each tick.
-template <Real Scalar, CheckedHand<Scalar> Holder = FirmHand<Scalar>>
-class NullDevice {
+template <Real Scalar, CheckedHand<Scalar> Holder = IdealHand<Scalar>>
+class ScriptedDevice {
   public:
     /// @throws InvalidInput for a script that is empty or not finite or does not go forward in time, or bad options
-    explicit NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options = {},
-                        const Holder& hand = Holder());
+    explicit ScriptedDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options = {},
+                            const Holder& hand = Holder());
 
     /// Whether the script is not yet over.
     [[nodiscard]] bool running() const noexcept { return time() < script_.back().time + tick_ / 2; }
@@ -182,7 +182,7 @@ class NullDevice {
     [[nodiscard]] Scalar time() const noexcept { return script_.front().time + static_cast<Scalar>(ticks_) * tick_; }
 
     /// Back to the beginning.
-    void restart() noexcept {
+    void reset() noexcept {
         ticks_ = 0;
         next_ = 0;
         force_.setZero();
@@ -201,13 +201,13 @@ class NullDevice {
 };
 
 template <Real Scalar, CheckedHand<Scalar> Holder>
-NullDevice<Scalar, Holder>::NullDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options,
-                                       const Holder& hand)
+ScriptedDevice<Scalar, Holder>::ScriptedDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options,
+                                               const Holder& hand)
     : script_(std::move(script)),
       tick_(static_cast<Scalar>(options.tick)),
       radius_(static_cast<Scalar>(options.radius)),
       hand_(hand) {
-    constexpr std::string_view component = "NullDevice";
+    constexpr std::string_view component = "ScriptedDevice";
     detail::check_option(component, tick_, "tick", "s", false);
     detail::check_option(component, radius_, "radius", "m");
     if (script_.empty()) refuse(component, "the script must have a waypoint, got none");
@@ -225,7 +225,7 @@ NullDevice<Scalar, Holder>::NullDevice(std::vector<Waypoint<Scalar>> script, con
 }
 
 template <Real Scalar, CheckedHand<Scalar> Holder>
-Tool<Scalar> NullDevice<Scalar, Holder>::read() noexcept {
+Tool<Scalar> ScriptedDevice<Scalar, Holder>::read() noexcept {
     Tool<Scalar> tool = scripted(time());
     if (ticks_ > 0) hand_.move(force_, tick_);
     hand_.aim(tool.position, tool.velocity);
@@ -236,7 +236,7 @@ Tool<Scalar> NullDevice<Scalar, Holder>::read() noexcept {
 }
 
 template <Real Scalar, CheckedHand<Scalar> Holder>
-Tool<Scalar> NullDevice<Scalar, Holder>::scripted(Scalar now) noexcept {
+Tool<Scalar> ScriptedDevice<Scalar, Holder>::scripted(Scalar now) noexcept {
     while (next_ < script_.size() && script_[next_].time <= now) ++next_;
     Tool<Scalar> tool{.radius = radius_, .time = now};
     const auto& from = script_[next_ == 0 ? 0 : next_ - 1];

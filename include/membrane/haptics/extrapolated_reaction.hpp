@@ -48,8 +48,8 @@ template <Real Scalar>
 Vector3<Scalar> ExtrapolatedReaction<Scalar>::operator()(const HapticState<Scalar>& state) const noexcept {
     const bool holding = state.grasp.holding();
     if (!holding && !state.contact.touching()) return Vector3<Scalar>::Zero();
-    const Vector3<Scalar> way = state.tool.position - position_;
-    Vector3<Scalar> force = scale_ * (reaction_ - stiffness_ * way);
+    const Vector3<Scalar> displacement = state.tool.position - position_;
+    Vector3<Scalar> force = scale_ * (reaction_ - stiffness_ * displacement);
     if (!holding) {
         const Vector3<Scalar>& normal = state.contact.normal;
         force -= (std::min)(dot(force, normal), Scalar(0)) * normal;

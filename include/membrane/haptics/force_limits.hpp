@@ -17,19 +17,19 @@ namespace membrane {
 
 /// All limits are on; each can be taken off.
 struct LimitOptions {
-    double rise_time = 0.02;     ///< for a change of the force by the peak force, at the quickest [s]; 0: no slew limit
-    double soft_start = 0.1;     ///< from nothing to the whole force, at first and after a fault [s]; 0: at once
-    double fresh_for = 0.04;     ///< a state of the solver may be this old [s]; infinity: no watchdog
-    double fade_time = 0.05;     ///< and then the force fades to zero in this time [s]
-    double longest_tick = 2e-3;  ///< a force grows as if no tick had been longer [s]
-    bool heating = true;         ///< whether motors that grow hot get no more than the continuous force
+    double rise_time = 0.02;  ///< for a change of the force by the peak force, at the quickest [s]; 0: no slew limit
+    double soft_start = 0.1;  ///< from nothing to the whole force, at first and after a fault [s]; 0: at once
+    double max_state_age = 0.04;  ///< a state of the solver may be this old [s]; infinity: no watchdog
+    double fade_time = 0.05;      ///< and then the force fades to zero in this time [s]
+    double max_tick = 2e-3;       ///< a force grows as if no tick had been longer [s]
+    bool heating = true;          ///< whether motors that grow hot get no more than the continuous force
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
 };
 
 /// Which limits have made the force of this tick smaller.
-struct LimitsActed {
+struct ActiveLimits {
     bool fault = false;  ///< force or clock was not finite: no force
     bool faded = false;  ///< the state is old, or the force still comes in after that, a fault or the start
     bool peak = false;   ///< of the device
@@ -42,7 +42,7 @@ struct LimitsActed {
 /// How much of the force an old state of the solver is good for: 1 while it is fresh, then down to 0.
 class Watchdog {
   public:
-    Watchdog(double fresh_for, double fade_time) noexcept : fresh_for_(fresh_for), fade_time_(fade_time) {}
+    Watchdog(double max_state_age, double fade_time) noexcept : fresh_for_(max_state_age), fade_time_(fade_time) {}
 
     /// `state`: a number that the solver changes with each solve; `dt` since the last call [s].
     double update(std::uint64_t state, double dt) noexcept;
@@ -71,15 +71,15 @@ class SoftStart {
 /// continuous force. So 1 is not passed where ticks are short beside `thermal_time` (for the stock devices, up to 40 ms).
 /// In a longer gap the device goes on with a force that was chosen for a short tick: then it can be more, up to the
 /// square of peak over continuous force.
-class MotorHeat {
+class MotorThermalModel {
   public:
-    explicit MotorHeat(const DeviceProfile& device) noexcept
+    explicit MotorThermalModel(const DeviceProfile& device) noexcept
         : peak_(device.peak_force), continuous_(device.continuous_force), time_(device.thermal_time) {}
 
     /// `force` was held for `dt` [N], [s].
     void add(double force, double dt) noexcept;
-    [[nodiscard]] double warmth() const noexcept { return warmth_; }
-    [[nodiscard]] double most_force() const noexcept;
+    [[nodiscard]] double thermal_load() const noexcept { return warmth_; }
+    [[nodiscard]] double max_force() const noexcept;
 
   private:
     double peak_, continuous_, time_;
@@ -122,15 +122,15 @@ class ForceLimiter {
     [[nodiscard]] Vector3<Scalar> operator()(const Vector3<Scalar>& force, double now, std::uint64_t state) noexcept;
 
     /// What limited the last force.
-    [[nodiscard]] const LimitsActed& acted() const noexcept { return acted_; }
-    /// Of the motors: 0 cold, 1 what the continuous force comes to; see `MotorHeat`.
-    [[nodiscard]] double warmth() const noexcept { return heat_.warmth(); }
+    [[nodiscard]] const ActiveLimits& acted() const noexcept { return acted_; }
+    /// Of the motors: 0 cold, 1 what the continuous force comes to; see `MotorThermalModel`.
+    [[nodiscard]] double thermal_load() const noexcept { return heat_.thermal_load(); }
     /// Of the force that came through watchdog and soft start, 0 to 1.
     [[nodiscard]] double share() const noexcept { return soft_start_.share(); }
     [[nodiscard]] const DeviceProfile& device() const noexcept { return device_; }
 
     /// As new, but for the heat. For a replay take a new one.
-    void restart() noexcept;
+    void reset() noexcept;
 
   private:
     double time_since_last(double now) noexcept;
@@ -140,8 +140,8 @@ class ForceLimiter {
     double slew_;  // [N/s]
     Watchdog watchdog_;
     SoftStart soft_start_;
-    MotorHeat heat_;
-    LimitsActed acted_;
+    MotorThermalModel heat_;
+    ActiveLimits acted_;
     bool began_ = false;
     double time_ = 0;
     Vector3<double> force_ = Vector3<double>::Zero();  // the last one [N]
@@ -193,9 +193,9 @@ inline void LimitOptions::check() const {
     detail::check_option(component, rise_time, "rise_time", "s");
     detail::check_option(component, soft_start, "soft_start", "s");
     detail::check_option(component, fade_time, "fade_time", "s");
-    detail::check_option(component, longest_tick, "longest_tick", "s", false);
-    if (!(is_finite(fresh_for) ? fresh_for > 0 : fresh_for == std::numeric_limits<double>::infinity())) {
-        refuse(component, "fresh_for must be positive [s], got ", fresh_for);
+    detail::check_option(component, max_tick, "max_tick", "s", false);
+    if (!(is_finite(max_state_age) ? max_state_age > 0 : max_state_age == std::numeric_limits<double>::infinity())) {
+        refuse(component, "max_state_age must be positive [s], got ", max_state_age);
     }
 }
 
@@ -212,7 +212,7 @@ inline double SoftStart::update(double allowed, double dt) noexcept {
     return share_;
 }
 
-inline void MotorHeat::add(double force, double dt) noexcept {
+inline void MotorThermalModel::add(double force, double dt) noexcept {
     constexpr double long_enough = 1e3;  // to forget what was before
     const double time = dt / long_enough < time_ ? dt / time_ : long_enough;
     const double left = 1 / (1 + time * (1 + time * (0.5 + time / 6)));  // of exp(-time), the same on all machines
@@ -220,17 +220,17 @@ inline void MotorHeat::add(double force, double dt) noexcept {
     warmth_ = left * warmth_ + (1 - left) * (relative * relative);  // between the two, however long the time
 }
 
-inline double MotorHeat::most_force() const noexcept {
+inline double MotorThermalModel::max_force() const noexcept {
     constexpr double warm = 0.75;
-    const double room = std::clamp((1 - warmth_) / (1 - warm), 0.0, 1.0);
-    return continuous_ + room * (peak_ - continuous_);
+    const double reserve = std::clamp((1 - warmth_) / (1 - warm), 0.0, 1.0);
+    return continuous_ + reserve * (peak_ - continuous_);
 }
 
 inline ForceLimiter::ForceLimiter(const DeviceProfile& device, const LimitOptions& options)
     : device_((device.check(), device)),
       options_((options.check(), options)),
       slew_(options.rise_time > 0 ? device.peak_force / options.rise_time : 0),
-      watchdog_(options.fresh_for, options.fade_time),
+      watchdog_(options.max_state_age, options.fade_time),
       soft_start_(options.soft_start),
       heat_(device) {}
 
@@ -247,8 +247,8 @@ Vector3<Scalar> ForceLimiter::operator()(const Vector3<Scalar>& force, double no
     acted_.fault = !is_finite(force) || !is_finite(now);
     const double dt = is_finite(now) ? time_since_last(now) : 0;
     // A clock that stands still or jumps back stops no watchdog, and lets no force grow.
-    const double passed = dt > 0 && is_finite(dt) ? dt : options_.longest_tick;
-    const double growing = std::clamp(dt, 0.0, options_.longest_tick);
+    const double passed = dt > 0 && is_finite(dt) ? dt : options_.max_tick;
+    const double growing = std::clamp(dt, 0.0, options_.max_tick);
     heat_.add(norm(force_), passed);
 
     const double fresh = watchdog_.update(state, passed);
@@ -266,14 +266,14 @@ Vector3<Scalar> ForceLimiter::operator()(const Vector3<Scalar>& force, double no
         return acts;
     };
     acted_.peak = change_to(detail::shortened(felt, device_.peak_force));
-    acted_.heat = options_.heating && change_to(detail::shortened(felt, heat_.most_force()));
+    acted_.heat = options_.heating && change_to(detail::shortened(felt, heat_.max_force()));
     acted_.slew = slew_ > 0 && change_to(detail::slewed(felt, force_, slew_ * growing));
     force_ = felt.template cast<double>();
     return felt;
 }
 
-inline void ForceLimiter::restart() noexcept {
-    watchdog_ = Watchdog(options_.fresh_for, options_.fade_time);
+inline void ForceLimiter::reset() noexcept {
+    watchdog_ = Watchdog(options_.max_state_age, options_.fade_time);
     soft_start_ = SoftStart(options_.soft_start);
     acted_ = {};
     began_ = false;

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <concepts>
 
-#include <membrane/collision/contact.hpp>
-#include <membrane/collision/grasper.hpp>
-#include <membrane/collision/tool.hpp>
+#include <membrane/contact/contact.hpp>
+#include <membrane/contact/grasper.hpp>
+#include <membrane/contact/tool.hpp>
 #include <membrane/solve/step.hpp>
 
 /// What the hand should feel.
@@ -114,10 +114,10 @@ Vector3<Scalar> SpringDamperForce::force(const HapticState<Scalar>& state) const
     const auto k = static_cast<Scalar>(stiffness), mu = static_cast<Scalar>(damping);
     const auto& [tool, contact, report, grasp] = state;
     if (grasp.holding()) {
-        const Vector3<Scalar> way = grasp.displacement(tool);
-        const Scalar length = norm(way);
+        const Vector3<Scalar> displacement = grasp.displacement(tool);
+        const Scalar length = norm(displacement);
         if (!(length > 0)) return Vector3<Scalar>::Zero();
-        const Vector3<Scalar> along = way / length;
+        const Vector3<Scalar> along = displacement / length;
         return detail::finite_or_zero<Scalar>(
             -(k * length + mu * dot<Scalar>(tool.velocity - grasp.body_velocity, along)) * along);
     }

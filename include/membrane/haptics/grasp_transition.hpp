@@ -33,12 +33,12 @@ class GraspTransition {
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& state) noexcept;
 
     /// Whether the force is still on its way from one law to the other.
-    [[nodiscard]] bool under_way() const noexcept { return under_way_; }
+    [[nodiscard]] bool in_transition() const noexcept { return in_transition_; }
 
   private:
     Policy policy_;
     Scalar duration_;
-    bool held_ = false, under_way_ = false;
+    bool held_ = false, in_transition_ = false;
     Scalar begin_ = 0;                                      // [s]
     Vector3<Scalar> difference_ = Vector3<Scalar>::Zero();  // of the old law to the new, at the beginning [N]
     Vector3<Scalar> last_ = Vector3<Scalar>::Zero();        // force [N]
@@ -53,12 +53,12 @@ requires CheckedForcePolicy<Policy, Scalar> Vector3<Scalar> GraspTransition<Poli
         held_ = holds;
         begin_ = state.tool.time;
         difference_ = last_ - force;
-        under_way_ = true;
+        in_transition_ = true;
     }
     const Scalar past = (state.tool.time - begin_) / duration_;
     // A time that jumps back or is none ends it.
-    under_way_ = under_way_ && past >= 0 && past < 1 && is_finite(past) && is_finite(difference_);
-    last_ = under_way_ ? Vector3<Scalar>(force + (1 - past) * difference_) : force;
+    in_transition_ = in_transition_ && past >= 0 && past < 1 && is_finite(past) && is_finite(difference_);
+    last_ = in_transition_ ? Vector3<Scalar>(force + (1 - past) * difference_) : force;
     return last_;
 }
 

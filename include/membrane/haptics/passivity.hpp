@@ -14,7 +14,7 @@
 ///                                      .negative_stiffness = 100, .off_potential = 0.06};
 ///     const auto device = membrane::devices::touch;
 ///     membrane::require_passive(loop, device, {.hand_damping = 2});     // throws, and says what would do
-///     const auto most = membrane::passivity(loop, device, {.hand_damping = 2}).most_stiffness;  // [N/m]
+///     const auto most = membrane::passivity(loop, device, {.hand_damping = 2}).max_stiffness;  // [N/m]
 namespace membrane {
 
 /// What is shown to the hand: a force that has a potential, but for its damping and for what `off_potential` says. Its
@@ -46,7 +46,7 @@ struct Dissipation {
     double hand_damping;  ///< the least a hand that holds the device ever has [N s/m]; 0: it may let go
     /// In contact the tool is never faster [m/s]. Friction takes as much as a damper of friction / speed up to there, and
     /// is counted so. Infinity: it is not counted, but against a coarse resolution.
-    double fastest = std::numeric_limits<double>::infinity();
+    double max_speed = std::numeric_limits<double>::infinity();
 
     /// @throws InvalidInput for a number out of its range
     void check() const;
@@ -55,10 +55,10 @@ struct Dissipation {
 /// What a check comes to.
 struct PassivityReport {
     bool passive = false;
-    double most_stiffness = 0;   ///< of the loop, the rest as it is; 0: none [N/m]
-    double damping_needed = 0;   ///< by the loop as it is [N s/m]
-    double damping_there = 0;    ///< of device and hand, and of friction as far as it is counted [N s/m]
-    double friction_needed = 0;  ///< of the device, for a coarse resolution and what has no potential [N]
+    double max_stiffness = 0;      ///< of the loop, the rest as it is; 0: none [N/m]
+    double damping_needed = 0;     ///< by the loop as it is [N s/m]
+    double damping_available = 0;  ///< of device and hand, and of friction as far as it is counted [N s/m]
+    double friction_needed = 0;    ///< of the device, for a coarse resolution and what has no potential [N]
 };
 
 /// Whether a held, sampled force gives the hand no energy that the hand has not brought.
@@ -86,13 +86,13 @@ inline void require_passive(const SampledLoop& loop, const DeviceProfile& device
 /// The energy a hand has put into the loop, tick by tick [Hannaford02]. Where it sinks below zero, the loop has given more
 /// than it got.
 ///
-///     membrane::EnergyObserver observer(2.0);             // least damping of device and hand [N s/m]
+///     membrane::PassivityObserver observer(2.0);             // least damping of device and hand [N s/m]
 ///     observer.update(tool.position, force, dt);          // the force that is written in this tick
 ///     if (observer.energy() < 0) ...                      // active
-class EnergyObserver {
+class PassivityObserver {
   public:
     /// With damping and friction of device and hand, what they take counts too: without, each sampled spring gives some.
-    explicit EnergyObserver(double damping = 0, double friction = 0) noexcept
+    explicit PassivityObserver(double damping = 0, double friction = 0) noexcept
         : damping_(damping), friction_(friction) {}
 
     /// `position` of the tool now [m], `force` on the hand from now on [N], `dt` since the last call [s]. What is not
@@ -103,10 +103,10 @@ class EnergyObserver {
     /// What the hand has put in, less what it got back [J].
     [[nodiscard]] double energy() const noexcept { return energy_; }
     /// What went in, not counting what came back [J].
-    [[nodiscard]] double brought() const noexcept { return brought_; }
+    [[nodiscard]] double energy_in() const noexcept { return brought_; }
     /// The least there ever was [J].
     [[nodiscard]] double least() const noexcept { return least_; }
-    void restart() noexcept { *this = EnergyObserver(damping_, friction_); }
+    void reset() noexcept { *this = PassivityObserver(damping_, friction_); }
 
   private:
     double damping_, friction_;
@@ -129,7 +129,7 @@ inline void SampledLoop::check() const {
 
 inline void Dissipation::check() const {
     detail::check_option("Dissipation", hand_damping, "hand_damping", "N s/m");
-    if (!(fastest > 0)) refuse("Dissipation", "fastest must be positive [m/s], got ", fastest);
+    if (!(max_speed > 0)) refuse("Dissipation", "fastest must be positive [m/s], got ", max_speed);
 }
 
 inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation) {
@@ -137,31 +137,31 @@ inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& d
     device.check();
     dissipation.check();
     const double lag = loop.tick / 2, coarse = device.resolution, negative = loop.negative_stiffness;
-    const double per_speed = 1 / dissipation.fastest;
+    const double per_speed = 1 / dissipation.max_speed;
     const double viscous = device.damping + dissipation.hand_damping;
     // For slopes: without a lag even an infinite one does nothing.
     const double friction = device.friction - loop.off_potential - loop.damping / loop.tick * coarse;
-    const auto over = [](double slope, double way) { return way > 0 ? slope * way : 0.0; };
+    const auto over = [](double slope, double displacement) { return displacement > 0 ? slope * displacement : 0.0; };
 
     PassivityReport report;
     const double steepest = (std::max)(loop.stiffness, negative);
     const double left = friction - over(steepest, coarse / 2);
     report.friction_needed = device.friction - left;
     report.damping_needed = loop.stiffness * lag + over(steepest, loop.delay) + loop.damping;
-    report.damping_there = viscous + (std::max)(left, 0.0) * per_speed;
+    report.damping_available = viscous + (std::max)(left, 0.0) * per_speed;
 
     // The most where the stiffness is the steepest slope; if that is less than the negative one, where that is.
     const double late = loop.delay + coarse / 2 * per_speed;
-    const double room = viscous + friction * per_speed - loop.damping;
-    double most = room / (lag + late);
-    if (late > 0 && !(most >= negative)) most = (room - negative * late) / lag;
-    const double most_slope = coarse > 0 ? 2 * friction / coarse : std::numeric_limits<double>::infinity();
-    const bool borne = friction >= 0 && (coarse == 0 || negative <= most_slope);
-    report.most_stiffness = borne ? (std::max)((std::min)({most, most_slope, device.stiffness}), 0.0) : 0;
+    const double spare = viscous + friction * per_speed - loop.damping;
+    double most = spare / (lag + late);
+    if (late > 0 && !(most >= negative)) most = (spare - negative * late) / lag;
+    const double max_slope = coarse > 0 ? 2 * friction / coarse : std::numeric_limits<double>::infinity();
+    const bool borne = friction >= 0 && (coarse == 0 || negative <= max_slope);
+    report.max_stiffness = borne ? (std::max)((std::min)({most, max_slope, device.stiffness}), 0.0) : 0;
 
     // A wall of no stiffness and no damping is no wall.
     const bool shows_nothing = loop.stiffness == 0 && loop.damping == 0;
-    const bool enough = left >= 0 && report.damping_there >= report.damping_needed;
+    const bool enough = left >= 0 && report.damping_available >= report.damping_needed;
     report.passive = shows_nothing || (enough && loop.stiffness <= device.stiffness);
     return report;
 }
@@ -183,17 +183,18 @@ inline void require_passive(const SampledLoop& loop, const DeviceProfile& device
                report.friction_needed, " [N], got ", device.friction);
     }
     refuse("passivity", "with damping ", loop.damping, " N s/m and a tick of ", loop.tick, " s on ", device.name,
-           " stiffness must be at most ", report.most_stiffness, " [N/m], got ", loop.stiffness, "; damping needed ",
-           report.damping_needed, " [N s/m], there is ", report.damping_there);
+           " stiffness must be at most ", report.max_stiffness, " [N/m], got ", loop.stiffness, "; damping needed ",
+           report.damping_needed, " [N s/m], there is ", report.damping_available);
 }
 
 template <Real Scalar>
-void EnergyObserver::update(const Vector3<Scalar>& position, const Vector3<Scalar>& force, double dt) noexcept {
+void PassivityObserver::update(const Vector3<Scalar>& position, const Vector3<Scalar>& force, double dt) noexcept {
     if (!is_finite(position) || !is_finite(force) || !is_finite(dt)) return;
     const Vector3<double> now = position.template cast<double>();
     if (began_ && dt > 0) {
-        const Vector3<double> way = now - position_;
-        const double more = damping_ / dt * squared_norm(way) + friction_ * norm(way) - dot(force_, way);
+        const Vector3<double> displacement = now - position_;
+        const double more =
+            damping_ / dt * squared_norm(displacement) + friction_ * norm(displacement) - dot(force_, displacement);
         energy_ += more;
         brought_ += (std::max)(more, 0.0);
         least_ = (std::min)(least_, energy_);

@@ -47,10 +47,10 @@ struct Recording {
 template <Real Scalar>
 class Recorder {
   public:
-    /// Room for `most_ticks`, 120 bytes each in `double`, of which every page has been touched.
+    /// Room for `max_ticks`, 120 bytes each in `double`, of which every page has been touched.
     /// @throws InvalidInput for no room, or a negative number of vertices
-    explicit Recorder(std::size_t most_ticks, Index vertex_count) : ticks_(most_ticks), vertex_count_(vertex_count) {
-        if (most_ticks == 0) refuse("Recorder", "most_ticks must be positive, got 0");
+    explicit Recorder(std::size_t max_ticks, Index vertex_count) : ticks_(max_ticks), vertex_count_(vertex_count) {
+        if (max_ticks == 0) refuse("Recorder", "max_ticks must be positive, got 0");
         if (vertex_count < 0) refuse("Recorder", "vertex_count must not be negative, got ", vertex_count);
     }
 
@@ -113,7 +113,7 @@ class ReplayDevice {
     [[nodiscard]] std::size_t first_difference() const noexcept { return first_difference_; }
 
     /// Back to the beginning.
-    void restart() noexcept { next_ = differing_ = first_difference_ = 0; }
+    void reset() noexcept { next_ = differing_ = first_difference_ = 0; }
 
   private:
     std::vector<RecordedTick<Scalar>> ticks_;

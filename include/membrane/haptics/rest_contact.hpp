@@ -3,12 +3,12 @@
 
 #include <cmath>
 
-#include <membrane/collision/aabb_tree.hpp>
-#include <membrane/collision/contact.hpp>
-#include <membrane/collision/neighbourhood.hpp>
-#include <membrane/collision/tool.hpp>
-#include <membrane/mesh/moving_body.hpp>
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact.hpp>
+#include <membrane/contact/local_surface.hpp>
+#include <membrane/contact/tool.hpp>
+#include <membrane/surface/moving_body.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 /// A depth and a normal that belong together, so that a force made of them has a potential.
 ///
@@ -65,7 +65,7 @@ class RestContact {
     static constexpr int points_along_shaft = 17;
 
     Points<Scalar> at_rest_;
-    Neighbourhood<Scalar> surface_;
+    LocalSurface<Scalar> surface_;
     AabbTree<Scalar> tree_;
 };
 
@@ -75,7 +75,7 @@ Contact<Scalar> RestContact<Scalar>::contact_with(const ConstPointsRef<Scalar>& 
                                                   const Tool<Scalar>& tool) const noexcept {
     MEMBRANE_ASSERT(anchors.cols() == at_rest_.cols());
     Contact<Scalar> lowest;
-    if (!is_sound(tool) || (!surface_.closed() && !contact.touching())) return lowest;
+    if (!is_valid(tool) || (!surface_.closed() && !contact.touching())) return lowest;
     const Scalar side = surface_.closed() ? Scalar(1) : contact.side;
     const int points = feature_pairs(tool) == 1 ? 1 : points_along_shaft;
     for (int i = 0; i < points; ++i) {
@@ -104,7 +104,7 @@ Contact<Scalar> RestContact<Scalar>::contact_of(const Vector3<Scalar>& q, Scalar
     contact.corners = surface_.corners(nearest.triangle);
     contact.barycentric = nearest.barycentric;
     contact.point = nearest.point;
-    contact.on_axis = contact.before = q;
+    contact.axis_point = contact.previous_axis_point = q;
     contact.side = side;
     const Vector3<Scalar> reach = q - nearest.point;
     const Vector3<Scalar> outward = side * surface_.outward(anchors, nearest.triangle, nearest.barycentric);

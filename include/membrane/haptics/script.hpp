@@ -14,7 +14,7 @@
 /// Scripts of the null device from text. Offline, included by its own name.
 ///
 ///     std::ifstream file("press.csv");
-///     membrane::NullDevice<double> device(membrane::read_script<double>(file), {.radius = 1e-3});
+///     membrane::ScriptedDevice<double> device(membrane::read_script<double>(file), {.radius = 1e-3});
 namespace membrane {
 
 /// Waypoints from lines `time,x,y,z,grasping` in s, m and 0 or 1; the last column may be left out. Passed over are

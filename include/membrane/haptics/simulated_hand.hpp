@@ -8,7 +8,7 @@
 /// A hand at a desk: it gives way to the force, as one that holds a device would.
 ///
 ///     using Hand = membrane::SimulatedHand<double>;
-///     membrane::NullDevice<double, Hand> device({{0.0, above}, {1.0, below}}, {.radius = 1e-3},
+///     membrane::ScriptedDevice<double, Hand> device({{0.0, above}, {1.0, below}}, {.radius = 1e-3},
 ///                                               Hand({.mass = 0.1, .damping = 2, .stiffness = 300}));
 ///     while (device.running()) { const auto tool = device.read(); ...; device.write(force); }     // a closed loop
 namespace membrane {
@@ -88,14 +88,15 @@ bool SimulatedHand<Scalar>::move(const Vector3<Scalar>& force, Scalar dt) noexce
     const Response by = response(static_cast<double>(dt));
     // Seen from where the force would hold it, which moves as the target does, it swings freely.
     const Vector3<Scalar> held = target_ + force / stiffness_, away = position_ - held;
-    const Vector3<Scalar> speed = velocity_ - target_velocity_, way = dt * target_velocity_;
-    const Vector3<Scalar> position = held + way + (by.position_by_position * away + by.position_by_velocity * speed);
+    const Vector3<Scalar> speed = velocity_ - target_velocity_, displacement = dt * target_velocity_;
+    const Vector3<Scalar> position =
+        held + displacement + (by.position_by_position * away + by.position_by_velocity * speed);
     const Vector3<Scalar> velocity =
         target_velocity_ + (by.velocity_by_position * away + by.velocity_by_velocity * speed);
     if (!is_finite(position) || !is_finite(velocity)) return false;
     position_ = position;
     velocity_ = velocity;
-    target_ += way;
+    target_ += displacement;
     return true;
 }
 

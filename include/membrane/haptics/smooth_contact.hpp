@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <limits>
 
-#include <membrane/collision/contact.hpp>
-#include <membrane/mesh/adjacency.hpp>
-#include <membrane/mesh/normals.hpp>
-#include <membrane/mesh/triangle.hpp>
-#include <membrane/mesh/triangle_mesh.hpp>
+#include <membrane/contact/contact.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/normals.hpp>
+#include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 /// A normal that does not jump as the tool slides over edges and vertices.
 ///
@@ -58,7 +58,7 @@ class SmoothContact {
                                             const ConstPointsRef<Scalar>& normals) const noexcept;
     [[nodiscard]] Index across(Index f, const Vector3<Scalar>& weights) const noexcept;
 
-    static constexpr int most_triangles = 64;  // on the way from the contact to the proxy
+    static constexpr int max_triangles = 64;  // on the way from the contact to the proxy
 
     Triangles triangles_;
     Adjacency adjacency_;
@@ -80,10 +80,10 @@ template <Real Scalar>
         const Vector3<Scalar> area = cross(b, c);
         const Scalar volume = dot(to_q, area);
         const Scalar slope = dot<Scalar>(to_q, cross(turn_b, c) + cross(b, turn_c)) - dot(normals.a, area);
-        const Scalar way = volume / slope;
-        if (!is_finite(way)) break;
-        height -= way;
-        if (std::abs(way) <= std::numeric_limits<Scalar>::epsilon() * norm(aq)) break;
+        const Scalar displacement = volume / slope;
+        if (!is_finite(displacement)) break;
+        height -= displacement;
+        if (std::abs(displacement) <= std::numeric_limits<Scalar>::epsilon() * norm(aq)) break;
     }
     const Vector3<Scalar> b = ab + height * turn_b, c = ac + height * turn_c, to_q = aq - height * normals.a;
     const Vector3<Scalar> area = cross(b, c);
@@ -100,9 +100,9 @@ Contact<Scalar> SmoothContact<Scalar>::over(const Contact<Scalar>& contact, cons
                                             const ConstPointsRef<Scalar>& normals) const noexcept {
     MEMBRANE_ASSERT(anchors.cols() == at_rest_.cols() && normals.cols() == at_rest_.cols());
     MEMBRANE_ASSERT(!contact.touching() || contact.triangle < static_cast<Index>(triangles_.cols()));
-    if (!contact.touching() || !is_sound(contact)) return contact;
+    if (!contact.touching() || !is_valid(contact)) return contact;
     Contact<Scalar> smooth = contact;
-    const Vector3<Scalar> normal = normal_at(contact.triangle, contact.on_axis, anchors, normals);
+    const Vector3<Scalar> normal = normal_at(contact.triangle, contact.axis_point, anchors, normals);
     if (is_finite(normal)) smooth.normal = direction<Scalar>(contact.side * normal, contact.normal);
     return smooth;
 }
@@ -112,7 +112,7 @@ template <Real Scalar>
 Vector3<Scalar> SmoothContact<Scalar>::normal_at(Index f, const Vector3<Scalar>& q,
                                                  const ConstPointsRef<Scalar>& anchors,
                                                  const ConstPointsRef<Scalar>& normals) const noexcept {
-    for (int left = most_triangles;; --left) {
+    for (int left = max_triangles;; --left) {
         const auto turned = triangle_at(normals, triangles_.col(f));
         const Vector3<Scalar> weights = detail::weights_below(triangle_at(anchors, triangles_.col(f)), turned, q);
         const Index next = left > 0 ? across(f, weights) : no_index;

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-#include <membrane/collision/tool.hpp>
+#include <membrane/contact/tool.hpp>
 #include <membrane/core/check.hpp>
 #include <membrane/core/rigid_frame.hpp>
 
@@ -12,8 +12,8 @@
 ///
 ///     const membrane::DeviceScale scale{.force = 40, .motion = 0.1};     // the tool goes a tenth of what the hand does
 ///     membrane::Tool<double> tool = scale.to_scene(membrane::Millimetres(position), membrane::MillimetresPerSecond(velocity));
-///     const auto felt = scale.to_device(membrane::Newtons(reaction));           // felt.on_hand, felt.by_tissue, felt.scale
-///     write(felt.on_hand.value());                                       // [N]
+///     const auto felt = scale.to_device(membrane::Newtons(reaction));           // felt.device_force, felt.scene_force, felt.scale
+///     write(felt.device_force.value());                                       // [N]
 namespace membrane {
 
 /// A number or vector together with its unit: units do not mix, nothing turns into a bare number unasked.
@@ -69,9 +69,9 @@ using NewtonsPerMillimetre = In<unit::NewtonPerMillimetre, double>;
 
 /// A force with the scale it was magnified by, so that nobody takes the one for the other.
 struct FeltForce {
-    Newtons on_hand;    ///< what to write, in the device's frame
-    Newtons by_tissue;  ///< what the tissue does to the tool, in the scene
-    double scale;       ///< the first is so many times the second
+    Newtons device_force;  ///< what to write, in the device's frame
+    Newtons scene_force;   ///< what the tissue does to the tool, in the scene
+    double scale;          ///< the first is so many times the second
 };
 
 /// How hand and tool correspond. A lens capsule tears at 15 to 35 mN, of which a hand feels nothing: `force` is 30 to 100
@@ -85,10 +85,10 @@ struct DeviceScale {
     void check() const;
 
     [[nodiscard]] Metres to_scene(const Millimetres& position) const noexcept {
-        return Metres(device.point_out(motion * in_metres(position).value()));
+        return Metres(device.point_to_world(motion * in_metres(position).value()));
     }
     [[nodiscard]] MetresPerSecond to_scene(const MillimetresPerSecond& velocity) const noexcept {
-        return MetresPerSecond(device.direction_out(motion * in_metres(velocity).value()));
+        return MetresPerSecond(device.vector_to_world(motion * in_metres(velocity).value()));
     }
     /// The tool of the scene; radius, axis, time and grasping are the caller's.
     [[nodiscard]] Tool<double> to_scene(const Millimetres& position,
@@ -98,8 +98,8 @@ struct DeviceScale {
         tool.velocity = to_scene(velocity).value();
         return tool;
     }
-    [[nodiscard]] FeltForce to_device(const Newtons& by_tissue) const noexcept {
-        return {Newtons(device.direction_in(force * by_tissue.value())), by_tissue, force};
+    [[nodiscard]] FeltForce to_device(const Newtons& scene_force) const noexcept {
+        return {Newtons(device.vector_to_body(force * scene_force.value())), scene_force, force};
     }
 
     /// What the stiffness of a tissue becomes at the device, for `passivity`.

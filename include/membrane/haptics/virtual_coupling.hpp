@@ -13,14 +13,14 @@
 ///     auto coupling = membrane::VirtualCoupling<double>({.stiffness = 300, .scale = 40});
 ///     const auto tool    = coupling.follow(device.read(), reaction, dt);     // what the membrane meets
 ///     const auto contact = tracker.update(tree, x, tool);
-///     const auto report  = solver.step(x, dt, network, backing, press(tool, contact));
+///     const auto report  = solver.step(x, dt, network, foundation, press(tool, contact));
 ///     reaction = report.total_reaction();                                    // for the next tick
 ///     device.write(coupling.force());                                        // [N]
 namespace membrane {
 
 struct CouplingOptions {
     double stiffness;    ///< between hand and tool [N/m]
-    double damping = 0;  ///< that holds the tool back where it is, see `least_damping` [N s/m]
+    double damping = 0;  ///< that holds the tool back where it is, see `min_damping` [N s/m]
     double scale = 1;    ///< from the tissue to the hand
 
     /// @throws InvalidInput for a number out of its range
@@ -29,11 +29,11 @@ struct CouplingOptions {
 
 /// The `damping` that a tissue asks for whose stiffness, after the scale, is `tissue` [N/m]: none if the coupling is
 /// stiffer. It is felt as a drag in free air, too.
-[[nodiscard]] inline double least_damping(double tissue, double coupling, double tick) noexcept {
+[[nodiscard]] inline double min_damping(double tissue, double coupling, double tick) noexcept {
     return (std::max)(tissue - coupling, 0.0) * tick / 2;
 }
 
-/// A tool without mass between the coupling's spring and the membrane's reaction [Colgate95]. With `least_damping` it
+/// A tool without mass between the coupling's spring and the membrane's reaction [Colgate95]. With `min_damping` it
 /// makes no energy of its own: passivity has to reckon with the coupling's stiffness only.
 template <Real Scalar>
 class VirtualCoupling {
@@ -54,7 +54,7 @@ class VirtualCoupling {
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& /*state*/) const noexcept { return force_; }
 
     /// As new.
-    void restart() noexcept {
+    void reset() noexcept {
         began_ = false;
         force_.setZero();
     }
@@ -76,18 +76,18 @@ template <Real Scalar>
 Tool<Scalar> VirtualCoupling<Scalar>::follow(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction,
                                              Scalar dt) noexcept {
     Tool<Scalar> tool = hand;
-    const bool sound = is_sound(hand) && is_finite(reaction) && is_finite(dt) && dt > 0;
-    if (!sound || !began_) {
-        began_ = sound;
+    const bool valid = is_valid(hand) && is_finite(reaction) && is_finite(dt) && dt > 0;
+    if (!valid || !began_) {
+        began_ = valid;
         position_ = hand.position;
         force_.setZero();
         return tool;
     }
     const Vector3<Scalar> push = stiffness_ * (hand.position - position_) + scale_ * reaction;
-    const Vector3<Scalar> way = push / (stiffness_ + damping_ / dt);
-    position_ += way;
+    const Vector3<Scalar> displacement = push / (stiffness_ + damping_ / dt);
+    position_ += displacement;
     tool.position = position_;
-    tool.velocity = way / dt;
+    tool.velocity = displacement / dt;
     force_ = stiffness_ * (position_ - hand.position);
     if (is_finite(force_) && is_finite(tool.velocity)) return tool;
     began_ = false;

@@ -10,7 +10,7 @@
 #include <membrane/core/index_set.hpp>
 #include <membrane/solve/propagation_queue.hpp>
 #include <membrane/solve/step.hpp>
-#include <membrane/solve/vertex_groups.hpp>
+#include <membrane/solve/vertex_colouring.hpp>
 
 /// Which vertices a step updates.
 ///
@@ -23,7 +23,7 @@ namespace membrane {
 /// ended has left out of balance. A vertex stays awake until its forces balance. A neighbour that moves wakes it again if it
 /// was active since all were last in balance; beyond the layers vertices stay asleep.
 ///
-/// With `layers_as_needed` the queue begins each step with layer 0, `grow` adds a layer, and no vertex stays asleep whose
+/// With `adaptive_layers` the queue begins each step with layer 0, `grow` adds a layer, and no vertex stays asleep whose
 /// neighbours move.
 class ActiveVertices {
   public:
@@ -45,7 +45,7 @@ class ActiveVertices {
     [[nodiscard]] std::size_t from_queue() const noexcept { return from_queue_; }
 
     /// Where in `vertices` the groups end that those outside the queue are in, if they are updated in groups.
-    [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return groups_.ends(); }
+    [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return groups_.ends(); }
 
     /// Whether the queue is another one than at the last call of this.
     [[nodiscard]] bool take_new_queue() noexcept { return std::exchange(has_new_queue_, false); }
@@ -101,11 +101,11 @@ class ActiveVertices {
     IndexSet dropped_;    // by the queue, which has gone elsewhere, or has no capacity
     IndexSet active_;     // in this step
     IndexSet activated_;  // active since all were last in balance
-    VertexGroups groups_;
+    VertexColouring groups_;
     Index capacity_ = 0;  // for active vertices
     std::size_t from_queue_ = 0;
     Index layers_ = 0, layers_before_ = 0;
-    VisitOrder order_ = VisitOrder::arrival;
+    UpdateOrder order_ = UpdateOrder::breadth_first;
     bool as_needed_ = false, has_frontier_ = false;
     bool has_new_queue_ = false;
     bool queue_fits_ = true, truncated_ = false;
@@ -127,11 +127,12 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
 template <class Network, class Options>
 void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
     if (std::exchange(is_open_, true)) undo_arrange(network);
-    as_needed_ = options.layers_as_needed;
-    order_ = as_needed_ ? VisitOrder::arrival : options.order;
-    if (order_ == VisitOrder::colours && options.most_visits != unlimited)
-        order_ = VisitOrder::groups;  // what is left out is to be the farthest
-    layers_before_ = order_ == VisitOrder::colours ? std::exchange(layers_, options.layers) : queue_.layer_count() - 1;
+    as_needed_ = options.adaptive_layers;
+    order_ = as_needed_ ? UpdateOrder::breadth_first : options.order;
+    if (order_ == UpdateOrder::colour_all && options.max_vertex_updates != unlimited)
+        order_ = UpdateOrder::colour_layers;  // what is left out is to be the farthest
+    layers_before_ =
+        order_ == UpdateOrder::colour_all ? std::exchange(layers_, options.layers) : queue_.layer_count() - 1;
     next_seeds_.clear();
     for (const Index v : seeds) next_seeds_.insert(v);
     dropped_.clear();
@@ -154,19 +155,19 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     activate(awake_.items(), capacity_);
     activate(dropped_.items(), capacity_);
     groups_.clear();
-    if (order_ != VisitOrder::arrival) groups_.add(network, active_, from_queue_, vertices().size());
+    if (order_ != UpdateOrder::breadth_first) groups_.add(network, active_, from_queue_, vertices().size());
     extend(network, options);
 }
 
 // How many vertices a step may update: what layer 0 is updated more often is taken off the rest.
 template <class Options>
 Index ActiveVertices::capacity_for(const Options& options) const noexcept {
-    if (options.most_visits == unlimited) return unlimited;
+    if (options.max_vertex_updates == unlimited) return unlimited;
     const auto touched = static_cast<Index>(layer_0().size());
-    const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_visits + 1);
+    const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_iterations + 1);
     const auto passes =
         (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // its forces, before a layer is added
-    return touched + static_cast<Index>((std::max)((options.most_visits - own) / passes, std::int64_t{1}));
+    return touched + static_cast<Index>((std::max)((options.max_vertex_updates - own) / passes, std::int64_t{1}));
 }
 
 // Vertices awake or dropped by the queue have their turns under a lasting contact, too.
@@ -192,7 +193,7 @@ inline void ActiveVertices::activate(std::span<const Index> vertices, Index capa
 template <class Network>
 void ActiveVertices::build_queue(const Network& network, std::span<const Index> seeds, Index layers) noexcept {
     queue_.build(network, seeds, layers);
-    if (order_ != VisitOrder::arrival) queue_.group(network, order_ == VisitOrder::colours);
+    if (order_ != UpdateOrder::breadth_first) queue_.group(network, order_ == UpdateOrder::colour_all);
     has_new_queue_ = true;
 }
 

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <span>
 
-#include <membrane/mesh/triangle.hpp>
 #include <membrane/solve/step_state.hpp>
+#include <membrane/surface/triangle.hpp>
 
 /// What a constraint sees of a step.
 ///
@@ -108,7 +108,7 @@ class ConstraintContext {
             std::span<const ContactPoint<Scalar>>(state_.previous_points.items()));
     }
 
-    // For the solver and `Press`.
+    // For the solver and `ToolContact`.
 
     [[nodiscard]] StepState<Scalar>& state() noexcept { return state_; }
     [[nodiscard]] const StepState<Scalar>& state() const noexcept { return state_; }

@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include <membrane/solve/constraints.hpp>
-#include <membrane/solve/press.hpp>
+#include <membrane/solve/tool_contact.hpp>
 
 /// What a constraint asks of a membrane, in the same few words whatever its type, for those who do not step: Newton's
 /// method, the error bound, what judges a trial.
@@ -49,7 +49,7 @@ struct ConstraintTerm {
     [[nodiscard]] double weight(std::size_t k) const noexcept { return weights[static_cast<Eigen::Index>(k)]; }
 
     /// The point's place where the vertices are at `x` (3 x V [m]); of anything else that vertices have, its value there.
-    [[nodiscard]] Vector3<double> point_in(const Points<double>& x) const noexcept {
+    [[nodiscard]] Vector3<double> point_to_body(const Points<double>& x) const noexcept {
         return point_at(triangle_at(x, corners), weights);
     }
 
@@ -59,30 +59,30 @@ struct ConstraintTerm {
 };
 
 template <Real Scalar, class Terms>
-void describe(const HeldVertex<Scalar>& held, Terms& terms) {
+void describe(const VertexAttachment<Scalar>& held, Terms& terms) {
     terms.add(ConstraintTerm::hold(held.vertex, held.target.template cast<double>()));
 }
 
 template <Real Scalar, class Terms>
-void describe(const HeldPoint<Scalar>& held, Terms& terms) {
+void describe(const PointAttachment<Scalar>& held, Terms& terms) {
     if (held.triangle == no_index) return;
     terms.add(ConstraintTerm::hold(held.corners, held.barycentric.template cast<double>(),
                                    held.target.template cast<double>()));
 }
 
 template <class Terms>
-void describe(const Pinned& pinned, Terms& terms) {
+void describe(const PinnedVertices& pinned, Terms& terms) {
     for (const Index v : pinned.vertices) terms.add(ConstraintTerm::pin(v));
 }
 
 template <Real Scalar, class Terms>
-void describe(const Load<Scalar>& load, Terms& terms) {
+void describe(const PointLoad<Scalar>& load, Terms& terms) {
     terms.add(ConstraintTerm::load(load.corners, load.barycentric.template cast<double>(),
                                    load.force.template cast<double>()));
 }
 
 template <Real Scalar, class Terms>
-void describe(const Press<Scalar>& press, Terms& terms) {
+void describe(const ToolContact<Scalar>& press, Terms& terms) {
     Tool<double> tool;
     tool.position = press.tool.position.template cast<double>();
     tool.axis = press.tool.axis.template cast<double>();
@@ -92,9 +92,9 @@ void describe(const Press<Scalar>& press, Terms& terms) {
     contact.corners = press.contact.corners;
     contact.point = press.contact.point.template cast<double>();
     contact.normal = press.contact.normal.template cast<double>();
-    contact.on_axis = press.contact.on_axis.template cast<double>();
+    contact.axis_point = press.contact.axis_point.template cast<double>();
     contact.gap = press.contact.gap;
-    contact.reach = press.contact.reach;
+    contact.detection_distance = press.contact.detection_distance;
     contact.radius = press.contact.radius;
     terms.add(ConstraintTerm::press(tool, contact));
 }
@@ -118,8 +118,9 @@ template <class C>
 concept DescribedConstraint = requires(const C& constraint, detail::EachTerm<detail::IgnoreTerm>& terms) {
     describe(constraint, terms);
 };
-static_assert(DescribedConstraint<HeldVertex<float>> && DescribedConstraint<HeldPoint<double>>);
-static_assert(DescribedConstraint<Pinned> && DescribedConstraint<Load<float>> && DescribedConstraint<Press<double>>);
+static_assert(DescribedConstraint<VertexAttachment<float>> && DescribedConstraint<PointAttachment<double>>);
+static_assert(DescribedConstraint<PinnedVertices> && DescribedConstraint<PointLoad<float>> &&
+              DescribedConstraint<ToolContact<double>>);
 
 /// Calls `act(term)` for each term of the constraint; of one that does not describe itself, none is known.
 template <class C, class Act>

@@ -9,26 +9,26 @@
 #include <limits>
 #include <span>
 
-#include <membrane/collision/grasper.hpp>
-#include <membrane/collision/tool.hpp>
+#include <membrane/contact/grasper.hpp>
+#include <membrane/contact/tool.hpp>
 #include <membrane/solve/predictor.hpp>
 #include <membrane/solve/surface_point.hpp>
 
 /// What acts on the membrane from outside, as arguments of a step.
 ///
-///     const auto report = solver.step(x, dt, network, backing, press(tool, contact), pull(tool, grasp));
+///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact), pull(tool, grasp));
 ///     report.reactions[0]                                          // force of the membrane on the pressing tool [N]
 namespace membrane {
 
 /// Something that acts on the membrane during one step. `begin` names all vertices where its force enters, and puts in
 /// place what it holds; `enforce` is called after each update of layer 0, and once more at the end where vertices have
 /// moved since; it restores what they broke and says whether there was anything to restore; `reaction` is the force of the membrane on it
-/// [N]. One that something leads may say where that is, `lead(): Lead<Scalar>`: the next steps are predicted from it. One
+/// [N]. One that something leads may say where that is, `driving_input(): DrivingInput<Scalar>`: the next steps are predicted from it. One
 /// that holds vertices may do so in `hold(context)`, which is called before any `begin`.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> &&
     requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
-    { constraint.sound() }
+    { constraint.valid() }
     noexcept->std::same_as<bool>;  // else the step is refused
     { constraint.begin(context) }
     noexcept;
@@ -44,10 +44,10 @@ template <class C, class Scalar>
 consteval bool check_constraint() noexcept {
     static_assert(
         requires(const C& constraint) {
-            { constraint.sound() }
+            { constraint.valid() }
             noexcept->std::same_as<bool>;
         },
-        "Constraint: sound() const noexcept must return bool");
+        "Constraint: valid() const noexcept must return bool");
     static_assert(
         requires(const C& constraint, ConstraintContext<Scalar>& context) {
             { constraint.begin(context) }
@@ -82,8 +82,8 @@ class ConstraintRef {
     template <Constraint<Scalar> C>
     explicit ConstraintRef(const C& constraint) noexcept : constraint_(&constraint), calls_(&calls_of<C>) {}
 
-    [[nodiscard]] bool sound() const noexcept { return calls_->sound(constraint_); }
-    [[nodiscard]] Lead<Scalar> lead() const noexcept { return calls_->lead(constraint_); }
+    [[nodiscard]] bool valid() const noexcept { return calls_->valid(constraint_); }
+    [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return calls_->lead(constraint_); }
     void hold(ConstraintContext<Scalar>& context) const noexcept { calls_->hold(constraint_, context); }
     void begin(ConstraintContext<Scalar>& context) const noexcept { calls_->begin(constraint_, context); }
     [[nodiscard]] bool enforce(ConstraintContext<Scalar>& context) const noexcept {
@@ -95,8 +95,8 @@ class ConstraintRef {
 
   private:
     struct Calls {
-        bool (*sound)(const void*) noexcept;
-        Lead<Scalar> (*lead)(const void*) noexcept;
+        bool (*valid)(const void*) noexcept;
+        DrivingInput<Scalar> (*lead)(const void*) noexcept;
         void (*hold)(const void*, ConstraintContext<Scalar>&) noexcept;
         void (*begin)(const void*, ConstraintContext<Scalar>&) noexcept;
         bool (*enforce)(const void*, ConstraintContext<Scalar>&) noexcept;
@@ -108,9 +108,9 @@ class ConstraintRef {
     }
     template <class C>
     static constexpr Calls calls_of{
-        .sound = [](const void* c) noexcept -> bool { return as<C>(c).sound(); },
-        .lead = [](const void* c) noexcept -> Lead<Scalar> {
-            if constexpr (requires { as<C>(c).lead(); }) return as<C>(c).lead();
+        .valid = [](const void* c) noexcept -> bool { return as<C>(c).valid(); },
+        .lead = [](const void* c) noexcept -> DrivingInput<Scalar> {
+            if constexpr (requires { as<C>(c).driving_input(); }) return as<C>(c).driving_input();
             return {};
         },
         .hold =
@@ -137,12 +137,12 @@ class ConstraintList {
     ConstraintList(ConstraintContext<Scalar>& context, std::span<const ConstraintRef<Scalar>> constraints) noexcept
         : context_(context), constraints_(constraints) {}
 
-    [[nodiscard]] bool sound() const noexcept {
-        return std::all_of(constraints_.begin(), constraints_.end(), [](const auto& c) { return c.sound(); });
+    [[nodiscard]] bool valid() const noexcept {
+        return std::all_of(constraints_.begin(), constraints_.end(), [](const auto& c) { return c.valid(); });
     }
     /// Where those that are led are led to.
-    void collect_leads(std::span<Lead<Scalar>> leads) const noexcept {
-        for (std::size_t i = 0; i < constraints_.size(); ++i) leads[i] = constraints_[i].lead();
+    void collect_inputs(std::span<DrivingInput<Scalar>> inputs) const noexcept {
+        for (std::size_t i = 0; i < constraints_.size(); ++i) inputs[i] = constraints_[i].driving_input();
     }
     /// Vertices that a constraint holds are fixed for all of them, in whatever order they were handed in.
     void begin() const noexcept {
@@ -183,15 +183,15 @@ class ConstraintList {
 
 /// Holds a point of a triangle at `target`; its corners are free otherwise.
 template <Real Scalar>
-struct HeldPoint {
+struct PointAttachment {
     Index triangle = no_index;  ///< none: holds nothing
     std::array<Index, 3> corners{no_index, no_index, no_index};
     Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();
     Vector3<Scalar> target = Vector3<Scalar>::Zero();  ///< [m]
 
-    [[nodiscard]] bool sound() const noexcept;
-    [[nodiscard]] Lead<Scalar> lead() const noexcept {
-        return triangle == no_index ? Lead<Scalar>() : LeadPoint<Scalar>{target};
+    [[nodiscard]] bool valid() const noexcept;
+    [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
+        return triangle == no_index ? DrivingInput<Scalar>() : InputSample<Scalar>{target};
     }
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>& context) const noexcept;
@@ -200,12 +200,12 @@ struct HeldPoint {
 
 /// Holds a vertex at `target`.
 template <Real Scalar>
-struct HeldVertex {
+struct VertexAttachment {
     Index vertex;
     Vector3<Scalar> target;  ///< [m]
 
-    [[nodiscard]] bool sound() const noexcept { return is_finite(target); }
-    [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{target}; }
+    [[nodiscard]] bool valid() const noexcept { return is_finite(target); }
+    [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return InputSample<Scalar>{target}; }
     void hold(ConstraintContext<Scalar>& context) const noexcept {
         if (context.check(vertex)) context.prescribe(vertex, target);
     }
@@ -217,10 +217,10 @@ struct HeldVertex {
 };
 
 /// Holds vertices where they are. No force enters there: they seed no queue. Their reactions add up.
-struct Pinned {
+struct PinnedVertices {
     std::span<const Index> vertices;  ///< of the caller
 
-    [[nodiscard]] bool sound() const noexcept { return true; }
+    [[nodiscard]] bool valid() const noexcept { return true; }
     template <Real Scalar>
     void hold(ConstraintContext<Scalar>& context) const noexcept;
     template <Real Scalar>
@@ -237,13 +237,15 @@ struct Pinned {
 
 /// An external force on a point of a triangle, F^ext of [Liu07] (1).
 template <Real Scalar>
-struct Load {
+struct PointLoad {
     std::array<Index, 3> corners;
     Vector3<Scalar> barycentric;
     Vector3<Scalar> force;  ///< [N]
 
-    [[nodiscard]] bool sound() const noexcept;
-    [[nodiscard]] Lead<Scalar> lead() const noexcept { return LeadPoint<Scalar>{.at = force, .is_force = true}; }
+    [[nodiscard]] bool valid() const noexcept;
+    [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
+        return InputSample<Scalar>{.at = force, .is_force = true};
+    }
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>&) const noexcept { return -force; }
@@ -251,29 +253,29 @@ struct Load {
 
 /// What forceps hold follows the tool.
 template <Real Scalar>
-[[nodiscard]] HeldPoint<Scalar> pull(const Tool<Scalar>& tool, const Grasp<Scalar>& grasp) noexcept {
+[[nodiscard]] PointAttachment<Scalar> pull(const Tool<Scalar>& tool, const Grasp<Scalar>& grasp) noexcept {
     return {grasp.triangle, grasp.corners, grasp.barycentric, tool.position + grasp.offset};
 }
 
 /// Vertex `v` is held at `target` [m].
 template <class Target>
-[[nodiscard]] HeldVertex<typename Target::Scalar> pull(Index v, const Target& target) noexcept {
+[[nodiscard]] VertexAttachment<typename Target::Scalar> force_on(Index v, const Target& target) noexcept {
     return {v, target};
 }
 
 /// `vertices` stay where they are; the span must outlive the step.
-[[nodiscard]] inline Pinned pin(std::span<const Index> vertices) noexcept { return {vertices}; }
+[[nodiscard]] inline PinnedVertices pin(std::span<const Index> vertices) noexcept { return {vertices}; }
 
 /// `force` [N] acts on the point `barycentric` of the triangle with the vertices `corners`.
 template <Real Scalar>
-[[nodiscard]] Load<Scalar> load(const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
-                                const Vector3<Scalar>& force) noexcept {
+[[nodiscard]] PointLoad<Scalar> load(const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
+                                     const Vector3<Scalar>& force) noexcept {
     return {corners, barycentric, force};
 }
 template <class Force>
-[[nodiscard]] Load<typename Force::Scalar> load(const std::array<Index, 3>& corners,
-                                                const Vector3<typename Force::Scalar>& barycentric,
-                                                const Eigen::MatrixBase<Force>& force) noexcept {
+[[nodiscard]] PointLoad<typename Force::Scalar> load(const std::array<Index, 3>& corners,
+                                                     const Vector3<typename Force::Scalar>& barycentric,
+                                                     const Eigen::MatrixBase<Force>& force) noexcept {
     return {corners, barycentric, force};
 }
 
@@ -288,12 +290,12 @@ template <Real Scalar>
 }  // namespace detail
 
 template <Real Scalar>
-bool HeldPoint<Scalar>::sound() const noexcept {
+bool PointAttachment<Scalar>::valid() const noexcept {
     return triangle == no_index || (detail::is_barycentric(barycentric) && is_finite(target));
 }
 
 template <Real Scalar>
-void HeldPoint<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
+void PointAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
     if (triangle == no_index || !seed_corners(context, corners)) return;
     const Vector3<Scalar> none = Vector3<Scalar>::Zero();
     ContactPoint<Scalar> point{triangle, 0, corners, barycentric, none, none};
@@ -305,7 +307,7 @@ void HeldPoint<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept
 }
 
 template <Real Scalar>
-bool HeldPoint<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
+bool PointAttachment<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
     bool changed = false;
     for (auto& point : context.points()) {
         const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
@@ -319,19 +321,19 @@ bool HeldPoint<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexce
 }
 
 template <Real Scalar>
-Vector3<Scalar> HeldPoint<Scalar>::reaction(const ConstraintContext<Scalar>& context) const noexcept {
+Vector3<Scalar> PointAttachment<Scalar>::reaction(const ConstraintContext<Scalar>& context) const noexcept {
     return reaction_at_points(context);
 }
 
 template <Real Scalar>
-void HeldVertex<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
+void VertexAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
     if (!context.check(vertex)) return;
     context.seed(vertex);
     context.prescribe(vertex, target);
 }
 
 template <Real Scalar>
-void Pinned::hold(ConstraintContext<Scalar>& context) const noexcept {
+void PinnedVertices::hold(ConstraintContext<Scalar>& context) const noexcept {
     for (const Index v : vertices) {
         if (!context.check(v)) return;
         context.prescribe(v);
@@ -339,19 +341,19 @@ void Pinned::hold(ConstraintContext<Scalar>& context) const noexcept {
 }
 
 template <Real Scalar>
-Vector3<Scalar> Pinned::reaction(const ConstraintContext<Scalar>& context) const noexcept {
+Vector3<Scalar> PinnedVertices::reaction(const ConstraintContext<Scalar>& context) const noexcept {
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
     for (const Index v : vertices) sum += context.residual_force(v);
     return sum;
 }
 
 template <Real Scalar>
-bool Load<Scalar>::sound() const noexcept {
+bool PointLoad<Scalar>::valid() const noexcept {
     return detail::is_barycentric(barycentric) && is_finite(force);
 }
 
 template <Real Scalar>
-void Load<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
+void PointLoad<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
     if (seed_corners(context, corners)) add_point_force(context, corners, barycentric, force);
 }
 

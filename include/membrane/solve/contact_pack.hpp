@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
-#include <membrane/collision/contact_point.hpp>
-#include <membrane/core/bounded_list.hpp>
+#include <membrane/contact/contact_point.hpp>
+#include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/lane_points.hpp>
 
 /// Contact points in packs.
@@ -104,7 +104,7 @@ class ContactPacks {
     static void add_lane(ContactPack<Scalar>& pack, const ContactPoint<Scalar>& point, Index number,
                          const IsFixed& is_fixed) noexcept;
 
-    BoundedList<ContactPack<Scalar>> packs_;
+    FixedVector<ContactPack<Scalar>> packs_;
     std::vector<std::uint64_t> colours_;  // of each vertex, those of the points it is a corner of; zero between calls
     Index unused_row_;
 };

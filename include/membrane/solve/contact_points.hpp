@@ -9,11 +9,11 @@
 #include <span>
 #include <type_traits>
 
-#include <membrane/collision/contact.hpp>
-#include <membrane/collision/tool.hpp>
-#include <membrane/mesh/triangle.hpp>
+#include <membrane/contact/contact.hpp>
+#include <membrane/contact/tool.hpp>
 #include <membrane/solve/contact_pack.hpp>
 #include <membrane/solve/step_state.hpp>
+#include <membrane/surface/triangle.hpp>
 
 /// Contact points against a tool, several at a time: where they are now, how deep the tool is in, and the force that keeps
 /// it out.

@@ -12,7 +12,7 @@
 ///
 ///     using Clock = std::chrono::steady_clock;
 ///     const auto deadline = membrane::Deadline([] { return Clock::now(); }, Clock::now() + 300us);
-///     const auto report = solver.step_until(deadline, x, dt, network, backing, press(tool, contact));
+///     const auto report = solver.step_until(deadline, x, dt, network, foundation, press(tool, contact));
 namespace membrane {
 
 /// A time of the caller's clock. `now()` gives the time as a number [s] or as a time point of std::chrono; it is called

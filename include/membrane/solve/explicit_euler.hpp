@@ -3,14 +3,14 @@
 
 #include <algorithm>
 
-#include <membrane/network/mass_spring_network.hpp>
-#include <membrane/network/volume_springs.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/model/volume_springs.hpp>
 
 /// The usual way to move masses and springs, against which the quasi-static solver is measured.
 ///
 ///     auto euler = membrane::ExplicitEuler(network);
 ///     auto v = membrane::Points<double>::Zero(3, network.vertex_count()).eval();
-///     const bool finite = euler.step(x, v, dt, network, backing);
+///     const bool finite = euler.step(x, v, dt, network, foundation);
 namespace membrane {
 
 /// Explicit Euler, [Liu07] (2) and (3): all vertices at once, the velocity by the force, then the position by the *new*
@@ -26,10 +26,10 @@ class ExplicitEuler {
         if (!network.has_masses()) refuse("ExplicitEuler", "the network must have masses [kg]");
     }
 
-    /// One step of `dt` [s] under the springs, the viscosity and the backing. `x` [m] and `velocity` [m/s] are 3 x V;
+    /// One step of `dt` [s] under the springs, the viscosity and the foundation. `x` [m] and `velocity` [m/s] are 3 x V;
     /// pinned vertices stay. False, with both as they were, where the result would not be finite or dt is not positive.
     /// Online. Cost: all springs.
-    template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume>
+    template <ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume>
     [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt, const Network& network,
                             const Volume& volume) noexcept {
         force_.setZero();
@@ -37,7 +37,7 @@ class ExplicitEuler {
     }
 
     /// The same with an external force on each vertex, F^ext of (1), 3 x V [N].
-    template <ElasticNetwork<Scalar> Network, VolumeModel<Scalar> Volume>
+    template <ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume>
     [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt, const Network& network,
                             const Volume& volume, const ConstPointsRef<Scalar>& external) noexcept {
         force_ = external;
@@ -69,9 +69,9 @@ bool ExplicitEuler<Scalar>::advance(PointsRef<Scalar>& x, PointsRef<Scalar>& vel
     previous_velocity_ = velocity;
     const ConstPointsRef<Scalar> here(x);
     for (Index v = 0; v < network.vertex_count(); ++v) {
-        // The backing is damped by the vertex's velocity: over a tick it would have come from here.
+        // The foundation is damped by the vertex's velocity: over a tick it would have come from here.
         const Vector3<Scalar> start = point(x, v) - dt * point(velocity, v);
-        force_.col(v) += network.pull(v, here).force + volume.pull(v, point(x, v), start, dt).force;
+        force_.col(v) += network.force_on(v, here).force + volume.force_on(v, point(x, v), start, dt).force;
     }
     residual_ = 0;
     for (Index v = 0; v < network.vertex_count(); ++v) {

@@ -8,15 +8,15 @@
 #include <span>
 #include <vector>
 
-#include <membrane/core/bounded_list.hpp>
 #include <membrane/core/executor.hpp>
+#include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/lane_points.hpp>
 #include <membrane/solve/vertex_update.hpp>
 
 /// Updates of several vertices at once.
 ///
-///     packed.assign(queue.vertices(), queue.group_ends(), network);         // where the queue has changed
-///     packed.append(active.vertices(), active.from_queue(), active.group_ends(), network);
+///     packed.assign(queue.vertices(), queue.colour_ends(), network);         // where the queue has changed
+///     packed.append(active.vertices(), active.from_queue(), active.colour_ends(), network);
 ///     packed.begin_step(scene);
 ///     for (std::size_t p = 0, end; p < packed.count(); p = end) {
 ///         end = packed.end_of_group(p, packed.count());
@@ -34,7 +34,7 @@ concept UpdatesInLanes = (Network::never_stiffens ||
     network.law()(spring);
     rule.compliance(vertex);
 }
-&&(std::same_as<Volume, NoVolumeSprings> || requires(const Volume& volume, const Vector3<Scalar>& start, Scalar dt) {
+&&(std::same_as<Volume, NoFoundation> || requires(const Volume& volume, const Vector3<Scalar>& start, Scalar dt) {
     { volume.spring(Index(0), start, dt) } -> std::same_as<VolumeSpring<Scalar>>;
 });
 
@@ -163,7 +163,7 @@ class PackedVertices {
     struct PackState {
         Vector3<Wide> here, constraint_force;
         VertexState<Wide> vertex;
-        Pull<Wide> others;
+        VertexForce<Wide> others;
     };
     template <bool in_contact, class Rule, class Scene>
     [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene) const noexcept;
@@ -175,7 +175,8 @@ class PackedVertices {
     [[nodiscard]] VertexState<Wide> spring_state(std::size_t p, const Vector3<Wide>& here,
                                                  const Scene& scene) const noexcept;
     template <bool in_contact, class Scene>
-    void add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene, Pull<Wide>& others) const noexcept;
+    void add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene,
+                    VertexForce<Wide>& others) const noexcept;
 
     void keep_response(std::size_t p, const PackState& at, const Symmetric3<Wide>& block,
                        StepState<Scalar>& rows) const noexcept;
@@ -186,13 +187,13 @@ class PackedVertices {
     }
 
     Index unused_row_;  // where the row of unused lanes begins
-    BoundedList<Index> members_;
-    BoundedList<Pack> packs_;
+    FixedVector<Index> members_;
+    FixedVector<Pack> packs_;
     std::vector<Terms> terms_;
     std::vector<Outcome> outcomes_;
     std::size_t slot_count_ = 0;
     std::vector<Slot> slots_;
-    BoundedList<Index> needed_;
+    FixedVector<Index> needed_;
     std::vector<unsigned char> is_needed_;
     Extent assigned_;
     bool is_whole_ = false;  // what was assigned has room
@@ -205,17 +206,17 @@ template <ElasticNetwork<Scalar> Network>
 PackedVertices<Scalar>::PackedVertices(const Network& network, Index capacity)
     : unused_row_(numbers_in_point * network.vertex_count()),
       members_(static_cast<std::size_t>((std::min)(network.vertex_count(), capacity))),
-      packs_(packs_for(members_.room())),
-      terms_(packs_.room()),
-      outcomes_(packs_.room()),
+      packs_(packs_for(members_.capacity())),
+      terms_(packs_.capacity()),
+      outcomes_(packs_.capacity()),
       needed_(capacity > 0 ? static_cast<std::size_t>(network.vertex_count()) : 0),
-      is_needed_(needed_.room(), 0) {
+      is_needed_(needed_.capacity(), 0) {
     std::size_t ends = 0, longest = 0;
     for (Index v = 0; v < network.vertex_count(); ++v) {
         ends += network.neighbours(v).size();
         longest = (std::max)(longest, network.neighbours(v).size());
     }
-    ends = (std::min)(ends, longest * members_.room());
+    ends = (std::min)(ends, longest * members_.capacity());
     if (capacity > 0) slots_.resize(2 * ends / lanes + 64 * longest);
 }
 
@@ -268,7 +269,7 @@ template <class Network>
 bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const Network& network) noexcept {
     std::size_t springs = 0;
     for (const Index v : vertices) springs = (std::max)(springs, network.neighbours(v).size());
-    if (members_.size() + vertices.size() > members_.room() || slot_count_ + springs > slots_.size()) return false;
+    if (members_.size() + vertices.size() > members_.capacity() || slot_count_ + springs > slots_.size()) return false;
     Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}, false};
     pack.own.fill(unused_row_);
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
@@ -323,10 +324,10 @@ template <class Sum, class Scene>
     Sum sum{};
     const auto* rows = scene.state.position.data();
     const auto slots = std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count);
-    constexpr std::size_t at_once = 6;
-    std::array<SpringReach<Wide>, at_once> reaches;
-    for (std::size_t first = 0; first < slots.size(); first += at_once) {
-        const auto some = slots.subspan(first, (std::min)(at_once, slots.size() - first));
+    constexpr std::size_t grain_size = 6;
+    std::array<SpringReach<Wide>, grain_size> reaches;
+    for (std::size_t first = 0; first < slots.size(); first += grain_size) {
+        const auto some = slots.subspan(first, (std::min)(grain_size, slots.size() - first));
         for (std::size_t i = 0; i < some.size(); ++i) {
             reaches[i] = SpringReach<Wide>(gather(rows, some[i].other.data()) - here);
         }
@@ -344,10 +345,10 @@ template <class Rule, class Scene>
                                                                         const Scene& scene) const noexcept
     -> VertexState<Wide> {
     VertexState<Wide> vertex;
-    if constexpr (requires { requires Rule::needs_relief; }) {
-        static_cast<CurvedPull<Wide>&>(vertex) = springs_on<CurvedSum<Wide>>(p, here, scene).total();
+    if constexpr (requires { requires Rule::needs_majoriser; }) {
+        static_cast<EnergyMajoriser<Wide>&>(vertex) = springs_on<CurvedSum<Wide>>(p, here, scene).total();
     } else {
-        const auto sum = springs_on<Pull<Wide>>(p, here, scene);
+        const auto sum = springs_on<VertexForce<Wide>>(p, here, scene);
         vertex.force = sum.force;
         vertex.stiffness = sum.stiffness;
     }
@@ -359,10 +360,10 @@ template <Real Scalar>
 template <bool in_contact, class Scene>
 [[gnu::always_inline]] inline void PackedVertices<Scalar>::add_others(std::size_t p, const Vector3<Wide>& here,
                                                                       const Scene& scene,
-                                                                      Pull<Wide>& others) const noexcept {
-    if constexpr (!std::same_as<std::remove_cvref_t<decltype(scene.volume)>, NoVolumeSprings>) {
+                                                                      VertexForce<Wide>& others) const noexcept {
+    if constexpr (!std::same_as<std::remove_cvref_t<decltype(scene.volume)>, NoFoundation>) {
         const auto& spring = terms_[p].spring;
-        const auto foundation = terms_[p].damps ? spring.pull(here) : spring.elastic_pull(here);
+        const auto foundation = terms_[p].damps ? spring.force_on(here) : spring.elastic_pull(here);
         others.force = in_contact ? Vector3<Wide>(foundation.force + others.force) : foundation.force;
         others.stiffness = in_contact ? Wide(foundation.stiffness + others.stiffness) : foundation.stiffness;
     }
@@ -460,12 +461,12 @@ template <class Scene>
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     const Vector3<Wide> here = gather(rows.position.data(), own.data());
-    const auto springs = springs_on<Pull<Wide>>(p, here, scene);
-    Pull<Wide> others{gather(rows.force.data(), own.data()), 0};
+    const auto springs = springs_on<VertexForce<Wide>>(p, here, scene);
+    VertexForce<Wide> others{gather(rows.force.data(), own.data()), 0};
     add_others<true>(p, here, scene, others);
     const Vector3<Wide> force = springs.force + others.force;
     Vector3<Wide> undamped = force;
-    if (terms_[p].damps) undamped -= terms_[p].spring.drag(here);
+    if (terms_[p].damps) undamped -= terms_[p].spring.damping_force(here);
     scatter_padded<Scalar>({force, norm(undamped)}, rows.residual.data(), own.data());
 }
 

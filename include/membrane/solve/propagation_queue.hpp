@@ -5,8 +5,8 @@
 #include <span>
 
 #include <membrane/core/index_set.hpp>
-#include <membrane/network/mass_spring_network.hpp>
-#include <membrane/solve/vertex_groups.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/solve/vertex_colouring.hpp>
 
 /// The order in which a force spreads through the springs.
 ///
@@ -40,7 +40,7 @@ class PropagationQueue {
     void group(const Network& network, bool together = false) noexcept;
 
     /// Where in `vertices` the groups end. None before `group` is called.
-    [[nodiscard]] std::span<const std::size_t> group_ends() const noexcept { return groups_.ends(); }
+    [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return groups_.ends(); }
 
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
     [[nodiscard]] bool contains(Index v) const noexcept { return reached_.contains(v); }
@@ -64,8 +64,8 @@ class PropagationQueue {
 
   private:
     IndexSet reached_;
-    BoundedList<std::size_t> layer_ends_;
-    VertexGroups groups_;
+    FixedVector<std::size_t> layer_ends_;
+    VertexColouring groups_;
 };
 
 template <class Network>

@@ -12,8 +12,8 @@
 
 #include <membrane/core/executor.hpp>
 #include <membrane/core/rigid_frame.hpp>
-#include <membrane/network/mass_spring_network.hpp>
-#include <membrane/network/volume_springs.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/deadline.hpp>
@@ -29,7 +29,7 @@
 /// Where the membrane comes to rest, and what it pushes back with.
 ///
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
-///     const auto report = solver.step(x, dt, network, backing, press(tool, contact));
+///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
 ///     // report.reactions[0] [N], report.moved
 namespace membrane {
 
@@ -67,9 +67,9 @@ class QuasiStaticSolver {
                                const AnyExecutor& executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
-    /// Cost: `sweeps` + 1 updates for each vertex in the queue or awake, in layer 0 `contact_visits` in each sweep; an
+    /// Cost: `sweeps` + 1 updates for each vertex in the queue or awake, in layer 0 `contact_iterations` in each sweep; an
     /// update costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
-    template <CheckedElasticNetwork<Scalar> Network, CheckedVolumeModel<Scalar> Volume,
+    template <CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                           const Constraints&... constraints) noexcept {
@@ -79,7 +79,7 @@ class QuasiStaticSolver {
     /// The same, but stops at `deadline`. It may overrun by the error of its cost estimate, or by the minimum work: one
     /// contact iteration, 32 updates beyond, and the residual forces of all active vertices. One thread does the updates. The next
     /// step goes on where time ran out, so that a membrane comes to rest however little time its steps have.
-    template <class Now, CheckedElasticNetwork<Scalar> Network, CheckedVolumeModel<Scalar> Volume,
+    template <class Now, CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
                                                 const Network& network, const Volume& volume,
@@ -141,7 +141,7 @@ class QuasiStaticSolver {
     StepState<Scalar> state_;
     IndexSet last_prescribed_;
     IndexSet woken_;            // since the last step
-    BoundedList<Index> moved_;  // in the last step that advanced, and by how much [m]
+    FixedVector<Index> moved_;  // in the last step that advanced, and by how much [m]
     Points<Scalar> last_displacements_;
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
@@ -165,9 +165,11 @@ namespace detail {
 
 // Room for packed vertices: none where no volume model allows updates in lanes.
 template <class Scalar, class Rule, class Network>
-[[nodiscard]] Index most_in_lanes(const SolverOptions<Scalar>& options) noexcept {
-    constexpr bool possible = UpdatesInLanes<Scalar, Rule, Network, NoVolumeSprings>;
-    return possible && options.order != VisitOrder::arrival && !options.layers_as_needed ? options.most_in_groups : 0;
+[[nodiscard]] Index max_in_lanes(const SolverOptions<Scalar>& options) noexcept {
+    constexpr bool possible = UpdatesInLanes<Scalar, Rule, Network, NoFoundation>;
+    return possible && options.order != UpdateOrder::breadth_first && !options.adaptive_layers
+               ? options.max_packed_vertices
+               : 0;
 }
 
 }  // namespace detail
@@ -180,8 +182,8 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       options_((options.check(), options)),
       executor_(executor),
       active_(network.vertex_count()),
-      packed_(network, detail::most_in_lanes<Scalar, Rule, Network>(options)),
-      state_(network.vertex_count(), options.most_touches),
+      packed_(network, detail::max_in_lanes<Scalar, Rule, Network>(options)),
+      state_(network.vertex_count(), options.max_contact_points),
       last_prescribed_(network.vertex_count()),
       woken_(network.vertex_count()),
       moved_(static_cast<std::size_t>(network.vertex_count())),
@@ -191,7 +193,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
     }
-    state_.force_tolerance = options.negligible_force > 0 ? options.negligible_force : network.negligible_force();
+    state_.force_tolerance = options.force_tolerance > 0 ? options.force_tolerance : network.force_tolerance();
 }
 
 // A step, in the order in which it happens.
@@ -213,11 +215,11 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     const ConstPointsRef<Scalar> start = x, now = state_.positions();
     ConstraintContext<Scalar> context(start, state_, network);
     const ConstraintList<Scalar> acting(context, constraints);
-    if (!acting.sound()) return refuse_step(StepStatus::bad_input);
+    if (!acting.valid()) return refuse_step(StepStatus::invalid_input);
     extrapolate<Volume>(acting, context);
     acting.begin();
-    if (state_.invalid) return refuse_step(StepStatus::bad_input);
-    if (state_.full) return refuse_step(StepStatus::too_many_touches);
+    if (state_.invalid) return refuse_step(StepStatus::invalid_input);
+    if (state_.full) return refuse_step(StepStatus::too_many_contact_points);
 
     const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
     set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
@@ -229,7 +231,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     if (report_.status == StepStatus::advanced && !sweeps.evaluate_residuals()) {
         state_.forget_points();  // what ran away may be a force from the step before
         state_.restore(start);   // not finite there either: then the input is not valid
-        report_.status = sweeps.evaluate_residuals() ? StepStatus::unstable : StepStatus::bad_input;
+        report_.status = sweeps.evaluate_residuals() ? StepStatus::unstable : StepStatus::invalid_input;
     }
     if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
     if (report_.status != StepStatus::advanced) return refuse_step(report_.status);
@@ -251,7 +253,7 @@ void QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume&
         state_.rotate(motion.rotation);
         if (!options_.predict) return;
         for (const Index v : moved_.items()) {
-            last_displacements_.col(v) = motion.direction_out(point(last_displacements_, v));
+            last_displacements_.col(v) = motion.vector_to_world(point(last_displacements_, v));
         }
     }
 }
@@ -263,14 +265,14 @@ template <class Volume>
 void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& acting,
                                                   ConstraintContext<Scalar>& context) noexcept {
     if (!options_.predict) return;
-    std::array<Lead<Scalar>, StepState<Scalar>::max_constraints> leads{};
-    acting.collect_leads(leads);
+    std::array<DrivingInput<Scalar>, StepState<Scalar>::max_constraints> inputs{};
+    acting.collect_inputs(inputs);
     if constexpr (moves<Volume>) {  // as they go on the body
-        for (auto& lead : leads) {
-            if (lead) lead->at = lead->is_force ? pose_.direction_in(lead->at) : pose_.point_in(lead->at);
+        for (auto& lead : inputs) {
+            if (lead) lead->at = lead->is_force ? pose_.vector_to_body(lead->at) : pose_.point_to_body(lead->at);
         }
     }
-    const Scalar factor = predictor_.extrapolation_factor(leads);
+    const Scalar factor = predictor_.extrapolation_factor(inputs);
     if (factor == 0 || !complete_) return;
     for (const Index v : moved_.items()) {
         if (context.fixed(v)) continue;

@@ -14,7 +14,7 @@
 /// whether a contact point has a thousandth of its weight on a free corner. To tools, and to them alone, a fixed vertex
 /// is therefore one on a spring of stiffness k to its place: a contact point with the weights w bears on fixed corners with
 /// the compliance sum w^2 / k, beside that of the free ones, so that its force is continuous in the tool's position, and a
-/// tool that is d inside a fixed vertex is pushed out with k d. Springs and backing see the vertex where it is.
+/// tool that is d inside a fixed vertex is pushed out with k d. Springs and foundation see the vertex where it is.
 namespace membrane {
 
 namespace detail {
@@ -31,7 +31,7 @@ template <class Scalar, class Network, class Volume>
 [[nodiscard]] Scalar own_stiffness(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const Vector3<Scalar> here = point(scene.start, v);
     constexpr Scalar for_ever = (std::numeric_limits<Scalar>::max)();  // nothing is left of damping
-    return scene.network.pull(v, scene.start).stiffness + scene.volume.pull(v, here, here, for_ever).stiffness;
+    return scene.network.force_on(v, scene.start).stiffness + scene.volume.force_on(v, here, here, for_ever).stiffness;
 }
 
 /// Sets how stiff those of the `vertices` are to tools that are fixed: `stiffness` [N/m], or for 0 four times as stiff as

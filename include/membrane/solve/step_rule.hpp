@@ -10,7 +10,7 @@
 
 #include <membrane/core/check.hpp>
 #include <membrane/core/lanes.hpp>
-#include <membrane/network/elastic_network.hpp>
+#include <membrane/model/elastic_network.hpp>
 
 /// How far a vertex moves for the force on it.
 ///
@@ -23,10 +23,10 @@ namespace membrane {
 template <class C, class Scalar>
 concept Compliance = std::same_as<C, Scalar> || std::same_as<C, Symmetric3<Scalar>>;
 
-/// What a rule knows of the vertex it is asked about: the pull of springs, backing, damping and constraints, and what
+/// What a rule knows of the vertex it is asked about: the pull of springs, foundation, damping and constraints, and what
 /// follows. `stiffness` is the sum of all.
 template <Number Scalar>
-struct VertexState : CurvedPull<Scalar> {
+struct VertexState : EnergyMajoriser<Scalar> {
     Scalar contact_stiffness = 0;  ///< the part of `stiffness` that acts along `contact_normal` alone [N/m]
     Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();
     Scalar mass = 0;       ///< [kg], zero where the network has none
@@ -36,7 +36,7 @@ struct VertexState : CurvedPull<Scalar> {
 
 /// The distance that a vertex moves for each newton on it [m/N]: a number, or a `Symmetric3` for a rule whose
 /// moves are not along the force. What the compiler cannot see: not negative, finite. A rule that sets `needs_mass` is
-/// refused by the solver for a network without masses; only one that sets `needs_relief` is told `relief` and `size`.
+/// refused by the solver for a network without masses; only one that sets `needs_majoriser` is told `stiffness_reduction` and `size`.
 /// With one that sets `is_safe`, no visit of a vertex may raise the energy: where springs stiffen, the solver sees to it.
 template <class Rule, class Scalar>
 concept StepRule = Real<Scalar> && std::copyable<Rule> &&
@@ -95,7 +95,7 @@ template <Number Scalar>
 }  // namespace detail
 
 /// Rule (4) with the mass that is always stable: dx = omega F / stiffness. No visit raises the energy (what springs and
-/// backing store and damping takes, less the work of the constraints' forces) for 0 < omega < 2: along the way s F it is
+/// foundation store and damping takes, less the work of the constraints' forces) for 0 < omega < 2: along the way s F it is
 /// at most E - s F^2 + s^2 F^2 stiffness / 2, which is below E for 0 < s < 2 / stiffness.
 struct SafeStep {
     static constexpr bool is_safe = true;
@@ -116,14 +116,14 @@ struct SafeStep {
 /// Newton's step of a vertex on its own 3 x 3 block, as vertex block descent takes it [Chen24], made safe without a
 /// look at the energy: dx = omega H^-1 F, H = stiffness I - relief / (1 + rho / size).
 ///
-/// By `CurvedPull` the energy is at most E - F.d + d.H d / 2 for every move d up to the length rho. As for `SafeStep`,
-/// d = omega H^-1 F does not raise it for 0 < omega < 2, if only rho is no shorter than d. No eigenvalue of `relief` is
+/// By `EnergyMajoriser` the energy is at most E - F.d + d.H d / 2 for every move d up to the length rho. As for `SafeStep`,
+/// d = omega H^-1 F does not raise it for 0 < omega < 2, if only rho is no shorter than d. No eigenvalue of `stiffness_reduction` is
 /// above half its trace b, so |H^-1 F| <= |F| / (stiffness - b / (1 + rho / size)): the rho that is chosen makes
 /// max(omega, 1) times the right side equal to rho, a quadratic equation. Near rest rho vanishes, and H is the second
 /// derivative of the energy, short springs apart, whose push across is left out. Where a contact adds a stiffness s along
 /// a normal n, s n n^T is added to H.
 struct BlockStep {
-    static constexpr bool is_safe = true, needs_relief = true;
+    static constexpr bool is_safe = true, needs_majoriser = true;
 
     double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and may swing
 
@@ -167,12 +167,12 @@ Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) cons
     // Beyond 1 / epsilon times the move nothing is lost by a smaller size.
     const Scalar size = smaller<Scalar>(vertex.size, longest / Limits::epsilon() + (Limits::min)());
     // With b = trace / (2 stiffness): rho^2 + (size (1 - b) - longest) rho = longest size.
-    const Scalar slack = size * (1 - per_stiffness * vertex.relief.trace() / 2) - longest;
+    const Scalar slack = size * (1 - per_stiffness * vertex.stiffness_reduction.trace() / 2) - longest;
     const Scalar rho = (root_of<Scalar>(slack * slack + 4 * longest * size) - slack) / 2;
     // Nearly flat springs leave H nearly singular: cbrt(epsilon) keeps the determinant out of the rounding.
     const auto flattest = static_cast<Each<Scalar>>(sizeof(Each<Scalar>) == 4 ? 4e-3 : 6e-6);
     const Scalar part = size / (size + larger<Scalar>(rho, flattest * size));
-    Symmetric3<Scalar> block = (-per_stiffness * part) * vertex.relief;
+    Symmetric3<Scalar> block = (-per_stiffness * part) * vertex.stiffness_reduction;
     block += diagonal3(Scalar(1));
     Symmetric3<Scalar> compliance = inverse(block, select<Scalar>(resists, relaxation * per_stiffness, Scalar(0)));
     if (vertex.touched) detail::stiffen(compliance, vertex.contact_stiffness, vertex.contact_normal);

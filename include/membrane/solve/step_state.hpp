@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/core/bounded_list.hpp>
+#include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/lane_points.hpp>
 #include <membrane/core/rigid_frame.hpp>
@@ -156,13 +156,13 @@ struct StepState {
     IndexSet kept;                     // vertices with an `anchor`
     std::vector<unsigned char> fixed;  // of loaded vertices: pinned or prescribed
 
-    BoundedList<ContactPoint<Scalar>> points, previous_points;
+    FixedVector<ContactPoint<Scalar>> points, previous_points;
     std::vector<Index> first_previous;       // of each vertex, the last previous point of which it is the first corner
     std::vector<Index> next_of_same_corner;  // of each previous point
     std::array<ListRange, max_constraints> point_ranges{}, previous_ranges{};
     ContactPacks<Scalar> packs;
     std::array<ListRange, max_constraints> pack_ranges{};
-    IndexSet watched;  // vertices that must not pass a tool: they are kept
+    IndexSet candidates;  // vertices that must not pass a tool: they are kept
 
     Scalar force_tolerance = 0;
     bool invalid = false, full = false;
@@ -189,9 +189,9 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       points(static_cast<std::size_t>(max_contact_points)),
       previous_points(points),
       first_previous(static_cast<std::size_t>(vertices), no_index),
-      next_of_same_corner(points.room(), no_index),
+      next_of_same_corner(points.capacity(), no_index),
       packs(vertices, static_cast<std::size_t>(max_contact_points)),
-      watched(vertices) {}
+      candidates(vertices) {}
 
 template <Real Scalar>
 void StepState<Scalar>::begin_step() noexcept {
@@ -200,7 +200,7 @@ void StepState<Scalar>::begin_step() noexcept {
         added_stiffness[static_cast<std::size_t>(v)] = 0;
     }
     for (const Index v : pressed_supports.items()) row(support, v).set(Vector3<Scalar>::Zero(), support_stiffness(v));
-    for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &pressed_supports, &kept, &watched}) set->clear();
+    for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &pressed_supports, &kept, &candidates}) set->clear();
     points.clear();
     packs.clear();
     point_ranges = {};
@@ -241,8 +241,8 @@ template <Real Scalar>
 void StepState<Scalar>::rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept {
     const RigidFrame<Scalar> turned{.rotation = rotation};
     for (auto& point : previous_points.items()) {
-        point.normal = turned.direction_out(point.normal);
-        point.force = turned.direction_out(point.force);
+        point.normal = turned.vector_to_world(point.normal);
+        point.force = turned.vector_to_world(point.force);
     }
     for (const Index v : loaded.items()) {  // in the last step
         const Symmetric3<Scalar> block = rotated(compliance_block(v), rotation);

@@ -5,8 +5,8 @@
 #include <array>
 #include <cstddef>
 
-#include <membrane/mesh/triangle.hpp>
 #include <membrane/solve/constraint_context.hpp>
+#include <membrane/surface/triangle.hpp>
 
 /// What constraints do to a point of a triangle: they add forces to it or move it through the triangle's corners, each in
 /// proportion to its barycentric weight.

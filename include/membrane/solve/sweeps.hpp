@@ -79,7 +79,7 @@ struct Sweeps {
         bool finite = true;
         const auto count = [&](Index v) {
             const Vector3<Scalar> force = scene.state.residual_force(v);
-            ++report.visits;
+            ++report.vertex_updates;
             if (!scene.state.is_fixed(v)) report.residual = (std::max)(report.residual, norm(force));
             finite &= is_finite(force);
         };
@@ -112,9 +112,9 @@ struct Sweeps {
     // If the whole queue is active and no constraint adds a force beyond layer 0.
     void pack() noexcept {
         const auto& queue = active.queue();
-        if (active.take_new_queue()) packed.assign(queue.vertices(), queue.group_ends(), scene.network);
+        if (active.take_new_queue()) packed.assign(queue.vertices(), queue.colour_ends(), scene.network);
         if (active.from_queue() != queue.vertices().size() || forces_beyond_contact()) return;
-        packed.append(active.vertices(), active.from_queue(), active.group_ends(), scene.network);
+        packed.append(active.vertices(), active.from_queue(), active.colour_ends(), scene.network);
         for (const Index v : packed.needed()) scene.state.load(v, scene.start, scene.network);
         packed.begin_step(scene);
         in_packs = packed.size();
@@ -135,7 +135,7 @@ struct Sweeps {
     bool iterate_contact() noexcept {
         const auto layer = active.contact_layer();
         bool changed = false;
-        for (Index i = 0; i < options.contact_visits; ++i) {
+        for (Index i = 0; i < options.contact_iterations; ++i) {
             if (!budget.has_time_for_contact(layer.size())) {
                 report.out_of_time = true;
                 break;
@@ -169,7 +169,7 @@ struct Sweeps {
         return changed;
     }
 
-    // With `layers_as_needed`: adds the next layer, and updates it, if a force on it is above the tolerance.
+    // With `adaptive_layers`: adds the next layer, and updates it, if a force on it is above the tolerance.
     bool add_layer() noexcept {
         const auto frontier = active.frontier();
         if (frontier.empty() || stopped || !advances()) return false;
@@ -177,7 +177,7 @@ struct Sweeps {
             report.out_of_time = true;
             return false;
         }
-        report.visits += static_cast<Index>(frontier.size());
+        report.vertex_updates += static_cast<Index>(frontier.size());
         const bool needed = std::any_of(frontier.begin(), frontier.end(), [&](Index v) {
             return !scene.state.is_fixed(v) && norm(pull_on(scene, v).force) > scene.state.force_tolerance;
         });
@@ -207,11 +207,11 @@ struct Sweeps {
     bool update_packs_until_time_is_up(std::size_t p, std::size_t end) noexcept {
         bool changed = false;
         while (p < end && goes_on(packed.first_of(p))) {
-            const Index before = report.visits;
+            const Index before = report.vertex_updates;
             const std::size_t batch = budget.limited() ? updates_in_batch / Lanes<Scalar>::count : end - p;
             const std::size_t next = (std::min)(p + batch, end);
             changed |= update_packs<false>(p, next);
-            budget.updated(static_cast<std::size_t>(report.visits - before));
+            budget.updated(static_cast<std::size_t>(report.vertex_updates - before));
             p = next;
         }
         return changed;
@@ -249,7 +249,7 @@ struct Sweeps {
     bool finish_update(std::size_t p) noexcept {
         using Outcome = typename PackedVertices<Scalar>::Outcome;
         Outcome outcome = packed.outcome(p);
-        report.visits += packed.free_count(p);
+        report.vertex_updates += packed.free_count(p);
         if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
             if (outcome == Outcome::too_far) {
                 for (const Index v : packed.vertices(p)) {
@@ -267,7 +267,7 @@ struct Sweeps {
     bool update(Index v) noexcept {
         auto& state = scene.state;
         if (state.is_fixed(v) || !advances()) return false;
-        ++report.visits;
+        ++report.vertex_updates;
         const auto vertex = state_of<Rule>(scene, v);
         const auto move = move_of(rule, vertex, state.force_tolerance);
         if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {

@@ -6,9 +6,9 @@
 #include <limits>
 #include <type_traits>
 
-#include <membrane/network/mass_spring_network.hpp>
-#include <membrane/network/volume_springs.hpp>
-#include <membrane/solve/curvature.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/model/volume_springs.hpp>
+#include <membrane/solve/largest_eigenvalue.hpp>
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/step_state.hpp>
 
@@ -84,19 +84,19 @@ template <class Rule, Number N>
 
 /// What pulls on vertex `v` beside its springs: foundation, damping and constraints.
 template <class Scalar, class Network, class Volume>
-[[nodiscard]] Pull<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
+[[nodiscard]] VertexForce<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const Vector3<Scalar> of_constraints = scene.state.constraint_force(v);
     const Scalar stiffness =
         scene.state.contact_stiffness(v) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
-    if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {of_constraints, stiffness};
-    const auto foundation = scene.volume.pull(v, point(scene.x, v), point(scene.start, v), scene.dt);
+    if constexpr (std::is_same_v<Volume, NoFoundation>) return {of_constraints, stiffness};
+    const auto foundation = scene.volume.force_on(v, point(scene.x, v), point(scene.start, v), scene.dt);
     return {foundation.force + of_constraints, foundation.stiffness + stiffness};
 }
 
 /// All that pulls on it.
 template <class Scalar, class Network, class Volume>
-[[nodiscard]] Pull<Scalar> pull_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
-    const auto springs = scene.network.pull(v, scene.x), others = others_on(scene, v);
+[[nodiscard]] VertexForce<Scalar> pull_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
+    const auto springs = scene.network.force_on(v, scene.x), others = others_on(scene, v);
     return {springs.force + others.force, springs.stiffness + others.stiffness};
 }
 
@@ -107,10 +107,10 @@ template <class Scalar, class Network, class Volume>
     const Vector3<Scalar> here = point(scene.x, v), start = point(scene.start, v);
     if constexpr (requires { scene.volume.spring(v, start, scene.dt); }) {
         const auto spring = scene.volume.spring(v, start, scene.dt);
-        return spring.rate == 0 ? now : Vector3<Scalar>(now - spring.drag(here));
+        return spring.rate == 0 ? now : Vector3<Scalar>(now - spring.damping_force(here));
     } else {
-        const Vector3<Scalar> still = scene.volume.pull(v, here, here, scene.dt).force;
-        const Vector3<Scalar> moving = scene.volume.pull(v, here, start, scene.dt).force;
+        const Vector3<Scalar> still = scene.volume.force_on(v, here, here, scene.dt).force;
+        const Vector3<Scalar> moving = scene.volume.force_on(v, here, start, scene.dt).force;
         return now + (still - moving);
     }
 }
@@ -119,10 +119,10 @@ template <class Scalar, class Network, class Volume>
 template <class Rule, class Scalar, class Network, class Volume>
 [[nodiscard]] VertexState<Scalar> state_of(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     VertexState<Scalar> state;
-    if constexpr (requires { requires Rule::needs_relief; }) {
-        static_cast<CurvedPull<Scalar>&>(state) = scene.network.curved_pull(v, scene.x);
+    if constexpr (requires { requires Rule::needs_majoriser; }) {
+        static_cast<EnergyMajoriser<Scalar>&>(state) = scene.network.majoriser(v, scene.x);
     } else {
-        const auto springs = scene.network.pull(v, scene.x);
+        const auto springs = scene.network.force_on(v, scene.x);
         state.force = springs.force;
         state.stiffness = springs.stiffness;
     }
@@ -143,7 +143,7 @@ template <class Rule, class Scalar, class Network, class Volume>
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] bool diverges(const StepInput<Scalar, Network, Volume>& scene, Index v, Scalar compliance) noexcept {
     const Scalar others = others_on(scene, v).stiffness;
-    if (compliance * (curvature_bound(scene.network.curved_pull(v, scene.x)) + others) < 2) return false;
+    if (compliance * (curvature_bound(scene.network.majoriser(v, scene.x)) + others) < 2) return false;
     return compliance * (largest_curvature<Scalar>(scene.network, v, scene.x) + others) >= 2;
 }
 

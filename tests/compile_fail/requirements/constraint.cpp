@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
-// wrong: Constraint: sound() const noexcept must return bool
+// wrong: Constraint: valid() const noexcept must return bool
 // wrong: Constraint: there must be begin(ConstraintContext<Scalar>&) const noexcept
 // wrong: Constraint: enforce(ConstraintContext<Scalar>&) const noexcept must return bool
 // wrong: Constraint: reaction(const ConstraintContext<Scalar>&) const noexcept must return Vector3<Scalar>
-// wrong: Constraint: sound() const noexcept must return bool
+// wrong: Constraint: valid() const noexcept must return bool
 // wrong: Constraint: reaction(const ConstraintContext<Scalar>&) const noexcept must return Vector3<Scalar>
 #include <type_traits>
 
 #include <membrane/solve/quasi_static.hpp>
 
 struct Magnet {
-    std::conditional_t<WRONG == 5, int, bool> sound() const noexcept(WRONG != 1);
+    std::conditional_t<WRONG == 5, int, bool> valid() const noexcept(WRONG != 1);
     void begin(membrane::ConstraintContext<double>&) const noexcept(WRONG != 2);
     bool enforce(membrane::ConstraintContext<double>&) const noexcept(WRONG != 3);
 #if WRONG != 6
@@ -21,5 +21,5 @@ struct Magnet {
 using Network = membrane::MassSpringNetwork<double, membrane::LinearSpring>;
 
 auto step(membrane::QuasiStaticSolver<double>& solver, Eigen::Matrix3Xd& x, const Network& network) {
-    return solver.step(x, 1e-3, network, membrane::NoVolumeSprings{}, Magnet{}).residual;
+    return solver.step(x, 1e-3, network, membrane::NoFoundation{}, Magnet{}).residual;
 }

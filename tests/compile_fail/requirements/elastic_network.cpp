@@ -7,14 +7,14 @@
 // wrong: ElasticNetwork: mass(Index) const noexcept must return Scalar
 // wrong: ElasticNetwork: viscosity(Index) const noexcept must return Scalar
 // wrong: ElasticNetwork: neighbours(Index) const must give a range of something with .other, an Index
-// wrong: ElasticNetwork: pull(Index, const ConstPointsRef<Scalar>&) const noexcept must return Pull<Scalar>
-// wrong: ElasticNetwork: curved_pull(Index, const ConstPointsRef<Scalar>&) const noexcept must return CurvedPull<Scalar>
+// wrong: ElasticNetwork: force_on(Index, const ConstPointsRef<Scalar>&) const noexcept must return Pull<Scalar>
+// wrong: ElasticNetwork: majoriser(Index, const ConstPointsRef<Scalar>&) const noexcept must return EnergyMajoriser<Scalar>
 // wrong: ElasticNetwork: curvature(Index, const ConstPointsRef<Scalar>&) const noexcept must return Symmetric3<Scalar>
 // wrong: ElasticNetwork: energy_change(Index, const Vector3<Scalar>&, const ConstPointsRef<Scalar>&) const noexcept must
-// wrong: ElasticNetwork: negligible_force() const noexcept must return Scalar
+// wrong: ElasticNetwork: force_tolerance() const noexcept must return Scalar
 #include <type_traits>
 
-#include <membrane/network/elastic_network.hpp>
+#include <membrane/model/elastic_network.hpp>
 
 using membrane::Index;
 using X = membrane::ConstPointsRef<double>;
@@ -33,12 +33,12 @@ struct Net {
     double mass(Index) const noexcept(WRONG != 6);
     double viscosity(Index) const noexcept(WRONG != 7);
     std::conditional_t<WRONG == 8, const Index*, const End*> neighbours(Index) const noexcept;
-    membrane::Pull<double> pull(Index, const X&) const noexcept(WRONG != 9);
-    membrane::CurvedPull<double> curved_pull(Index, const X&) const noexcept(WRONG != 10);
+    membrane::VertexForce<double> force_on(Index, const X&) const noexcept(WRONG != 9);
+    membrane::EnergyMajoriser<double> majoriser(Index, const X&) const noexcept(WRONG != 10);
     membrane::Symmetric3<double> curvature(Index, const X&) const noexcept(WRONG != 11);
     membrane::EnergyChange<double> energy_change(Index, const membrane::Vector3<double>&, const X&) const
         noexcept(WRONG != 12);
-    double negligible_force() const noexcept(WRONG != 13);
+    double force_tolerance() const noexcept(WRONG != 13);
 };
 
 static_assert(membrane::CheckedElasticNetwork<Net, double>);

@@ -3,7 +3,7 @@
 // wrong: ForceModel: model(std::span<const double> constants, std::span<const double> depths) const must
 #include <type_traits>
 
-#include <membrane/accuracy/fit.hpp>
+#include <membrane/calibration/fit.hpp>
 
 struct Punch {
     std::conditional_t<WRONG == 2, double, std::vector<double>> operator()(std::span<const double>,

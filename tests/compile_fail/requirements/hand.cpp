@@ -20,5 +20,5 @@ struct Stump {
     const Vector& velocity() const noexcept(WRONG != 6);
 };
 
-using Device = membrane::NullDevice<double, Stump>;
+using Device = membrane::ScriptedDevice<double, Stump>;
 auto run(Device& device) { return device.running(); }

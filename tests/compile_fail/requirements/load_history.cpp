@@ -7,7 +7,7 @@
 
 #include <membrane/accuracy/trial.hpp>
 
-using Hold = std::conditional_t<WRONG == 4, int, membrane::HeldVertex<double>>;
+using Hold = std::conditional_t<WRONG == 4, int, membrane::VertexAttachment<double>>;
 
 struct Pinch {
 #if WRONG == 1

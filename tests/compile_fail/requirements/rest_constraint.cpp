@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// wrong: RestConstraint: there must be describe(const C&, RestScene&) in the namespace of the constraint
-#include <membrane/accuracy/rest_scene.hpp>
+// wrong: StaticConstraint: there must be describe(const C&, EquilibriumScene&) in the namespace of the constraint
+#include <membrane/accuracy/equilibrium_scene.hpp>
 
 struct Clamp {};
 #if WRONG != 1
-void describe(const Clamp&, membrane::RestScene&);
+void describe(const Clamp&, membrane::EquilibriumScene&);
 #endif
 
-static_assert(membrane::CheckedRestConstraint<Clamp>);
+static_assert(membrane::CheckedStaticConstraint<Clamp>);

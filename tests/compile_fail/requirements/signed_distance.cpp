@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // wrong: SignedDistance: distance(const Vector3<double>&) const must give a double [m]
-#include <membrane/mesh/distmesh.hpp>
+#include <membrane/meshing/distmesh.hpp>
 
 struct Pot {
     double operator()(const membrane::Vector3<double>&)

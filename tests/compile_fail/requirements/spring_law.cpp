@@ -4,7 +4,7 @@
 // wrong: SpringLaw: law(const SpringState<Scalar>&) const noexcept must return SpringResponse<Scalar>
 #include <type_traits>
 
-#include <membrane/network/mass_spring_network.hpp>
+#include <membrane/model/mass_spring_network.hpp>
 
 struct Cubic {
     Cubic();

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: MIT
-// wrong: VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
-// wrong: VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
-// wrong: VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
-// wrong: VolumeModel: pull(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
+// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
+// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
+// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
+// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
 #include <type_traits>
 
 #include <membrane/solve/quasi_static.hpp>
 
 struct Body {
 #if WRONG == 4  // where the vertex was at the tick's beginning is left out
-    membrane::Pull<double> pull(membrane::Index, const membrane::Vector3<double>&, double) const noexcept;
+    membrane::VertexForce<double> pull(membrane::Index, const membrane::Vector3<double>&, double) const noexcept;
 #elif WRONG != 3
-    std::conditional_t<WRONG == 2, double, membrane::Pull<double>> pull(membrane::Index,
-                                                                        const membrane::Vector3<double>&,
-                                                                        const membrane::Vector3<double>&, double) const
-        noexcept(WRONG != 1);
+    std::conditional_t<WRONG == 2, double, membrane::VertexForce<double>> pull(membrane::Index,
+                                                                               const membrane::Vector3<double>&,
+                                                                               const membrane::Vector3<double>&,
+                                                                               double) const noexcept(WRONG != 1);
 #endif
 };
 

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <type_traits>
+#include <vector>
+
+#include <membrane/accuracy/point_attachments.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+#include <membrane/model/volume_springs.hpp>
+#include <membrane/solve/constraint_term.hpp>
+
+/// What has to balance where a membrane of linear springs is at rest.
+///
+///     membrane::EquilibriumProblem problem(network);                                            // offline
+///     if (problem.take(x, network, foundation, membrane::pull(7, target)) != ProblemStatus::valid) ...
+///     problem.forces(problem.centre(), force, magnitude);                                // [N]
+namespace membrane {
+
+/// A foundation that pulls in proportion to the distance from an anchor, or not at all.
+template <class Volume>
+concept LinearFoundation = std::same_as<Volume, NoFoundation> || std::same_as<Volume, VirtualVolumeSprings<float>> ||
+                           std::same_as<Volume, VirtualVolumeSprings<double>> || std::same_as < Volume,
+        MovedVolume < VirtualVolumeSprings<float>,
+float >> || std::same_as<Volume, MovedVolume<VirtualVolumeSprings<double>, double>>;
+
+enum class ProblemStatus {
+    valid,
+    invalid_input,  ///< a number is not finite, an index names no vertex, counts do not agree
+    contact,        ///< a tool touches; everything else has been taken in
+    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that something else holds too
+};
+
+/// Springs, foundation, loads and what is held, in double whatever the network's scalar. Damping is left out: at rest it
+/// has no force. Made of what a step is handed, and good until that changes; it keeps no reference.
+class EquilibriumProblem {
+  public:
+    /// Cost: O(V + springs) memory.
+    template <Real Scalar, class Law>
+    explicit EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& network);
+
+    /// Takes in the membrane at `x` (3 x V [m]) and what acts on it. Online. Cost: O(V + springs).
+    template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
+    [[nodiscard]] ProblemStatus take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                     const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                     const Constraints&... constraints) noexcept;
+
+    /// Fixes every other vertex as well. Online. Cost: O(V).
+    [[nodiscard]] ProblemStatus fix_all_but(std::span<const Index> free) noexcept;
+
+    [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed_.size()); }
+    [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
+    [[nodiscard]] double foundation(Index v) const noexcept { return backing_[at(v)].stiffness; }
+
+    /// The foundation's stiffness less what something else takes away of it, until the next `take` [N/m].
+    [[nodiscard]] double support(Index v) const noexcept { return foundation(v) - softening_[at(v)]; }
+    void soften(Index v, double by) noexcept { softening_[at(v)] = by; }
+
+    [[nodiscard]] bool fixed(Index v) const noexcept { return fixed_[at(v)] != 0; }
+    [[nodiscard]] int free_ends(const Spring<double>& spring) const noexcept {
+        return (fixed(spring.first) ? 0 : 1) + (fixed(spring.second) ? 0 : 1);
+    }
+
+    /// The x that was handed in, and the same with held vertices in their places [m].
+    [[nodiscard]] const Points<double>& given() const noexcept { return given_; }
+    [[nodiscard]] const Points<double>& centre() const noexcept { return centre_; }
+
+    /// Springs, foundation and loads on every vertex at `y` [N], and the sum of the magnitudes that went into it: rounding
+    /// changes the force by no more than `rounding()` times that.
+    void forces(const Points<double>& y, Points<double>& force, std::vector<double>& magnitude) const noexcept;
+    [[nodiscard]] double rounding() const noexcept { return rounding_; }
+
+    /// Takes out of `f` what does not move, or changes, anything that is held: the orthogonal projection onto the ways
+    /// that are left to the membrane.
+    void project(Points<double>& f) const noexcept;
+
+    /// Held points: their places.
+    [[nodiscard]] const PointAttachments& places() const noexcept { return places_; }
+
+    /// Adds to `weights` (V) how the reaction of what a constraint holds is made of the forces on the vertices; nothing
+    /// for a load or a tool.
+    static void share(const ConstraintTerm& term, std::vector<double>& weights) noexcept;
+
+  private:
+    static constexpr unsigned char by_network = 1, by_constraint = 2, by_caller = 4;
+
+    [[nodiscard]] static std::size_t at(Index v) noexcept { return static_cast<std::size_t>(v); }
+    [[nodiscard]] bool is_vertex(Index v) const noexcept { return v >= 0 && v < vertex_count(); }
+    template <class Springs>
+    void take_springs(const Springs& springs) noexcept;
+    template <class Scalar, class Volume>
+    bool take_backing(const Volume& volume) noexcept;
+    void fix(Index v, unsigned char by) noexcept { fixed_[at(v)] = static_cast<unsigned char>(fixed_[at(v)] | by); }
+    template <class C>
+    [[nodiscard]] ProblemStatus take_constraint(const C& constraint) noexcept;
+    [[nodiscard]] ProblemStatus take_term(const ConstraintTerm& term) noexcept;
+    [[nodiscard]] ProblemStatus check_places() const noexcept;
+
+    std::vector<Spring<double>> springs_;
+    std::vector<VolumeSpring<double>> backing_;
+    std::vector<double> softening_;
+    std::vector<unsigned char> fixed_;  // by whom
+    Points<double> load_, given_, centre_;
+    PointAttachments places_;
+    double rounding_ = 0;
+    bool touched_ = false;  // by a tool
+};
+
+template <Real Scalar, class Law>
+EquilibriumProblem::EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& network)
+    : springs_(network.springs().size()),
+      backing_(static_cast<std::size_t>(network.vertex_count())),
+      softening_(backing_.size()),
+      fixed_(backing_.size()),
+      load_(Points<double>::Zero(3, network.vertex_count())),
+      given_(load_),
+      centre_(load_) {
+    static_assert(std::same_as<Law, LinearSpring>,
+                  "the springs must follow LinearSpring: nothing is proven for others");
+    take_springs(network.springs());
+    std::size_t most = 0;
+    for (Index v = 0; v < network.vertex_count(); ++v) most = (std::max)(most, network.springs_of(v).size());
+    // A spring's force is off by 13 units of rounding, half an epsilon each, times k (l + r) at the most; each sum of n
+    // adds n of all magnitudes. Loads and foundation are two more, and the magnitudes are rounded as well.
+    rounding_ = std::numeric_limits<double>::epsilon() * static_cast<double>(8 + most);
+}
+
+template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
+ProblemStatus EquilibriumProblem::take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                       const Constraints&... constraints) noexcept {
+    if (x.cols() != vertex_count() || network.vertex_count() != vertex_count()) return ProblemStatus::invalid_input;
+    if (network.springs().size() != springs_.size()) return ProblemStatus::invalid_input;
+    take_springs(network.springs());
+    for (Index v = 0; v < vertex_count(); ++v) {
+        fixed_[at(v)] = network.pinned(v) ? by_network : static_cast<unsigned char>(0);
+        given_.col(v) = centre_.col(v) = point(x, v).template cast<double>();
+    }
+    load_.setZero();
+    places_.clear();
+    std::fill(softening_.begin(), softening_.end(), 0.0);
+    touched_ = false;
+    if (!take_backing<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::invalid_input;
+    ProblemStatus status = ProblemStatus::valid;
+    ((status = status == ProblemStatus::valid ? take_constraint(constraints) : status), ...);
+    if (status == ProblemStatus::valid) status = check_places();
+    return status == ProblemStatus::valid && touched_ ? ProblemStatus::contact : status;
+}
+
+template <class Springs>
+void EquilibriumProblem::take_springs(const Springs& springs) noexcept {
+    std::transform(springs.begin(), springs.end(), springs_.begin(), [](const auto& spring) {
+        return Spring<double>{spring.first, spring.second, static_cast<double>(spring.stiffness),
+                              static_cast<double>(spring.rest_length)};
+    });
+}
+
+template <class Scalar, class Volume>
+bool EquilibriumProblem::take_backing(const Volume& volume) noexcept {
+    if constexpr (std::same_as<Volume, NoFoundation>) {
+        std::fill(backing_.begin(), backing_.end(), VolumeSpring<double>());
+        return true;
+    } else {
+        if (volume.anchors().cols() != vertex_count()) return false;
+        for (Index v = 0; v < vertex_count(); ++v) {
+            const Vector3<Scalar> anchor = point(volume.anchors(), v);
+            const auto spring = volume.spring(v, anchor, std::numeric_limits<Scalar>::infinity());
+            if (!is_finite(anchor)) return false;
+            backing_[at(v)] = {anchor.template cast<double>(), static_cast<double>(spring.stiffness)};
+        }
+        return true;
+    }
+}
+
+template <class C>
+ProblemStatus EquilibriumProblem::take_constraint(const C& constraint) noexcept {
+    if (!constraint.valid()) return ProblemStatus::invalid_input;
+    ProblemStatus status = DescribedConstraint<C> ? ProblemStatus::valid : ProblemStatus::unsupported;
+    for_each_term(constraint, [&](const ConstraintTerm& term) {
+        if (status == ProblemStatus::valid) status = take_term(term);
+    });
+    return status;
+}
+
+inline ProblemStatus EquilibriumProblem::take_term(const ConstraintTerm& term) noexcept {
+    using Kind = ConstraintTerm::Kind;
+    if (term.kind == Kind::press) {
+        touched_ |= term.contact.touching();
+        return ProblemStatus::valid;
+    }
+    for (const Index v : term.corners) {
+        if (!is_vertex(v)) return ProblemStatus::invalid_input;
+    }
+    const Index v = term.corners[0];
+    switch (term.kind) {
+        case Kind::hold_vertex:
+            if ((fixed_[at(v)] & by_network) == 0) centre_.col(v) = term.target;
+            [[fallthrough]];
+        case Kind::pin: fix(v, by_constraint); return ProblemStatus::valid;
+        case Kind::load:
+            for (std::size_t k = 0; k < 3; ++k) load_.col(term.corners[k]) += term.weight(k) * term.force;
+            return ProblemStatus::valid;
+        default: return places_.add(term) ? ProblemStatus::valid : ProblemStatus::unsupported;
+    }
+}
+
+inline ProblemStatus EquilibriumProblem::fix_all_but(std::span<const Index> free) noexcept {
+    for (Index v = 0; v < vertex_count(); ++v) fix(v, by_caller);
+    for (const Index v : free) {
+        if (!is_vertex(v)) return ProblemStatus::invalid_input;
+        fixed_[at(v)] = static_cast<unsigned char>(fixed_[at(v)] & ~by_caller);
+    }
+    return check_places();
+}
+
+inline ProblemStatus EquilibriumProblem::check_places() const noexcept {
+    const bool independent = places_.independent([&](Index v) { return fixed(v); });
+    return independent ? ProblemStatus::valid : ProblemStatus::unsupported;
+}
+
+inline void EquilibriumProblem::forces(const Points<double>& y, Points<double>& force,
+                                       std::vector<double>& magnitude) const noexcept {
+    for (Index v = 0; v < vertex_count(); ++v) {
+        const Vector3<double> pull = backing_[at(v)].elastic_pull(point(y, v)).force;
+        force.col(v) = pull + load_.col(v);
+        magnitude[at(v)] = norm(pull) + norm(point(load_, v));
+    }
+    for (const auto& spring : springs_) {
+        const auto pull = pull_of(LinearSpring{}, edge_vector(spring, y), spring.stiffness, spring.rest_length);
+        force.col(spring.first) += pull.force();
+        force.col(spring.second) -= pull.force();
+        const double most = spring.stiffness * (pull.length + spring.rest_length);
+        magnitude[at(spring.first)] += most;
+        magnitude[at(spring.second)] += most;
+    }
+}
+
+inline void EquilibriumProblem::project(Points<double>& f) const noexcept {
+    for (Index v = 0; v < vertex_count(); ++v) {
+        if (fixed(v)) f.col(v).setZero();
+    }
+    places_.project(f);
+}
+
+inline void EquilibriumProblem::share(const ConstraintTerm& term, std::vector<double>& weights) noexcept {
+    if (!term.holds()) return;
+    for (std::size_t k = 0; k < 3; ++k) weights[at(term.corners[k])] += term.share(k);
+}
+
+}  // namespace membrane

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <membrane/accuracy/tool_points.hpp>
+#include <membrane/solve/constraint_term.hpp>
+
+/// What acts on a membrane at rest, told by the constraints of a step, and by those of one's own: see `ConstraintTerm`, or
+///
+///     void describe(const Clamp& clamp, membrane::EquilibriumScene& scene) { scene.hold(clamp.vertex, clamp.target); }
+namespace membrane {
+
+struct EquilibriumOptions {
+    Index increments = 1;       ///< targets, loads and tools are brought on in so many parts; more for a start far off
+    Index layers = unlimited;   ///< vertices farther than this from where forces enter stay where they are
+    Index max_iterations = 60;  ///< of Newton's method, in each increment
+    double tolerance =
+        1e-12;  ///< of forces, in parts of the largest that one spring, foundation or load exerts, and of
+                ///< lengths, in parts of the mean edge; neither is asked for below rounding
+
+    /// @throws InvalidInput for an option out of its range
+    void check() const;
+};
+
+struct Equilibrium {
+    Points<double> x;                        ///< 3 x V [m]
+    std::vector<Vector3<double>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]
+    std::vector<ToolPoint> contacts;         ///< what tools press on; tools are counted from 0, those that touch
+    double residual = 0;                     ///< largest unbalanced force on a free vertex [N]
+    double overlap = 0;                      ///< how deep the surface is in a tool [m]
+    Index iterations = 0;                    ///< of Newton's method, in all increments
+    bool converged = false;                  ///< forces balance, what is held is in its place, no tool overlaps
+};
+
+/// A tool that the surface stays outside of.
+struct ScenePress {
+    std::size_t constraint;
+    Tool<double> tool;
+    Vector3<double> exit_displacement;  ///< moved so far, it just touches the surface from its own side [m]
+    double reach;                       ///< triangles up to this far from it count as touched [m]
+};
+
+/// Where everything is to be, and what pulls.
+struct LoadStep {
+    Points<double> targets;               ///< of fixed vertices; the others, where they were at the start, 3 x V [m]
+    Points<double> loads;                 ///< on each vertex, 3 x V [N]
+    std::vector<Vector3<double>> places;  ///< targets of the held places [m]
+    std::vector<Tool<double>> tools;      ///< that press
+};
+
+/// The constraints of one membrane, in double. All it is told is checked.
+/// @throws InvalidInput for a vertex that is none, weights that are not barycentric, a number that is not finite
+class EquilibriumScene {
+  public:
+    /// The membrane is at `start` (3 x V [m]); `pinned[v]` where vertex `v` never moves.
+    EquilibriumScene(Points<double> start, std::vector<unsigned char> pinned)
+        : start_(std::move(start)), targets_(start_), pinned_(std::move(pinned)), held_(pinned_.size(), 0) {}
+
+    // For `describe`.
+
+    /// A pinned vertex stays where it is, whatever its target; the last one to hold a vertex decides where. A tool that
+    /// does not touch is nothing.
+    void add(const ConstraintTerm& term);
+
+    void hold(Index v, const Vector3<double>& target) { add(ConstraintTerm::hold(v, target)); }
+    void hold(Index v) { add(ConstraintTerm::pin(v)); }
+    void hold(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& target) {
+        add(ConstraintTerm::hold(corners, barycentric, target));
+    }
+    void load(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& force) {
+        add(ConstraintTerm::load(corners, barycentric, force));
+    }
+    void press(const Tool<double>& tool, const Contact<double>& contact) { add(ConstraintTerm::press(tool, contact)); }
+
+    // For `equilibrium`.
+
+    /// What is told from now on comes from constraint number `constraint`.
+    void turn_to(std::size_t constraint) noexcept { constraint_ = constraint; }
+
+    [[nodiscard]] bool fixed(Index v) const noexcept {
+        return pinned_[static_cast<std::size_t>(v)] != 0 || held_[static_cast<std::size_t>(v)] != 0;
+    }
+
+    /// Targets and loads, brought on from the start by this part, and tools that have come in from outside so far.
+    [[nodiscard]] LoadStep goals(double part) const;
+
+    /// Constraint and vertex.
+    [[nodiscard]] const std::vector<std::pair<std::size_t, Index>>& holds() const noexcept { return holds_; }
+    [[nodiscard]] const std::vector<ConstraintTerm>& point_attachments() const noexcept { return held_places_; }
+    [[nodiscard]] const std::vector<ConstraintTerm>& loaded_places() const noexcept { return loaded_places_; }
+    [[nodiscard]] const std::vector<ScenePress>& tools() const noexcept { return tools_; }
+
+    /// Vertices where a force enters.
+    [[nodiscard]] const std::vector<Index>& seeds() const noexcept { return seeds_; }
+
+  private:
+    void hold_vertex(const ConstraintTerm& term);
+    void act_on_point(const ConstraintTerm& term);
+    void press(const ConstraintTerm& term);
+    void check(Index v) const;
+    void check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const;
+    void check(const Vector3<double>& vector, std::string_view what, std::string_view unit) const;
+
+    Points<double> start_, targets_;
+    std::vector<unsigned char> pinned_, held_;
+    std::vector<std::pair<std::size_t, Index>> holds_;
+    std::vector<ConstraintTerm> held_places_, loaded_places_;
+    std::vector<ScenePress> tools_;
+    std::vector<Index> seeds_;
+    std::size_t constraint_ = 0;
+};
+
+/// What `describe(constraint, scene)` tells a scene about.
+template <class C>
+concept StaticConstraint = requires(const C& constraint, EquilibriumScene& scene) {
+    describe(constraint, scene);
+};
+
+namespace detail {
+
+template <class C>
+consteval bool check_static_constraint() noexcept {
+    static_assert(
+        StaticConstraint<C>,
+        "StaticConstraint: there must be describe(const C&, EquilibriumScene&) in the namespace of the constraint");
+    return StaticConstraint<C>;
+}
+
+}  // namespace detail
+
+/// A `StaticConstraint`; where it is none, the error says what is missing.
+template <class C>
+concept CheckedStaticConstraint = detail::check_static_constraint<C>();
+static_assert(StaticConstraint<VertexAttachment<float>> && StaticConstraint<PointAttachment<double>> &&
+              StaticConstraint<PinnedVertices>);
+static_assert(StaticConstraint<PointLoad<float>> && StaticConstraint<ToolContact<double>>);
+
+namespace detail {
+inline constexpr std::string_view equilibrium_name = "equilibrium";
+}
+
+inline void EquilibriumOptions::check() const {
+    const auto at_least = [](Index number, Index least, std::string_view name) {
+        if (number < least) refuse(detail::equilibrium_name, name, " must be at least ", least, ", got ", number);
+    };
+    at_least(increments, 1, "increments");
+    at_least(layers, 0, "layers");
+    at_least(max_iterations, 1, "max_iterations");
+    if (!is_finite(tolerance) || !(tolerance > 0)) {
+        refuse(detail::equilibrium_name, "tolerance must be finite and positive, got ", tolerance);
+    }
+}
+
+inline void EquilibriumScene::check(Index v) const {
+    if (v >= 0 && v < targets_.cols()) return;
+    refuse(detail::equilibrium_name, "constraint ", constraint_, " names vertex ", v, ", expected 0 to ",
+           targets_.cols() - 1);
+}
+
+inline void EquilibriumScene::check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const {
+    for (const Index v : corners) check(v);
+    // Whoever brings weights of floats, brings their rounding.
+    const bool is_float = barycentric.cast<float>().cast<double>() == barycentric;
+    if (is_float ? detail::is_barycentric<float>(barycentric.cast<float>()) : detail::is_barycentric(barycentric))
+        return;
+    refuse(detail::equilibrium_name, "barycentric weights of constraint ", constraint_,
+           " must not be negative and have the sum 1, got ", barycentric[0], " ", barycentric[1], " ", barycentric[2]);
+}
+
+inline void EquilibriumScene::check(const Vector3<double>& vector, std::string_view what, std::string_view unit) const {
+    for (Eigen::Index k = 0; k < 3; ++k) {
+        if (is_finite(vector[k])) continue;
+        refuse(detail::equilibrium_name, std::string_view("xyz").substr(static_cast<std::size_t>(k), 1), " of the ",
+               what, " of constraint ", constraint_, " must be finite [", unit, "], got ", vector[k]);
+    }
+}
+
+inline void EquilibriumScene::add(const ConstraintTerm& term) {
+    switch (term.kind) {
+        case ConstraintTerm::Kind::pin:
+        case ConstraintTerm::Kind::hold_vertex: return hold_vertex(term);
+        case ConstraintTerm::Kind::hold_point:
+        case ConstraintTerm::Kind::load: return act_on_point(term);
+        case ConstraintTerm::Kind::press: return press(term);
+    }
+}
+
+inline void EquilibriumScene::hold_vertex(const ConstraintTerm& term) {
+    const Index v = term.corners[0];
+    check(v);
+    check(term.target, "target", "m");
+    held_[static_cast<std::size_t>(v)] = 1;
+    holds_.emplace_back(constraint_, v);
+    if (term.kind == ConstraintTerm::Kind::pin) return;
+    seeds_.push_back(v);
+    if (pinned_[static_cast<std::size_t>(v)] == 0) targets_.col(v) = term.target;
+}
+
+inline void EquilibriumScene::act_on_point(const ConstraintTerm& term) {
+    check(term.corners, term.weights);
+    check(term.target, "target", "m");
+    check(term.force, "force", "N");
+    auto& places = term.kind == ConstraintTerm::Kind::load ? loaded_places_ : held_places_;
+    places.push_back(term);
+    places.back().constraint = constraint_;
+    seeds_.insert(seeds_.end(), term.corners.begin(), term.corners.end());
+}
+
+inline void EquilibriumScene::press(const ConstraintTerm& term) {
+    const auto& tool = term.tool;
+    const auto& contact = term.contact;
+    check(tool.position, "tool's position", "m");
+    check(tool.axis, "tool's axis", "m");
+    if (!is_finite(tool.radius) || tool.radius < 0) {
+        refuse(detail::equilibrium_name, "radius of the tool of constraint ", constraint_,
+               " must be finite and not negative [m], got ", tool.radius);
+    }
+    if (!contact.touching()) return;
+    for (const Index v : contact.corners) check(v);
+    check(contact.point, "contact's point", "m");
+    check(contact.normal, "contact's normal", "1");
+    check(contact.axis_point, "contact's point of the axis", "m");
+    if (!is_finite(contact.radius) || !(contact.radius > 0)) {
+        refuse(detail::equilibrium_name, "radius of the contact of constraint ", constraint_,
+               " must be finite and positive [m], got ", contact.radius);
+    }
+    ScenePress pressing{constraint_, tool, Vector3<double>::Zero(), contact.detection_distance};
+    pressing.tool.radius = contact.radius;
+    if (contact.gap < 0)
+        pressing.exit_displacement = contact.point + contact.radius * contact.normal - contact.axis_point;
+    tools_.push_back(pressing);
+    seeds_.insert(seeds_.end(), contact.corners.begin(), contact.corners.end());
+}
+
+inline LoadStep EquilibriumScene::goals(double part) const {
+    const auto interpolated = [&](const auto& from, const auto& to) {  // exact for what stays, and at the end
+        auto there = to;
+        if (part != 1) there = from + part * (to - from);
+        return there;
+    };
+    LoadStep goals{interpolated(start_, targets_), Points<double>::Zero(3, start_.cols()), {}, {}};
+    for (const auto& place : loaded_places_) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            goals.loads.col(place.corners[k]) += part * place.weight(k) * place.force;
+        }
+    }
+    for (const auto& place : held_places_) {
+        goals.places.push_back(interpolated(place.point_to_body(start_), place.target));
+    }
+    for (const auto& pressing : tools_) {
+        goals.tools.push_back(pressing.tool);
+        goals.tools.back().position += (1 - part) * pressing.exit_displacement;
+    }
+    return goals;
+}
+
+}  // namespace membrane

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <iterator>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include <membrane/accuracy/elasticity.hpp>
+#include <membrane/accuracy/equilibrium_scene.hpp>
+#include <membrane/accuracy/newton_system.hpp>
+#include <membrane/accuracy/tool_points.hpp>
+
+namespace membrane {
+
+/// Newton's method on one scene, see `equilibrium`: the last of these parts, and the one that puts them together.
+///
+///     EquilibriumSolver(x, mesh.triangles(), Elasticity(network, volume), scene, fixed, options).run(constraint_count)
+template <class ElasticModel>
+class EquilibriumSolver {
+  public:
+    /// From `x` (3 x V [m]); `fixed[v]` where vertex v does not move but to where the scene holds it. Triangles and scene
+    /// must outlive the search.
+    EquilibriumSolver(const Points<double>& x, const Triangles& triangles, const ElasticModel& elasticity,
+                      const EquilibriumScene& scene, std::vector<unsigned char> fixed,
+                      const EquilibriumOptions& options);
+
+    /// All increments. May be run once.
+    [[nodiscard]] Equilibrium run(std::size_t constraint_count);
+
+  private:
+    struct State {
+        ElasticState elastic;
+        std::vector<ToolPoint> contacts;
+        double overlap = 0;
+    };
+
+    [[nodiscard]] bool settle();
+    [[nodiscard]] State state_at(const Points<double>& x);
+    [[nodiscard]] Points<double> newton_step();
+    void add_rows();
+    [[nodiscard]] bool is_at_rest() const;
+    [[nodiscard]] bool is_in_place() const;
+    void advance(const Points<double>& step);
+    [[nodiscard]] Points<double> applied(const State& state) const;
+    [[nodiscard]] Points<double> unbalanced(const State& state) const;
+    [[nodiscard]] double residual(const State& state) const;
+    [[nodiscard]] std::vector<Vector3<double>> reactions(std::size_t count) const;
+    [[nodiscard]] double negligible_length() const noexcept { return (std::max)(options_.tolerance * edge_, spacing_); }
+    [[nodiscard]] bool is_free(Index v) const noexcept { return fixed_[static_cast<std::size_t>(v)] == 0; }
+    [[nodiscard]] bool can_move(const std::array<Index, 3>& corners, const Vector3<double>& weights) const noexcept;
+    [[nodiscard]] Vector3<double> off_target(std::size_t i) const noexcept;
+
+    const Triangles& triangles_;
+    ElasticModel elasticity_;
+    const EquilibriumScene& scene_;
+    std::vector<unsigned char> fixed_;
+    EquilibriumOptions options_;
+    double edge_, spacing_;  // mean edge; what rounding makes of a length [m]
+    NewtonSystem system_;
+
+    LoadStep goals_;  // of this increment
+    State here_;
+    std::vector<Vector3<double>> holding_;  // force on each held place [N]
+    double stiffness_ = 0;                  // of the stiffest spring [N/m]
+    double penalty_ = 0;                    // of overlap [N]
+    Index iterations_ = 0;
+};
+
+namespace detail {
+
+/// Mean length of the triangles' sides [m].
+[[nodiscard]] inline double mean_side(const Points<double>& x, const Triangles& triangles) {
+    double sum = 0;
+    for (const auto& corners : triangles.colwise()) {
+        const auto t = triangle_at(x, corners);
+        sum += norm<double>(t.b - t.a) + norm<double>(t.c - t.b) + norm<double>(t.a - t.c);
+    }
+    return sum / (3 * static_cast<double>(triangles.cols()));
+}
+
+}  // namespace detail
+
+template <class ElasticModel>
+EquilibriumSolver<ElasticModel>::EquilibriumSolver(const Points<double>& x, const Triangles& triangles,
+                                                   const ElasticModel& elasticity, const EquilibriumScene& scene,
+                                                   std::vector<unsigned char> fixed, const EquilibriumOptions& options)
+    : triangles_(triangles),
+      elasticity_(elasticity),
+      scene_(scene),
+      fixed_(std::move(fixed)),
+      options_(options),
+      edge_(detail::mean_side(x, triangles)),
+      spacing_(64 * std::numeric_limits<double>::epsilon() * x.cwiseAbs().maxCoeff()),
+      system_(fixed_),
+      holding_(scene.point_attachments().size(), Vector3<double>::Zero()) {
+    here_.elastic.x = x;
+}
+
+template <class ElasticModel>
+Equilibrium EquilibriumSolver<ElasticModel>::run(std::size_t constraint_count) {
+    double increments = options_.increments;
+    for (const auto& pressing : scene_.tools()) {
+        increments = (std::max)(increments, std::ceil(2 * norm(pressing.exit_displacement) / pressing.tool.radius));
+    }
+    Equilibrium rest;
+    for (double i = 1; i <= increments; ++i) {
+        goals_ = scene_.goals(i / increments);
+        here_ = state_at(here_.elastic.x);
+        rest.converged = settle();
+    }
+    rest.x = here_.elastic.x;
+    rest.reactions = reactions(constraint_count);
+    std::copy_if(here_.contacts.begin(), here_.contacts.end(), std::back_inserter(rest.contacts),
+                 [](const ToolPoint& point) { return point.multiplier > 0; });
+    for (auto& point : rest.contacts) point.force = -point.multiplier * point.normal;
+    rest.residual = residual(here_);
+    rest.overlap = here_.overlap;
+    rest.iterations = iterations_;
+    return rest;
+}
+
+template <class ElasticModel>
+bool EquilibriumSolver<ElasticModel>::settle() {
+    for (Index i = 0; i < options_.max_iterations; ++i) {
+        ++iterations_;
+        const Points<double> step = newton_step();
+        if (is_at_rest()) return true;
+        if (!is_finite(step)) return false;
+        advance(step);
+    }
+    return false;
+}
+
+template <class ElasticModel>
+auto EquilibriumSolver<ElasticModel>::state_at(const Points<double>& x) -> State {
+    State state{elasticity_.at(x), tool_points(triangles_, x, goals_.tools, edge_ / 2)};
+    std::erase_if(state.contacts, [&](const ToolPoint& point) { return !can_move(point.corners, point.weights); });
+    for (auto& point : state.contacts) {
+        state.overlap = (std::max)(state.overlap, -point.gap);
+        const auto before = std::lower_bound(here_.contacts.begin(), here_.contacts.end(), point, is_before);
+        if (before != here_.contacts.end() && !is_before(point, *before)) point.multiplier = before->multiplier;
+    }
+    for (const auto& tool : goals_.tools) {
+        if (is_pierced(triangles_, x, tool, fixed_)) state.overlap = (std::max)(state.overlap, tool.radius);
+    }
+    return state;
+}
+
+// The step from here, and with it the forces of what holds and presses.
+template <class ElasticModel>
+Points<double> EquilibriumSolver<ElasticModel>::newton_step() {
+    const auto& x = here_.elastic.x;
+    system_.open(goals_.targets - x);
+    elasticity_.add_stiffness(here_.elastic, system_);
+    const Points<double> forces = applied(here_);
+    for (Index v = 0; v < forces.cols(); ++v) system_.push(v, forces.col(v));
+    stiffness_ = elasticity_.largest_stiffness(here_.elastic);
+    add_rows();
+    const auto solution = system_.solve(stiffness_);
+    Eigen::Index row = 0;
+    for (auto& force : holding_) {
+        force = solution.multipliers.segment<3>(row);
+        row += 3;
+    }
+    for (auto& point : here_.contacts) point.multiplier = solution.multipliers[row++];
+    return solution.step;
+}
+
+// What is held is expected to come to its place, and what touches to go on touching: stiffer across that way, H is
+// positive definite wherever the equilibrium is stable.
+template <class ElasticModel>
+void EquilibriumSolver<ElasticModel>::add_rows() {
+    for (std::size_t i = 0; i < holding_.size(); ++i) {
+        const auto& place = scene_.point_attachments()[i];
+        const Vector3<double> off = off_target(i);
+        for (Eigen::Index c = 0; c < 3; ++c) {
+            ConstraintRow row{place.corners, {}, off[c], true, stiffness_};
+            for (std::size_t k = 0; k < 3; ++k) {
+                row.gradient[k] = place.weight(k) * Vector3<double>::Unit(c);
+            }
+            system_.add(row);
+        }
+    }
+    for (const auto& point : here_.contacts) {
+        const auto& v = point.corners;
+        const double stiffening = point.multiplier > 0 ? stiffness_ : 0;
+        system_.add({v, {point.gradient(0), point.gradient(1), point.gradient(2)}, point.gap, false, stiffening});
+        if (point.multiplier == 0) continue;
+        const Eigen::Matrix<double, 9, 9> hessian = gap_hessian(point, here_.elastic.x, goals_.tools[point.tool]);
+        for (std::size_t k = 0; k < 3; ++k) {
+            for (std::size_t l = 0; l <= k; ++l) {
+                const auto i = static_cast<Eigen::Index>(3 * k), j = static_cast<Eigen::Index>(3 * l);
+                system_.add(v[k], v[l], -point.multiplier * hessian.block<3, 3>(i, j));
+            }
+        }
+    }
+}
+
+template <class ElasticModel>
+bool EquilibriumSolver<ElasticModel>::is_at_rest() const {
+    const double largest = (std::max)(here_.elastic.largest_force, goals_.loads.colwise().norm().maxCoeff());
+    if (!(residual(here_) <= (std::max)(options_.tolerance * largest, stiffness_ * spacing_))) return false;
+    const auto contacts = [&](const ToolPoint& p) { return p.multiplier == 0 || p.gap <= negligible_length(); };
+    return is_in_place() && here_.overlap <= negligible_length() &&
+           std::all_of(here_.contacts.begin(), here_.contacts.end(), contacts);
+}
+
+template <class ElasticModel>
+bool EquilibriumSolver<ElasticModel>::is_in_place() const {
+    for (std::size_t i = 0; i < holding_.size(); ++i) {
+        const auto& place = scene_.point_attachments()[i];
+        if (can_move(place.corners, place.weights) && norm(off_target(i)) > negligible_length()) return false;
+    }
+    for (Index v = 0; v < here_.elastic.x.cols(); ++v) {
+        if (!is_free(v) && point(here_.elastic.x, v) != point(goals_.targets, v)) return false;
+    }
+    return true;
+}
+
+// As far as a tool keeps its side, and once all that is held is in its place, as far as it helps: by the energy and the
+// overlap from afar; close to rest, where the curved way of the contacts would forbid whole steps, by what is out of balance.
+template <class ElasticModel>
+void EquilibriumSolver<ElasticModel>::advance(const Points<double>& step) {
+    constexpr int max_halvings = 12;
+    const auto after = [&](double part) {
+        Points<double> x = here_.elastic.x + part * step;
+        for (Index v = 0; v < x.cols(); ++v) {
+            if (part == 1 && !is_free(v)) x.col(v) = goals_.targets.col(v);
+        }
+        return state_at(x);
+    };
+    const auto merit = [&](const State& state) { return residual(state) + stiffness_ * state.overlap; };
+    double part = collision_free_step(triangles_, here_.elastic.x, step, goals_.tools);
+    State there = after(part);
+    if (is_in_place()) {
+        double multipliers = 0;
+        for (const auto& point : here_.contacts) multipliers += point.multiplier;
+        penalty_ = (std::max)(penalty_, 2 * multipliers);
+        const double slope = -applied(here_).cwiseProduct(step).sum() - penalty_ * here_.overlap;
+        const auto helps = [&] {
+            const double work = goals_.loads.cwiseProduct(there.elastic.x - here_.elastic.x).sum();
+            const double energy = elasticity_.energy_change(here_.elastic, there.elastic) - work;
+            const double noise = 1e-13 * (here_.elastic.energy + there.elastic.energy);
+            const double change = energy + penalty_ * (there.overlap - here_.overlap);
+            return change <= 1e-4 * part * slope + noise || merit(there) <= merit(here_) / 2;
+        };
+        for (int i = 0; i < max_halvings && !helps(); ++i) {
+            part /= 2;
+            there = after(part);
+        }
+    }
+    here_ = std::move(there);
+}
+
+// Springs, foundation and loads.
+template <class ElasticModel>
+Points<double> EquilibriumSolver<ElasticModel>::applied(const State& state) const {
+    return state.elastic.springs + state.elastic.foundation + goals_.loads;
+}
+
+// The same and what holds and presses, of fixed vertices as well.
+template <class ElasticModel>
+Points<double> EquilibriumSolver<ElasticModel>::unbalanced(const State& state) const {
+    Points<double> forces = applied(state);
+    for (const auto& point : state.contacts) {
+        for (std::size_t k = 0; k < 3; ++k) forces.col(point.corners[k]) += point.multiplier * point.gradient(k);
+    }
+    for (std::size_t i = 0; i < holding_.size(); ++i) {
+        const auto& held = scene_.point_attachments()[i];
+        for (std::size_t k = 0; k < 3; ++k) {
+            forces.col(held.corners[k]) += held.weight(k) * holding_[i];
+        }
+    }
+    return forces;
+}
+
+template <class ElasticModel>
+double EquilibriumSolver<ElasticModel>::residual(const State& state) const {
+    const Points<double> forces = unbalanced(state);
+    double largest = 0;
+    for (Index v = 0; v < forces.cols(); ++v) {
+        if (is_free(v)) largest = (std::max)(largest, norm(point(forces, v)));
+    }
+    return largest;
+}
+
+template <class ElasticModel>
+std::vector<Vector3<double>> EquilibriumSolver<ElasticModel>::reactions(std::size_t count) const {
+    std::vector<Vector3<double>> sums(count, Vector3<double>::Zero());
+    const Points<double> forces = unbalanced(here_);
+    for (const auto& [constraint, v] : scene_.holds()) sums[constraint] += forces.col(v);
+    for (const auto& place : scene_.loaded_places()) sums[place.constraint] -= place.force;
+    for (std::size_t i = 0; i < holding_.size(); ++i) sums[scene_.point_attachments()[i].constraint] -= holding_[i];
+    for (const auto& point : here_.contacts)
+        sums[scene_.tools()[point.tool].constraint] += point.multiplier * point.normal;
+    return sums;
+}
+
+template <class ElasticModel>
+bool EquilibriumSolver<ElasticModel>::can_move(const std::array<Index, 3>& corners,
+                                               const Vector3<double>& weights) const noexcept {
+    for (std::size_t k = 0; k < 3; ++k) {
+        if (weights[static_cast<Eigen::Index>(k)] > 0 && is_free(corners[k])) return true;
+    }
+    return false;
+}
+
+template <class ElasticModel>
+Vector3<double> EquilibriumSolver<ElasticModel>::off_target(std::size_t i) const noexcept {
+    return scene_.point_attachments()[i].point_to_body(here_.elastic.x) - goals_.places[i];
+}
+
+}  // namespace membrane

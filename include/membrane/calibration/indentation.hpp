@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numeric>
+#include <span>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <membrane/accuracy/equilibrium.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+
+/// A membrane under an indenter: the force at each depth, for constants of one's own; what `fit` takes for a model.
+///
+///     const auto build = [&](std::span<const double> c) {
+///         return std::pair(membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = c[0]}),
+///                          membrane::VirtualVolumeSprings(mesh, {.stiffness = c[1]}));
+///     };
+///     const membrane::Tool<double> tip{.position = {0, 0, 0.015}, .radius = 1e-3};
+///     const auto model = membrane::Indentation(mesh, tip, {0, 0, -1}, build);
+///     const auto found = membrane::fit(table, {40.0, 8.0}, model);
+namespace membrane {
+
+/// Makes network and foundation of some constants, a std::pair of them.
+template <class Build>
+concept MembraneBuilder = requires(const Build& build, std::span<const double> constants) {
+    build(constants).first.springs();
+    build(constants).second;
+};
+
+/// A tool that is pressed into a membrane along a line, as deep as a table says, and no faster than it comes to rest.
+template <Real Scalar, MembraneBuilder Build>
+class Indentation {
+  public:
+    /// `tool` stands outside and moves along `displacement`, of any length. Depth is how far it is beyond where it first touches
+    /// the surface at rest [m]. `mesh` must outlive this.
+    /// @throws InvalidInput for a tool that is not valid, has no radius, does not stand outside or does not meet the
+    /// surface, and for a way without a direction. Cost: O(F) some ten times.
+    Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool,
+                const std::type_identity_t<Vector3<Scalar>>& displacement, Build build);
+
+    /// Force of the membrane on the tool at each depth, against its way [N]; none (NaN) from the first depth on where it
+    /// was found not to rest. Depths in any order: each is reached from the one above it.
+    /// @throws InvalidInput for a depth that is not finite, for what `equilibrium` refuses; what `build` throws
+    /// Cost: an `equilibrium` for each depth.
+    [[nodiscard]] std::vector<double> operator()(std::span<const double> constants,
+                                                 std::span<const double> depths) const;
+
+    /// The tool where it first touches.
+    [[nodiscard]] const Tool<Scalar>& touching() const noexcept { return tool_; }
+
+  private:
+    const TriangleMesh<Scalar>* mesh_;
+    Tool<Scalar> tool_;
+    Vector3<Scalar> displacement_;  // a unit vector
+    Build build_;
+    AabbTree<Scalar> tree_;
+    ContactTracker<Scalar> tracker_;
+};
+
+namespace detail {
+
+inline constexpr std::string_view indentation_name = "Indentation";
+
+/// How far `tool` can move along `displacement`, a unit vector, until it touches: as far as it is away can do no harm, again and
+/// again. Infinite where it passes by.
+[[nodiscard]] inline double distance_to_touch(Tool<double> tool, const Vector3<double>& displacement,
+                                              const Triangles& triangles, const Points<double>& x) {
+    const double far = norm<double>(tool.position - x.col(0)) + norm(tool.axis) +
+                       2 * norm<double>(x.rowwise().maxCoeff() - x.rowwise().minCoeff());
+    const double negligible = 1e-12 * far;
+    double sum = 0;
+    for (int turn = 0; sum <= far && turn < 10000; ++turn) {
+        double gap = std::numeric_limits<double>::infinity();
+        for (const auto& corners : triangles.colwise()) {
+            gap = (std::min)(gap, distance_from_axis(triangle_at(x, corners), tool) - tool.radius);
+        }
+        if (gap <= negligible) return sum;
+        sum += gap;
+        tool.position += gap * displacement;
+    }
+    return std::numeric_limits<double>::infinity();
+}
+
+}  // namespace detail
+
+template <Real Scalar, MembraneBuilder Build>
+Indentation<Scalar, Build>::Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool,
+                                        const std::type_identity_t<Vector3<Scalar>>& displacement, Build build)
+    : mesh_(&mesh), tool_(tool), displacement_(displacement), build_(std::move(build)), tree_(mesh), tracker_(mesh) {
+    constexpr auto name = detail::indentation_name;
+    if (!is_valid(tool) || !(tool.radius > 0)) {
+        refuse(name, "the tool must be finite and have a radius [m], got one that is not or has none");
+    }
+    if (!is_finite(displacement) || !(norm(displacement) > 0))
+        refuse(name, "the way must be finite and have a direction, got none");
+    displacement_ /= norm(displacement);
+    Tool<double> moving;
+    moving.position = tool.position.template cast<double>();
+    moving.axis = tool.axis.template cast<double>();
+    moving.radius = tool.radius;
+    const double along = detail::distance_to_touch(moving, displacement_.template cast<double>(), mesh.triangles(),
+                                                   mesh.positions().template cast<double>());
+    if (!(along > 0)) refuse(name, "the tool must stand outside the surface, got one that touches it");
+    if (!is_finite(along)) refuse(name, "the tool must meet the surface on its way, got one that passes by");
+    tool_.position += static_cast<Scalar>(along) * displacement_;
+}
+
+template <Real Scalar, MembraneBuilder Build>
+std::vector<double> Indentation<Scalar, Build>::operator()(std::span<const double> constants,
+                                                           std::span<const double> depths) const {
+    for (std::size_t i = 0; i < depths.size(); ++i) {
+        if (is_finite(depths[i])) continue;
+        refuse(detail::indentation_name, "depth ", i, " must be finite [m], got ", depths[i]);
+    }
+    const auto [network, foundation] = build_(constants);
+    auto tree = tree_;
+    auto tracker = tracker_;
+    Points<Scalar> x = mesh_->positions();
+    std::vector<std::size_t> ascending(depths.size());
+    std::iota(ascending.begin(), ascending.end(), std::size_t{0});
+    std::sort(ascending.begin(), ascending.end(), [&](auto i, auto j) { return depths[i] < depths[j]; });
+    std::vector<double> forces(depths.size(), std::numeric_limits<double>::quiet_NaN());
+    for (const std::size_t i : ascending) {
+        auto tool = tool_;
+        tool.position += static_cast<Scalar>(depths[i]) * displacement_;
+        tree.refit(x);
+        const auto contact = tracker.update(tree, x, tool);
+        const auto rest = equilibrium(x, *mesh_, network, foundation, {}, press(tool, contact));
+        if (!rest.converged) break;
+        forces[i] = -dot<double>(rest.reactions[0], displacement_.template cast<double>());
+        x = rest.x.template cast<Scalar>();
+    }
+    return forces;
+}
+
+}  // namespace membrane

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <limits>
+#include <span>
+#include <utility>
+
+#include <membrane/contact/wide_bvh.hpp>
+#include <membrane/surface/box.hpp>
+#include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+
+/// Finds the triangles near a point, a segment, a sphere, a box or a capsule, on a surface that deforms.
+///
+///     auto tree = membrane::AabbTree(mesh);
+///     const auto nearest = tree.closest_point(x, tool.position);
+///     tree.refit(x, report.moved);
+namespace membrane {
+
+/// The point of the surface nearest to another.
+template <Real Scalar>
+struct SurfacePoint {
+    Index triangle;               ///< `no_index`: nothing found.
+    Vector3<Scalar> barycentric;  ///< Exactly zero for the corners that have no part in it.
+    Vector3<Scalar> point;        ///< [m]
+    Scalar squared_distance;      ///< [m^2]
+    Index nodes_visited;
+};
+
+/// Where a segment first meets the surface.
+template <Real Scalar>
+struct SurfaceHit {
+    Index triangle;  ///< `no_index`: nothing met.
+    Scalar along;    ///< 0 at the segment's start, 1 at its end.
+    Vector3<Scalar> barycentric;
+    Index nodes_visited;
+};
+
+inline namespace MEMBRANE_INSTRUCTION_SET {
+
+/// A tree of boxes over the triangles of a mesh [Bergen97], and what is asked of it.
+///
+/// The tree owns what it needs of the mesh; positions are handed in. The splits stay as they were at the start, the
+/// boxes follow by `refit`. Queries may run in several threads at once, none beside a refit.
+///
+/// A query with a number that is not finite, a negative radius or a box inside out finds nothing, at no box. A triangle
+/// with a corner that is not finite may not be found; the others are as ever (but under `-ffast-math` those in the same
+/// boxes are not). Nor is what is so far away that the square of the distance overflows.
+template <Real Scalar>
+class AabbTree {
+  public:
+    /// O(F log F) for usual shapes.
+    /// @throws InvalidInput if `balance_threshold` is below 1
+    explicit AabbTree(const TriangleMesh<Scalar>& mesh, const TreeOptions& options = {}) : boxes_(mesh, options) {}
+
+    /// Fits all boxes to the positions `x`, 3 x V [m]. O(F), no allocation.
+    /// @pre `x` has as many points as the mesh (asserted)
+    void refit(const ConstPointsRef<Scalar>& x) noexcept { boxes_.refit(x); }
+
+    /// Fits the boxes around the vertices `moved`, each once, in any order, repeated or not: to the bit what a refit of
+    /// all gives if only these have moved since the last one. O(moved * depth) and a bit for each node, no
+    /// allocation.
+    /// @pre `x` has as many points as the mesh and `moved` names some of them (asserted)
+    void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept { boxes_.refit(x, moved); }
+
+    // All queries take the positions that the tree was last fitted to. They do not allocate, and visit as many boxes as
+    // they report: of the order of log F for what is near the surface and small, all at worst.
+
+    /// The point of the surface nearest to `q`. Of points equally near, one; always the same.
+    [[nodiscard]] SurfacePoint<Scalar> closest_point(const ConstPointsRef<Scalar>& x,
+                                                     const Vector3<Scalar>& q) const noexcept;
+
+    /// Where the segment first meets the surface, from either side; the lowest triangle if it meets several at once.
+    [[nodiscard]] SurfaceHit<Scalar> first_hit(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& from,
+                                               const Vector3<Scalar>& to) const noexcept;
+
+    /// Calls `visit(Index f)` once for each triangle that has a point in common with the sphere, the box between two
+    /// corners, or the capsule around the segment from `p` to `q`; always in the same order. `visit` must not throw.
+    /// Returns the boxes visited.
+    template <class Visit>
+    Index overlap_sphere(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& centre, Scalar radius,
+                         Visit&& visit) const noexcept;
+    template <class Visit>
+    Index overlap_box(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& low, const Vector3<Scalar>& high,
+                      Visit&& visit) const noexcept;
+    template <class Visit>
+    Index overlap_capsule(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& p, const Vector3<Scalar>& q,
+                          Scalar radius, Visit&& visit) const noexcept;
+
+    [[nodiscard]] const TreeStatistics& statistics() const noexcept { return boxes_.statistics(); }
+
+    /// Around all triangles below a node of `tree_shape`; of node 0, around the surface.
+    /// @pre 0 <= `node` < `statistics().nodes` (asserted)
+    [[nodiscard]] Box<Scalar> box(Index node) const noexcept { return boxes_.box(node); }
+
+  private:
+    WideBvh<Scalar> boxes_;
+};
+
+}  // namespace MEMBRANE_INSTRUCTION_SET
+
+namespace detail {
+
+/// How far along the segment a box may be met; of triangles, 0 where they may be.
+template <Real Scalar>
+struct SegmentKey {
+    const CapsuleQuery<Scalar>& probe;
+    const Vector3<Scalar>&from, &to;
+
+    template <Number N>
+    [[nodiscard]] N operator()(const Box<N>& box) const noexcept {
+        return probe.entry(box);
+    }
+    template <Number N>
+    [[nodiscard]] N operator()(const Triangle<N>& triangles) const noexcept {
+        const Crossing<N> crossing(triangles, from, to);
+        return select<N>(crossing.clear, select<N>(crossing.met, 0, probe.never), 0);
+    }
+};
+
+}  // namespace detail
+
+template <Real Scalar>
+SurfacePoint<Scalar> AabbTree<Scalar>::closest_point(const ConstPointsRef<Scalar>& x,
+                                                     const Vector3<Scalar>& q) const noexcept {
+    using Limits = std::numeric_limits<Scalar>;
+    SurfacePoint<Scalar> best{no_index, {0, 0, 0}, {0, 0, 0}, (Limits::max)(), 0};
+    if (!is_finite(q)) return best;
+    const auto distance_to = [&]<Number N>(const Box<N>& box) { return squared_distance(box, q); };
+    best.nodes_visited =
+        boxes_.search(x, distance_to, best.squared_distance, [&](Index f, const Triangle<Scalar>& triangle) {
+            const auto found = membrane::closest_point(triangle, q);
+            if (!(found.squared_distance < best.squared_distance)) return;
+            best = {f, found.barycentric, found.point, found.squared_distance, 0};
+        });
+    return best;
+}
+
+template <Real Scalar>
+SurfaceHit<Scalar> AabbTree<Scalar>::first_hit(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& from,
+                                               const Vector3<Scalar>& to) const noexcept {
+    constexpr Scalar epsilon = std::numeric_limits<Scalar>::epsilon();
+    SurfaceHit<Scalar> best{no_index, 1, {0, 0, 0}, 0};
+    if (!is_finite(from) || !is_finite(to)) return best;
+    const CapsuleQuery<Scalar> probe(from, to, 0, boxes_.surface());
+    Scalar limit = 1 + epsilon;
+    const auto examine = [&](Index f, const Triangle<Scalar>& triangle) {
+        const auto hit = membrane::first_hit(triangle, from, to);
+        if (!hit) return;
+        const bool tie = hit->along == best.along && (best.triangle == no_index || f < best.triangle);
+        if (!(hit->along < best.along || tie)) return;
+        best = {f, hit->along, hit->barycentric, 0};
+        limit = best.along + epsilon;
+    };
+    best.nodes_visited = boxes_.search(x, detail::SegmentKey<Scalar>{probe, from, to}, limit, examine);
+    return best;
+}
+
+template <Real Scalar>
+template <class Visit>
+Index AabbTree<Scalar>::overlap_sphere(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& centre, Scalar radius,
+                                       Visit&& visit) const noexcept {
+    using Limits = std::numeric_limits<Scalar>;
+    if (!is_finite(centre) || !is_finite(radius) || !(radius >= 0)) return 0;
+    const Scalar limit = radius * radius;
+    const Scalar beyond = limit * (1 + 16 * Limits::epsilon()) + (Limits::min)();
+    return boxes_.search(
+        x, [&]<Number N>(const Box<N>& box) { return squared_distance(box, centre); }, beyond,
+        [&](Index f, const Triangle<Scalar>& triangle) {
+            if (membrane::closest_point(triangle, centre).squared_distance <= limit) visit(f);
+        });
+}
+
+template <Real Scalar>
+template <class Visit>
+Index AabbTree<Scalar>::overlap_box(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& low,
+                                    const Vector3<Scalar>& high, Visit&& visit) const noexcept {
+    if (!is_finite(low) || !is_finite(high) || !at_most(low, high)) return 0;
+    const Box<Scalar> asked{low, high};
+    return boxes_.search(
+        x, [&]<Number N>(const Box<N>& box) { return select<N>(overlap(box, asked), 0, 1); }, Scalar(1),
+        [&](Index f, const Triangle<Scalar>& triangle) {
+            if (touches_box(triangle, low, high)) visit(f);
+        });
+}
+
+template <Real Scalar>
+template <class Visit>
+Index AabbTree<Scalar>::overlap_capsule(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& p,
+                                        const Vector3<Scalar>& q, Scalar radius, Visit&& visit) const noexcept {
+    if (!is_finite(p) || !is_finite(q) || !is_finite(radius) || !(radius >= 0)) return 0;
+    const CapsuleQuery<Scalar> probe(p, q, radius, boxes_.surface());
+    return boxes_.search(
+        x, [&]<Number N>(const Box<N>& box) { return probe.entry(box); }, probe.never,
+        [&](Index f, const Triangle<Scalar>& triangle) {
+            const auto nearest = closest_to_segment(triangle, p, q);
+            if (nearest.on_triangle.squared_distance <= radius * radius) visit(f);
+        });
+}
+
+}  // namespace membrane

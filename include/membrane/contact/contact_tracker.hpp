@@ -1,0 +1,641 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_geometry.hpp>
+#include <membrane/contact/local_surface.hpp>
+#include <membrane/contact/tool.hpp>
+#include <membrane/contact/winding_number.hpp>
+#include <membrane/core/fixed_vector.hpp>
+#include <membrane/core/index_set.hpp>
+#include <membrane/core/lanes.hpp>
+
+/// Does the tool touch, where, how deep, and since when?
+///
+///     auto tree    = membrane::AabbTree(mesh);
+///     auto tracker = membrane::ContactTracker(mesh);
+///     const auto contact = tracker.update(tree, x, tool);                    // once a tick, before the solver's step
+namespace membrane {
+
+template <Real Scalar>
+class MovingBody;  // of moving_body.hpp
+
+struct TrackerOptions {
+    double margin = 0.01;  ///< what is this near counts as touched, and a point as a sphere of this radius [mean edges]
+    Index full_query_interval =
+        128;  ///< ticks in contact after which the tree is asked whether something else is touched too
+    Index max_contact_points = 16384;  ///< room for contact points; it decides the memory, not the time
+};
+
+/// Finds the contact with the tree while there is none, and follows it over the neighbours of the triangles touched
+/// before, [Liu07] 2.3: in contact the cost depends on what the tool touches and not on the size of the mesh.
+///
+/// Beyond the paper: the neighbours are flooded over every triangle within the tool's reach. A tool whose reference point
+/// (or, for a capsule, its other end) went through the surface since the last tick touches it where it went through,
+/// however far it has come: the tree is asked about its way in every tick. A second fold of the surface that comes near a
+/// tool in contact is found after `full_query_interval` ticks at the latest.
+///
+/// The tool stays on the outer side of a closed surface: behind it is where the winding number is not 0. On an open one it
+/// stays on the side of first contact until it is clear of the surface, or has slid off a border that gave way; of a shaft
+/// that slides off parts are on either side, and until it is clear it has gone through only where an end did. A tool that
+/// is outside the surface as it would be without it touches nothing that it would pull farther out. The depth is measured
+/// against the surface as it would be without the tool: the mesh, or the anchors of a body that moves.
+template <Real Scalar>
+class ContactTracker {
+  public:
+    /// @throws InvalidInput for options out of range. Cost: O(V + F log F).
+    explicit ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options = {});
+
+    /// The contact of `tool` with the surface at `x` (3 x V [m]). A tool that is not valid touches nothing and
+    /// changes nothing. Online. Cost: O(log F), and in contact the triangles within the tool's reach and their neighbours.
+    [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                         const Tool<Scalar>& tool) noexcept {
+        return track(tree, x, tool, origins_);
+    }
+
+    /// The same on a body that moves: what is remembered of tool and contact goes along with it.
+    [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                         const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
+
+    /// How often the tree has been asked for what the tool touches during contact, since the beginning.
+    [[nodiscard]] Index full_query_count() const noexcept { return tree_checks_; }
+
+    /// Forgets contact and tool: from here on it does what a new one does, to the bit.
+    void reset() noexcept;
+
+  private:
+    // What is handed in for one update.
+    struct Scene {
+        const AabbTree<Scalar>& tree;
+        const ConstPointsRef<Scalar>& x;
+        const Tool<Scalar>& tool;
+        const ConstPointsRef<Scalar>& anchors;
+        Scalar radius;  // of the tool, a point's included
+        Scalar travel;  // of the tool since the last tick, at most [m]
+        Scalar reach;   // from the tool's axis to what may touch it in this tick [m]
+    };
+
+    void go_along(const RigidFrame<Scalar>& pose) noexcept;
+    [[nodiscard]] Contact<Scalar> track(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                        const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) noexcept;
+    [[nodiscard]] Scene scene_of(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                 const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) const noexcept;
+    [[nodiscard]] Scalar expected_side() const noexcept {
+        return side_ != 0 ? side_ : last_.touching() ? last_.side : Scalar(1);
+    }
+    // Of an open surface either side may be the one that the tool comes from.
+    [[nodiscard]] bool is_first_seen() const noexcept { return !surface_.closed() && !last_.touching() && side_ == 0; }
+    [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
+    bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool contacts(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    bool crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept;
+    void describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept;
+    void describe_shaft(const Scene& scene, Index f, Scalar side, Contact<Scalar>& contact) const noexcept;
+    static void turn(const Scene& scene, Contact<Scalar>& contact) noexcept {
+        contact.gap = -contact.gap - 2 * scene.radius;
+        contact.normal = -contact.normal;
+    }
+    [[nodiscard]] bool was_behind(const Scene& scene, Index f, Scalar side, const Vector3<Scalar>& q) const noexcept;
+    [[nodiscard]] std::optional<Vector3<Scalar>> middle_inside(const Scene& scene, Index f, Scalar side) const noexcept;
+    [[nodiscard]] bool has_passed(const Scene& scene, Index near, Scalar side, const Vector3<Scalar>& q) const noexcept;
+    void gather_from_tree(const Scene& scene) noexcept;
+    void flood(const Scene& scene) noexcept;
+    void examine(const Scene& scene, std::span<const Index> some) noexcept;
+    void watch_rings(int rings) noexcept;
+    void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    void find_points(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    template <class List>
+    void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> touched,
+                               const List& list) const noexcept;
+    void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
+    [[nodiscard]] bool leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
+    void settle_side(const Scene& scene, const Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] bool is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
+
+    // What a tool has gone through springs back, and may fold over it: for some ticks it is looked at from farther off.
+    static constexpr int rings_watched = 2, rings_after_crossing = 6, ticks_after_crossing = 16;
+    static constexpr Scalar negligible_part = Scalar(1e-6);  // part of the tool's way in a tick
+
+    Points<Scalar> origins_;
+    LocalSurface<Scalar> surface_;
+    Scalar margin_;  // [m]
+    Index check_every_;
+
+    IndexSet near_, near_before_;  // the local model: triangles within reach of the tool
+    Index nearest_ = no_index;     // of those
+    Scalar nearest_square_ = 0;
+    IndexSet candidates_;  // for those, in the order in which they are examined
+    IndexSet watched_;     // those near and the ones around them
+    IndexSet expanded_;    // vertices whose triangles are all watched
+    FixedVector<ContactTriangle> listed_;
+    FixedVector<ContactPoint<Scalar>> points_;
+    Contact<Scalar> last_;
+    std::optional<Tool<Scalar>> last_tool_;
+    RigidFrame<Scalar> pose_;  // of the body then
+    Scalar side_ = 0;          // that the tool is known to be on; 0: not yet
+    bool slid_off_ = false;    // a shaft, off a border that gave way: from then on parts of it may be on either side
+    // Where on the surface without the tool its two ends and its contact point are nearest to.
+    std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
+    Index ticks_ = 0, tree_checks_ = 0;
+    int lively_ticks_ = 0;
+};
+
+template <Real Scalar>
+ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options)
+    : origins_(mesh.positions()),
+      surface_(mesh),
+      margin_(static_cast<Scalar>(options.margin) * surface_.mean_edge()),
+      check_every_(options.full_query_interval),
+      near_(mesh.triangle_count()),
+      near_before_(near_),
+      candidates_(near_),
+      watched_(near_),
+      expanded_(mesh.vertex_count()),
+      listed_(static_cast<std::size_t>(mesh.triangle_count())),
+      points_(static_cast<std::size_t>(std::clamp(options.max_contact_points, Index(0), 5 * mesh.triangle_count()))) {
+    if (!is_finite(options.margin) || !(options.margin > 0 && options.margin <= 1)) {
+        refuse("ContactTracker", "margin must be above 0 and at most 1 [mean edges], got ", options.margin);
+    }
+    if (options.full_query_interval < 1)
+        refuse("ContactTracker", "full_query_interval must be at least 1, got ", options.full_query_interval);
+    if (options.max_contact_points < 1)
+        refuse("ContactTracker", "max_contact_points must be at least 1, got ", options.max_contact_points);
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::reset() noexcept {
+    near_.clear();
+    last_ = {};
+    last_tool_.reset();
+    pose_ = {};
+    side_ = 0;
+    slid_off_ = false;
+    origin_triangles_.fill(no_index);
+    ticks_ = 0;
+    lively_ticks_ = 0;
+}
+
+template <Real Scalar>
+Contact<Scalar> ContactTracker<Scalar>::update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                               const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept {
+    go_along(body.pose());
+    auto contact = track(tree, x, tool, body.anchors());
+    if (contact.touching()) {
+        contact.body_velocity = body.velocity_at(tool.position, contact.corners, contact.barycentric);
+    }
+    return contact;
+}
+
+// The body is at `pose` now, and what was seen in the last tick is on it.
+template <Real Scalar>
+void ContactTracker<Scalar>::go_along(const RigidFrame<Scalar>& pose) noexcept {
+    if (pose.same_pose(pose_)) return;
+    const auto motion = motion_between(pose_, pose);
+    pose_ = pose;
+    if (last_tool_) {
+        last_tool_->position = motion.point_to_world(last_tool_->position);
+        last_tool_->axis = motion.vector_to_world(last_tool_->axis);
+    }
+    for (auto* place : {&last_.point, &last_.axis_point, &last_.previous_axis_point})
+        *place = motion.point_to_world(*place);
+    last_.normal = motion.vector_to_world(last_.normal);
+}
+
+template <Real Scalar>
+Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                              const Tool<Scalar>& tool,
+                                              const ConstPointsRef<Scalar>& anchors) noexcept {
+    MEMBRANE_ASSERT(x.cols() == origins_.cols() && anchors.cols() == origins_.cols());
+    if (!is_valid(tool)) return Contact<Scalar>::none();
+    const Scene scene = scene_of(tree, x, tool, anchors);
+    const bool before = last_.touching();
+    Contact<Scalar> contact;
+    const bool followed = before && scene.travel <= surface_.mean_edge() && follow(scene, contact);
+    if (before && !followed) ++tree_checks_;
+    if ((followed || find(scene, contact)) && contacts(scene, contact)) {
+        complete(scene, contact);
+        contact.phase = before ? ContactPhase::ongoing : ContactPhase::began;
+        settle_side(scene, contact);
+        slid_off_ = slid_off_ || (feature_pairs(tool) > 1 && leaves_border(scene, contact));
+    } else {
+        if ((side_ != 0 || slid_off_) && !tool.grasping) {
+            const bool clear = is_clear(scene);
+            slid_off_ = slid_off_ && !clear;
+            if (clear || leaves_border(scene, contact)) side_ = 0;
+        }
+        near_.clear();
+        origin_triangles_.fill(no_index);
+        contact = {};
+        contact.phase = before ? ContactPhase::ended : ContactPhase::none;
+    }
+    last_tool_ = tool;
+    last_ = contact;
+    last_.triangles = last_.candidates = {};
+    return contact;
+}
+
+template <Real Scalar>
+auto ContactTracker<Scalar>::scene_of(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
+                                      const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) const noexcept
+    -> Scene {
+    const Tool<Scalar>& last = last_tool_ ? *last_tool_ : tool;
+    const Vector3<Scalar> displacement = tool.position - last.position;
+    const Scalar travel = (std::max)(norm(displacement), norm<Scalar>(displacement + tool.axis - last.axis));
+    // What the tool has withdrawn from comes after it.
+    const Scalar behind = (std::max)(last_.gap, Scalar(0));
+    const Scalar radius = (std::max)(tool.radius, margin_);
+    return {
+        tree, x, tool, anchors, radius, travel, radius + margin_ + (std::min)(travel + behind, surface_.mean_edge())};
+}
+
+// In contact: the triangles touched before and their neighbours know; false if the tool has left them all.
+template <Real Scalar>
+bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    std::swap(near_, near_before_);
+    near_.clear();
+    candidates_.clear();
+    for (const Index f : near_before_.items()) candidates_.insert(f);
+    if (++ticks_ % check_every_ == 0 || lively_ticks_ > 0) {
+        ++tree_checks_;
+        gather_from_tree(scene);
+    }
+    flood(scene);
+    if (near_.empty()) return false;
+
+    contact.side = expected_side();
+    if (!crossing(scene, contact)) describe(scene, nearest_, contact);
+    return true;
+}
+
+// No contact, or none that could be followed: the tree knows; false if there is nothing to be near to.
+template <Real Scalar>
+bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    contact = {};
+    near_.clear();
+    candidates_.clear();
+    gather_from_tree(scene);
+    flood(scene);
+    if (!crossing(scene, contact)) {
+        const Index f = near_.empty() ? scene.tree.closest_point(scene.x, scene.tool.position).triangle : nearest_;
+        if (f == no_index) return false;
+        contact.side = expected_side();
+        describe(scene, f, contact);
+    }
+    return true;
+}
+
+// A tool that overlaps touches; one that touched before goes on until the membrane has come back all the way.
+template <Real Scalar>
+bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    if (!last_.touching() && contact.gap > 0) return false;
+    if (contact.gap > 0 && (slid_off_ || is_below_border(scene, contact))) return false;
+    measure_depth(scene, contact);
+    if (is_hooked(scene, contact)) return false;
+    if (!last_.touching()) return true;
+    const Scalar slack = margin_ / 1000;
+    return contact.gap <= slack || (contact.depth > 0 && contact.gap <= contact.depth + scene.travel);
+}
+
+// Whether the way of an end of the tool since the last tick leads through the surface.
+template <Real Scalar>
+bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept {
+    if (!last_tool_) return false;
+    const Scalar side = expected_side();
+    const auto through = [&](const Vector3<Scalar>& from, const Vector3<Scalar>& now) {
+        const auto hit = scene.tree.first_hit(scene.x, from, now);
+        if (hit.triangle == no_index) return false;
+        auto passed = contact_where_passed(surface_, scene.x, hit.triangle, hit.barycentric, from, now, side);
+        if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it has only come to it
+        if (passed.gap > 0) {
+            if (hit.along < negligible_part) return false;  // it leaves what it rests on
+            if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from))
+                return false;                // or comes out
+            passed.normal = -passed.normal;  // of a crease, or an open surface from its other side
+            passed.gap = -passed.gap;
+            if (is_first_seen() && was_behind(scene, hit.triangle, side, from)) passed.side = -side;
+        }
+        contact = passed;
+        contact.gap -= scene.radius;
+        return true;
+    };
+    return through(last_tool_->position, scene.tool.position) ||
+           (feature_pairs(scene.tool) > 1 &&
+            through(last_tool_->position + last_tool_->axis, scene.tool.position + scene.tool.axis));
+}
+
+// What looks as if the tool were behind is a crease, or the tool has passed the surface.
+template <Real Scalar>
+void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept {
+    const auto seen_from = [&](Scalar side) {
+        contact = contact_in(surface_, scene.x, f, scene.tool, scene.radius, side);
+        return contact.gap < -scene.radius - detail::rounding_at(contact.axis_point);  // not on the surface itself
+    };
+    const Scalar side = contact.side;
+    bool behind = seen_from(side);
+    // A shaft beside a border may reach to both sides: the middle tells, where it was before it touched.
+    const Tool<Scalar>& before = last_tool_ ? *last_tool_ : scene.tool;
+    const Vector3<Scalar> middle = before.position + before.axis / 2;
+    if (behind && is_first_seen() && was_behind(scene, f, side, middle)) behind = seen_from(-1);
+    // A tool that is apart from the surface has not come through: a way of its ends that did is known by now.
+    if (is_first_seen() && contact.gap < -2 * scene.radius) return turn(scene, contact);
+    if (side_ != 0 && contact.side != side_) {  // beside a border
+        contact.side = side_;
+        behind = !leaves_border(scene, contact);
+        if (behind) turn(scene, contact);
+    }
+    const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1 &&  // stuck through, perhaps
+                                     (surface_.closed() || !last_tool_) &&
+                                     !surface_.on_border(contact.triangle, contact.barycentric);
+    contact.tunnelled = behind && !slid_off_ &&
+                        (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.axis_point));
+    if (behind && !contact.tunnelled) turn(scene, contact);
+    if (!contact.tunnelled && feature_pairs(scene.tool) > 1 && !slid_off_ && !leaves_border(scene, contact)) {
+        describe_shaft(scene, f, side, contact);
+    }
+    contact.previous_axis_point = (contact.tunnelled ? contact.point : contact.axis_point) + margin_ * contact.normal;
+}
+
+// Whether `q` is on the other side of the surface as that would be without the tool.
+template <Real Scalar>
+bool ContactTracker<Scalar>::was_behind(const Scene& scene, Index f, Scalar side,
+                                        const Vector3<Scalar>& q) const noexcept {
+    return side * surface_.height(scene.anchors, surface_.walk_to_closest(scene.anchors, f, q), q) < 0;
+}
+
+// Of a shaft what is nearest may be outside, and another point behind: the middle of what is inside, or an end, if the
+// shaft lies across a border.
+template <Real Scalar>
+void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar side,
+                                            Contact<Scalar>& contact) const noexcept {
+    const auto take_if_behind = [&](const Vector3<Scalar>& q) {
+        if (contact.tunnelled || !has_passed(scene, f, side, q)) return;
+        const Index g = surface_.walk_to_closest(scene.x, f, q);
+        auto there = contact_in(surface_, scene.x, g, Tool<Scalar>{.position = q}, scene.radius, side);
+        const bool seen_behind = there.side == side && there.gap < -scene.radius;
+        there.side = side;
+        if (leaves_border(scene, there)) return;
+        if (!seen_behind) turn(scene, there);
+        there.tunnelled = true;
+        contact = there;
+    };
+    if (const auto middle = middle_inside(scene, f, side)) take_if_behind(*middle);
+    if (side_ == 0 || surface_.closed()) return;
+    // A shaft that has one end behind has gone through the surface, or round its border.
+    const Vector3<Scalar> end = scene.tool.position + scene.tool.axis;
+    if (scene.tree.first_hit(scene.x, scene.tool.position, end).triangle == no_index) return;
+    take_if_behind(scene.tool.position);
+    take_if_behind(scene.tool.position + scene.tool.axis);
+}
+
+// Of a shaft that goes through `f` and comes out again farther along: halfway between. Both its ends may be outside, and
+// say nothing of how deep it is.
+template <Real Scalar>
+std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene& scene, Index f,
+                                                                     Scalar side) const noexcept {
+    const Tool<Scalar>& tool = scene.tool;
+    const auto hit_in = [&](const Triangle<Scalar>& triangle) {
+        return first_hit<Scalar>(triangle, tool.position, tool.position + tool.axis);
+    };
+    const auto climb = [&](const Triangle<Scalar>& triangle) { return side * dot(area_vector(triangle), tool.axis); };
+    const auto triangle = surface_.triangle(scene.x, f);
+    const auto here = hit_in(triangle);
+    if (!here) return std::nullopt;
+    const Scalar inward = climb(triangle) < 0 ? Scalar(1) : Scalar(-1);  // along the axis
+    Scalar inside = 2;                                                   // part of it
+    for (const Index g : near_.items()) {
+        const auto other = surface_.triangle(scene.x, g);
+        if (!(inward * climb(other) > 0)) continue;
+        const auto there = hit_in(other);
+        const Scalar length = there ? inward * (there->along - here->along) : Scalar(0);
+        if (length > 0) inside = (std::min)(inside, length);
+    }
+    if (inside > 1) return std::nullopt;
+    return tool.position + (here->along + inward * inside / 2) * tool.axis;
+}
+
+// Whether `q` is behind the surface and not outside, in a crease. An open surface has no inside: there it is behind what
+// lies between it and where it would be outside, had the surface not moved.
+template <Real Scalar>
+bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar side,
+                                        const Vector3<Scalar>& q) const noexcept {
+    if (surface_.closed()) return winding_number(surface_, scene.tree, scene.x, q) != 0;
+    const Index f = surface_.walk_to_closest(scene.anchors, near, q);
+    const auto nearest = closest_point(surface_.triangle(scene.anchors, f), q);
+    const Vector3<Scalar> outward = side * surface_.outward(scene.anchors, f, nearest.barycentric);
+    const auto hit = scene.tree.first_hit(scene.x, q, q + 2 * reach(scene.tree.box(0), q) * outward);
+    if (hit.triangle == no_index) return false;
+    return side * dot<Scalar>(area_vector(surface_.triangle(scene.x, hit.triangle)), outward) > 0;
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::gather_from_tree(const Scene& scene) noexcept {
+    const auto& tool = scene.tool;
+    scene.tree.overlap_capsule(scene.x, tool.position, tool.position + tool.axis, scene.reach,
+                               [&](Index f) { candidates_.insert(f); });
+}
+
+// Takes the candidates that the tool reaches, and of their neighbours those that it reaches, and so on.
+template <Real Scalar>
+void ContactTracker<Scalar>::flood(const Scene& scene) noexcept {
+    constexpr auto at_a_time = static_cast<Index>(Lanes<Scalar>::count);
+    for (Index examined = 0, spread = 0;;) {
+        while (spread < near_.count() && candidates_.count() - examined < at_a_time) {
+            surface_.across_sides(near_.items()[static_cast<std::size_t>(spread++)],
+                                  [&](Index f) { candidates_.insert(f); });
+        }
+        const Index count = (std::min)(at_a_time, candidates_.count() - examined);
+        if (count == 0) return;
+        examine(scene,
+                candidates_.items().subspan(static_cast<std::size_t>(examined), static_cast<std::size_t>(count)));
+        examined += count;
+    }
+}
+
+// Takes those of `some` into the local model that the tool reaches; as many as there are lanes at most.
+template <Real Scalar>
+void ContactTracker<Scalar>::examine(const Scene& scene, std::span<const Index> some) noexcept {
+    std::array<Index, Lanes<Scalar>::count> triangles;
+    for (std::size_t i = 0; i < triangles.size(); ++i) triangles[i] = some[(std::min)(i, some.size() - 1)];
+    const auto squares = surface_.squared_distances(scene.x, triangles, scene.tool);
+    for (std::size_t i = 0; i < some.size(); ++i) {
+        const Scalar square = squares[i];
+        if (!(square <= scene.reach * scene.reach)) continue;
+        if (near_.empty() || square < nearest_square_) {
+            nearest_ = some[i];
+            nearest_square_ = square;
+        }
+        near_.insert(some[i]);
+    }
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    // What is not yet within reach, but may come to the tool as the membrane moves.
+    near_.insert(contact.triangle);
+    surface_.around_corners(contact.triangle, [&](Index f) { near_.insert(f); });
+    if (contact.tunnelled) {
+        scene.tree.overlap_capsule(scene.x, contact.previous_axis_point, contact.axis_point, Scalar(0),
+                                   [&](Index f) { near_.insert(f); });
+    }
+    lively_ticks_ = contact.tunnelled ? ticks_after_crossing : (std::max)(lively_ticks_ - 1, 0);
+    watch_rings(lively_ticks_ > 0 ? rings_after_crossing : rings_watched);
+    listed_.clear();
+    for (const Index f : watched_.items()) listed_.push({f, surface_.corners(f)});
+    contact.closed = surface_.closed();
+    contact.radius = scene.radius;
+    contact.detection_distance = scene.reach;
+    contact.candidates = listed_.items();
+    contact.triangles = contact.candidates.first(near_.items().size());
+    find_points(scene, contact);
+    contact.points = points_.items();
+}
+
+// The points within reach, of what the tool has crossed all: where the surface comes to is not known.
+template <Real Scalar>
+void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    points_.clear();
+    const auto list = [&](const ContactPoint<Scalar>& point) {
+        if (!contact.tunnelled && point.gap + scene.radius > scene.reach) return;
+        if (!points_.push(point)) contact.has_all_points = false;
+    };
+    const int features = feature_pairs(scene.tool);
+    if (features == 1) return find_points_of_sphere(scene, contact.triangles, list);
+    for (const auto& [f, corners] : contact.triangles) {
+        const auto triangle = triangle_at(scene.x, corners);
+        for (int feature = 0; feature < features; ++feature) {
+            const auto point = contact_point(f, corners, triangle, scene.tool, feature, scene.radius);
+            if (point) list(*point);
+        }
+    }
+}
+
+// The same, several triangles at a time.
+template <Real Scalar>
+template <class List>
+void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> touched,
+                                                   const List& list) const noexcept {
+    using Wide = Lanes<Scalar>;
+    const Vector3<Scalar>& centre = scene.tool.position;
+    std::array<Index, Wide::count> triangles;
+    for (std::size_t first = 0; first < touched.size(); first += triangles.size()) {
+        for (std::size_t i = 0; i < triangles.size(); ++i) {
+            triangles[i] = touched[(std::min)(first + i, touched.size() - 1)].triangle;
+        }
+        const auto nearest = surface_.closest_points(scene.x, triangles, centre);
+        const Vector3<Wide> separation = Vector3<Wide>(centre.x(), centre.y(), centre.z()) - nearest.point;
+        const Wide distance = norm(separation);
+        const Wide per_length = select<Wide>(distance > 0, 1 / select<Wide>(distance > 0, distance, 1), 0);
+        const Vector3<Wide> normal = per_length * separation;
+        for (std::size_t i = 0; i < (std::min)(triangles.size(), touched.size() - first); ++i) {
+            const auto of_lane = [i](const Vector3<Wide>& a) { return Vector3<Scalar>(a[0][i], a[1][i], a[2][i]); };
+            const auto& [f, corners] = touched[first + i];
+            ContactPoint<Scalar> point{f, 0, corners, of_lane(nearest.barycentric), of_lane(normal)};
+            point.gap = distance[i] - scene.radius;
+            list(point);
+        }
+    }
+}
+
+// Watches what is near and so many rings around it. The triangles of a vertex are one fan: where they are not all watched,
+// two of them with a side in common are, and are not. So the first ring is around those beside what is not near.
+template <Real Scalar>
+void ContactTracker<Scalar>::watch_rings(int rings) noexcept {
+    watched_.clear();
+    expanded_.clear();
+    const auto expand = [&](Index f) {
+        for (const Index v : surface_.corners(f)) {
+            if (!expanded_.insert(v)) continue;
+            for (const Index g : surface_.triangles_of(v)) watched_.insert(g);
+        }
+    };
+    for (const Index f : near_.items()) watched_.insert(f);
+    for (const Index f : near_.items()) {
+        bool inside = true;
+        surface_.across_sides(f, [&](Index g) { inside &= near_.contains(g); });
+        if (!inside) expand(f);
+    }
+    for (std::size_t next = near_.items().size(); rings > 1; --rings) {
+        for (const std::size_t end = watched_.items().size(); next < end; ++next) expand(watched_.items()[next]);
+    }
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
+                                                contact.axis_point};
+    const std::size_t count = feature_pairs(scene.tool) == 1 ? 1 : 3;
+    const bool below_border = is_below_border(scene, contact);
+    contact.depth = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+        Index& f = origin_triangles_[i];
+        f = surface_.walk_to_closest(scene.anchors, f == no_index ? contact.triangle : f, probes[i]);
+        Scalar height = contact.side * surface_.height(scene.anchors, f, probes[i]);
+        if (below_border) height = std::abs(height);
+        contact.depth = (std::max)(contact.depth, scene.radius - height);
+    }
+}
+
+// Whether nothing is within two edges of the tool.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_clear(const Scene& scene) const noexcept {
+    bool clear = true;
+    const auto& tool = scene.tool;
+    const Scalar radius = scene.radius + 2 * surface_.mean_edge();
+    scene.tree.overlap_capsule(scene.x, tool.position, tool.position + tool.axis, radius,
+                               [&](Index) { clear = false; });
+    return clear;
+}
+
+// Beside a border a tool may be on either side. Once it has been above or below, it stays there until it is clear of the
+// surface, or has slid off a border that gave way: past one that does not, it can only have been forced.
+template <Real Scalar>
+void ContactTracker<Scalar>::settle_side(const Scene& scene, const Contact<Scalar>& contact) noexcept {
+    if (side_ != 0) return;
+    const auto outward = surface_.outward(scene.x, contact.triangle, contact.barycentric);
+    const bool above = contact.side * dot<Scalar>(contact.normal, outward) > Scalar(0.5);
+    if (above || !surface_.on_border(contact.triangle, contact.barycentric)) side_ = contact.side;
+}
+
+// Whether the tool is beside a border, and lower.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+    if (contact.tunnelled || !surface_.on_border(contact.triangle, contact.barycentric)) return false;
+    const auto outward = surface_.outward(scene.x, contact.triangle, contact.barycentric);
+    return contact.side * dot<Scalar>(contact.normal, outward) < 0;
+}
+
+template <Real Scalar>
+bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+    if (contact.triangle == no_index || !is_below_border(scene, contact)) return false;
+    const Vector3<Scalar> origin = point_at(surface_.triangle(scene.anchors, contact.triangle), contact.barycentric);
+    return norm<Scalar>(contact.point - origin) > margin_;
+}
+
+// A tool that is outside the surface as it would be without it has nothing to press; what lies beyond it, farther out, would
+// be pulled.
+template <Real Scalar>
+bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+    const auto overlapped = [&](Index f) {
+        const auto before = surface_.nearest(scene.anchors, f, scene.tool).on_triangle;
+        return before.squared_distance < scene.radius * scene.radius;
+    };
+    // A shaft may be inside between the points where its depth is measured.
+    const auto near = near_.items();
+    if (contact.depth > 0 || overlapped(contact.triangle) || std::any_of(near.begin(), near.end(), overlapped)) {
+        return false;
+    }
+    const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
+    const auto nearest = closest_point(surface_.triangle(scene.anchors, f), contact.axis_point);
+    return dot<Scalar>(contact.normal, contact.axis_point - nearest.point) < 0;
+}
+
+}  // namespace membrane

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include <membrane/contact/tool.hpp>
+#include <membrane/core/lanes.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/normals.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+
+/// A surface as seen from one of its triangles: what is around it, which way is out, where it comes nearest to a point.
+///
+///     const membrane::LocalSurface<double> around(mesh);
+///     const membrane::Index f = around.walk_to_closest(x, start, q);
+///     const double height = around.height(x, f, q);                        // of q over the surface, negative behind it
+namespace membrane {
+
+/// The triangles of a mesh and their neighbours, with the geometric questions that only these can answer. Positions are
+/// handed in. Online but for the constructor.
+template <Real Scalar>
+class LocalSurface {
+  public:
+    /// Cost: O(V + F log F).
+    explicit LocalSurface(const TriangleMesh<Scalar>& mesh);
+
+    [[nodiscard]] Index triangle_count() const noexcept { return static_cast<Index>(triangles_.cols()); }
+    [[nodiscard]] bool closed() const noexcept { return adjacency_.closed(); }
+    [[nodiscard]] Scalar mean_edge() const noexcept { return mean_edge_; }  ///< [m]
+
+    [[nodiscard]] std::array<Index, 3> corners(Index f) const noexcept {
+        return {triangles_(0, f), triangles_(1, f), triangles_(2, f)};
+    }
+    [[nodiscard]] Triangle<Scalar> triangle(const ConstPointsRef<Scalar>& x, Index f) const noexcept {
+        return triangle_at(x, triangles_.col(f));
+    }
+
+    /// Those with the corner `v`, ascending.
+    [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return adjacency_.triangles_of(v); }
+
+    /// Calls `visit(g)` once for each triangle that has a side in common with `f`; or a corner, as `f` itself has.
+    template <class Visit>
+    void across_sides(Index f, Visit&& visit) const noexcept;
+    template <class Visit>
+    void around_corners(Index f, Visit&& visit) const noexcept;
+
+    /// The outward unit vector at the point `barycentric` of triangle `f`, see `pseudo_normal`.
+    [[nodiscard]] Vector3<Scalar> outward(const ConstPointsRef<Scalar>& x, Index f,
+                                          const Vector3<Scalar>& barycentric) const noexcept {
+        return pseudo_normal(x, triangles_, adjacency_, f, barycentric);
+    }
+
+    /// Whether the point `barycentric` of triangle `f` is on the border of the surface.
+    [[nodiscard]] bool on_border(Index f, const Vector3<Scalar>& barycentric) const noexcept;
+
+    /// Downhill from `f`, over the triangles around its corners, to one that is nearer to `q` than all around it.
+    [[nodiscard]] Index walk_to_closest(const ConstPointsRef<Scalar>& x, Index f,
+                                        const Vector3<Scalar>& q) const noexcept;
+
+    /// Height of `q` over the surface at its nearest point of triangle `f`, negative behind it [m].
+    [[nodiscard]] Scalar height(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q) const noexcept;
+
+    /// Where triangle `f` and the tool's axis come nearest.
+    [[nodiscard]] SegmentPair<Scalar> nearest(const ConstPointsRef<Scalar>& x, Index f,
+                                              const Tool<Scalar>& tool) const noexcept;
+
+    using Wide = std::array<Index, Lanes<Scalar>::count>;  ///< triangles
+
+    /// In lane i the squared distance of triangle `some[i]` from `q`, or from the tool's axis [m^2]: what `closest_point`
+    /// and `nearest` give, to the bit.
+    [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
+                                                  const Vector3<Scalar>& q) const noexcept;
+    [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
+                                                  const Tool<Scalar>& tool) const noexcept;
+
+    /// In lane i the point of triangle `some[i]` nearest to `q`.
+    [[nodiscard]] TrianglePoint<Lanes<Scalar>> closest_points(const ConstPointsRef<Scalar>& x, const Wide& some,
+                                                              const Vector3<Scalar>& q) const noexcept;
+
+  private:
+    [[nodiscard]] Triangle<Lanes<Scalar>> gather(const ConstPointsRef<Scalar>& x, const Wide& some) const noexcept;
+
+    Triangles triangles_;
+    Adjacency adjacency_;
+    std::vector<unsigned char> border_;  // vertices on it
+    Scalar mean_edge_ = 0;
+};
+
+template <Real Scalar>
+LocalSurface<Scalar>::LocalSurface(const TriangleMesh<Scalar>& mesh)
+    : triangles_(mesh.triangles()), adjacency_(mesh), border_(static_cast<std::size_t>(mesh.vertex_count()), 0) {
+    for (const Index v : adjacency_.border_vertices()) border_[static_cast<std::size_t>(v)] = 1;
+    for (const auto& [first, second] : adjacency_.edges()) {
+        mean_edge_ += norm<Scalar>(point(mesh.positions(), second) - point(mesh.positions(), first));
+    }
+    mean_edge_ /= static_cast<Scalar>(adjacency_.edges().size());
+}
+
+template <Real Scalar>
+template <class Visit>
+void LocalSurface<Scalar>::across_sides(Index f, Visit&& visit) const noexcept {
+    for (const Index g : adjacency_.triangle_neighbours(f)) {
+        if (g != no_index) visit(g);
+    }
+}
+
+template <Real Scalar>
+template <class Visit>
+void LocalSurface<Scalar>::around_corners(Index f, Visit&& visit) const noexcept {
+    const auto vertices = corners(f);
+    const auto has = [this](Index g, Index v) {
+        return triangles_(0, g) == v || triangles_(1, g) == v || triangles_(2, g) == v;
+    };
+    for (std::size_t k = 0; k < 3; ++k) {
+        for (const Index g : triangles_of(vertices[k])) {
+            const bool seen = (k > 0 && has(g, vertices[0])) || (k > 1 && has(g, vertices[1]));
+            if (!seen) visit(g);
+        }
+    }
+}
+
+template <Real Scalar>
+bool LocalSurface<Scalar>::on_border(Index f, const Vector3<Scalar>& barycentric) const noexcept {
+    const auto vertices = corners(f);
+    for (std::size_t k = 0; k < 3; ++k) {
+        const auto weight = [&](std::size_t i) { return barycentric[static_cast<Eigen::Index>(i % 3)]; };
+        if (weight(k) == 1) return border_[static_cast<std::size_t>(vertices[k])] != 0;
+        if (weight(k) > 0 && weight(k + 1) > 0 && weight(k + 2) == 0) {
+            return adjacency_.triangle_neighbours(f)[k] == no_index;
+        }
+    }
+    return false;
+}
+
+template <Real Scalar>
+Index LocalSurface<Scalar>::walk_to_closest(const ConstPointsRef<Scalar>& x, Index f,
+                                            const Vector3<Scalar>& q) const noexcept {
+    Scalar square = closest_point(triangle(x, f), q).squared_distance;
+    Wide some;
+    std::size_t count = 0;
+    const auto examine = [&] {
+        std::fill(some.begin() + static_cast<std::ptrdiff_t>(count), some.end(), some[0]);
+        const auto squares = squared_distances(x, some, q);
+        for (std::size_t i = 0; i < count; ++i) {
+            if (!(squares[i] < square)) continue;
+            square = squares[i];
+            f = some[i];
+        }
+        count = 0;
+    };
+    for (Index from = no_index; from != f;) {
+        from = f;
+        around_corners(from, [&](Index g) {
+            some[count++] = g;
+            if (count == some.size()) examine();
+        });
+        if (count > 0) examine();
+    }
+    return f;
+}
+
+template <Real Scalar>
+Scalar LocalSurface<Scalar>::height(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q) const noexcept {
+    const auto nearest = closest_point(triangle(x, f), q);
+    const Vector3<Scalar> reach = q - nearest.point;
+    return dot(reach, outward(x, f, nearest.barycentric)) < 0 ? -norm(reach) : norm(reach);
+}
+
+template <Real Scalar>
+SegmentPair<Scalar> LocalSurface<Scalar>::nearest(const ConstPointsRef<Scalar>& x, Index f,
+                                                  const Tool<Scalar>& tool) const noexcept {
+    if (feature_pairs(tool) == 1) return {0, closest_point(triangle(x, f), tool.position)};
+    return closest_to_segment<Scalar>(triangle(x, f), tool.position, tool.position + tool.axis);
+}
+
+template <Real Scalar>
+Triangle<Lanes<Scalar>> LocalSurface<Scalar>::gather(const ConstPointsRef<Scalar>& x, const Wide& some) const noexcept {
+    const auto corner = [&](Eigen::Index k) {
+        std::array<const Scalar*, Lanes<Scalar>::count> p;
+        for (std::size_t i = 0; i < p.size(); ++i) p[i] = x.data() + triangles_(k, some[i]) * x.outerStride();
+        const auto along = [&](std::size_t axis) {
+            return Lanes<Scalar>::of([&](std::size_t i) { return p[i][axis]; });
+        };
+        return Vector3<Lanes<Scalar>>(along(0), along(1), along(2));
+    };
+    return {corner(0), corner(1), corner(2)};
+}
+
+template <Real Scalar>
+TrianglePoint<Lanes<Scalar>> LocalSurface<Scalar>::closest_points(const ConstPointsRef<Scalar>& x, const Wide& some,
+                                                                  const Vector3<Scalar>& q) const noexcept {
+    return closest_point<Lanes<Scalar>>(gather(x, some), Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));
+}
+
+template <Real Scalar>
+Lanes<Scalar> LocalSurface<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
+                                                      const Vector3<Scalar>& q) const noexcept {
+    if constexpr (Lanes<Scalar>::parts > 1) {  // registers of half the lanes, without a blend: slower than one by one
+        return Lanes<Scalar>::of([&](std::size_t i) { return squared_distance(triangle(x, some[i]), q); });
+    }
+    return squared_distance(gather(x, some), Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));
+}
+
+template <Real Scalar>
+Lanes<Scalar> LocalSurface<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
+                                                      const Tool<Scalar>& tool) const noexcept {
+    if (feature_pairs(tool) == 1) return squared_distances(x, some, tool.position);
+    return Lanes<Scalar>::of([&](std::size_t i) { return nearest(x, some[i], tool).on_triangle.squared_distance; });
+}
+
+}  // namespace membrane

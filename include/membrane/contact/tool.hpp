@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <optional>
+
+#include <membrane/core/check.hpp>
+#include <membrane/core/rigid_frame.hpp>
+#include <membrane/surface/triangle.hpp>
+
+namespace membrane {
+
+/// What the device steers: a point, a sphere, or a capsule (an instrument's shaft).
+///
+///     const membrane::Tool<double> tip{.position = {0, 0, 0.011}, .radius = 1e-3};
+///     const membrane::Tool<double> shaft{.position = {0, 0, 0.011}, .axis = {0, 0, 0.04}, .radius = 5e-4};
+template <Real Scalar>
+struct Tool {
+    Vector3<Scalar> position =
+        Vector3<Scalar>::Zero();                     ///< the reference point: centre, or centre of the tip's end [m]
+    Vector3<Scalar> axis = Vector3<Scalar>::Zero();  ///< to the other end of a capsule; zero for a sphere [m]
+    Scalar radius = 0;                               ///< zero for a point [m]
+    Vector3<Scalar> velocity = Vector3<Scalar>::Zero();  ///< of the reference point [m/s]
+    Scalar time = 0;                                     ///< [s]
+    bool grasping = false;                               ///< the button that closes the forceps
+};
+
+/// Whether every number of the tool is finite and the radius not negative.
+template <Real Scalar>
+[[nodiscard]] bool is_valid(const Tool<Scalar>& tool) noexcept {
+    return is_finite(tool.position) && is_finite(tool.axis) && is_finite(tool.velocity) && is_finite(tool.time) &&
+           is_finite(tool.radius) && tool.radius >= 0;
+}
+
+/// The tool as seen from a body that moves.
+template <Real Scalar>
+[[nodiscard]] Tool<Scalar> to_body_frame(const Tool<Scalar>& tool, const RigidFrame<Scalar>& body) noexcept {
+    Tool<Scalar> seen = tool;
+    seen.position = body.point_to_body(tool.position);
+    seen.axis = body.vector_to_body(tool.axis);
+    seen.velocity = body.velocity_in(tool.velocity, tool.position);
+    return seen;
+}
+
+/// Where tool and triangle come nearest.
+template <Real Scalar>
+struct Proximity {
+    Vector3<Scalar> barycentric;  ///< of the point of the triangle
+    Vector3<Scalar> reach;        ///< from that point to the tool's axis [m]; the gap is its length less the radius
+};
+
+/// How many pairs of features can be in touch at once: a sphere touches a triangle in one point, a capsule that lies on
+/// it with both ends and across its edges.
+template <Real Scalar>
+[[nodiscard]] int feature_pairs(const Tool<Scalar>& tool) noexcept {
+    return tool.axis.isZero(0) ? 1 : 5;
+}
+
+/// Nearest points of pair `pair`, 0 to `feature_pairs(tool)` - 1: each end of the axis against the triangle, then the
+/// axis against each edge. None where the axis is nearest with an end: the end has a pair of its own. Each pair changes
+/// smoothly as things move. Where all pairs are outside, the tool is, or its axis runs through the triangle's inside.
+template <Real Scalar>
+[[nodiscard]] std::optional<Proximity<Scalar>> proximity(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool,
+                                                         int pair) noexcept;
+
+template <Real Scalar>
+std::optional<Proximity<Scalar>> proximity(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool,
+                                           int pair) noexcept {
+    const Vector3<Scalar> other_end = tool.position + tool.axis;
+    if (pair < 2) {
+        const Vector3<Scalar>& end = pair == 0 ? tool.position : other_end;
+        const auto nearest = closest_point(triangle, end);
+        return Proximity<Scalar>{nearest.barycentric, end - nearest.point};
+    }
+    const auto nearest = closest_to_segment(triangle, pair - 2, tool.position, other_end);
+    if (!(nearest.along > 0 && nearest.along < 1)) return std::nullopt;
+    const Vector3<Scalar> axis_point = tool.position + nearest.along * tool.axis;
+    return Proximity<Scalar>{nearest.on_triangle.barycentric, axis_point - nearest.on_triangle.point};
+}
+
+}  // namespace membrane

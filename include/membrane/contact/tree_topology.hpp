@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <numeric>
+#include <span>
+#include <vector>
+
+#include <membrane/surface/box.hpp>
+#include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+
+/// How the triangles of a mesh are shared out in a binary tree.
+///
+///     const auto shape = membrane::tree_shape(mesh, 16);
+///     std::printf("%d leaves, %d levels\n", statistics(shape).leaves, statistics(shape).depth);
+namespace membrane {
+
+/// A binary tree over triangles, without geometry. Node 0 is the root.
+struct TreeTopology {
+    /// No node lies more steps below the root than this, whatever the mesh: see `tree_shape`.
+    static constexpr Index max_depth = 63;
+
+    struct Node {
+        Index parent;  ///< `no_index` for the root.
+        Index first;   ///< Of the two children, `first` and `first + 1`; of a leaf's triangles, in `triangles`.
+        Index count;   ///< Of a leaf's triangles; 0 for a node with children.
+        [[nodiscard]] bool is_leaf() const noexcept { return count > 0; }
+    };
+    std::vector<Node> nodes;       ///< Depth first: children after their parent.
+    std::vector<Index> triangles;  ///< Leaf by leaf, ascending in each.
+};
+
+struct TreeStatistics {
+    Index nodes, leaves;
+    Index depth;  ///< Steps from the root to the deepest leaf.
+    Index smallest_leaf, largest_leaf;
+    double mean_leaf;  ///< [triangles]
+};
+
+/// A set of triangles is split at the middle of the longest side of its box, by where their centroids are. If one part
+/// is empty, the set is halved instead. A set of fewer than `balance_threshold` triangles is shared out evenly into two
+/// leaves, whatever the positions [Liu07] 2.3. Halves are taken at the median, so that they too lie side by side.
+///
+/// From 32 steps below the root on, every set is halved; a set of fewer than 2^31 triangles is down to single ones 31
+/// steps later. So the depth is bounded by `max_depth`, and a search needs room for what waits beside one node a level.
+///
+/// The same for the same mesh everywhere. O(F log F) for usual shapes, at most O(F max_depth).
+/// @throws InvalidInput if `balance_threshold` is below 1
+template <Real Scalar>
+[[nodiscard]] TreeTopology tree_shape(const TriangleMesh<Scalar>& mesh, Index balance_threshold);
+
+/// O(F).
+[[nodiscard]] inline TreeStatistics statistics(const TreeTopology& shape);
+
+/// A binary tree of which most nodes are folded into those above: what is left of it, and is no leaf, has up to `width`
+/// children.
+template <std::size_t width>
+struct CollapsedTree {
+    using Children = std::array<Index, width>;  ///< Nodes of the binary tree, then `no_index`.
+
+    std::vector<Index> nodes;        ///< Of the binary tree; the root first, children after their parent.
+    std::vector<Children> children;  ///< Of each.
+};
+
+/// Folds in what has most triangles first. A root that is a leaf is the only child of itself. O(nodes).
+template <std::size_t width>
+[[nodiscard]] CollapsedTree<width> folded(const TreeTopology& shape);
+
+namespace detail {
+
+/// Splits sets of triangles along the longest side of their box.
+template <Real Scalar>
+class TriangleSplit {
+  public:
+    explicit TriangleSplit(const TriangleMesh<Scalar>& mesh);
+
+    /// Puts the set in the order of its two parts, neither of them empty, and returns the size of the first.
+    /// @pre two triangles at least
+    [[nodiscard]] Index operator()(std::span<Index> set, bool evenly) const;
+
+  private:
+    std::vector<Box<Scalar>> boxes_;
+    std::vector<Vector3<Scalar>> centroids_;
+};
+
+template <Real Scalar>
+TriangleSplit<Scalar>::TriangleSplit(const TriangleMesh<Scalar>& mesh) {
+    for (Index f = 0; f < mesh.triangle_count(); ++f) {
+        const auto triangle = triangle_at(mesh.positions(), mesh.triangles().col(f));
+        boxes_.push_back(bounds(triangle));
+        centroids_.push_back((triangle.a + triangle.b + triangle.c) / 3);
+    }
+}
+
+template <Real Scalar>
+Index TriangleSplit<Scalar>::operator()(std::span<Index> set, bool evenly) const {
+    Box<Scalar> box;
+    for (const Index f : set) box.include(boxes_[static_cast<std::size_t>(f)]);
+    const int axis = major_axis(box);
+    const auto place = [&](Index f) { return centroids_[static_cast<std::size_t>(f)][axis]; };
+    if (!evenly) {
+        const Scalar middle = (box.low[axis] + box.high[axis]) / 2;
+        const auto right = std::partition(set.begin(), set.end(), [&](Index f) { return place(f) < middle; });
+        if (right != set.begin() && right != set.end()) return static_cast<Index>(right - set.begin());
+    }
+    const auto median = set.begin() + static_cast<std::ptrdiff_t>(set.size() / 2);
+    std::nth_element(set.begin(), median, set.end(), [&](Index f, Index g) {
+        return place(f) != place(g) ? place(f) < place(g) : f < g;  // no ties, or each library would break its own way
+    });
+    return static_cast<Index>(median - set.begin());
+}
+
+/// Grows the tree below node `i`, a leaf so far.
+template <Real Scalar>
+void grow(TreeTopology& shape, const TriangleSplit<Scalar>& split, Index balance_threshold, Index i, Index depth) {
+    constexpr Index halving_depth = TreeTopology::max_depth - 31;
+    const auto [parent, first, count] = shape.nodes[static_cast<std::size_t>(i)];
+    if (count == 1) return;
+    const bool shared_out = count < balance_threshold;
+    const auto set =
+        std::span(shape.triangles).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
+    const Index half = split(set, shared_out || depth >= halving_depth);
+    const auto child = static_cast<Index>(shape.nodes.size());
+    shape.nodes[static_cast<std::size_t>(i)] = {parent, child, 0};
+    shape.nodes.push_back({i, first, half});
+    shape.nodes.push_back({i, first + half, count - half});
+    if (shared_out) return;
+    grow(shape, split, balance_threshold, child, depth + 1);
+    grow(shape, split, balance_threshold, child + 1, depth + 1);
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+TreeTopology tree_shape(const TriangleMesh<Scalar>& mesh, Index balance_threshold) {
+    if (balance_threshold < 1) refuse("AabbTree", "balance_threshold must be at least 1, got ", balance_threshold);
+    TreeTopology shape{{{no_index, 0, mesh.triangle_count()}},
+                       std::vector<Index>(static_cast<std::size_t>(mesh.triangle_count()))};
+    std::iota(shape.triangles.begin(), shape.triangles.end(), 0);
+    detail::grow(shape, detail::TriangleSplit<Scalar>(mesh), balance_threshold, 0, 0);
+    for (const TreeTopology::Node& node : shape.nodes) {
+        const auto begin = shape.triangles.begin() + node.first;
+        if (node.is_leaf()) std::sort(begin, begin + node.count);
+    }
+    return shape;
+}
+
+inline TreeStatistics statistics(const TreeTopology& shape) {
+    TreeStatistics tree{static_cast<Index>(shape.nodes.size()), 0, 0, unlimited, 0, 0};
+    std::vector<Index> depth;
+    for (const TreeTopology::Node& node : shape.nodes) {
+        depth.push_back(node.parent == no_index ? 0 : depth[static_cast<std::size_t>(node.parent)] + 1);
+        tree.depth = (std::max)(tree.depth, depth.back());
+        if (!node.is_leaf()) continue;
+        ++tree.leaves;
+        tree.smallest_leaf = (std::min)(tree.smallest_leaf, node.count);
+        tree.largest_leaf = (std::max)(tree.largest_leaf, node.count);
+    }
+    tree.mean_leaf = static_cast<double>(shape.triangles.size()) / tree.leaves;
+    return tree;
+}
+
+template <std::size_t width>
+CollapsedTree<width> folded(const TreeTopology& shape) {
+    const auto node = [&](Index i) -> const TreeTopology::Node& { return shape.nodes[static_cast<std::size_t>(i)]; };
+    std::vector<Index> sizes(shape.nodes.size());  // [triangles]
+    const auto size = [&](Index i) -> Index& { return sizes[static_cast<std::size_t>(i)]; };
+    for (auto i = static_cast<Index>(sizes.size()); i-- > 0;) {
+        size(i) = node(i).is_leaf() ? node(i).count : size(node(i).first) + size(node(i).first + 1);
+    }
+    CollapsedTree<width> wide{{0}, {}};
+    for (std::size_t n = 0; n < wide.nodes.size(); ++n) {
+        typename CollapsedTree<width>::Children children;
+        children.fill(no_index);
+        children[0] = wide.nodes[n];
+        for (std::size_t count = 1; count < width; ++count) {
+            const auto weight = [&](Index i) { return i == no_index || node(i).is_leaf() ? 0 : size(i); };
+            const auto largest = std::max_element(children.begin(), children.end(),
+                                                  [&](Index a, Index b) { return weight(a) < weight(b); });
+            if (weight(*largest) == 0) break;
+            children[count] = node(*largest).first + 1;
+            *largest = node(*largest).first;
+        }
+        for (const Index i : children) {
+            if (i != no_index && !node(i).is_leaf()) wide.nodes.push_back(i);
+        }
+        wide.children.push_back(children);
+    }
+    return wide;
+}
+
+}  // namespace membrane

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/check.hpp>
+#include <membrane/mesh_check/surface_facts.hpp>
+#include <membrane/surface/mesh_defect.hpp>
+
+/// What has been found out about a mesh.
+///
+///     const membrane::MeshReport report = membrane::validate(x, triangles);
+///     std::cout << to_string(report);
+namespace membrane {
+
+/// One defect, and where.
+struct MeshFinding {
+    MeshDefect defect;
+    std::vector<Index> vertices, triangles;  ///< Those concerned; none where it is the whole mesh.
+    std::string text;                        ///< With what was found and what is expected.
+};
+
+struct MeshReport {
+    SurfaceFacts facts;
+    std::vector<MeshFinding> findings;  ///< In the order of the search; of each kind no more than asked for.
+    std::array<std::size_t, mesh_defect_count> counts{};  ///< Of each kind, listed or not.
+    bool complete = true;                                 ///< False: a search was given up, there may be more.
+
+    [[nodiscard]] std::size_t count(MeshDefect defect) const noexcept {
+        return counts[static_cast<std::size_t>(defect)];
+    }
+
+    /// Whether nothing has been found.
+    [[nodiscard]] bool empty() const noexcept {
+        return std::all_of(counts.begin(), counts.end(), [](std::size_t count) { return count == 0; });
+    }
+
+    /// Whether no error has been found: `TriangleMesh` takes the mesh.
+    [[nodiscard]] bool valid() const noexcept {
+        for (std::size_t i = 0; i < mesh_defect_count; ++i) {
+            if (counts[i] > 0 && severity(static_cast<MeshDefect>(i)) == Severity::error) return false;
+        }
+        return true;
+    }
+};
+
+/// A line for each finding.
+[[nodiscard]] inline std::string to_string(const MeshReport& report) {
+    std::string text;
+    for (const MeshFinding& finding : report.findings) {
+        text += severity(finding.defect) == Severity::error ? "error: " : "warning: ";
+        ((((text += name(finding.defect)) += ": ") += finding.text) += "; ") += remedy(finding.defect);
+        text += "\n";
+    }
+    for (std::size_t i = 0; i < mesh_defect_count; ++i) {
+        const auto defect = static_cast<MeshDefect>(i);
+        const auto listed = std::count_if(report.findings.begin(), report.findings.end(),
+                                          [&](const MeshFinding& finding) { return finding.defect == defect; });
+        const std::size_t more = report.counts[i] - static_cast<std::size_t>(listed);
+        if (more > 0) ((text += std::to_string(more) + " more: ") += name(defect)) += "\n";
+    }
+    if (!report.complete) text += "not everything was looked at\n";
+    return text;
+}
+
+namespace detail {
+
+/// Puts down what checks find.
+class Recorder {
+  public:
+    Recorder(MeshReport& report, Index max_findings_per_kind) : report_(&report), most_(max_findings_per_kind) {}
+
+    template <class... Parts>
+    void operator()(MeshDefect defect, std::vector<Index> vertices, std::vector<Index> triangles,
+                    const Parts&... parts) const {
+        const std::size_t count = ++report_->counts[static_cast<std::size_t>(defect)];
+        if (count > static_cast<std::size_t>(most_)) return;
+        std::string text;
+        (append(text, parts), ...);
+        report_->findings.push_back({defect, std::move(vertices), std::move(triangles), std::move(text)});
+    }
+
+  private:
+    MeshReport* report_;
+    Index most_;
+};
+
+}  // namespace detail
+
+}  // namespace membrane

@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/check.hpp>
+#include <membrane/core/disjoint_sets.hpp>
+#include <membrane/core/exact_sign.hpp>
+#include <membrane/mesh_check/checked_mesh.hpp>
+#include <membrane/mesh_check/coincident_vertices.hpp>
+#include <membrane/mesh_check/surface_facts.hpp>
+#include <membrane/surface/mesh_checks.hpp>
+
+/// Mends what can be mended without a guess, if asked to.
+///
+///     const auto repaired = membrane::repair(x, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true});
+///     std::cout << to_string(repaired.done);                        // welded 12 vertices, turned 3 triangles
+///     const membrane::TriangleMesh mesh(repaired.positions, repaired.triangles);
+namespace membrane {
+
+/// What to do, in this order; nothing by itself.
+struct RepairOptions {
+    /// Vertices this near become one, the lowest of them, which stays where it is [m]; 0: those at the very same place.
+    /// Of several in a row the ends may be farther apart.
+    std::optional<double> weld{};
+
+    bool drop_repeated = false;    ///< Triangles that name a vertex twice.
+    bool drop_zero_area = false;   ///< Triangles with corners on one line; may leave a T-junction.
+    bool drop_duplicates = false;  ///< Of triangles with the same vertices, however turned, all but the first.
+    /// Turns triangles of a component to agree, not if it is one-sided: a closed component so that it faces outward, any other
+    /// as few triangles as possible. One whose triangles agree as given stays as it is, see `flip_inward`. Each component by
+    /// itself: one inside another comes to face outward too, though it may be meant as the wall of a cavity.
+    bool orient = false;
+    bool split_vertices = false;  ///< Gives each fan of triangles at a vertex, but for the first, a vertex of its own.
+    bool flip_inward = false;     ///< Turns closed components that face inward.
+    bool drop_isolated = false;   ///< Vertices that no triangle names.
+};
+
+/// What was done: how many vertices or triangles each option has changed.
+struct RepairReport {
+    Index welded = 0, repeated = 0, zero_area = 0, duplicates = 0, turned = 0, split = 0, flipped = 0, isolated = 0;
+    bool complete = true;  ///< False: the search for vertices to weld was given up, so many are within the distance.
+};
+
+template <Real Scalar>
+struct RepairedMesh {
+    Points<Scalar> positions;
+    Triangles triangles;
+    std::vector<Index> vertices, source_triangles;  ///< For each the one it was.
+    RepairReport done;
+};
+
+/// The mesh with what `options` ask for, and nothing else: what is kept keeps its order, its bits and, unless it is
+/// turned, its first corner. What comes out may still have defects: `validate` tells. O(F log F).
+/// @throws InvalidInput for shapes as `validate` does, for triangles that name a vertex that does not exist, and if
+/// `weld` is negative or not finite
+template <class P, class T>
+[[nodiscard]] RepairedMesh<typename P::Scalar> repair(const Eigen::MatrixBase<P>& positions,
+                                                      const Eigen::MatrixBase<T>& triangles,
+                                                      const RepairOptions& options);
+
+/// The same from x y z x y z ... [m] and three vertices for each triangle.
+template <class S, std::size_t m, std::integral I, std::size_t n>
+[[nodiscard]] auto repair(std::span<S, m> xyz, std::span<I, n> corners, const RepairOptions& options) {
+    return repair(detail::by_threes("repair", xyz, "positions"), detail::by_threes("repair", corners, "triangles"),
+                  options);
+}
+
+/// A phrase for each option that has changed something.
+[[nodiscard]] inline std::string to_string(const RepairReport& done) {
+    std::string text;
+    const auto say = [&](const char* what, Index count, const char* of) {
+        if (count > 0) (((((text += text.empty() ? "" : ", ") += what) += " ") += std::to_string(count)) += " ") += of;
+    };
+    say("welded", done.welded, "vertices");
+    say("dropped", done.repeated, "triangles with a repeated vertex");
+    say("dropped", done.zero_area, "triangles without area");
+    say("dropped", done.duplicates, "duplicate triangles");
+    say("turned", done.turned, "triangles");
+    say("split off", done.split, "vertices");
+    say("flipped", done.flipped, "inward triangles");
+    say("dropped", done.isolated, "isolated vertices");
+    if (!done.complete) text += " (gave up welding)";
+    return text.empty() ? "nothing" : text;
+}
+
+namespace detail {
+
+/// A mesh at work.
+class Repair {
+  public:
+    Repair(Points<double> x, Triangles triangles)
+        : x_(std::move(x)),
+          triangles_(std::move(triangles)),
+          kept_vertices_(static_cast<std::size_t>(x_.cols()), true),
+          kept_(static_cast<std::size_t>(triangles_.cols())),
+          origin_(static_cast<std::size_t>(x_.cols())) {
+        std::iota(kept_.begin(), kept_.end(), Index{0});
+        std::iota(origin_.begin(), origin_.end(), Index{0});
+    }
+
+    inline void weld(std::span<const Index> points, double distance);
+    inline void drop_repeated();
+    inline void drop_zero_area(const std::vector<bool>& usable);
+    inline void drop_duplicates();
+    inline void orient(const std::vector<bool>& usable);
+    inline void split_vertices();
+    inline void flip_inward(const std::vector<bool>& usable);
+    inline void drop_isolated();
+
+    template <Real Scalar>
+    [[nodiscard]] RepairedMesh<Scalar> result(const Points<Scalar>& given) const;
+
+  private:
+    [[nodiscard]] std::array<Index, 3> corners(Index f) const {
+        return {triangles_(0, f), triangles_(1, f), triangles_(2, f)};
+    }
+    void turn(Index f) { std::swap(triangles_(1, f), triangles_(2, f)); }
+
+    /// The sides of those kept that name three vertices.
+    [[nodiscard]] std::vector<HalfEdge> sides() const {
+        std::vector<Index> some;
+        for (const Index f : kept_) {
+            if (!repeats(f)) some.push_back(f);
+        }
+        return half_edges_of(triangles_, some);
+    }
+    [[nodiscard]] bool repeats(Index f) const {
+        const auto [a, b, c] = corners(f);
+        return a == b || b == c || c == a;
+    }
+    /// As triangles are turned now; a part with a point that cannot be computed with is not closed.
+    [[nodiscard]] inline SurfaceParts parts(const std::vector<bool>& usable) const;
+
+    Points<double> x_;
+    Triangles triangles_;
+    std::vector<bool> kept_vertices_;
+    std::vector<Index> kept_;    // triangles
+    std::vector<Index> origin_;  // of each vertex: itself, or the one it was split off
+    RepairReport done_;
+};
+
+inline void Repair::weld(std::span<const Index> points, double distance) {
+    const CoincidentVertices near(x_, points);
+    DisjointSets sets(kept_vertices_.size());
+    std::size_t v = 0;
+    for (const Index lowest : near.representative()) sets.unite(v++, static_cast<std::size_t>(lowest));
+    std::int64_t effort = 1'000'000 + 1000 * x_.cols();
+    done_.complete = distance == 0 || near.for_each_pair(distance, effort, [&](Index i, Index j) {
+        sets.unite(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
+    });
+    for (v = 0; v < kept_vertices_.size(); ++v) {
+        kept_vertices_[v] = sets.find(v) == v;
+        done_.welded += kept_vertices_[v] ? 0 : 1;
+    }
+    const auto one = [&](Index corner) { return static_cast<Index>(sets.find(static_cast<std::size_t>(corner))); };
+    for (Index& corner : triangles_.reshaped()) corner = one(corner);
+}
+
+inline void Repair::drop_repeated() {
+    done_.repeated = static_cast<Index>(std::erase_if(kept_, [&](Index f) { return repeats(f); }));
+}
+
+inline void Repair::drop_zero_area(const std::vector<bool>& usable) {
+    const auto flat = [&](Index f) {
+        for (const Index v : corners(f)) {
+            if (!usable[static_cast<std::size_t>(v)]) return false;
+        }
+        return !repeats(f) &&
+               on_one_line(point(x_, triangles_(0, f)), point(x_, triangles_(1, f)), point(x_, triangles_(2, f)));
+    };
+    done_.zero_area = static_cast<Index>(std::erase_if(kept_, flat));
+}
+
+inline void Repair::drop_duplicates() {
+    std::vector<bool> is_duplicate(static_cast<std::size_t>(triangles_.cols()), false);
+    const std::vector<HalfEdge> all = sides();
+    for_each_edge(all, [&](std::span<const HalfEdge> edge) {
+        for (std::size_t i = 1; i < edge.size(); ++i) {  // those of one apex by ascending triangle
+            if (edge[i].apex == edge[i - 1].apex) is_duplicate[static_cast<std::size_t>(edge[i].triangle)] = true;
+        }
+    });
+    done_.duplicates =
+        static_cast<Index>(std::erase_if(kept_, [&](Index f) { return is_duplicate[static_cast<std::size_t>(f)]; }));
+}
+
+inline void Repair::orient(const std::vector<bool>& usable) {
+    const auto count = static_cast<std::size_t>(triangles_.cols());
+    const std::vector<HalfEdge> all = sides();
+    DisjointSets sets = turns(all, count);
+    // Of each component, by its lowest triangle: how many are to be turned to agree with that, and how many not.
+    std::vector<std::array<Index, 2>> votes(count, {0, 0});
+    const auto side_of = [&](Index f) {
+        const std::size_t as_is = sets.find(static_cast<std::size_t>(f));
+        const std::size_t turned = sets.find(static_cast<std::size_t>(f) + count);
+        return std::pair((std::min)(as_is, turned), as_is <= turned ? std::size_t{0} : std::size_t{1});
+    };
+    for (const Index f : kept_) {
+        const auto [lowest, side] = side_of(f);
+        ++votes[lowest][side];
+    }
+    std::vector<bool> turned(count, false);
+    const auto turn_over = [&](Index f) {
+        turn(f);
+        turned[static_cast<std::size_t>(f)].flip();
+    };
+    for (const Index f : kept_) {
+        const auto [lowest, side] = side_of(f);
+        const std::size_t fewer = votes[lowest][1] <= votes[lowest][0] ? 1 : 0;
+        if (side == fewer) turn_over(f);  // on a one-sided surface none is
+    }
+    const SurfaceParts now = parts(usable);
+    std::vector<bool> agreed(now.parts.size(), true);  // as given
+    for (const Index f : kept_) {
+        const Index p = now.part_of[static_cast<std::size_t>(f)];
+        if (p != no_index && turned[static_cast<std::size_t>(f)]) agreed[static_cast<std::size_t>(p)] = false;
+    }
+    for (const Index f : kept_) {
+        const Index p = now.part_of[static_cast<std::size_t>(f)];
+        if (p == no_index || agreed[static_cast<std::size_t>(p)]) continue;
+        const SurfaceComponent& part = now.parts[static_cast<std::size_t>(p)];
+        if (part.closed && part.volume < 0) turn_over(f);
+    }
+    done_.turned = static_cast<Index>(std::count(turned.begin(), turned.end(), true));
+}
+
+inline void Repair::split_vertices() {
+    const std::vector<HalfEdge> all = sides();
+    DisjointSets sets = fans(triangles_, all);
+    constexpr auto none = static_cast<std::size_t>(-1);
+    std::vector<std::size_t> first_fan(kept_vertices_.size(), none);
+    std::vector<Index> vertex_of_fan(static_cast<std::size_t>(triangles_.size()), no_index);
+    std::vector<Index> origins;
+    for (const Index f : kept_) {
+        if (repeats(f)) continue;
+        for (Index k = 0; k < 3; ++k) {
+            Index& corner = triangles_(k, f);
+            const auto v = static_cast<std::size_t>(corner);
+            const std::size_t fan = sets.find(3 * static_cast<std::size_t>(f) + static_cast<std::size_t>(k));
+            if (first_fan[v] == none) first_fan[v] = fan;
+            if (first_fan[v] == fan) continue;
+            Index& own = vertex_of_fan[fan];
+            if (own == no_index) {
+                own = static_cast<Index>(origin_.size());
+                origin_.push_back(corner);
+                ++done_.split;
+            }
+            corner = own;
+        }
+    }
+    const Eigen::Index before = x_.cols();
+    x_.conservativeResize(3, static_cast<Eigen::Index>(origin_.size()));
+    for (Eigen::Index v = before; v < x_.cols(); ++v) x_.col(v) = x_.col(origin_[static_cast<std::size_t>(v)]);
+    kept_vertices_.resize(origin_.size(), true);
+}
+
+inline SurfaceParts Repair::parts(const std::vector<bool>& usable) const {
+    std::vector<bool> measured(static_cast<std::size_t>(triangles_.cols()), true);
+    for (const Index f : kept_) {
+        for (const Index v : corners(f)) {
+            const auto given = static_cast<std::size_t>(origin_[static_cast<std::size_t>(v)]);
+            if (!usable[given]) measured[static_cast<std::size_t>(f)] = false;
+        }
+    }
+    return surface_parts(x_, triangles_, sides(), measured);
+}
+
+inline void Repair::flip_inward(const std::vector<bool>& usable) {
+    const SurfaceParts now = parts(usable);
+    for (const Index f : kept_) {
+        const Index p = now.part_of[static_cast<std::size_t>(f)];
+        if (p == no_index) continue;
+        const SurfaceComponent& part = now.parts[static_cast<std::size_t>(p)];
+        if (!part.closed || part.volume >= 0) continue;
+        turn(f);
+        ++done_.flipped;
+    }
+}
+
+inline void Repair::drop_isolated() {
+    std::vector<bool> named(kept_vertices_.size(), false);
+    for (const Index f : kept_) {
+        for (const Index v : corners(f)) named[static_cast<std::size_t>(v)] = true;
+    }
+    for (std::size_t v = 0; v < named.size(); ++v) {
+        if (!kept_vertices_[v] || named[v]) continue;
+        kept_vertices_[v] = false;
+        ++done_.isolated;
+    }
+}
+
+template <Real Scalar>
+RepairedMesh<Scalar> Repair::result(const Points<Scalar>& given) const {
+    RepairedMesh<Scalar> mesh;
+    std::vector<Index> number(kept_vertices_.size(), no_index);
+    for (std::size_t v = 0; v < number.size(); ++v) {
+        if (!kept_vertices_[v]) continue;
+        number[v] = static_cast<Index>(mesh.vertices.size());
+        mesh.vertices.push_back(origin_[v]);
+    }
+    mesh.positions.resize(3, static_cast<Eigen::Index>(mesh.vertices.size()));
+    for (Eigen::Index v = 0; v < mesh.positions.cols(); ++v) {
+        mesh.positions.col(v) = given.col(mesh.vertices[static_cast<std::size_t>(v)]);
+    }
+    mesh.triangles = selected(triangles_, kept_);
+    for (Index& corner : mesh.triangles.reshaped()) corner = number[static_cast<std::size_t>(corner)];
+    mesh.source_triangles = kept_;
+    mesh.done = done_;
+    return mesh;
+}
+
+}  // namespace detail
+
+template <class P, class T>
+RepairedMesh<typename P::Scalar> repair(const Eigen::MatrixBase<P>& positions, const Eigen::MatrixBase<T>& triangles,
+                                        const RepairOptions& options) {
+    using Scalar = typename P::Scalar;
+    detail::check_types<P, T>();
+    static_assert(Real<Scalar>, "positions must be float or double");
+    if (options.weld) detail::check_option("repair", *options.weld, "weld", "m");
+    const auto found = [](MeshDefect defect, const std::vector<Index>&, const std::vector<Index>&,
+                          const auto&... parts) {
+        if (defect == MeshDefect::index_out_of_range) refuse("repair", parts...);
+    };
+    detail::check_shapes("repair", positions, triangles, found);
+    Triangles corners(3, triangles.cols());
+    for (Eigen::Index f = 0; f < triangles.cols(); ++f) {
+        detail::check_corners(triangles.derived(), f, positions.cols(), found);
+        for (Eigen::Index k = 0; k < 3; ++k) corners(k, f) = static_cast<Index>(triangles(k, f));
+    }
+    const detail::StoredPoints<Scalar> stored(positions.derived(), found);
+    detail::Repair work(stored.x.template cast<double>(), std::move(corners));
+    if (options.weld) work.weld(stored.points, *options.weld);
+    if (options.drop_repeated) work.drop_repeated();
+    if (options.drop_zero_area) work.drop_zero_area(stored.usable);
+    if (options.drop_duplicates) work.drop_duplicates();
+    if (options.orient) work.orient(stored.usable);
+    if (options.split_vertices) work.split_vertices();
+    if (options.flip_inward) work.flip_inward(stored.usable);
+    if (options.drop_isolated) work.drop_isolated();
+    return work.result(stored.x);
+}
+
+}  // namespace membrane

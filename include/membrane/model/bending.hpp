@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <membrane/model/elements.hpp>
+#include <membrane/model/material.hpp>
+#include <membrane/surface/half_edges.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+
+/// Resistance to being bent.
+///
+///     const auto tissue = membrane::Tissue(springs, membrane::bending_springs(mesh, membrane::flexural_rigidity(material)));
+///
+/// A flat sheet that is not stretched has no stiffness normal to itself but this and its foundation. It matters where both are
+/// soft: against a foundation of c [Pa/m] over ways of (D / c)^(1/4), 0.1 mm for a cornea's 3 uN m on 30 GPa/m, and against a
+/// tension T over ways of sqrt(D / T); triangles larger than that do not feel it.
+namespace membrane {
+
+/// E t^3 / (12 (1 - nu^2)) [N m]. @throws InvalidInput for a material out of its range
+[[nodiscard]] inline double flexural_rigidity(const Material& material) {
+    material.check();
+    const double nu = material.poisson_ratio;
+    return material.young_modulus * std::pow(material.thickness, 3) / (12 * (1 - nu * nu));
+}
+
+/// Two triangles at an edge, from corner 0 to corner 1, with the apexes 2 and 3, 2 on the left seen from outside. Folded
+/// by the angle a, positive where apexes go inward, instead of the angle at rest, it stores stiffness (a - rest)^2 / 2
+/// [Grinspun03]. Of the second derivative the part is left out that vanishes at rest, and with it all that could be
+/// negative.
+template <Number Scalar>
+struct Hinge {
+    static constexpr std::size_t corner_count = 4;
+
+    Scalar stiffness;  ///< [N m]
+    Scalar rest;       ///< [rad]
+
+    template <Number N>
+    [[nodiscard]] CornerForce<N> force_on(const Corners<N, 4>& x, std::size_t i) const noexcept;
+    template <Number N>
+    [[nodiscard]] N energy(const Corners<N, 4>& x) const noexcept;
+    template <Number N>
+    [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 4>& x, std::size_t i,
+                                                const Vector3<N>& displacement) const noexcept;
+    [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 4>& x, std::size_t i,
+                                                std::size_t j) const noexcept;
+};
+
+/// A hinge at each edge between two triangles of `mesh`, which is at rest as it is, for a flexural rigidity D [N m]: of
+/// stiffness D l^2 / (A + B), l the edge's length, A and B the areas. On equilateral triangles it stores what a plate does
+/// that is bent like a cylinder; where it is bent two ways, its Poisson ratio is -1/3: that part depends on the slopes at
+/// the border alone [Seung88].
+/// @throws InvalidInput for a rigidity that is not finite, or negative. O(F log F).
+template <Real Scalar>
+[[nodiscard]] Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh, double rigidity);
+
+namespace detail {
+
+/// The angle of a hinge, and its derivative by each corner; zero where a triangle has no area.
+template <Number N>
+class Fold {
+  public:
+    explicit Fold(const Corners<N, 4>& x) noexcept
+        : edge(x[1] - x[0]), left(cross<N>(edge, x[2] - x[0])), right(cross<N>(x[3] - x[0], edge)) {}
+
+    [[nodiscard]] auto is_valid() const noexcept {
+        const auto on_left = squared_norm(left) > 0, on_right = squared_norm(right) > 0;
+        return on_left & on_right;
+    }
+
+    [[nodiscard]] N angle() const noexcept {
+        const N sine = dot<N>(cross(left, right), edge) / unless_zero(norm(edge)), cosine = dot(left, right);
+        return if_sound(lane_by_lane<N>([](auto y, auto x) { return std::atan2(y, x); }, sine, cosine));
+    }
+
+    [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
+        const Vector3<N> slope = slope_of_sound(x, i);
+        return {if_sound(slope[0]), if_sound(slope[1]), if_sound(slope[2])};
+    }
+
+    Vector3<N> edge, left, right;
+
+  private:
+    [[nodiscard]] Vector3<N> slope_of_sound(const Corners<N, 4>& x, std::size_t i) const noexcept {
+        const N length = norm(edge), square = unless_zero(length * length);
+        const Vector3<N> by_left = (-length / unless_zero(squared_norm(left))) * left;
+        const Vector3<N> by_right = (-length / unless_zero(squared_norm(right))) * right;
+        if (i == 2) return by_left;
+        if (i == 3) return by_right;
+        // Neither does shifting the hinge change the angle, nor turning it about its edge.
+        const N on_left = dot<N>(edge, x[2] - x[0]) / square, on_right = dot<N>(edge, x[3] - x[0]) / square;
+        return i == 0 ? Vector3<N>((on_left - 1) * by_left + (on_right - 1) * by_right)
+                      : Vector3<N>(-on_left * by_left - on_right * by_right);
+    }
+    [[nodiscard]] N if_sound(const N& number) const noexcept { return select<N>(is_valid(), number, 0); }
+    [[nodiscard]] static N unless_zero(const N& divisor) noexcept { return select<N>(divisor > 0, divisor, 1); }
+};
+
+/// `angle` but for whole turns, between -pi and pi.
+template <Number N>
+[[nodiscard]] N within_half_turn(N angle) noexcept {
+    constexpr Each<N> turn = 2 * std::numbers::pi_v<Each<N>>;
+    return angle - turn * lane_by_lane<N>([](auto turns) { return std::round(turns); }, angle / turn);
+}
+
+}  // namespace detail
+
+template <Number Scalar>
+template <Number N>
+CornerForce<N> Hinge<Scalar>::force_on(const Corners<N, 4>& x, std::size_t i) const noexcept {
+    const detail::Fold<N> fold(x);
+    const N k = static_cast<N>(stiffness);
+    const Vector3<N> slope = fold.slope(x, i);
+    const N moment = k * detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
+    return {-moment * slope, outer<N>(k, slope)};
+}
+
+template <Number Scalar>
+template <Number N>
+N Hinge<Scalar>::energy(const Corners<N, 4>& x) const noexcept {
+    const detail::Fold<N> fold(x);
+    const N by = detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
+    return select<N>(fold.is_valid(), static_cast<N>(stiffness) * by * by / 2, 0);
+}
+
+template <Number Scalar>
+template <Number N>
+EnergyChange<N> Hinge<Scalar>::energy_change(const Corners<N, 4>& x, std::size_t i,
+                                             const Vector3<N>& displacement) const noexcept {
+    using std::abs;
+    auto there = x;
+    there[i] += displacement;
+    const N k = static_cast<N>(stiffness), before = energy(x), after = energy(there);
+    // The angle itself is known to some epsilons.
+    const N noise =
+        k * (1 + abs(static_cast<N>(rest))) * root_of<N>(2 * (before + after) / larger<N>(k, Each<N>(1e-30)));
+    return {after - before, before + after + noise};
+}
+
+template <Number Scalar>
+Eigen::Matrix3d Hinge<Scalar>::hessian_block(const Corners<double, 4>& x, std::size_t i, std::size_t j) const noexcept {
+    const detail::Fold<double> fold(x);
+    if (!fold.is_valid()) return Eigen::Matrix3d::Zero();
+    return static_cast<double>(stiffness) * fold.slope(x, i) * fold.slope(x, j).transpose();
+}
+
+template <Real Scalar>
+Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh, double rigidity) {
+    detail::check_option("bending_springs", rigidity, "rigidity", "N m");
+    using All = Elements<Scalar, Hinge<Scalar>>;
+    std::vector<typename All::Placed> all;
+    const auto sides = half_edges(mesh.triangles());
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
+        if (edge.size() != 2) return;
+        const HalfEdge &left = edge[0].forward ? edge[0] : edge[1], &right = edge[0].forward ? edge[1] : edge[0];
+        const std::array<Index, 4> corners{left.first, left.second, left.apex, right.apex};
+        Corners<double, 4> x;
+        for (std::size_t i = 0; i < 4; ++i) x[i] = point(mesh.positions(), corners[i]).template cast<double>();
+        const detail::Fold<double> fold(x);
+        if (!fold.is_valid() || rigidity == 0) return;
+        const double areas = (norm(fold.left) + norm(fold.right)) / 2;
+        all.push_back(
+            {corners,
+             {static_cast<Scalar>(rigidity * squared_norm(fold.edge) / areas), static_cast<Scalar>(fold.angle())}});
+    });
+    return All(mesh, std::move(all));
+}
+
+}  // namespace membrane

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <concepts>
+#include <limits>
+
+#include <membrane/core/symmetric3.hpp>
+#include <membrane/core/types.hpp>
+
+/// What a solver asks of whatever pulls on the vertices of a membrane.
+///
+///     template <membrane::ElasticNetwork<double> Network>
+///     membrane::Vector3<double> force_on(const Network& network, membrane::Index v, const Eigen::Matrix3Xd& x) {
+///         return network.force_on(v, x).force;                                                // [N]
+///     }
+namespace membrane {
+
+/// What pulls on a vertex: the sum over its springs.
+template <Number Scalar>
+struct VertexForce {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
+    Scalar stiffness = 0;                             ///< at least the curvature of the energy in every direction [N/m]
+};
+
+/// What pulls on a vertex, and what is known of the energy around it: for a move d of a length up to rho it is at most
+/// E - force . d + d . (stiffness I - relief / (1 + rho / size)) d / 2, see `MassSpringNetwork::majoriser`.
+template <Number Scalar>
+struct EnergyMajoriser {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();              ///< [N]
+    Scalar stiffness = 0;                                         ///< [N/m]
+    Symmetric3<Scalar> stiffness_reduction;                       ///< no eigenvalue below zero [N/m]
+    Scalar size = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m]
+};
+
+/// By how much the energy changes when a vertex moves.
+template <Number Scalar>
+struct EnergyChange {
+    Scalar change = 0;  ///< [J]
+    Scalar size = 0;    ///< of what was added up and taken off again: times epsilon, the rounding [J]
+
+    EnergyChange& operator+=(const EnergyChange& other) noexcept {
+        change += other.change, size += other.size;
+        return *this;
+    }
+};
+
+/// What joins the vertices of a membrane: springs, or springs and more. What the compiler cannot see: all of it is the
+/// derivative of one energy, `neighbours(v)` are all vertices whose place changes the pull on `v`, by their `other`, and
+/// where a network says that it `never_stiffens`, what `EnergyMajoriser` promises holds for every move, else for small ones.
+template <class Network, class Scalar>
+concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, Scalar> &&
+    requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& displacement) {
+    { Network::never_stiffens } -> std::convertible_to<bool>;
+    { network.vertex_count() }
+    noexcept->std::same_as<Index>;
+    { network.pinned(v) }
+    noexcept->std::same_as<bool>;
+    { network.has_masses() }
+    noexcept->std::same_as<bool>;
+    { network.mass(v) }
+    noexcept->std::same_as<Scalar>;
+    { network.viscosity(v) }
+    noexcept->std::same_as<Scalar>;
+    { network.neighbours(v)[0].other } -> std::convertible_to<Index>;
+    { network.force_on(v, x) }
+    noexcept->std::same_as<VertexForce<Scalar>>;
+    { network.majoriser(v, x) }
+    noexcept->std::same_as<EnergyMajoriser<Scalar>>;
+    { network.curvature(v, x) }
+    noexcept->std::same_as<Symmetric3<Scalar>>;
+    { network.energy_change(v, displacement, x) }
+    noexcept->std::same_as<EnergyChange<Scalar>>;
+    { network.force_tolerance() }
+    noexcept->std::same_as<Scalar>;
+};
+
+namespace detail {
+
+template <class Network, class Scalar>
+consteval bool check_elastic_network() noexcept {  // NOLINT(readability-function-size): a sentence for each requirement
+    static_assert(
+        requires { requires std::same_as<typename Network::Scalar, Scalar>; },
+        "ElasticNetwork: must have Scalar, the scalar of the solver");
+    static_assert(
+        requires {
+            { Network::never_stiffens } -> std::convertible_to<bool>;
+        },
+        "ElasticNetwork: must have static constexpr bool never_stiffens");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.vertex_count() }
+            noexcept->std::same_as<Index>;
+        },
+        "ElasticNetwork: vertex_count() const noexcept must return Index");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.pinned(v) }
+            noexcept->std::same_as<bool>;
+        },
+        "ElasticNetwork: pinned(Index) const noexcept must return bool");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.has_masses() }
+            noexcept->std::same_as<bool>;
+        },
+        "ElasticNetwork: has_masses() const noexcept must return bool");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.mass(v) }
+            noexcept->std::same_as<Scalar>;
+        },
+        "ElasticNetwork: mass(Index) const noexcept must return Scalar");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.viscosity(v) }
+            noexcept->std::same_as<Scalar>;
+        },
+        "ElasticNetwork: viscosity(Index) const noexcept must return Scalar");
+    static_assert(
+        requires(const Network& network, Index v) {
+            { network.neighbours(v)[0].other } -> std::convertible_to<Index>;
+        },
+        "ElasticNetwork: neighbours(Index) const must give a range of something with .other, an Index");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.force_on(v, x) }
+            noexcept->std::same_as<VertexForce<Scalar>>;
+        },
+        "ElasticNetwork: force_on(Index, const ConstPointsRef<Scalar>&) const noexcept must return Pull<Scalar>");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.majoriser(v, x) }
+            noexcept->std::same_as<EnergyMajoriser<Scalar>>;
+        },
+        "ElasticNetwork: majoriser(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
+        "EnergyMajoriser<Scalar>");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.curvature(v, x) }
+            noexcept->std::same_as<Symmetric3<Scalar>>;
+        },
+        "ElasticNetwork: curvature(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
+        "Symmetric3<Scalar>");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.energy_change(v, displacement, x) }
+            noexcept->std::same_as<EnergyChange<Scalar>>;
+        },
+        "ElasticNetwork: energy_change(Index, const Vector3<Scalar>&, const ConstPointsRef<Scalar>&) const noexcept "
+        "must return EnergyChange<Scalar>");
+    static_assert(
+        requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
+                 const Vector3<Scalar>& displacement) {
+            { network.force_tolerance() }
+            noexcept->std::same_as<Scalar>;
+        },
+        "ElasticNetwork: force_tolerance() const noexcept must return Scalar");
+    return ElasticNetwork<Network, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `ElasticNetwork`; where it is none, the error says what is missing.
+template <class Network, class Scalar>
+concept CheckedElasticNetwork = detail::check_elastic_network<Network, Scalar>();
+
+}  // namespace membrane

@@ -1,0 +1,221 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/compressed_rows.hpp>
+#include <membrane/core/lanes.hpp>
+#include <membrane/model/elastic_network.hpp>
+#include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+
+/// What joins more than two vertices, or pulls at one alone: triangles that resist stretch, hinges, pressure, loads.
+///
+///     const auto triangles = membrane::triangular_springs(mesh, material);
+///     const auto tissue = membrane::Tissue(springs, triangles, membrane::pressure(mesh, 2000.0));
+namespace membrane {
+
+/// What an element does to one of its corners.
+template <Number Scalar>
+struct CornerForce {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
+    Symmetric3<Scalar> curvature = {};  ///< of the energy as the corner moves, no eigenvalue below zero [N/m]
+};
+
+/// Where the corners of an element are [m].
+template <Number Scalar, std::size_t count>
+using Corners = std::array<Vector3<Scalar>, count>;
+
+/// One element with its constants, which floats and doubles can be asked. What the compiler cannot see: force, curvature
+/// and change of energy are of the same energy; `hessian_block(x, i, j)` is that by corners i and j [N/m], or so much
+/// of it that Newton's method still finds to rest. The stock ones take `Lanes` as well, as constants and as positions:
+/// several elements of a kind at once, each to the bits that it comes to alone.
+template <class E>
+concept Element = std::copyable<E> && requires(const E& element, const Corners<double, E::corner_count>& x,
+                                               const Corners<float, E::corner_count>& y, std::size_t i) {
+    { element.force_on(x, i) }
+    noexcept->std::same_as<CornerForce<double>>;
+    { element.force_on(y, i) }
+    noexcept->std::same_as<CornerForce<float>>;
+    { element.energy(x) }
+    noexcept->std::same_as<double>;
+    { element.energy_change(x, i, x[i]) }
+    noexcept->std::same_as<EnergyChange<double>>;
+    { element.energy_change(y, i, y[i]) }
+    noexcept->std::same_as<EnergyChange<float>>;
+    { element.hessian_block(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
+};
+
+/// An element at its vertices.
+template <class E>
+struct PlacedElement {
+    std::array<Index, E::corner_count> corners;
+    E element;
+
+    /// Where its corners are.
+    template <class Positions>
+    [[nodiscard]] Corners<typename Positions::Scalar, E::corner_count> where(const Positions& x) const noexcept {
+        Corners<typename Positions::Scalar, E::corner_count> places;
+        for (std::size_t i = 0; i < places.size(); ++i) places[i] = point(x, corners[i]);
+        return places;
+    }
+};
+
+namespace detail {
+
+template <class E>
+consteval bool check_element() noexcept {  // NOLINT(readability-function-size): a sentence for each requirement
+    static_assert(std::copyable<E>, "Element: must be copyable");
+    static_assert(
+        requires {
+            requires E::corner_count >
+            0;
+        },
+        "Element: must have static constexpr corner_count, the number of its corners");
+    static_assert(
+        requires(const E& element, const Corners<double, E::corner_count>& x, std::size_t i) {
+            { element.force_on(x, i) }
+            noexcept->std::same_as<CornerForce<double>>;
+        },
+        "Element: force_on(const Corners<double, corner_count>&, std::size_t) const noexcept must return "
+        "CornerForce<double>");
+    static_assert(
+        requires(const E& element, const Corners<float, E::corner_count>& x, std::size_t i) {
+            { element.force_on(x, i) }
+            noexcept->std::same_as<CornerForce<float>>;
+        },
+        "Element: force_on(const Corners<float, corner_count>&, std::size_t) const noexcept must return "
+        "CornerForce<float>");
+    static_assert(
+        requires(const E& element, const Corners<double, E::corner_count>& x, std::size_t i) {
+            { element.energy(x) }
+            noexcept->std::same_as<double>;
+        },
+        "Element: energy(const Corners<double, corner_count>&) const noexcept must return double");
+    static_assert(
+        requires(const E& element, const Corners<double, E::corner_count>& x, std::size_t i) {
+            { element.energy_change(x, i, x[i]) }
+            noexcept->std::same_as<EnergyChange<double>>;
+        },
+        "Element: energy_change(const Corners<double, corner_count>&, std::size_t, const Vector3<double>&) const "
+        "noexcept must return EnergyChange<double>");
+    static_assert(
+        requires(const E& element, const Corners<float, E::corner_count>& x, std::size_t i) {
+            { element.energy_change(x, i, x[i]) }
+            noexcept->std::same_as<EnergyChange<float>>;
+        },
+        "Element: energy_change(const Corners<float, corner_count>&, std::size_t, const Vector3<float>&) const "
+        "noexcept must return EnergyChange<float>");
+    static_assert(
+        requires(const E& element, const Corners<double, E::corner_count>& x, std::size_t i) {
+            { element.hessian_block(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
+        },
+        "Element: hessian_block(const Corners<double, corner_count>&, std::size_t, std::size_t) const must return "
+        "Eigen::Matrix3d");
+    return Element<E>;
+}
+
+}  // namespace detail
+
+/// A `Element`; where it is none, the error says what is missing.
+template <class E>
+concept CheckedElement = detail::check_element<E>();
+
+/// Elements of one kind, each at its vertices. Constant once built, no positions in it.
+template <Real Scalar_, CheckedElement Each>
+class Elements {
+  public:
+    using Scalar = Scalar_;
+    static constexpr std::size_t corner_count = Each::corner_count;
+    using Placed = PlacedElement<Each>;
+
+    /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, and for one that is pulled at
+    /// rest by what is not finite: a triangle too thin, or a constant too large, for the scalar. Linear.
+    Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all);
+
+    [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
+    [[nodiscard]] std::span<const Placed> all() const noexcept { return all_; }
+
+    /// Calls `act(placed)` for each.
+    template <class Act>
+    void for_each_element(Act act) const {
+        for (const auto& placed : all_) act(placed);
+    }
+
+    /// Calls `act(placed, x, corner)` for the elements of vertex `v`: where their corners are, and which of them is `v`.
+    template <class Act>
+    void for_each(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
+        for (const auto& at : corners_of_[v]) {
+            const Placed& placed = all_[static_cast<std::size_t>(at.element)];
+            act(placed, placed.where(x), static_cast<std::size_t>(at.corner));
+        }
+    }
+
+    /// Where the corners of an element are.
+    template <class Positions>
+    [[nodiscard]] static auto where(const Placed& placed, const Positions& x) noexcept {
+        return placed.where(x);
+    }
+
+    /// See `MassSpringNetwork::force_tolerance`.
+    [[nodiscard]] Scalar force_tolerance() const noexcept { return negligible_force_; }
+
+  private:
+    struct Corner {
+        Index element, corner;
+    };
+    [[nodiscard]] Scalar negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept;
+
+    std::vector<Placed> all_;
+    CompressedRows<Corner> corners_of_;
+    Scalar negligible_force_ = 0;
+};
+
+template <Real Scalar, CheckedElement Each>
+Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all) : all_(std::move(all)) {
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+        for (const Index v : all_[i].corners) {
+            if (v >= 0 && v < mesh.vertex_count()) continue;
+            refuse("Elements", "element ", i, " names vertex ", v, ", expected 0 to ", mesh.vertex_count() - 1);
+        }
+        const Scalar negligible = negligible_force_of(all_[i], mesh.positions());
+        if (!is_finite(negligible)) {
+            refuse("Elements", "element ", i, " at vertex ", all_[i].corners[0],
+                   " must pull with a finite force and stiffness at rest: its triangle is too thin, or a constant too "
+                   "large");
+        }
+        negligible_force_ = (std::max)(negligible_force_, negligible);
+    }
+    corners_of_ = CompressedRows<Corner>(mesh.vertex_count(), [this](auto put) {
+        for (std::size_t i = 0; i < all_.size(); ++i) {
+            for (std::size_t k = 0; k < corner_count; ++k) {
+                put(all_[i].corners[k], Corner{static_cast<Index>(i), static_cast<Index>(k)});
+            }
+        }
+    });
+}
+
+template <Real Scalar, CheckedElement Each>
+Scalar Elements<Scalar, Each>::negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept {
+    const auto corners = placed.where(x);
+    Scalar largest = 0, stiffness = 0, size = 0;
+    for (std::size_t i = 0; i < corner_count; ++i) {
+        const auto pull = placed.element.force_on(corners, i);
+        if (!is_finite(pull.force) || !is_finite(pull.curvature.trace()))
+            return std::numeric_limits<Scalar>::infinity();
+        stiffness = (std::max)(stiffness, pull.curvature.trace());
+        size = (std::max)(size, norm<Scalar>(corners[i] - corners[0]));
+        largest = (std::max)(largest, norm(pull.force));
+    }
+    const Scalar epsilon = std::numeric_limits<Scalar>::epsilon(), far = x.cwiseAbs().maxCoeff();
+    return (std::max)(stiffness * (std::max)(size / Scalar(1e9), 64 * epsilon * far), 64 * epsilon * largest);
+}
+
+}  // namespace membrane

@@ -1,0 +1,438 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include <membrane/core/compressed_rows.hpp>
+#include <membrane/core/field.hpp>
+#include <membrane/model/elastic_network.hpp>
+#include <membrane/model/elements.hpp>
+#include <membrane/model/spring_law.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+
+/// The membrane as masses joined by springs, one along each edge of the mesh.
+///
+///     const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});
+///     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
+///     const auto force = network.force_on(v, x).force;                                          // [N]
+namespace membrane {
+
+/// Constants of a network. What is given for each spring stands in the order of `Adjacency::edges()`.
+template <Real Scalar>
+struct NetworkOptions {
+    Field<Scalar> stiffness = {};    ///< k_ij [N/m], required; a spring of stiffness zero is left out
+    Field<Scalar> mass = {};         ///< m_i [kg]; only (4) as published and explicit Euler need it
+    Field<Scalar> viscosity = {};    ///< d_i [N s/m], zero if not given; only explicit Euler feels it
+    Field<Scalar> rest_length = {};  ///< r_ij [m]; if not given, the lengths in the mesh
+    std::vector<Index> pinned = {};  ///< vertices that never move: a clamped rim is `border(mesh)`
+};
+// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+static_assert(std::is_default_constructible_v<NetworkOptions<float>>);
+static_assert(std::is_default_constructible_v<NetworkOptions<double>>);
+
+/// One spring of the network.
+template <Real Scalar>
+struct Spring {
+    Index first, second;
+    Scalar stiffness;    ///< [N/m]
+    Scalar rest_length;  ///< [m]
+};
+
+/// One spring as the vertex at one end sees it.
+template <Real Scalar>
+struct SpringEnd {
+    Index other;
+    Scalar stiffness;    ///< [N/m]
+    Scalar rest_length;  ///< [m]
+};
+
+/// From the first end of a spring to the second [m].
+template <Real Scalar, class Positions>
+[[nodiscard]] Vector3<typename Positions::Scalar> edge_vector(const Spring<Scalar>& spring,
+                                                              const Positions& x) noexcept {
+    return point(x, spring.second) - point(x, spring.first);
+}
+
+/// The second derivative of a spring's energy by its reach, or a bound of it: along u u^T + across (I - u u^T), u the
+/// direction [N/m].
+template <Number Scalar>
+struct SpringStiffness {
+    Scalar along, across;
+    Vector3<Scalar> direction;  ///< to the other end, zero without a length
+};
+
+/// What one spring does to the vertex at one end. One of length zero has no direction and no force: it curves the energy
+/// alike in all directions.
+template <Number Scalar>
+struct SpringForce : SpringStiffness<Scalar> {
+    Vector3<Scalar> reach;  ///< to the other end [m]
+    Scalar length;          ///< [m]
+    Scalar tension;         ///< [N]
+
+    [[nodiscard]] Vector3<Scalar> force() const noexcept { return this->across * reach; }  ///< [N]
+};
+
+/// From the vertex at one end of a spring to the other, and how far that is. Of several springs, first all of these and
+/// then the rest: a root and a division take long, and one need not wait for the other's.
+template <Number Scalar>
+struct SpringReach {
+    Vector3<Scalar> reach;  ///< to the other end [m]
+    Scalar length;          ///< [m]
+    Scalar divisor;         ///< the same, 1 instead of 0 [m]
+    Scalar per_length;      ///< [1/m]
+
+    SpringReach() = default;
+    [[gnu::always_inline]] explicit SpringReach(const Vector3<Scalar>& to) noexcept
+        : reach(to), length(norm(to)), divisor(select(length != 0, length, Scalar(1))), per_length(1 / divisor) {}
+};
+
+/// What a spring of this stiffness [N/m] and rest length [m] does to the vertex from which it reaches.
+template <Number Scalar, class Law>
+[[gnu::always_inline, nodiscard]] inline SpringForce<Scalar> pull_of(const Law& law, const SpringReach<Scalar>& to,
+                                                                     const Scalar& stiffness,
+                                                                     const Scalar& rest_length) noexcept {
+    const auto has_length = to.length != 0;
+    const auto answer = law(SpringState<Scalar>{stiffness, rest_length, to.divisor});
+    return {{select(has_length, answer.stiffness, stiffness),
+             select<Scalar>(has_length, answer.tension * to.per_length, stiffness), to.per_length * to.reach},
+            to.reach,
+            to.length,
+            select(has_length, answer.tension, Scalar(0))};
+}
+template <Number Scalar, class Law>
+[[gnu::always_inline, nodiscard]] inline SpringForce<Scalar> pull_of(const Law& law, const Vector3<Scalar>& reach,
+                                                                     const Scalar& stiffness,
+                                                                     const Scalar& rest_length) noexcept {
+    return pull_of(law, SpringReach<Scalar>(reach), stiffness, rest_length);
+}
+
+/// Adds a spring to what pulls on a vertex.
+template <Number Scalar>
+[[gnu::always_inline]] inline void add(VertexForce<Scalar>& sum, const SpringForce<Scalar>& spring) noexcept {
+    sum.force += spring.force();
+    sum.stiffness += larger(spring.along, spring.across);
+}
+
+/// The same for `EnergyMajoriser`, in fewer operations: the relief as a sum of dyads, the size as a quotient.
+template <Number Scalar>
+struct CurvedSum {
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
+    Scalar stiffness = 0;                             ///< [N/m]
+    Symmetric3<Scalar> dyads;                         ///< of what the relief of each spring leaves out, along it [N/m]
+    Scalar size_force = 1, size_stiffness = 0;        ///< the quotient is the smallest size [N], [N/m]
+
+    [[gnu::always_inline, nodiscard]] EnergyMajoriser<Scalar> total() const noexcept {
+        EnergyMajoriser<Scalar> sum{force, stiffness, diagonal3(dyads.trace())};
+        sum.stiffness_reduction += Scalar(-1) * dyads;
+        const auto has_size = size_stiffness > 0;
+        sum.size = select(has_size, size_force / select(has_size, size_stiffness, Scalar(1)), sum.size);
+        return sum;
+    }
+};
+template <Number Scalar>
+[[gnu::always_inline]] inline void add(CurvedSum<Scalar>& sum, const SpringForce<Scalar>& spring) noexcept {
+    const Scalar stiffness = larger(spring.along, spring.across);
+    const Scalar stiffness_reduction = smaller(stiffness - spring.across, stiffness);
+    sum.force += spring.force();
+    sum.stiffness += stiffness;
+    sum.dyads += outer<Scalar>(larger(stiffness_reduction, Scalar(0)), spring.direction);
+    const Scalar size_force = stiffness * spring.length + larger<Scalar>(-spring.tension, Scalar(0));
+    const auto is_smaller = (stiffness_reduction > 0) & (size_force * sum.size_stiffness < sum.size_force * stiffness);
+    sum.size_force = select(is_smaller, size_force, sum.size_force);
+    sum.size_stiffness = select(is_smaller, stiffness, sum.size_stiffness);
+}
+
+/// Adds a spring's stiffness to a block.
+template <Number Scalar>
+inline void add(Symmetric3<Scalar>& sum, const SpringStiffness<Scalar>& spring) noexcept {
+    sum += diagonal3(spring.across);
+    sum += outer<Scalar>(spring.along - spring.across, spring.direction);
+}
+template <Number Scalar>
+[[nodiscard]] Symmetric3<Scalar> block_of(const SpringStiffness<Scalar>& spring) noexcept {
+    Symmetric3<Scalar> block;
+    add(block, spring);
+    return block;
+}
+
+/// Bound of the stiffness, from below, of a linear spring at all reaches that are at most `displacement` from `reach`; with none of
+/// them, then, is it stiffer in any direction than its own stiffness. None where it may get too short for that.
+///
+/// At a reach d of length l and direction u the second derivative of k (|d| - r)^2 / 2 is k I - k r/l (I - u u^T). Let
+/// d' be at most s l away from d. In the plane of d and d', at an angle a from u, it is no shorter than
+/// l' = l (cos a - sqrt(s^2 - sin^2 a)), and with q = r / (l - s l)
+///
+///     r/l' (I - u' u'^T)  <=  q (I - u u^T) + 2 s q u u^T,                                                     (*)
+///
+/// so that the stiffness is at least k (1 - q) across u and k (1 - 2 s q) along u. (*) is plain at right angles to the
+/// plane, where l' >= l - s l. Within it the left side is r/l' n n^T, n at right angles to u', and so (*) says that
+/// r/l' (sin^2 a / (2 s q) + cos^2 a / q) <= 1, or with z = sin^2 a that
+/// sqrt(1 - z) - sqrt(s^2 - z) >= (1 - s) (1 - z + z / (2 s)). At z = 0 both sides are 1 - s; up to z = s^2 the left
+/// one is convex, the right one is a line, and at z = 0 the left one is the steeper by 1 - s.
+[[nodiscard]] inline std::optional<SpringStiffness<double>> min_stiffness(const Spring<double>& spring,
+                                                                          const Vector3<double>& reach,
+                                                                          double displacement) noexcept {
+    constexpr double rounding = 1e-14;  // more than what is lost here
+    const double length = norm(reach);
+    if (!(2 * displacement < length)) return std::nullopt;
+    const double q = (1 + rounding) * spring.rest_length / (length - displacement), s = displacement / length;
+    if (!(q <= 2 && 2 * s * q <= 1)) return std::nullopt;
+    return SpringStiffness<double>{spring.stiffness * (1 - rounding - 2 * s * q), spring.stiffness * (1 - rounding - q),
+                                   reach / length};
+}
+
+/// A spring as an `Element`, between its two ends.
+template <Real Scalar, class Law>
+struct SpringElement {
+    static constexpr std::size_t corner_count = 2;
+
+    const Law* law;      ///< must outlive this
+    Scalar stiffness;    ///< [N/m]
+    Scalar rest_length;  ///< [m]
+
+    template <Real N>
+    [[nodiscard]] SpringForce<N> pull_towards(const Vector3<N>& reach) const noexcept {
+        static_assert(SpringLaw<Law, N>,
+                      "a law must take SpringState of the scalar it is asked in: an equilibrium is found in double");
+        return pull_of<N>(*law, reach, static_cast<N>(stiffness), static_cast<N>(rest_length));
+    }
+    template <Real N>
+    [[nodiscard]] SpringResponse<N> response(N length) const noexcept {
+        constexpr N shortest = (std::numeric_limits<N>::min)();  // a law is asked for no less
+        return (*law)(
+            SpringState<N>{static_cast<N>(stiffness), static_cast<N>(rest_length), (std::max)(length, shortest)});
+    }
+
+    template <Real N>
+    [[nodiscard]] CornerForce<N> force_on(const Corners<N, 2>& x, std::size_t i) const noexcept {
+        const auto spring = pull_towards<N>(x[1 - i] - x[i]);
+        const SpringStiffness<N> most{(std::max)(spring.along, N(0)), (std::max)(spring.across, N(0)),
+                                      spring.direction};
+        return {spring.force(), block_of(most)};
+    }
+    template <Real N>
+    [[nodiscard]] N energy(const Corners<N, 2>& x) const noexcept {
+        return response(norm<N>(x[1] - x[0])).energy;
+    }
+    template <Real N>
+    [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 2>& x, std::size_t i,
+                                                const Vector3<N>& displacement) const noexcept {
+        const Vector3<N> reach = x[1 - i] - x[i];
+        const N length = norm(reach), far = detail::largest_magnitude(x[i]);
+        const auto before = response(length), after = response(norm<N>(reach - displacement));
+        return {after.energy - before.energy, before.energy + std::abs(before.tension) * (length + far)};
+    }
+    [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 2>& x, std::size_t i,
+                                                std::size_t j) const noexcept {
+        const auto block = block_of<double>(pull_towards<double>(x[1] - x[0]));
+        return dense(i == j ? block : -1.0 * block);
+    }
+};
+static_assert(Element<SpringElement<float, LinearSpring>> && Element<SpringElement<double, ExponentialSpring>>);
+
+/// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1): constant once built, no positions in it.
+template <Real Scalar_, CheckedSpringLaw<Scalar_> Law>
+class MassSpringNetwork {
+  public:
+    using Scalar = Scalar_;
+
+    static constexpr bool never_stiffens = membrane::never_stiffens<Law>();
+
+    /// @throws InvalidInput for a number that is negative, not finite, missing, or of the wrong count. Cost: O(V + F log F).
+    MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law, const NetworkOptions<Scalar>& options);
+
+    [[nodiscard]] Index vertex_count() const noexcept { return ends_.row_count(); }
+    [[nodiscard]] std::span<const Spring<Scalar>> springs() const noexcept { return springs_; }
+    [[nodiscard]] const Law& law() const noexcept { return law_; }
+
+    /// The springs of vertex `v`, by ascending vertex at the other end.
+    [[nodiscard]] std::span<const SpringEnd<Scalar>> springs_of(Index v) const noexcept { return ends_[v]; }
+
+    /// Calls `act(placed)` for each spring: `PlacedElement<SpringElement>`.
+    template <class Act>
+    void for_each_element(Act act) const {
+        for (const auto& spring : springs_) act(placed(spring));
+    }
+
+    [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const noexcept { return ends_[v]; }
+
+    [[nodiscard]] bool pinned(Index v) const noexcept { return pinned_[static_cast<std::size_t>(v)] != 0; }
+    [[nodiscard]] bool has_masses() const noexcept { return !mass_.empty(); }
+    [[nodiscard]] Scalar mass(Index v) const noexcept {
+        return mass_[static_cast<std::size_t>(v)];
+    }  ///< @pre has_masses()
+    [[nodiscard]] Scalar viscosity(Index v) const noexcept {
+        return viscosity_.empty() ? Scalar(0) : viscosity_[static_cast<std::size_t>(v)];
+    }
+
+    /// Calls `act(pull)` with the `SpringForce` of each spring of vertex `v` at positions `x`.
+    template <class Act>
+    void for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept;
+
+    /// Sum of the spring forces on vertex `v` at positions `x`.
+    [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// The same, and a bound of the energy. A spring of stiffness k and tension T that is l long stores
+    /// k (l' - r)^2 / 2 and a constant when it is l' long, r = l - T / k (or less, where it never stiffens): of
+    /// k (l'^2 - 2 r l' + r^2) / 2 only the second term is no square of a distance. Let u be the direction away from the
+    /// other end. A vertex that moves by a along u and by b across, no more than rho in all, makes
+    /// l' = sqrt((l + a)^2 + b^2) >= l + a + b^2 / (2 (l + rho)). So the energy stays below one that curves by k along the
+    /// spring and by k (1 - r / (l + rho)) across it. `stiffness_reduction` is the sum of k min(r / l, 1) (I - u u^T), `size` the
+    /// smallest max(l, r): with these, relief / (1 + rho / size) is no more than the sum of k r / (l + rho) (I - u u^T).
+    [[nodiscard]] EnergyMajoriser<Scalar> majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// Second derivative of the energy by the place of vertex `v` alone [N/m].
+    [[nodiscard]] Symmetric3<Scalar> curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// What moving vertex `v` by `displacement` [m] costs.
+    [[nodiscard]] EnergyChange<Scalar> energy_change(Index v, const Vector3<Scalar>& displacement,
+                                                     const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// Tension of spring `s` [N].
+    [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
+        const auto& spring = springs_[static_cast<std::size_t>(s)];
+        return placed(spring).element.response(norm(edge_vector(spring, x))).tension;
+    }
+
+    /// Energy stored in all springs [J]. Cost: O(springs).
+    [[nodiscard]] Scalar energy(const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// An unbalanced force that is nothing beside the others [N]: 1e-9 of the stiffest spring stretched by its own
+    /// length, or what the spacing of numbers makes of it where that is more.
+    [[nodiscard]] Scalar force_tolerance() const noexcept { return negligible_force_; }
+
+  private:
+    [[nodiscard]] PlacedElement<SpringElement<Scalar, Law>> placed(const Spring<Scalar>& spring) const noexcept {
+        return {{spring.first, spring.second}, {&law_, spring.stiffness, spring.rest_length}};
+    }
+    void build_springs(const Adjacency& adjacency, const Points<Scalar>& x, const NetworkOptions<Scalar>& options);
+
+    [[no_unique_address]] Law law_;
+    std::vector<Spring<Scalar>> springs_;
+    CompressedRows<SpringEnd<Scalar>> ends_;  // each spring twice
+    std::vector<Scalar> mass_, viscosity_;
+    std::vector<unsigned char> pinned_;
+    Scalar negligible_force_ = 0;
+};
+
+template <Real Scalar, class Law>
+MassSpringNetwork(const TriangleMesh<Scalar>&, const Law&, const NetworkOptions<Scalar>&)
+    -> MassSpringNetwork<Scalar, Law>;
+
+namespace detail {
+inline constexpr std::string_view network_name = "MassSpringNetwork";
+}
+
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
+MassSpringNetwork<Scalar, Law>::MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law,
+                                                  const NetworkOptions<Scalar>& options)
+    : law_(law) {
+    if constexpr (requires { law_.check(); }) law_.check();
+    const Index vertices = mesh.vertex_count();
+    if (options.mass.given())
+        mass_ = options.mass.expand(vertices, detail::network_name, "mass", "vertex", "kg", false);
+    if (options.viscosity.given()) {
+        viscosity_ = options.viscosity.expand(vertices, detail::network_name, "viscosity", "vertex", "N s/m");
+    }
+    pinned_.assign(static_cast<std::size_t>(vertices), 0);
+    for (std::size_t i = 0; i < options.pinned.size(); ++i) {
+        const Index v = options.pinned[i];
+        if (v < 0 || v >= vertices) {
+            refuse(detail::network_name, "pinned ", i, " names vertex ", v, ", expected 0 to ", vertices - 1);
+        }
+        pinned_[static_cast<std::size_t>(v)] = 1;
+    }
+    build_springs(Adjacency(mesh), mesh.positions(), options);
+    ends_ = CompressedRows<SpringEnd<Scalar>>(vertices, [this](auto put) {
+        for (const auto& s : springs_) {  // ascending, so each row is
+            put(s.first, SpringEnd<Scalar>{s.second, s.stiffness, s.rest_length});
+            put(s.second, SpringEnd<Scalar>{s.first, s.stiffness, s.rest_length});
+        }
+    });
+}
+
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
+void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, const Points<Scalar>& x,
+                                                   const NetworkOptions<Scalar>& options) {
+    const auto edges = adjacency.edges();
+    const auto count = static_cast<Index>(edges.size());
+    if (!options.stiffness.given()) refuse(detail::network_name, "stiffness of the springs [N/m] is required");
+    const auto stiffness = options.stiffness.expand(count, detail::network_name, "stiffness", "spring", "N/m");
+    std::vector<Scalar> rest(edges.size());
+    if (options.rest_length.given()) {
+        rest = options.rest_length.expand(count, detail::network_name, "rest length", "spring", "m");
+    } else {
+        for (std::size_t s = 0; s < edges.size(); ++s) {
+            rest[s] = norm<Scalar>(point(x, edges[s][1]) - point(x, edges[s][0]));
+        }
+    }
+    springs_.reserve(edges.size());
+    for (std::size_t s = 0; s < edges.size(); ++s) {
+        if (stiffness[s] > 0) springs_.push_back({edges[s][0], edges[s][1], stiffness[s], rest[s]});
+    }
+    const Scalar spacing = std::numeric_limits<Scalar>::epsilon() * x.cwiseAbs().maxCoeff();
+    for (const auto& s : springs_) {
+        const Scalar force = s.stiffness * (std::max)(s.rest_length / Scalar(1e9), 64 * spacing);
+        negligible_force_ = (std::max)(negligible_force_, force);
+    }
+}
+
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
+template <class Act>
+void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
+    const Vector3<Scalar> here = point(x, v);
+    for (const auto& end : springs_of(v)) {
+        const Vector3<Scalar> reach = point(x, end.other) - here;
+        act(pull_of<Scalar>(law_, reach, end.stiffness, end.rest_length));
+    }
+}
+
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
+VertexForce<Scalar> MassSpringNetwork<Scalar, Law>::force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
+    VertexForce<Scalar> sum;
+    for_each_pull(v, x, [&](const SpringForce<Scalar>& spring) { add(sum, spring); });
+    return sum;
+}
+
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
+EnergyMajoriser<Scalar> MassSpringNetwork<Scalar, Law>::majoriser(Index v,
+                                                                  const ConstPointsRef<Scalar>& x) const noexcept {
+    CurvedSum<Scalar> sum;
+    for_each_pull(v, x, [&](const SpringForce<Scalar>& spring) { add(sum, spring); });
+    return sum.total();
+}
+
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
+Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
+    Symmetric3<Scalar> block;
+    for_each_pull(v, x, [&](const SpringForce<Scalar>& spring) { add(block, spring); });
+    return block;
+}
+
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
+EnergyChange<Scalar> MassSpringNetwork<Scalar, Law>::energy_change(Index v, const Vector3<Scalar>& displacement,
+                                                                   const ConstPointsRef<Scalar>& x) const noexcept {
+    EnergyChange<Scalar> sum;
+    for (const auto& end : springs_of(v)) {
+        const SpringElement<Scalar, Law> spring{&law_, end.stiffness, end.rest_length};
+        sum += spring.template energy_change<Scalar>({point(x, v), point(x, end.other)}, 0, displacement);
+    }
+    return sum;
+}
+
+template <Real Scalar, CheckedSpringLaw<Scalar> Law>
+Scalar MassSpringNetwork<Scalar, Law>::energy(const ConstPointsRef<Scalar>& x) const noexcept {
+    Scalar sum = 0;
+    for_each_element([&](const auto& spring) { sum += spring.element.energy(spring.where(x)); });
+    return sum;
+}
+
+}  // namespace membrane

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <type_traits>
+
+#include <membrane/core/symmetric3.hpp>
+#include <membrane/model/volume_springs.hpp>
+#include <membrane/surface/moving_body.hpp>
+
+/// What holds the membrane to a body that moves.
+///
+///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));
+namespace membrane {
+
+namespace detail {
+
+/// A rotation in another number type, orthonormal to its rounding.
+template <Real Number, Real Scalar>
+[[nodiscard]] Eigen::Matrix<Number, 3, 3> rotation_in(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept {
+    Eigen::Matrix<Number, 3, 3> r = rotation.template cast<Number>();
+    if constexpr (!std::is_same_v<Number, Scalar>) {
+        const Vector3<Number> x = r.col(0) / norm<Number>(r.col(0));
+        const Vector3<Number> z = cross<Number>(x, r.col(1));
+        r.col(0) = x;
+        r.col(2) = z / norm(z);
+        r.col(1) = cross<Number>(r.col(2), x);
+    }
+    return r;
+}
+
+}  // namespace detail
+
+/// Any `FoundationModel` on a body that has moved: at each vertex it is shifted with the anchor, and turned as the body is there.
+/// What it is asked is brought to where the body is at rest, and its answer back. A view of both for the length of a call or
+/// two, see `on`.
+template <class Volume, Real Scalar>
+class MovedVolume {
+  public:
+    MovedVolume(const MovingBody<Scalar>& body, const Volume& volume) noexcept : body_(&body), volume_(&volume) {}
+
+    /// Tells a solver that the membrane has been taken along.
+    [[nodiscard]] const MovingBody<Scalar>& body() const noexcept { return *body_; }
+
+    [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
+                                               Scalar dt) const noexcept {
+        const Place place(*body_, v);
+        auto pull = volume_->force_on(v, place.point_to_body(position), place.point_to_body(start), dt);
+        pull.force = place.turn.vector_to_world(pull.force);
+        return pull;
+    }
+
+    /// Of a model that hands out its springs.
+    [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept requires
+        requires(const Volume& volume) {
+        volume.spring(v, start, dt);
+    }
+    {
+        const Place place(*body_, v);
+        auto spring = volume_->spring(v, place.point_to_body(start), dt);
+        spring.anchor = place.point_to_world(spring.anchor);
+        return spring;
+    }
+
+    /// Of a model whose anchors are those of the body at rest.
+    [[nodiscard]] const Points<Scalar>& anchors() const noexcept requires requires(const Volume& volume) {
+        volume.anchors();
+    }
+    { return body_->anchors(); }
+
+    template <Real Number = Scalar>
+    [[nodiscard]] Symmetric3<Number> curvature(Index v) const noexcept requires requires(const Volume& volume) {
+        volume.curvature(v);
+    }
+    {
+        const auto rotation = detail::rotation_in<Number>(body_->rotation_at(v));
+        if constexpr (requires { volume_->template curvature<Number>(v); }) {
+            return rotated(volume_->template curvature<Number>(v), rotation);
+        } else {
+            const Symmetric3<Scalar> k = volume_->curvature(v);
+            return rotated<Number>({k.xx, k.yy, k.zz, k.xy, k.xz, k.yz}, rotation);
+        }
+    }
+
+    [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept requires
+        requires(const Volume& volume) {
+        volume.energy(v, position);
+    }
+    { return volume_->energy(v, Place(*body_, v).point_to_body(position)); }
+
+  private:
+    /// How things go along with vertex `v`.
+    struct Place {
+        Place(const MovingBody<Scalar>& body, Index v) noexcept
+            : at_rest(point(body.anchors_at_rest(), v)), now(point(body.anchors(), v)) {
+            turn.rotation = body.rotation_at(v);
+        }
+        [[nodiscard]] Vector3<Scalar> point_to_body(const Vector3<Scalar>& position) const noexcept {
+            return at_rest + turn.vector_to_body(position - now);
+        }
+        [[nodiscard]] Vector3<Scalar> point_to_world(const Vector3<Scalar>& position) const noexcept {
+            return now + turn.vector_to_world(position - at_rest);
+        }
+        Vector3<Scalar> at_rest, now;
+        RigidFrame<Scalar> turn;
+    };
+
+    const MovingBody<Scalar>* body_;
+    const Volume* volume_;
+};
+
+/// `volume`, made for the body at rest, on `body` as it is now. Both must outlive what is returned.
+template <Real Scalar, FoundationModel<Scalar> Volume>
+[[nodiscard]] MovedVolume<Volume, Scalar> on(const MovingBody<Scalar>& body, const Volume& volume) noexcept {
+    return {body, volume};
+}
+
+static_assert(FoundationModel<MovedVolume<VirtualVolumeSprings<float>, float>, float>);
+static_assert(FoundationModel<MovedVolume<NoFoundation, double>, double>);
+
+}  // namespace membrane

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <limits>
+
+#include <membrane/core/check.hpp>
+#include <membrane/core/lanes.hpp>
+#include <membrane/core/types.hpp>
+
+/// What one spring does at a given length: constant stiffness, or stiffness as a function of the elongation.
+///
+///     struct Cubic {                                              // a law of one's own
+///         template <membrane::Real Scalar>
+///         membrane::SpringResponse<Scalar> operator()(const membrane::SpringState<Scalar>& s) const noexcept;
+///     };
+///     const auto network = membrane::MassSpringNetwork(mesh, Cubic{}, {.stiffness = 40.0});
+namespace membrane {
+
+/// A spring as the law sees it.
+template <Number Scalar>
+struct SpringState {
+    Scalar stiffness;    ///< of the spring at rest, k_ij [N/m], > 0
+    Scalar rest_length;  ///< r_ij [m], >= 0
+    Scalar length;       ///< l_ij [m], > 0
+};
+
+/// What the spring answers.
+template <Number Scalar>
+struct SpringResponse {
+    Scalar tension;    ///< [N], positive where the spring pulls its two ends together
+    Scalar stiffness;  ///< derivative of the tension by the length [N/m]
+    Scalar energy;     ///< stored since rest [J]
+};
+
+/// A law of springs. What the compiler cannot see: no tension and no energy at rest length, `tension` the derivative
+/// of `energy` and `stiffness` that of `tension`, finite for every finite length. One that also takes `Lanes` for its
+/// numbers lets a solver visit several vertices at once. Parts that call a law use what they
+/// need of the answer; the rest is not computed once the call is inlined.
+template <class Law, class Scalar>
+concept SpringLaw = Real<Scalar> && std::copyable<Law> && requires(const Law& law, const SpringState<Scalar>& state) {
+    { law(state) }
+    noexcept->std::same_as<SpringResponse<Scalar>>;
+};
+
+namespace detail {
+
+template <class Law, class Scalar>
+consteval bool check_spring_law() noexcept {
+    static_assert(std::copyable<Law>, "SpringLaw: must be copyable");
+    static_assert(SpringLaw<Law, Scalar>,
+                  "SpringLaw: law(const SpringState<Scalar>&) const noexcept must return SpringResponse<Scalar>");
+    return SpringLaw<Law, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `SpringLaw`; where it is none, the error says what is missing.
+template <class Law, class Scalar>
+concept CheckedSpringLaw = detail::check_spring_law<Law, Scalar>();
+
+/// A law that sets `never_stiffens` says that no spring is stiffer at another length than it is at this one, or than its
+/// tension over its length if that is more. Then steps are known to be safe; with other laws, a solver has to look.
+template <class Law>
+[[nodiscard]] consteval bool never_stiffens() noexcept {
+    if constexpr (requires { Law::never_stiffens; }) return Law::never_stiffens;
+    return false;
+}
+
+/// Tension proportional to the elongation, [Liu07] 2.2: k (l - r).
+struct LinearSpring {
+    static constexpr bool never_stiffens = true;
+
+    template <Number Scalar>
+    SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
+        const Scalar elongation = spring.length - spring.rest_length;
+        const Scalar tension = spring.stiffness * elongation;
+        return {tension, spring.stiffness, tension * elongation / 2};
+    }
+};
+
+/// Linear while it is stretched, slack where it is shorter than at rest, as fibres and thin tissue that wrinkles are:
+/// k max(l - r, 0). A membrane of such springs has no force of its own against being pressed together: its foundation has.
+struct TensionSpring {
+    template <Number Scalar>
+    SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
+        const auto elongation = larger<Scalar>(spring.length - spring.rest_length, Scalar(0));
+        const Scalar tension = spring.stiffness * elongation;
+        const auto is_slack = spring.length < spring.rest_length;
+        return {tension, select(is_slack, Scalar(0), spring.stiffness), tension * elongation / 2};
+    }
+};
+
+/// Soft tissue stiffens as it is stretched: the tension grows exponentially with the strain e = (l - r) / r, as [Fung67]
+/// found for mesentery: k r (exp(a e) - 1) / a, of stiffness k at rest. Beyond `strain_limit` it goes on along its
+/// tangent, so that a wild position never overflows. A spring of rest length zero has no strain and stays linear.
+/// Calls exp: results may differ in the last bits from one mathematics library to another.
+struct ExponentialSpring {
+    double stiffening = 10;     ///< a; the stiffness grows e-fold for a strain of 1/a
+    double strain_limit = 0.5;  ///< from here on the stiffness is constant
+
+    template <Real Scalar>
+    SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept;
+
+    /// @throws InvalidInput unless both options are finite and positive, and their product at most 50
+    void check() const;
+};
+
+template <Real Scalar>
+SpringResponse<Scalar> ExponentialSpring::operator()(const SpringState<Scalar>& spring) const noexcept {
+    const Scalar rest = spring.rest_length;
+    if (rest == 0) return LinearSpring{}(spring);
+    const auto a = static_cast<Scalar>(stiffening);
+    const Scalar strain = (spring.length - rest) / rest;
+    const Scalar held = (std::min)(strain, static_cast<Scalar>(strain_limit));
+    const Scalar growth = std::expm1(a * held);
+    const Scalar stiffness = spring.stiffness * (growth + 1);
+    const Scalar tension = spring.stiffness * rest * growth / a;
+    // growth - a e loses all digits near rest; there the series says the same.
+    const Scalar z = a * held;
+    const Scalar series = Scalar(1) / 2 + z * (Scalar(1) / 6 + z * (Scalar(1) / 24 + z * (Scalar(1) / 120 + z / 720)));
+    const Scalar bend = std::abs(z) < Scalar(1e-2) ? z * z * series : growth - z;
+    const Scalar energy = spring.stiffness * rest * rest * bend / (a * a);
+    const Scalar beyond = (strain - held) * rest;
+    return {tension + stiffness * beyond, stiffness, energy + (tension + stiffness * beyond / 2) * beyond};
+}
+
+inline void ExponentialSpring::check() const {
+    constexpr std::string_view component = "ExponentialSpring";
+    if (!is_finite(stiffening) || !(stiffening > 0)) {
+        refuse(component, "stiffening must be finite and positive, got ", stiffening);
+    }
+    if (!is_finite(strain_limit) || !(strain_limit > 0)) {
+        refuse(component, "strain_limit must be finite and positive, got ", strain_limit);
+    }
+    if (stiffening * strain_limit > 50) {
+        refuse(component, "stiffening times strain_limit must be at most 50, got ", stiffening * strain_limit);
+    }
+}
+
+}  // namespace membrane

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <span>
+#include <string_view>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include <membrane/model/elements.hpp>
+#include <membrane/model/mass_spring_network.hpp>
+
+/// A network of springs, and elements beside them.
+///
+///     const auto springs = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 0.0});   // none
+///     const auto tissue = membrane::Tissue(springs, membrane::triangular_springs(mesh, material),
+///                                          membrane::bending_springs(mesh, membrane::flexural_rigidity(material)));
+///     auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 8});
+///     const auto report = solver.step(x, dt, tissue, foundation, press(tool, contact));
+namespace membrane {
+
+/// Springs and elements of one membrane, an `ElasticNetwork`; masses, viscosities and pins are the springs'. A scene
+/// pays for the kinds of elements that it names, and where it names none, a `MassSpringNetwork` alone is faster: it
+/// visits several vertices at once, and needs no look at the energy to be safe.
+template <class Springs, class... Kinds>
+class Tissue {
+  public:
+    using Scalar = typename Springs::Scalar;
+    static constexpr bool never_stiffens = false;
+
+    /// Keeps copies. @throws InvalidInput for elements of another mesh than the springs'. Linear.
+    explicit Tissue(const Springs& springs, const Kinds&... kinds);
+
+    [[nodiscard]] const Springs& springs() const noexcept { return springs_; }
+
+    /// Calls `act(elements)` for each kind.
+    template <class Act>
+    void for_each_kind(Act act) const {
+        std::apply([&](const auto&... kinds) { (act(kinds), ...); }, kinds_);
+    }
+
+    /// Calls `act(placed)` for each spring and each element: `PlacedElement`.
+    template <class Act>
+    void for_each_element(Act act) const {
+        springs_.for_each_element(act);
+        for_each_kind([&](const auto& elements) { elements.for_each_element(act); });
+    }
+
+    /// A vertex whose place changes the pull on another.
+    struct Neighbour {
+        Index other;
+    };
+    [[nodiscard]] std::span<const Neighbour> neighbours(Index v) const noexcept { return neighbours_[v]; }
+
+    [[nodiscard]] Index vertex_count() const noexcept { return springs_.vertex_count(); }
+    [[nodiscard]] bool pinned(Index v) const noexcept { return springs_.pinned(v); }
+    [[nodiscard]] bool has_masses() const noexcept { return springs_.has_masses(); }
+    [[nodiscard]] Scalar mass(Index v) const noexcept { return springs_.mass(v); }
+    [[nodiscard]] Scalar viscosity(Index v) const noexcept { return springs_.viscosity(v); }
+    [[nodiscard]] Scalar force_tolerance() const noexcept { return negligible_force_; }
+
+    [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+
+    /// The curvature of elements is what it is here; `size` is that of the springs.
+    [[nodiscard]] EnergyMajoriser<Scalar> majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+    [[nodiscard]] Symmetric3<Scalar> curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+    [[nodiscard]] EnergyChange<Scalar> energy_change(Index v, const Vector3<Scalar>& displacement,
+                                                     const ConstPointsRef<Scalar>& x) const noexcept;
+
+  private:
+    template <class Act>
+    void for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
+        for_each_kind([&](const auto& elements) {
+            elements.for_each(v, x, [&](const auto& placed, const auto& corners, std::size_t i) {
+                act(placed.element.force_on(corners, i));
+            });
+        });
+    }
+    void join();
+
+    Springs springs_;
+    std::tuple<Kinds...> kinds_;
+    CompressedRows<Neighbour> neighbours_;
+    Scalar negligible_force_;
+};
+
+template <class Springs, class... Kinds>
+Tissue<Springs, Kinds...>::Tissue(const Springs& springs, const Kinds&... kinds)
+    : springs_(springs), kinds_(kinds...), negligible_force_(springs.force_tolerance()) {
+    for_each_kind([&](const auto& elements) {
+        if (elements.vertex_count() != vertex_count()) {
+            refuse("Tissue", "elements must be of the springs' mesh of ", vertex_count(), " vertices, got one of ",
+                   elements.vertex_count());
+        }
+        negligible_force_ = (std::max)(negligible_force_, elements.force_tolerance());
+    });
+    join();
+}
+
+template <class Springs, class... Kinds>
+void Tissue<Springs, Kinds...>::join() {
+    std::vector<std::pair<Index, Index>> pairs;
+    for (Index v = 0; v < vertex_count(); ++v) {
+        for (const auto& end : springs_.neighbours(v)) pairs.emplace_back(v, end.other);
+    }
+    for_each_kind([&](const auto& elements) {
+        for (const auto& placed : elements.all()) {
+            for (const Index a : placed.corners) {
+                for (const Index b : placed.corners) {
+                    if (a != b) pairs.emplace_back(a, b);
+                }
+            }
+        }
+    });
+    std::sort(pairs.begin(), pairs.end());
+    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+    neighbours_ = CompressedRows<Neighbour>(vertex_count(), [&](auto put) {
+        for (const auto& [v, other] : pairs) put(v, Neighbour{other});
+    });
+}
+
+template <class Springs, class... Kinds>
+auto Tissue<Springs, Kinds...>::force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept
+    -> VertexForce<Scalar> {
+    auto sum = springs_.force_on(v, x);
+    for_each_pull(v, x, [&](const CornerForce<Scalar>& corner) {
+        sum.force += corner.force;
+        sum.stiffness += eigenvalue_bound(corner.curvature);
+    });
+    return sum;
+}
+
+template <class Springs, class... Kinds>
+auto Tissue<Springs, Kinds...>::majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept
+    -> EnergyMajoriser<Scalar> {
+    auto sum = springs_.majoriser(v, x);
+    Symmetric3<Scalar> curvature;
+    for_each_pull(v, x, [&](const CornerForce<Scalar>& corner) {
+        sum.force += corner.force;
+        curvature += corner.curvature;
+    });
+    const Scalar stiffness = eigenvalue_bound(curvature);
+    sum.stiffness += stiffness;
+    sum.stiffness_reduction += diagonal3(stiffness);
+    sum.stiffness_reduction += Scalar(-1) * curvature;
+    return sum;
+}
+
+template <class Springs, class... Kinds>
+auto Tissue<Springs, Kinds...>::curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept
+    -> Symmetric3<Scalar> {
+    auto sum = springs_.curvature(v, x);
+    for_each_pull(v, x, [&](const CornerForce<Scalar>& corner) { sum += corner.curvature; });
+    return sum;
+}
+
+template <class Springs, class... Kinds>
+auto Tissue<Springs, Kinds...>::energy_change(Index v, const Vector3<Scalar>& displacement,
+                                              const ConstPointsRef<Scalar>& x) const noexcept -> EnergyChange<Scalar> {
+    auto sum = springs_.energy_change(v, displacement, x);
+    for_each_kind([&](const auto& elements) {
+        elements.for_each(v, x, [&](const auto& placed, const auto& corners, std::size_t i) {
+            sum += placed.element.energy_change(corners, i, displacement);
+        });
+    });
+    return sum;
+}
+
+}  // namespace membrane

@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include <membrane/core/field.hpp>
+#include <membrane/core/lanes.hpp>
+#include <membrane/core/symmetric3.hpp>
+#include <membrane/model/elastic_network.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+
+/// What holds the membrane to the body under it.
+///
+///     const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+///     solver.step(x, dt, network, foundation, press(tool, contact));               // the body stands still
+///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));     // it moves, see `moved_volume.hpp`
+namespace membrane {
+
+/// Constants of the volume springs, the same for all vertices or one for each.
+template <Real Scalar>
+struct VolumeSpringOptions {
+    Field<Scalar> stiffness = {};  ///< k'_s [N/m], required; larger clings more
+    Field<Scalar> damping = {};    ///< k'_d [N s/m], zero if not given; recovery takes the time k'_d / k'_s [s]
+};
+// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+static_assert(std::is_default_constructible_v<VolumeSpringOptions<float>>);
+static_assert(std::is_default_constructible_v<VolumeSpringOptions<double>>);
+
+/// A model of the body under the membrane: the pull on vertex `v` at `position`, which was at `start` when the tick of
+/// length `dt` began. What the compiler cannot see: the pull does no work on the membrane over a closed path. One that
+/// hands out its springs, `spring(v, start, dt)`, lets a solver visit several vertices at once. For the parts that look for an
+/// equilibrium, one that is not alike in all directions may say its stiffness without damping as a `Symmetric3`,
+/// `curvature(v)`; one that is linear may say it in either number type, `curvature<Number>(v)`, and where it does not pull,
+/// `anchors()`: it is then evaluated in double even if it is of floats. A body that moves is no concern of a model's:
+/// `on(body, volume)` brings it there.
+template <class Volume, class Scalar>
+concept FoundationModel = Real<Scalar> &&
+    requires(const Volume& volume, Index v, const Vector3<Scalar>& position, Scalar dt) {
+    { volume.force_on(v, position, position, dt) }
+    noexcept->std::same_as<VertexForce<Scalar>>;
+};
+
+namespace detail {
+
+template <class Volume, class Scalar>
+consteval bool check_volume_model() noexcept {
+    static_assert(
+        FoundationModel<Volume, Scalar>,
+        "FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) "
+        "const noexcept must return Pull<Scalar>");
+    return FoundationModel<Volume, Scalar>;
+}
+
+}  // namespace detail
+
+/// A `FoundationModel`; where it is none, the error says what is missing.
+template <class Volume, class Scalar>
+concept CheckedFoundationModel = detail::check_volume_model<Volume, Scalar>();
+
+/// No body under the membrane: nothing holds it, at no cost.
+struct NoFoundation {
+    template <Real Scalar>
+    [[nodiscard]] VertexForce<Scalar> force_on(Index, const std::type_identity_t<Vector3<Scalar>>&,
+                                               const std::type_identity_t<Vector3<Scalar>>&, Scalar) const noexcept {
+        return {Vector3<Scalar>::Zero(), 0};
+    }
+};
+
+/// One virtual volume spring, [Liu07] (5), for the length of a tick: of rest length zero, from an anchor to its vertex.
+template <Number Scalar>
+struct VolumeSpring {
+    Vector3<Scalar> anchor = Vector3<Scalar>::Zero();  ///< [m]
+    Scalar stiffness = 0;                              ///< k'_s [N/m]
+    Scalar rate = 0;                                   ///< damping over the length of the tick, k'_d / dt [N/m]
+    Scalar before = 0;                                 ///< its length when the tick began [m]
+
+    /// Its pull on the vertex at `position` but for the drag.
+    [[nodiscard]] VertexForce<Scalar> elastic_pull(const Vector3<Scalar>& position) const noexcept {
+        return {-stiffness * (position - anchor), stiffness + rate};
+    }
+
+    /// Energy stored [J].
+    [[nodiscard]] Scalar energy(const Vector3<Scalar>& position) const noexcept {
+        return stiffness * squared_norm<Scalar>(position - anchor) / 2;
+    }
+
+    /// The drag. The velocity along the spring in (5) is by how much its length has changed
+    /// over the tick: how often a solver visits the vertex within the tick does not change the damping, and
+    /// the damping force, like that of a spring, has an energy: k'_d (change of length)^2 / (2 dt).
+    [[nodiscard]] Vector3<Scalar> damping_force(const Vector3<Scalar>& position) const noexcept {
+        const Vector3<Scalar> length = position - anchor;
+        const Scalar square = squared_norm(length);
+        const auto damps = (rate != 0) & (square != 0);  // the spring acts only while it has a length
+        const Scalar now = select(damps, root_of(square), Scalar(1));
+        return -select<Scalar>(damps, rate * (now - before) / now, Scalar(0)) * length;
+    }
+
+    /// Both.
+    [[nodiscard]] VertexForce<Scalar> force_on(const Vector3<Scalar>& position) const noexcept {
+        auto sum = elastic_pull(position);
+        if (any(rate != 0)) sum.force += damping_force(position);
+        return sum;
+    }
+};
+
+template <class Volume, Real Scalar>
+class MovedVolume;  // of moved_volume.hpp
+
+/// Virtual volume springs, [Liu07] (5): one for each vertex, of rest length zero, from the anchor to the vertex.
+template <Real Scalar>
+class VirtualVolumeSprings {
+  public:
+    /// Anchors are the positions of `mesh`.
+    /// @throws InvalidInput for a constant that is negative, not finite, missing, or of the wrong count
+    VirtualVolumeSprings(const TriangleMesh<Scalar>& mesh, const VolumeSpringOptions<Scalar>& options);
+
+    [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
+    [[nodiscard]] Scalar stiffness(Index v) const noexcept { return stiffness_[static_cast<std::size_t>(v)]; }
+    [[nodiscard]] Scalar damping(Index v) const noexcept {
+        return damping_.empty() ? Scalar(0) : damping_[static_cast<std::size_t>(v)];
+    }
+
+    /// The spring of vertex `v`, which was at `start` when the tick of length `dt` [s] began.
+    [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept {
+        const Vector3<Scalar> anchor = point(anchors_, v);
+        const Scalar d = damping(v);
+        if (d == 0) return {anchor, stiffness(v), 0, 0};
+        return {anchor, stiffness(v), d / dt, norm<Scalar>(start - anchor)};
+    }
+    [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
+                                               Scalar dt) const noexcept {
+        if (damping(v) == 0) return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.elastic_pull(position);
+        return spring(v, start, dt).force_on(position);
+    }
+
+    /// The second derivative of the energy, from the constants as they are.
+    template <Real Number = Scalar>
+    [[nodiscard]] Symmetric3<Number> curvature(Index v) const noexcept {
+        return diagonal3(static_cast<Number>(stiffness(v)));
+    }
+
+    /// Energy stored in the spring of vertex `v` at `position` [J].
+    [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept {
+        return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.energy(position);
+    }
+
+  private:
+    Points<Scalar> anchors_;
+    std::vector<Scalar> stiffness_, damping_;
+};
+
+template <Real Scalar>
+VirtualVolumeSprings<Scalar>::VirtualVolumeSprings(const TriangleMesh<Scalar>& mesh,
+                                                   const VolumeSpringOptions<Scalar>& options)
+    : anchors_(mesh.positions()) {
+    constexpr std::string_view component = "VirtualVolumeSprings";
+    if (!options.stiffness.given()) refuse(component, "stiffness [N/m] is required");
+    stiffness_ = options.stiffness.expand(mesh.vertex_count(), component, "stiffness", "vertex", "N/m");
+    if (options.damping.given()) {
+        damping_ = options.damping.expand(mesh.vertex_count(), component, "damping", "vertex", "N s/m");
+    }
+}
+
+}  // namespace membrane

@@ -1,0 +1,381 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include <membrane/contact/contact.hpp>
+#include <membrane/contact/grasper.hpp>
+#include <membrane/contact/tool.hpp>
+#include <membrane/solve/constraints.hpp>
+#include <membrane/solve/contact_points.hpp>
+#include <membrane/solve/surface_point.hpp>
+#include <membrane/surface/time_of_impact.hpp>
+
+/// The tool against the membrane.
+///
+///     const auto contact = tracker.update(tree, x, tool);
+///     const auto report  = solver.step(x, dt, network, foundation, press(tool, contact));
+///     report.reactions[0]                                                    // force of the membrane on the tool [N]
+namespace membrane {
+
+/// Keeps the surface outside the tool, without friction: every touched triangle in its point nearest to the tool, by a
+/// force along the normal that pushes and never pulls, distributed to the corners by barycentric weights. Corners that are
+/// pinned or prescribed stay where they are, and push with their stiffness times how deep the tool is in, see
+/// `SolverOptions::rigid_stiffness`: there, and beside them, the tool stays inside by force over stiffness. If its axis is
+/// behind such a corner, it touches in its nearest point alone; where that passes a border, or another part of a surface
+/// that is folded around a pin more sharply than its triangles, the force may jump.
+template <Real Scalar>
+struct ToolContact {
+    Tool<Scalar> tool;
+    Contact<Scalar> contact;
+
+    [[nodiscard]] bool valid() const noexcept { return is_valid(tool) && is_valid(contact); }
+    [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
+        if (!contact.touching() || contact.tunnelled) return {};
+        return InputSample<Scalar>{contact.axis_point, contact.radius / 2};  // farther, the surface might pass the tool
+    }
+    void begin(ConstraintContext<Scalar>& context) const noexcept;
+    bool enforce(ConstraintContext<Scalar>& context) const noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept {
+        return reaction_at_points(context);
+    }
+
+  private:
+    using Context = ConstraintContext<Scalar>;
+    using Corners = std::array<Index, 3>;
+
+    bool seed(Context& context) const noexcept;
+    void list_watched(Context& context) const noexcept;
+    void carry_with_tool(Context& context) const noexcept;
+    void clear_contact_point(Context& context) const noexcept;
+    void find_points(Context& context) const noexcept;
+    void add_point(Context& context, ContactPoint<Scalar> point) const noexcept;
+    void stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept;
+    void pack_points(Context& context) const noexcept;
+    [[nodiscard]] std::optional<Vector3<Scalar>> direction_out_of_support(const Context& context) const noexcept;
+    void touch_support(Context& context, const Vector3<Scalar>& out) const noexcept;
+    [[nodiscard]] bool comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept;
+    void prevent_tunnelling(Context& context) const noexcept;
+    [[nodiscard]] bool has_new_overlap(const Context& context) const noexcept;
+
+    [[nodiscard]] ContactTool<Scalar> shape() const noexcept {
+        return {tool.position, tool.axis, contact.axis_point, contact.radius};
+    }
+    [[nodiscard]] static auto packs(Context& context) noexcept {
+        return context.state().pack_ranges[context.constraint()].of(context.state().packs.items());
+    }
+    [[nodiscard]] static bool on_support(const Context& context) noexcept {
+        return !context.points().empty() && context.points().front().feature == fixed_feature;
+    }
+    // The triangle as a tool finds it, now and where its vertices were kept.
+    [[nodiscard]] static Triangle<Scalar> surface_triangle(const Context& context, const Corners& corners) noexcept {
+        const auto at = [&](Index v) { return Vector3<Scalar>(context.position(v) + context.support_displacement(v)); };
+        return {at(corners[0]), at(corners[1]), at(corners[2])};
+    }
+    [[nodiscard]] static Triangle<Scalar> kept_triangle(const Context& context, const Corners& corners) noexcept {
+        const auto at = [&](Index v) { return Vector3<Scalar>(context.kept(v) + context.support_displacement(v)); };
+        return {at(corners[0]), at(corners[1]), at(corners[2])};
+    }
+};
+
+static_assert(Constraint<ToolContact<double>, double> && Constraint<ToolContact<float>, float>);
+
+/// The tool presses where it touches. Forceps that hold something press nothing.
+template <Real Scalar>
+[[nodiscard]] ToolContact<Scalar> press(const Tool<Scalar>& tool, const Contact<Scalar>& contact,
+                                        const Grasp<Scalar>& grasp = {}) noexcept {
+    return {tool, grasp.holding() ? Contact<Scalar>::none() : contact};
+}
+
+namespace detail {
+
+// Points share vertices: until none is inside they are moved out this often at the most.
+inline constexpr int max_push_passes = 8;
+
+// And this often they are solved at the most before the vertices find their balance anew: as a rule, and while the tool is deep
+// inside.
+inline constexpr int all_contact_passes = 8, deep_contact_passes = 16;
+
+/// As a rule. Few points, on a coarse mesh, have each a large part of the force, and more passes give a better one; of many
+/// each has little. Where points are `stiff`, beside fixed corners or several of a shaft on one triangle, a pass moves each
+/// by little.
+[[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool stiff) noexcept {
+    constexpr int least = 2, points_of_all_passes = 32;
+    if (stiff || points == 0) return all_contact_passes;
+    return std::clamp(points_of_all_passes / static_cast<int>(points), least, all_contact_passes);
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+void ToolContact<Scalar>::begin(Context& context) const noexcept {
+    if (!contact.touching() || !seed(context)) return;
+    if (!contact.has_all_points) {
+        context.state().full = true;
+        return;
+    }
+    for (const auto& point : context.previous_points()) add_support_forces(context, point, point.force);
+    const auto out = direction_out_of_support(context);
+    if (contact.tunnelled && !out) carry_with_tool(context);
+    list_watched(context);
+    if (!contact.tunnelled && !out && contact.gap < -negligible_distance(context, contact.corners[0])) {
+        clear_contact_point(context);
+    }
+    out ? touch_support(context, *out) : find_points(context);
+    for (const auto& point : context.previous_points()) add_support_forces<Scalar>(context, point, -point.force);
+    if (context.state().full) return;
+    pack_points(context);
+    for (int pass = 0; pass < detail::max_push_passes; ++pass) {
+        if (!push_out(context.state(), shape(), packs(context))) break;
+    }
+    apply_forces(context.state(), packs(context));
+    prevent_tunnelling(context);
+}
+
+// False if a corner is no vertex: the step is refused then.
+template <Real Scalar>
+bool ToolContact<Scalar>::seed(Context& context) const noexcept {
+    const auto are_vertices = [&](const auto& corners) {
+        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return context.check(v); });
+    };
+    if (!are_vertices(contact.corners)) return false;
+    const auto all_are_vertices = [&](const auto& items) {
+        return std::all_of(items.begin(), items.end(), [&](const auto& item) { return are_vertices(item.corners); });
+    };
+    if (!all_are_vertices(contact.triangles) || !all_are_vertices(contact.candidates) ||
+        !all_are_vertices(contact.points))
+        return false;
+    for (const auto& touched : contact.triangles) {
+        for (const Index v : touched.corners) context.seed(v);
+    }
+    return true;
+}
+
+// The vertices that must not pass the tool.
+template <Real Scalar>
+void ToolContact<Scalar>::list_watched(Context& context) const noexcept {
+    for (const auto& candidates : contact.candidates) {
+        for (const Index v : candidates.corners) {
+            contact.tunnelled ? context.keep(v) : context.keep_start(v);
+            context.state().candidates.insert(v);
+        }
+    }
+}
+
+// The tool does not pass the surface: triangles that it crossed since the last tick are carried with it, all the distance or
+// until they are one radius ahead.
+//
+// Seen from a tool that moves by d, a vertex that moves by w d, 0 <= w <= 1, moves by (w - 1) d. So the tool can meet
+// only points of triangles that lie on its path, and does not meet one a part s of the path ahead if the corners there
+// move by w > 1 - s. Triangles off the path are safe however their corners move by such w.
+template <Real Scalar>
+void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
+    const Vector3<Scalar> path = contact.axis_point - contact.previous_axis_point;
+    const Scalar length = norm(path);
+    for (const auto& touched : contact.triangles) {
+        for (const Index v : touched.corners) context.keep(v);
+    }
+    for (const auto& touched : contact.triangles) {
+        const auto& v = touched.corners;
+        const auto before = kept_triangle(context, v);
+        const auto hit = first_hit(before, contact.previous_axis_point, contact.axis_point);
+        if (!hit) continue;
+        const Scalar part = 1 - detail::fraction(hit->along * length - contact.radius, length);
+        for (const Index corner : v) {
+            if (context.fixed(corner)) continue;
+            const Vector3<Scalar> so_far = context.position(corner) - context.kept(corner);
+            if (dot(so_far, path) < part * squared_norm(path)) {
+                context.place(corner, context.kept(corner) + part * path);
+            }
+        }
+    }
+}
+
+// The surface yields at the contact point first, to where it just touches the tool, if it is not there already.
+template <Real Scalar>
+void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
+    const Vector3<Scalar> now = point_at(surface_triangle(context, contact.corners), contact.barycentric);
+    const Vector3<Scalar> by = contact.axis_point - contact.radius * contact.normal - now;
+    if (dot(by, contact.normal) < 0) press_in<Scalar>(context, contact.corners, contact.barycentric, by);
+}
+
+// The tracker has found the points on the surface as the last step left it. Those of a shaft, and what a tool has crossed, are
+// found anew where the surface is expected now: there they may be on the other side.
+template <Real Scalar>
+void ToolContact<Scalar>::find_points(Context& context) const noexcept {
+    const bool as_found = feature_pairs(tool) == 1 && !contact.tunnelled;
+    for (const auto& found : contact.points) {
+        if (as_found) {
+            add_point(context, found);
+            continue;
+        }
+        const auto point = contact_point(found.triangle, found.corners, triangle_of(context, found.corners), tool,
+                                         found.feature, contact.radius);
+        if (point) add_point(context, *point);
+    }
+}
+
+// A point that was there in the last step goes on with its force; another one joins if it is near enough.
+template <Real Scalar>
+void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point) const noexcept {
+    const auto* before = context.cached_point(point.triangle, point.feature, point.corners[0]);
+    const Scalar distance = point.gap + contact.radius;
+    if (before == nullptr && distance > contact.detection_distance) return;
+    const bool apart = distance > contact.radius / 1000;
+    point.normal = direction(apart ? point.normal : Vector3<Scalar>(contact.previous_axis_point - contact.axis_point),
+                             contact.normal);
+    point.on_fixed = std::any_of(point.corners.begin(), point.corners.end(), [&](Index v) { return context.fixed(v); });
+    // Fixed corners have not been carried along: what the tool has crossed is between it and where it was.
+    if (contact.tunnelled && point.on_fixed) {
+        const Vector3<Scalar> came = contact.previous_axis_point - contact.axis_point + distance * point.normal -
+                                     support_displacement(context, point);
+        if (dot(came, point.normal) < 0) point.normal = -point.normal;
+    }
+    stay_on_side(context, point);
+    if (before != nullptr) point.force = -norm(before->force) * point.normal;
+    context.add_point(point);
+}
+
+// Vertices move by more than the radius of a tiny tool while the step balances them, and a nearest edge or corner says nothing
+// of the side then. So the tool stays in front of the planes of the triangles that it is in front of, all through the step: at
+// a convex edge this is too far out, by less than the radius. The end of a shaft thinner than an edge may be thrown as far, past
+// edges that turn its direction round; over the inside of a triangle of a closed surface it is on the side where the step began.
+// Under a thick one triangles are small enough to turn over, and have no such side.
+template <Real Scalar>
+void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept {
+    constexpr Scalar tiny = Scalar(2e-5);  // squared radius by area: a tool of less than a 300th of an edge
+    if (point.feature < 0 || point.feature > 1) return;
+    const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
+    const Scalar size = norm(area), square = contact.radius * contact.radius;
+    if (feature_pairs(tool) > 1) {
+        if (contact.closed && square < size) point.side = dot(point.normal, area) < 0 ? Scalar(-1) : Scalar(1);
+        return;
+    }
+    if (!(square < tiny * size)) return;
+    point.by_plane = contact.side * dot(point.normal, area) > 0;
+    if (point.by_plane) point.normal = direction<Scalar>(contact.side * area, point.normal);
+}
+
+// The points' forces act from here on.
+template <Real Scalar>
+void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
+    auto& state = context.state();
+    const auto points = context.points();
+    for (const auto& point : points) {
+        add_point_force(context, point.corners, point.weights, point.force);
+        add_support_forces(context, point, point.force);
+    }
+    auto& range = state.pack_ranges[context.constraint()];
+    range.begin = state.packs.size();
+    state.packs.append(std::span<const ContactPoint<Scalar>>(points), state.point_ranges[context.constraint()].begin,
+                       [&](Index v) { return context.fixed(v); });
+    range.end = state.packs.size();
+}
+
+// Fixed vertices do not yield to a tool, and one that is deeper in than its radius has its axis behind them. It touches
+// the surface in one point then, the nearest, as it did before: the direction out is given, no other.
+template <Real Scalar>
+std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(const Context& context) const noexcept {
+    const Vector3<Scalar> fixed = contact.barycentric - free_weights(context, contact.corners, contact.barycentric);
+    if (!(fixed.maxCoeff() > 0)) return std::nullopt;
+    Vector3<Scalar> pressed = Vector3<Scalar>::Zero();
+    for (const auto& point : context.previous_points()) pressed += point.force;
+    const bool turned = dot(pressed, contact.normal) > 0;
+    const Vector3<Scalar> out = turned ? Vector3<Scalar>(-contact.normal) : contact.normal;
+    // A point is given a radius: half of that far from the surface there is a direction still.
+    const Scalar ahead = (contact.radius - tool.radius) / 2;
+    if (!(dot<Scalar>(contact.axis_point - contact.point, out) < ahead)) return std::nullopt;
+    return out;
+}
+
+template <Real Scalar>
+void ToolContact<Scalar>::touch_support(Context& context, const Vector3<Scalar>& out) const noexcept {
+    Scalar pressed = 0;
+    for (const auto& point : context.previous_points()) pressed -= dot(point.force, out);
+    const Vector3<Scalar> force = -(std::max)(pressed, Scalar(0)) * out;
+    context.add_point({contact.triangle, fixed_feature, contact.corners, contact.barycentric, out, force, true});
+}
+
+// Whether a shaft's axis point is on a triangle or behind, but for rounding, and in front after the triangle has moved.
+template <Real Scalar>
+bool ToolContact<Scalar>::comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept {
+    if (feature_pairs(tool) == 1) return false;
+    const Vector3<Scalar> front = contact.side * area_vector(before), front_now = contact.side * area_vector(now);
+    return dot<Scalar>(contact.axis_point - before.a, front) < contact.radius / 1000 * norm(front) &&
+           dot<Scalar>(contact.axis_point - now.a, front_now) > 0;
+}
+
+// However far vertices have jumped, the surface has not passed the tool: if it would have, all go back to before the earliest
+// time of impact, with some clearance.
+template <Real Scalar>
+void ToolContact<Scalar>::prevent_tunnelling(Context& context) const noexcept {
+    if (on_support(context)) return;
+    const auto& state = context.state();
+    const Scalar farthest = largest_squared_move(state, state.candidates.items());
+    if (4 * farthest < contact.radius * contact.radius && contact.gap > -contact.radius / 2) return;
+    const Scalar rounding = detail::rounding_at(contact.axis_point);
+    Scalar first = 1;
+    for (const auto& triangle : contact.candidates) {
+        const auto before = kept_triangle(context, triangle.corners);
+        const auto now = surface_triangle(context, triangle.corners);
+        const Scalar time = time_of_impact<Scalar>(before, now, contact.axis_point);
+        if (time == 1 || comes_out(before, now)) continue;
+        const Scalar clearance = std::sqrt(closest_point(before, contact.axis_point).squared_distance);
+        if (clearance <= rounding) continue;  // on the tool's axis: its side is not known
+        const Scalar part = clearance > contact.radius / 2 ? 1 - contact.radius / (4 * clearance) : Scalar(0.1);
+        first = (std::min)(first, part * time);
+    }
+    if (first < 1) context.go_back(1 - first);
+}
+
+template <Real Scalar>
+bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
+    if (!contact.touching()) return false;
+    Scalar first = 0;  // largest change of a force in the first pass [N]
+    bool released = false;
+    const auto points = std::as_const(context).points();
+    const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
+    const int most = detail::max_contact_passes(points.size(), on_fixed || feature_pairs(tool) > 1);
+    bool deep = false;
+    for (int i = 0; i < detail::deep_contact_passes; ++i) {
+        const auto pass = solve_contacts(context.state(), shape(), packs(context), i > 0);
+        deep = pass.deep;
+        released = released || pass.released;
+        if (i == 0) first = pass.largest;
+        // The vertices have to find their balance anew.
+        if (!(i + 1 < most ? pass.largest > first / 2 : pass.deep)) break;
+    }
+    for (int i = 0; deep && i < detail::max_push_passes; ++i) deep = push_out(context.state(), shape(), packs(context));
+    apply_forces(context.state(), packs(context));
+    prevent_tunnelling(context);
+    return first > 0 || released || has_new_overlap(context);
+}
+
+// Whether a triangle that was out of range when the step began, and has no contact point in it, has come into the tool.
+template <Real Scalar>
+bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept {
+    if (on_support(context)) return false;  // no other point counts
+    const int features = feature_pairs(tool);
+    const auto points = context.points();
+    auto next = points.begin();  // in the same order
+    for (const auto& touched : contact.triangles) {
+        for (int feature = 0; feature < features; ++feature) {
+            if (next != points.end() && next->triangle == touched.triangle && next->feature == feature) {
+                ++next;
+                continue;
+            }
+            const auto nearest = proximity(surface_triangle(context, touched.corners), tool, feature);
+            const Scalar slack = negligible_distance(context, touched.corners[0]);
+            if (nearest && norm(nearest->reach) < contact.radius - slack) return true;
+        }
+    }
+    return false;
+}
+
+}  // namespace membrane

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/fixed_vector.hpp>
+#include <membrane/core/index_set.hpp>
+
+namespace membrane {
+
+/// Vertices in an order in which many that follow on one another may be visited all at once: in groups that no spring
+/// joins, each vertex in the first group that holds no neighbour of it.
+///
+///     membrane::VertexColouring groups(network.vertex_count());
+///     groups.add(network, vertices, 0, 100);           // now in another order
+///     for (const std::size_t end : groups.ends()) { ... }
+class VertexColouring {
+  public:
+    explicit VertexColouring(Index vertex_count)
+        : ends_(static_cast<std::size_t>(vertex_count)),
+          group_of_(static_cast<std::size_t>(vertex_count), no_index),
+          barred_(group_of_),
+          fill_(group_of_),
+          order_(group_of_) {}
+
+    /// Orders the vertices number `begin` to `end` of a set. Online. Cost: their springs.
+    template <class Network>
+    void add(const Network& network, IndexSet& set, std::size_t begin, std::size_t end) noexcept;
+
+    /// Where in the set each group ends, and the next one begins.
+    [[nodiscard]] std::span<const std::size_t> ends() const noexcept { return ends_.items(); }
+
+    void clear() noexcept { ends_.clear(); }
+
+  private:
+    FixedVector<std::size_t> ends_;
+    std::vector<Index> group_of_;  // of each vertex that is being ordered
+    std::vector<Index> barred_;    // of each group, the last vertex that has a neighbour there
+    std::vector<Index> fill_;      // of each group, how many are in it; then, where its next one goes
+    std::vector<Index> order_;
+};
+
+template <class Network>
+void VertexColouring::add(const Network& network, IndexSet& set, std::size_t begin, std::size_t end) noexcept {
+    const auto at = [](Index i) { return static_cast<std::size_t>(i); };
+    const auto vertices = set.items().subspan(begin, end - begin);
+    Index groups = 0;
+    for (const Index v : vertices) {
+        for (const auto& spring : network.neighbours(v)) {
+            const Index group = group_of_[at(spring.other)];
+            if (group != no_index) barred_[at(group)] = v;
+        }
+        Index group = 0;
+        while (group < groups && barred_[at(group)] == v) ++group;
+        if (group == groups) {
+            barred_[at(group)] = no_index;
+            fill_[at(groups++)] = 0;
+        }
+        ++fill_[at(group)];
+        group_of_[at(v)] = group;
+    }
+    Index place = 0;
+    for (Index group = 0; group < groups; ++group) {
+        const Index first = place;
+        place += std::exchange(fill_[at(group)], first);
+        ends_.push(begin + at(place));
+    }
+    for (const Index v : vertices) order_[at(fill_[at(std::exchange(group_of_[at(v)], no_index))]++)] = v;
+    set.reorder(begin, std::span(order_).first(vertices.size()));
+}
+
+}  // namespace membrane

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <membrane/core/lanes.hpp>
+#include <membrane/surface/triangle.hpp>
+
+/// Boxes along the axes, and what is near them.
+///
+///     membrane::Box<double> box;
+///     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) box.include(point(x, v));
+///     if (squared_distance(box, tool.position) > tool.radius * tool.radius) { /* the tool contacts nothing */ }
+namespace membrane {
+
+/// All points between two corners, borders included [m]; empty until something is included. Of `Lanes`: several boxes.
+template <Number N>
+struct Box {
+    Vector3<N> low = Vector3<N>::Constant((std::numeric_limits<Each<N>>::max)());
+    Vector3<N> high = Vector3<N>::Constant(std::numeric_limits<Each<N>>::lowest());
+
+    /// Grows to hold `p`; coordinates that are NaN are left out.
+    void include(const Vector3<N>& p) noexcept;
+    void include(const Box& other) noexcept;
+};
+
+/// The smallest box around a triangle.
+template <Number N>
+[[nodiscard]] Box<N> bounds(const Triangle<N>& triangle) noexcept;
+
+/// The axis along which the box is longest, 0 to 2; the first of equals.
+template <Real Scalar>
+[[nodiscard]] int major_axis(const Box<Scalar>& box) noexcept;
+
+/// Whether the boxes have a point in common.
+template <Number N>
+[[nodiscard]] auto overlap(const Box<N>& a, const Box<Each<N>>& b) noexcept;
+
+/// How far apart they are along the axis where that is most [m]; not positive where they overlap.
+template <Real Scalar>
+[[nodiscard]] Scalar gap_between(const Box<Scalar>& a, const Box<Scalar>& b) noexcept;
+
+/// Whether the point, or another box that is not empty, lies within.
+template <Real Scalar>
+[[nodiscard]] bool contains(const Box<Scalar>& box, const Vector3<Scalar>& p) noexcept;
+template <Real Scalar>
+[[nodiscard]] bool contains(const Box<Scalar>& box, const Box<Scalar>& other) noexcept;
+
+/// From `q` to the nearest point of the box, 0 inside [m^2].
+template <Number N>
+[[nodiscard]] N squared_distance(const Box<N>& box, const Vector3<Each<N>>& q) noexcept;
+
+/// From `q` to the farthest corner, along the axis where that is most [m].
+template <Real Scalar>
+[[nodiscard]] Scalar reach(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept;
+
+/// A capsule made ready to be tested against many boxes; a segment if its radius is zero.
+template <Real Scalar>
+class CapsuleQuery {
+  public:
+    static constexpr Scalar never = 2;
+
+    /// Around the segment between two points. The boxes to test lie in `all`: its size tells how much the capsule must
+    /// be thickened, so that rounding errors never make it miss a box.
+    CapsuleQuery(const Vector3<Scalar>& from, const Vector3<Scalar>& to, Scalar radius,
+                 const Box<Scalar>& all) noexcept;
+
+    /// A bound from below of how far along the segment, 0 to 1, the capsule meets the box; `never` if it does not.
+    template <Number N>
+    [[nodiscard]] N entry(const Box<N>& box) const noexcept;
+
+  private:
+    Vector3<Scalar> to_near_, to_far_;  // where it begins, seen from the sides of a box that it meets and leaves by
+    Vector3<Scalar> pace_;              // what part of the segment it takes to advance by a metre
+};
+
+template <Number N>
+void Box<N>::include(const Vector3<N>& p) noexcept {
+    for (int k = 0; k < 3; ++k) {
+        low[k] = smaller(low[k], p[k]);
+        high[k] = larger(high[k], p[k]);
+    }
+}
+
+template <Number N>
+void Box<N>::include(const Box& other) noexcept {
+    for (int k = 0; k < 3; ++k) {
+        low[k] = smaller(low[k], other.low[k]);
+        high[k] = larger(high[k], other.high[k]);
+    }
+}
+
+template <Number N>
+Box<N> bounds(const Triangle<N>& triangle) noexcept {
+    Box<N> box{triangle.a, triangle.a};
+    box.include(triangle.b);
+    box.include(triangle.c);
+    return box;
+}
+
+template <Real Scalar>
+int major_axis(const Box<Scalar>& box) noexcept {
+    const Vector3<Scalar> side = box.high - box.low;
+    const int longer = side[1] > side[0] ? 1 : 0;
+    return side[2] > side[longer] ? 2 : longer;
+}
+
+template <Number N>
+auto overlap(const Box<N>& a, const Box<Each<N>>& b) noexcept {
+    const auto along = [&](int k) {
+        const auto begins = a.low[k] <= N(b.high[k]), ends = N(b.low[k]) <= a.high[k];
+        return begins & ends;
+    };
+    const auto x = along(0), y = along(1), z = along(2);
+    return x & y & z;
+}
+
+template <Real Scalar>
+Scalar gap_between(const Box<Scalar>& a, const Box<Scalar>& b) noexcept {
+    Scalar most = std::numeric_limits<Scalar>::lowest();
+    for (int k = 0; k < 3; ++k) most = (std::max)(most, (std::max)(a.low[k] - b.high[k], b.low[k] - a.high[k]));
+    return most;
+}
+
+template <Real Scalar>
+bool contains(const Box<Scalar>& box, const Vector3<Scalar>& p) noexcept {
+    return at_most(box.low, p) && at_most(p, box.high);
+}
+
+template <Real Scalar>
+bool contains(const Box<Scalar>& box, const Box<Scalar>& other) noexcept {
+    return contains(box, other.low) && contains(box, other.high);
+}
+
+template <Number N>
+N squared_distance(const Box<N>& box, const Vector3<Each<N>>& q) noexcept {
+    const auto offset = [&](int k) { return q[k] - smaller(larger(N(q[k]), box.low[k]), box.high[k]); };
+    return squared_norm<N>({offset(0), offset(1), offset(2)});
+}
+
+template <Real Scalar>
+Scalar reach(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept {
+    Scalar most = 0;
+    for (int k = 0; k < 3; ++k) most = (std::max)((std::max)(most, q[k] - box.low[k]), box.high[k] - q[k]);
+    return most;
+}
+
+template <Real Scalar>
+CapsuleQuery<Scalar>::CapsuleQuery(const Vector3<Scalar>& from, const Vector3<Scalar>& to, Scalar radius,
+                                   const Box<Scalar>& all) noexcept {
+    using std::abs;
+    using Limits = std::numeric_limits<Scalar>;
+    const Scalar size = reach(all, from) + radius, margin = radius + 64 * Limits::epsilon() * size;
+    // A step below the rounding is lost in the margin; taken for no shorter, nothing times its pace overflows.
+    const Scalar shortest = (std::max)(Limits::epsilon() * size, (Limits::min)());
+    for (int k = 0; k < 3; ++k) {
+        const Scalar step = to[k] - from[k];
+        pace_[k] = 1 / (abs(step) >= shortest ? step : shortest);
+        const Scalar ahead = pace_[k] > 0 ? margin : -margin;
+        to_near_[k] = from[k] + ahead;
+        to_far_[k] = from[k] - ahead;
+    }
+}
+
+template <Real Scalar>
+template <Number N>
+N CapsuleQuery<Scalar>::entry(const Box<N>& box) const noexcept {
+    N first = 0, last = 1;
+    for (int k = 0; k < 3; ++k) {
+        const bool forward = pace_[k] > 0;
+        const N& near = forward ? box.low[k] : box.high[k];
+        const N& far = forward ? box.high[k] : box.low[k];
+        first = larger<N>(first, (near - to_near_[k]) * pace_[k]);
+        last = smaller<N>(last, (far - to_far_[k]) * pace_[k]);
+    }
+    return select<N>(first <= last, first, never);
+}
+
+}  // namespace membrane

@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/check.hpp>
+#include <membrane/core/disjoint_sets.hpp>
+#include <membrane/surface/half_edges.hpp>
+#include <membrane/surface/mesh_defect.hpp>
+
+/// The checks that a mesh must stand: `TriangleMesh` refuses at the first defect, `validate` collects them all.
+///
+///     check_edges(sides, triangle_count, found);  // calls found(MeshDefect, vertices, triangles, parts of a message...)
+///
+/// What they call may return: then they go on.
+namespace membrane::detail {
+
+/// Three to a column, without a copy.
+template <class Number, std::size_t n>
+auto by_threes(std::string_view component, std::span<Number, n> numbers, std::string_view what) {
+    if (numbers.size() % 3 != 0) {
+        refuse(component, what, " must be a multiple of 3 numbers, got ", numbers.size());
+    }
+    using Columns = Eigen::Matrix<std::remove_const_t<Number>, 3, Eigen::Dynamic>;
+    return Eigen::Map<const Columns>(numbers.data(), 3, static_cast<Eigen::Index>(numbers.size() / 3));
+}
+
+/// Refuses at compile time what is no mesh at all.
+template <class P, class T>
+constexpr void check_types() {
+    static_assert(P::RowsAtCompileTime == 3 || P::RowsAtCompileTime == Eigen::Dynamic,
+                  "positions must be 3 x V, one point a column: pass the transpose if yours are one point a row");
+    static_assert(T::RowsAtCompileTime == 3 || T::RowsAtCompileTime == Eigen::Dynamic,
+                  "triangles must be 3 x F, one triangle a column: pass the transpose if yours are one triangle a row, "
+                  "and cut quads into triangles");
+    static_assert(std::integral<typename T::Scalar> && !std::same_as<typename T::Scalar, bool>,
+                  "triangles must be of an integer type: pass triangles.cast<int>()");
+}
+
+/// Refuses a matrix that has not three rows, or more columns than can be numbered; nothing has been stored yet.
+template <class Found>
+void check_shape(std::string_view component, Eigen::Index rows, Eigen::Index columns, Eigen::Index most,
+                 MeshDefect none, Found found) {
+    const bool points = none == MeshDefect::no_vertices;
+    const std::string_view what = points ? "positions" : "triangles";
+    const std::string_view shape = points ? "3 x V, one point a column" : "3 x F, one triangle a column";
+    if (columns == 0) return found(none, {}, {}, what, " must be ", shape, ", got none");
+    if (rows != 3) {
+        const std::string_view hint = columns == 3 ? "; pass the transpose" : "";
+        refuse(component, what, " must be ", shape, ", got ", rows, " x ", columns, hint);
+    }
+    if (columns > most) refuse(component, "at most ", most, " ", what, " can be numbered, got ", columns);
+}
+
+/// The shapes of positions and triangles.
+template <class P, class T, class Found>
+void check_shapes(std::string_view component, const P& positions, const T& triangles, Found found) {
+    constexpr Eigen::Index most = (std::numeric_limits<Index>::max)();
+    check_shape(component, positions.rows(), positions.cols(), most, MeshDefect::no_vertices, found);
+    check_shape(component, triangles.rows(), triangles.cols(), most / 3, MeshDefect::no_triangles, found);
+}
+
+/// Whether triangle `f` names three different vertices; looked at before they are stored as `Index`, which could hide
+/// what they are.
+template <class T, class Found>
+bool check_corners(const T& triangles, Eigen::Index f, Eigen::Index vertex_count, Found found) {
+    using Corner = typename T::Scalar;
+    const std::array<Corner, 3> corner{triangles(0, f), triangles(1, f), triangles(2, f)};
+    const auto number = static_cast<Index>(f);
+    for (const Corner v : corner) {
+        if (std::cmp_greater_equal(v, 0) && std::cmp_less(v, vertex_count)) continue;
+        found(MeshDefect::index_out_of_range, {}, {number}, "triangle ", f, " names vertex ", v, ", expected 0 to ",
+              vertex_count - 1);
+        return false;
+    }
+    for (const std::size_t i : {0U, 1U, 2U}) {
+        if (corner[i] != corner[(i + 1) % 3]) continue;
+        found(MeshDefect::repeated_vertex, {static_cast<Index>(corner[i])}, {number}, "triangle ", f, " names vertex ",
+              corner[i], " twice, expected three vertices");
+        return false;
+    }
+    return true;
+}
+
+/// Whether one can compute with point `v`; if so, `largest` grows to its largest magnitude [m].
+template <Real Scalar, class Found>
+bool check_point(const Points<Scalar>& x, Index v, Scalar& largest, Found found) {
+    const Scalar most = std::sqrt(std::sqrt((std::numeric_limits<Scalar>::max)())) / 4;
+    Scalar magnitude[3];
+    for (const Index k : {0, 1, 2}) {
+        magnitude[k] = std::abs(x(k, v));
+        const std::string_view name = std::string_view("xyz").substr(static_cast<std::size_t>(k), 1);
+        if (!is_finite(magnitude[k])) {
+            found(MeshDefect::coordinate_not_finite, {v}, {}, name, " of vertex ", v, " must be finite [m], got ",
+                  x(k, v));
+            return false;
+        }
+        if (magnitude[k] > most) {
+            found(MeshDefect::coordinate_too_large, {v}, {}, name, " of vertex ", v, " must be within ", most,
+                  " [m] of 0, or squares of areas overflow, got ", x(k, v));
+            return false;
+        }
+    }
+    largest = (std::max)({largest, magnitude[0], magnitude[1], magnitude[2]});
+    return true;
+}
+
+/// Whether the surface has size and area, and numbers fine enough for its edges.
+template <Real Scalar, class Found>
+bool check_size(const Points<Scalar>& x, const Triangles& triangles, Scalar largest_coordinate, Found found) {
+    using Limits = std::numeric_limits<Scalar>;
+    const double least = 4 * std::sqrt(std::sqrt(static_cast<double>((Limits::min)())));
+    const double spacing = static_cast<double>(Limits::epsilon()) * static_cast<double>(largest_coordinate);
+    double sum = 0, largest_height = 0;
+    for (Index f = 0; f < triangles.cols(); ++f) {
+        const auto corner = [&](Index k) { return Vector3<double>(point(x, triangles(k, f)).template cast<double>()); };
+        const Vector3<double> ab = corner(1) - corner(0), bc = corner(2) - corner(1), ca = corner(0) - corner(2);
+        const auto length = [](const Vector3<double>& side) { return std::hypot(side.x(), side.y(), side.z()); };
+        sum += length(ab) + length(bc) + length(ca);
+        const double longest = (std::max)({length(ab), length(bc), length(ca)});
+        if (longest > 0) largest_height = (std::max)(largest_height, length(cross(ab, bc)) / longest);
+    }
+    const double mean_edge = sum / (3.0 * static_cast<double>(triangles.cols()));
+    if (!(mean_edge > 0)) {
+        found(MeshDefect::all_at_one_point, {}, {},
+              "all vertices of each triangle are at one point, expected a surface");
+    } else if (mean_edge < least) {
+        found(MeshDefect::too_small, {}, {}, "the mean edge must be at least ", least,
+              " [m], or squares of areas vanish, got ", mean_edge);
+    } else if (mean_edge < 100 * spacing) {
+        found(MeshDefect::too_coarse, {}, {}, "the mean edge must be at least ", 100 * spacing,
+              " [m], a hundred times the spacing of numbers at the largest coordinate, got ", mean_edge,
+              "; move the mesh to the origin, or use double");
+    } else if (largest_height <= 4 * spacing) {
+        found(MeshDefect::all_on_one_line, {}, {}, "all vertices of each triangle are on one line, expected a surface");
+    } else {
+        return true;
+    }
+    return false;
+}
+
+/// Triangles that lie on one edge and have the same third vertex, and edges of three triangles or more.
+template <class Found>
+void check_edges(std::span<const HalfEdge> sides, Found found) {
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
+        const Index first = edge[0].first, second = edge[0].second;
+        std::size_t different = 1;
+        for (std::size_t i = 1; i < edge.size(); ++i) {
+            const HalfEdge &before = edge[i - 1], &side = edge[i];
+            if (side.apex != before.apex) ++different;
+            if (side.apex != before.apex || side.apex < second) continue;  // told once, at the lowest two vertices
+            const bool same = side.forward == before.forward;
+            found(same ? MeshDefect::duplicate_triangle : MeshDefect::double_sided_triangle, {first, second, side.apex},
+                  {before.triangle, side.triangle}, "triangles ", before.triangle, " and ", side.triangle,
+                  " name the same vertices ", first, ", ", second, " and ", side.apex, ", expected one of them");
+        }
+        if (different < 3) return;
+        std::vector<Index> all;
+        for (const HalfEdge& side : edge) all.push_back(side.triangle);
+        found(MeshDefect::non_manifold_edge, {first, second}, all, "edge ", first, "-", second, " belongs to ",
+              edge.size(), " triangles (", all[0], ", ", all[1], ", ", all[2], edge.size() > 3 ? ", ..." : "",
+              "), expected 1 or 2");
+    });
+}
+
+/// Whether two triangles lie side by side at an edge, and run along it in the same direction.
+inline bool against(std::span<const HalfEdge> edge) {
+    return edge.size() == 2 && edge[0].forward == edge[1].forward && edge[0].apex != edge[1].apex;
+}
+
+/// Which triangles are to be turned together, so that neighbours run along their edge in opposite directions: number f
+/// is triangle f as it is, f + `triangle_count` turned. Both in one set: the surface is one-sided.
+inline DisjointSets turns(std::span<const HalfEdge> sides, std::size_t triangle_count) {
+    DisjointSets sets(2 * triangle_count);
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
+        if (edge.size() != 2 || edge[0].apex == edge[1].apex) return;
+        const auto f = static_cast<std::size_t>(edge[0].triangle), g = static_cast<std::size_t>(edge[1].triangle);
+        const std::size_t turn = against(edge) ? triangle_count : 0;
+        sets.unite(f, g + turn);
+        sets.unite(f + triangle_count, g + triangle_count - turn);
+    });
+    return sets;
+}
+
+/// Neighbours that are turned against each other, and surfaces where that cannot be helped.
+template <class Found>
+void check_turns(std::span<const HalfEdge> sides, std::size_t triangle_count, Found found) {
+    DisjointSets sets(0);
+    std::vector<bool> told;
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
+        if (!against(edge)) return;
+        if (told.empty()) {
+            sets = turns(sides, triangle_count);
+            told.assign(2 * triangle_count, false);
+        }
+        const Index f = edge[0].triangle, g = edge[1].triangle, first = edge[0].first, second = edge[0].second;
+        const std::size_t set = sets.find(static_cast<std::size_t>(f));
+        if (set != sets.find(static_cast<std::size_t>(f) + triangle_count)) {
+            found(MeshDefect::inconsistent_orientation, {first, second}, {f, g}, "triangles ", f, " and ", g,
+                  " run along edge ", first, "-", second,
+                  " in the same direction, expected opposite ones; turn one of them");
+        } else if (!told[set]) {
+            told[set] = true;
+            found(MeshDefect::one_sided, {first, second}, {f, g},
+                  "the surface is one-sided (a Moebius strip), expected two sides");
+        }
+    });
+}
+
+/// Which corners hang together by edges around their vertex: number 3 f + k is corner k of triangle f.
+inline DisjointSets fans(const Triangles& triangles, std::span<const HalfEdge> sides) {
+    const auto corner_at = [&](const HalfEdge& side, Index v) {
+        const Index k = triangles(side.side, side.triangle) == v ? side.side : (side.side + 1) % 3;
+        return static_cast<std::size_t>(3 * static_cast<Eigen::Index>(side.triangle) + k);
+    };
+    DisjointSets sets(static_cast<std::size_t>(triangles.size()));
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
+        for (const HalfEdge& side : edge.subspan(1)) {
+            for (const Index v : {side.first, side.second}) sets.unite(corner_at(edge[0], v), corner_at(side, v));
+        }
+    });
+    return sets;
+}
+
+/// A vertex whose triangles do not all hang together by edges at that vertex; told once. Triangles of `no_index` are
+/// left out.
+template <class Found>
+void check_fans(const Triangles& triangles, std::span<const HalfEdge> sides, Index vertex_count, Found found) {
+    DisjointSets fan_of = fans(triangles, sides);
+    const auto none = static_cast<std::size_t>(triangles.size());
+    std::vector<std::size_t> first_fan(static_cast<std::size_t>(vertex_count), none);
+    std::vector<bool> told(static_cast<std::size_t>(vertex_count), false);
+    for (std::size_t corner = 0; corner < none; ++corner) {
+        if (triangles.data()[corner] == no_index) continue;
+        const auto v = static_cast<std::size_t>(triangles.data()[corner]);
+        if (first_fan[v] == none) first_fan[v] = fan_of.find(corner);
+        if (first_fan[v] == fan_of.find(corner) || told[v]) continue;
+        told[v] = true;
+        const auto f = static_cast<Index>(first_fan[v] / 3), g = static_cast<Index>(corner / 3);
+        found(MeshDefect::non_manifold_vertex, {static_cast<Index>(v)}, {f, g}, "vertex ", v, " joins triangles ", f,
+              " and ", g, ", which no edges connect around it, expected one fan of triangles");
+    }
+}
+
+}  // namespace membrane::detail

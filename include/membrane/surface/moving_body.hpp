@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <utility>
+
+#include <membrane/core/rigid_frame.hpp>
+#include <membrane/surface/normals.hpp>
+#include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
+
+/// The body under the membrane, where it moves in the world: the one thing that tells all parts how.
+///
+///     auto body = membrane::MovingBody(mesh);
+///     if (!body.move_to(pose, x)) ...                                          // each tick: rigidly, or
+///     if (!body.move_to(anchors, dt, x)) ...                                   // anyhow
+///     tree.refit(x);
+///     const auto contact = tracker.update(tree, x, tool, body);
+///     const auto grasp   = grasper.update(contact, x, tool, body);
+///     const auto report  = solver.step(x, dt, network, on(body, foundation), press(tool, contact, grasp), pull(tool, grasp));
+///     device.write(feel({tool, smooth(contact, body), report, grasp}));
+namespace membrane {
+
+/// Where the body is and how it came there: the anchors, which are where the membrane would be without any tool, and the
+/// pose, which carries the mesh to them as nearly as a rigid motion can.
+///
+/// A move takes the membrane along, pinned vertices too: each vertex goes with its anchor, and its distance from that is
+/// turned as the pose is. What parts remember (contact, grasp, forces, displacements) they turn and shift with the pose at
+/// their next call. So a membrane and a tool that move rigidly with the body feel nothing of it: all is as at rest, to
+/// rounding. Vertices are woken only when anchors move other than rigidly.
+///
+/// A body that only moves rigidly, as an eye in its orbit, needs none of this where positions need not be in the world:
+/// with `to_body_frame(tool, frame)` the membrane stays in the body's frame, at no cost. Loads of a network that keep their
+/// direction in the world (`DeadLoad`) do not turn with a body, and force policies that remember a position there
+/// (`ContactFriction`) do not go along; with `to_body_frame` they do.
+template <Real Scalar>
+class MovingBody {
+  public:
+    /// At rest, its anchors the positions of `mesh`. Cost: O(F log F).
+    explicit MovingBody(const TriangleMesh<Scalar>& mesh);
+
+    /// The body is at `pose`, which carries it from where the mesh is; `x` (3 x V [m]), on the body, goes along. To be
+    /// called in every tick: velocities are those of the last call. Then refit the tree, all of it.
+    ///
+    /// False, and nothing has changed, for a number that is not finite in `pose` or `x`, or that would come out so. Online.
+    /// Cost: O(V). @pre `x` has a column for each vertex, and the pose's rotation is one (asserted)
+    [[nodiscard]] bool move_to(const RigidFrame<Scalar>& pose, PointsRef<Scalar> x) noexcept;
+
+    /// The same for a body that moves anyhow: its anchors are at `anchors` (3 x V [m]) now, and got there in `dt` [s]. The
+    /// pose is the best fit in the sense of least squares, by quaternions [Horn87]. Cost: O(F).
+    /// @pre as many anchors as vertices (asserted)
+    [[nodiscard]] bool move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept;
+
+    [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
+
+    /// Of the surface that the anchors are the vertices of, unit length, 3 x V.
+    [[nodiscard]] const Points<Scalar>& normals() const noexcept { return normals_; }
+
+    /// From the mesh to the anchors. The velocities are of the last move.
+    [[nodiscard]] const RigidFrame<Scalar>& pose() const noexcept { return pose_; }
+
+    /// How often anchors have moved other than rigidly: a membrane at rest is then out of balance.
+    [[nodiscard]] std::uint64_t deformations() const noexcept { return deformations_; }
+
+    /// Velocity at `place` of what is fixed to the body at the point `barycentric` of the triangle of vertices `corners`
+    /// [m/s].
+    [[nodiscard]] Vector3<Scalar> velocity_at(const Vector3<Scalar>& place, const std::array<Index, 3>& corners,
+                                              const Vector3<Scalar>& barycentric) const noexcept;
+
+    /// How the body is turned at vertex `v`: as the pose is, and where it is deformed so that the normal there stays normal.
+    [[nodiscard]] Eigen::Matrix<Scalar, 3, 3> rotation_at(Index v) const noexcept;
+
+    /// The anchors of the body at rest: the mesh.
+    [[nodiscard]] const Points<Scalar>& anchors_at_rest() const noexcept { return at_rest_; }
+
+  private:
+    [[nodiscard]] bool carry(const RigidFrame<Scalar>& pose, PointsRef<Scalar>& x) noexcept;
+    [[nodiscard]] RigidFrame<Scalar> fit(const ConstPointsRef<Scalar>& anchors) const noexcept;
+    [[nodiscard]] bool is_carried(const RigidFrame<Scalar>& motion, const Points<Scalar>& from) const noexcept;
+
+    Points<Scalar> at_rest_;
+    VertexNormals<Scalar> surface_;
+    Points<Scalar> normals_at_rest_, anchors_, normals_;
+    Points<Scalar> previous_;        // anchors before the last move
+    Points<Scalar> next_, carried_;  // during a move: its anchors, and the membrane's positions
+    RigidFrame<Scalar> pose_;
+    Scalar rate_ = 0;        // the last move's 1 / dt; zero: velocities are the pose's [1/s]
+    bool deformed_ = false;  // anchors are not where the pose carries the mesh
+    std::uint64_t deformations_ = 0;
+};
+
+namespace detail {
+
+/// The eigenvector of the largest eigenvalue, by Jacobi's method.
+[[nodiscard]] inline std::array<double, 4> largest_eigenvector(std::array<std::array<double, 4>, 4> a) noexcept {
+    std::array<std::array<double, 4>, 4> vectors{};  // as columns
+    for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = 1;
+    for (int sweep = 0; sweep < 16; ++sweep) {  // quadratic: six or so will do
+        bool done = true;
+        for (std::size_t p = 0; p < 3; ++p) {
+            for (std::size_t q = p + 1; q < 4; ++q) {
+                if (!(std::abs(a[p][q]) > 1e-30 * (std::abs(a[p][p]) + std::abs(a[q][q])))) continue;
+                done = false;
+                const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
+                const double root = std::abs(theta) < 1e9 ? std::sqrt(theta * theta + 1) : std::abs(theta);
+                const double t = (theta < 0 ? -1 : 1) / (std::abs(theta) + root);
+                const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+                for (std::size_t i = 0; i < 4; ++i) {
+                    const double ip = a[i][p], iq = a[i][q];
+                    a[i][p] = c * ip - s * iq;
+                    a[i][q] = s * ip + c * iq;
+                }
+                for (std::size_t i = 0; i < 4; ++i) {
+                    const double pi = a[p][i], qi = a[q][i];
+                    a[p][i] = c * pi - s * qi;
+                    a[q][i] = s * pi + c * qi;
+                    const double vp = vectors[i][p], vq = vectors[i][q];
+                    vectors[i][p] = c * vp - s * vq;
+                    vectors[i][q] = s * vp + c * vq;
+                }
+                a[p][q] = a[q][p] = 0;
+            }
+        }
+        if (done) break;
+    }
+    std::size_t largest = 0;
+    for (std::size_t i = 1; i < 4; ++i) {
+        if (a[i][i] > a[largest][largest]) largest = i;
+    }
+    return {vectors[0][largest], vectors[1][largest], vectors[2][largest], vectors[3][largest]};
+}
+
+/// The rotation by a quaternion w, x, y, z, which need not be of length 1.
+template <Real Scalar>
+[[nodiscard]] Eigen::Matrix<Scalar, 3, 3> rotation_by(const std::array<double, 4>& quaternion) noexcept {
+    const auto [w, x, y, z] = quaternion;
+    const double s = 2 / ((w * w + x * x) + (y * y + z * z));
+    const Eigen::Matrix3d rotation{{1 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)},
+                                   {s * (x * y + w * z), 1 - s * (x * x + z * z), s * (y * z - w * x)},
+                                   {s * (x * z - w * y), s * (y * z + w * x), 1 - s * (x * x + y * y)}};
+    return rotation.cast<Scalar>();
+}
+
+/// Axis times angle of a rotation by less than half a turn.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> rotation_vector(const Eigen::Matrix<Scalar, 3, 3>& r) noexcept {
+    const Vector3<Scalar> twice_sine(r(2, 1) - r(1, 2), r(0, 2) - r(2, 0), r(1, 0) - r(0, 1));
+    const Scalar sine = norm(twice_sine) / 2, cosine = ((r(0, 0) + r(1, 1)) + r(2, 2) - 1) / 2;
+    return sine > 0 ? Vector3<Scalar>(std::atan2(sine, cosine) / (2 * sine) * twice_sine) : Vector3<Scalar>(twice_sine);
+}
+
+template <Real Scalar>
+[[nodiscard]] bool is_rotation(const Eigen::Matrix<Scalar, 3, 3>& r) noexcept {
+    const Vector3<Scalar> x = r.col(0), y = r.col(1), z = r.col(2);
+    const Scalar off = norm<Scalar>(cross(x, y) - z) + norm<Scalar>(cross(y, z) - x);
+    return off <= Scalar(1e-4);
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+MovingBody<Scalar>::MovingBody(const TriangleMesh<Scalar>& mesh)
+    : at_rest_(mesh.positions()),
+      surface_(mesh),
+      normals_at_rest_(surface_.values()),
+      anchors_(at_rest_),
+      normals_(normals_at_rest_),
+      previous_(at_rest_),
+      next_(at_rest_),
+      carried_(at_rest_) {}
+
+template <Real Scalar>
+bool MovingBody<Scalar>::move_to(const RigidFrame<Scalar>& pose, PointsRef<Scalar> x) noexcept {
+    MEMBRANE_ASSERT(x.cols() == anchors_.cols());
+    if (!is_finite(pose.rotation) || !is_finite(pose.origin)) return false;
+    if (!is_finite(pose.velocity) || !is_finite(pose.angular_velocity)) return false;
+    MEMBRANE_ASSERT(detail::is_rotation(pose.rotation));
+    for (Index v = 0; v < anchors_.cols(); ++v) next_.col(v) = pose.point_to_world(point(at_rest_, v));
+    const bool was_deformed = deformed_;
+    if (!carry(pose, x)) return false;
+    rate_ = 0;
+    deformed_ = false;
+    if (was_deformed) ++deformations_;
+    for (Index v = 0; v < anchors_.cols(); ++v) normals_.col(v) = pose.vector_to_world(point(normals_at_rest_, v));
+    return true;
+}
+
+template <Real Scalar>
+bool MovingBody<Scalar>::move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept {
+    MEMBRANE_ASSERT(x.cols() == anchors_.cols() && anchors.cols() == anchors_.cols());
+    if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)()) || !is_finite(anchors)) return false;
+    RigidFrame<Scalar> pose = fit(anchors);
+    const auto motion = motion_between(pose_, pose);
+    pose.angular_velocity = detail::rotation_vector(motion.rotation) / dt;
+    pose.velocity = (pose.origin - pose_.origin) / dt;
+    if (!is_finite(pose.rotation) || !is_finite(pose.velocity) || !is_finite(pose.angular_velocity)) return false;
+    next_ = anchors;
+    if (!carry(pose, x)) return false;
+    rate_ = 1 / dt;
+    if (!is_carried(motion, previous_)) ++deformations_;
+    deformed_ = !is_carried(pose_, at_rest_);
+    surface_.update(anchors_);
+    normals_ = surface_.values();
+    return true;
+}
+
+// To the anchors in `next_`, which are those of `pose`.
+template <Real Scalar>
+bool MovingBody<Scalar>::carry(const RigidFrame<Scalar>& pose, PointsRef<Scalar>& x) noexcept {
+    const auto motion = motion_between(pose_, pose);
+    for (Index v = 0; v < anchors_.cols(); ++v) {
+        const Vector3<Scalar> off = point(x, v) - point(anchors_, v);
+        carried_.col(v) = point(next_, v) + motion.vector_to_world(off);
+    }
+    if (!is_finite(next_) || !is_finite(carried_)) return false;
+    x = carried_;
+    previous_.swap(anchors_);
+    anchors_.swap(next_);
+    pose_ = pose;
+    return true;
+}
+
+template <Real Scalar>
+RigidFrame<Scalar> MovingBody<Scalar>::fit(const ConstPointsRef<Scalar>& anchors) const noexcept {
+    // In parts of the largest number, so that no product overflows.
+    const auto size_of = [](const auto& points) {
+        const auto largest = static_cast<double>(points.size() > 0 ? points.cwiseAbs().maxCoeff() : Scalar(0));
+        return (std::max)(largest, (std::numeric_limits<double>::min)());
+    };
+    const double scale = size_of(at_rest_), scale_now = size_of(anchors);
+    const auto count = static_cast<double>((std::max)(anchors.cols(), Eigen::Index{1}));
+    Vector3<double> centre = Vector3<double>::Zero(), centre_now = centre;
+    for (Index v = 0; v < anchors.cols(); ++v) {
+        centre += point(at_rest_, v).template cast<double>() / scale;
+        centre_now += point(anchors, v).template cast<double>() / scale_now;
+    }
+    centre /= count;
+    centre_now /= count;
+    Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
+    for (Index v = 0; v < anchors.cols(); ++v) {
+        const Vector3<double> p = point(at_rest_, v).template cast<double>() / scale - centre;
+        const Vector3<double> q = point(anchors, v).template cast<double>() / scale_now - centre_now;
+        for (Eigen::Index k = 0; k < 3; ++k) m.col(k) += q[k] * p;
+    }
+    RigidFrame<Scalar> pose;
+    pose.rotation = detail::rotation_by<Scalar>(detail::largest_eigenvector(
+        {{{(m(0, 0) + m(1, 1)) + m(2, 2), m(1, 2) - m(2, 1), m(2, 0) - m(0, 2), m(0, 1) - m(1, 0)},
+          {m(1, 2) - m(2, 1), (m(0, 0) - m(1, 1)) - m(2, 2), m(0, 1) + m(1, 0), m(2, 0) + m(0, 2)},
+          {m(2, 0) - m(0, 2), m(0, 1) + m(1, 0), (m(1, 1) - m(0, 0)) - m(2, 2), m(1, 2) + m(2, 1)},
+          {m(0, 1) - m(1, 0), m(2, 0) + m(0, 2), m(1, 2) + m(2, 1), (m(2, 2) - m(0, 0)) - m(1, 1)}}}));
+    const Vector3<Scalar> mean = (scale * centre).template cast<Scalar>();
+    pose.origin = (scale_now * centre_now).template cast<Scalar>() - pose.vector_to_world(mean);
+    return pose;
+}
+
+// Whether `motion` takes the points `from` to the anchors, but for rounding.
+template <Real Scalar>
+bool MovingBody<Scalar>::is_carried(const RigidFrame<Scalar>& motion, const Points<Scalar>& from) const noexcept {
+    Scalar off = 0, size = 0;
+    for (Index v = 0; v < anchors_.cols(); ++v) {
+        const Vector3<Scalar> now = point(anchors_, v);
+        off = (std::max)(off, norm<Scalar>(motion.point_to_world(point(from, v)) - now));
+        size = (std::max)({size, norm(now), norm(point(from, v))});
+    }
+    return off <= 64 * std::numeric_limits<Scalar>::epsilon() * size;
+}
+
+template <Real Scalar>
+Vector3<Scalar> MovingBody<Scalar>::velocity_at(const Vector3<Scalar>& place, const std::array<Index, 3>& corners,
+                                                const Vector3<Scalar>& barycentric) const noexcept {
+    if (rate_ == 0) return pose_.velocity_at(place);
+    const Vector3<Scalar> now = point_at(triangle_at(anchors_, corners), barycentric);
+    const Vector3<Scalar> before = point_at(triangle_at(previous_, corners), barycentric);
+    return rate_ * (now - before) + cross<Scalar>(pose_.angular_velocity, place - now);
+}
+
+template <Real Scalar>
+Eigen::Matrix<Scalar, 3, 3> MovingBody<Scalar>::rotation_at(Index v) const noexcept {
+    if (!deformed_) return pose_.rotation;
+    // Turned on by the smallest angle that takes the normal along.
+    const Vector3<Scalar> from = pose_.vector_to_world(point(normals_at_rest_, v)), to = point(normals_, v);
+    const Vector3<Scalar> axis = cross(from, to);
+    const Scalar cosine = dot(from, to);
+    if (!(cosine > Scalar(-0.5))) return pose_.rotation;  // about which axis is hardly known
+    Eigen::Matrix<Scalar, 3, 3> rotation;
+    for (Eigen::Index k = 0; k < 3; ++k) {
+        const Vector3<Scalar> column = pose_.rotation.col(k), turned = cross(axis, column);
+        rotation.col(k) = column + turned + cross(axis, turned) / (1 + cosine);
+    }
+    return rotation;
+}
+
+}  // namespace membrane

@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <membrane/core/compressed_rows.hpp>
+#include <membrane/core/index_set.hpp>
+#include <membrane/core/lane_points.hpp>
+#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/triangle.hpp>
+
+/// Which way a surface faces as it moves.
+///
+///     auto normals = membrane::VertexNormals(mesh);
+///     normals.update(x, report.moved);    // in the loop: the moved vertices and their neighbours
+///     draw(x, normals.values());
+namespace membrane {
+
+namespace detail {
+
+/// The border of the triangles around a vertex; see `borders_of`.
+struct Border {
+    std::array<Index, 6> vertices;  ///< The first, of most vertices all.
+    Index rest = 0, rest_size = 0;  ///< Where the others are in an array of them.
+};
+
+}  // namespace detail
+
+/// Unit normals of the vertices, weighted by the area of their triangles. Owns all it holds; the mesh may go.
+///
+/// An update of the moved vertices gives the same bits as one of all. A vertex whose triangles have no area together,
+/// or are not finite or too large for the numbers, gets its normal at rest, and (0, 0, 1) if it had none there or has
+/// no triangles: always a finite vector of length 1.
+template <Real Scalar>
+class VertexNormals {
+  public:
+    /// Of the mesh at rest. O(F log F).
+    explicit VertexNormals(const TriangleMesh<Scalar>& mesh);
+
+    /// Of all vertices, at the positions `x`, 3 x V [m]. O(F), no allocation.
+    /// @pre `x` has a column for each vertex (asserted).
+    void update(const ConstPointsRef<Scalar>& x) noexcept;
+
+    /// Of the vertices `moved` and their neighbours, each once; a vertex may be named several times. Returns them, valid
+    /// until the next update: no other normal has changed, and no point is read but the corners of their triangles. Linear
+    /// in the number of these, no allocation.
+    /// @pre `x` has a column for each vertex and `moved` names vertices (asserted).
+    std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
+
+    /// 3 x V, unit length.
+    [[nodiscard]] const Points<Scalar>& values() const noexcept { return values_; }
+
+  private:
+    static constexpr auto lanes = static_cast<Index>(Lanes<Scalar>::count);
+    static constexpr Index at_a_time = 256;  // vertices: what is in between stays in the cache
+
+    template <class VertexAt>
+    void face(const ConstPointsRef<Scalar>& x, Index count, const VertexAt& vertex) noexcept;
+    template <class VertexAt>
+    void normalise(const ConstPointsRef<Scalar>& x, const VertexAt& vertex, Index first, Index end) noexcept;
+    void check(const Vector3<Scalar>& place, Index v, Scalar squared) noexcept;
+
+    std::vector<detail::Border> borders_;
+    std::vector<Index> rests_;  // of the borders
+    Points<Scalar> values_;
+    Points<Scalar> at_rest_;
+    IndexSet updated_;                        // by the last call
+    std::vector<PaddedPoint<Scalar>> areas_;  // twice those around the vertices at hand, as z, x, y; then their normals
+};
+
+/// The angle-weighted normal where `barycentric` says, of the face, edge or corner: its sign against the way from there
+/// to a point tells inside from outside when that is the surface point nearest to it [Baerentzen05].
+/// `barycentric` is exactly zero at the corners that have no part in it, as `closest_point` gives it. Unit length, or
+/// zero where the triangles around have no area. No allocation; linear in the triangles of a corner.
+/// @pre `f` is a triangle (asserted).
+template <class Positions>
+[[nodiscard]] Vector3<typename Positions::Scalar> pseudo_normal(
+    const Positions& x, const Triangles& triangles, const Adjacency& adjacency, Index f,
+    const Vector3<typename Positions::Scalar>& barycentric) noexcept;
+
+namespace detail {
+
+/// `a` at unit length, or `otherwise` where its length is not a number one can divide by.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> unit_or(const Vector3<Scalar>& a, const Vector3<Scalar>& otherwise) noexcept {
+    const Scalar squared = squared_norm(a);
+    if (!is_finite(squared) || squared < (std::numeric_limits<Scalar>::min)()) return otherwise;
+    return a / std::sqrt(squared);
+}
+
+/// What the triangles around each vertex have for a border, counter-clockwise: its neighbours; if these do not go all the
+/// way round, the vertex and its neighbours. An even number: where it would be odd, the first comes again.
+template <Real Scalar>
+[[nodiscard]] CompressedRows<Index> borders_of(const TriangleMesh<Scalar>& mesh) {
+    const Adjacency adjacency(mesh);
+    const auto& triangles = mesh.triangles();
+    return {mesh.vertex_count(), [&](auto put) {
+                for (Index v = 0; v < mesh.vertex_count(); ++v) {
+                    const auto corner = [&](Index f, Index k) {  // k corners after the vertex
+                        return ((triangles(0, f) == v ? 0 : triangles(1, f) == v ? 1 : 2) + k) % 3;
+                    };
+                    const auto across = [&](Index f, Index k) {
+                        return adjacency.triangle_neighbours(f)[static_cast<std::size_t>(corner(f, k))];
+                    };
+                    const auto around = adjacency.triangles_of(v);
+                    const std::size_t neighbours = adjacency.neighbours(v).size();
+                    const bool closed = neighbours == around.size();  // an isolated vertex has none of either
+                    Index f = around.empty() ? no_index : around[0];
+                    while (!closed && across(f, 0) != no_index) f = across(f, 0);
+                    const Index first = closed && f != no_index ? triangles(corner(f, 1), f) : v;
+                    put(v, first);
+                    if (!closed) put(v, triangles(corner(f, 1), f));
+                    for (std::size_t n = closed ? 1 : 0; n < around.size(); ++n, f = across(f, 2)) {
+                        put(v, triangles(corner(f, 2), f));
+                    }
+                    if ((neighbours + (closed ? 0 : 1)) % 2 == 1 || around.empty()) put(v, first);
+                }
+            }};
+}
+
+/// Twice the area that the border encloses, as z, x, y: whatever is inside, triangles from its first point to its others
+/// have the same together. They are taken two at a time, as the product of their diagonals.
+template <Real Scalar>
+[[gnu::always_inline]] inline PaddedVector<Scalar> area_within(const Border& border, const Index* references,
+                                                               const Scalar* x, std::ptrdiff_t stride) noexcept {
+    const auto at = [&](Index v) { return PaddedVector<Scalar>::load_point(x + v * stride); };
+    const auto first = at(border.vertices[0]);
+    auto last = at(border.vertices[1]);
+    const auto next_two = [&](Index p, Index q) {
+        const auto next = at(q), a = at(p) - first, b = next - last;
+        last = next;
+        return a * b.turned() - a.turned() * b;
+    };
+    auto area = next_two(border.vertices[2], border.vertices[3]);
+    area = area + next_two(border.vertices[4], border.vertices[5]);
+    for (Index k = border.rest; k < border.rest + border.rest_size; k += 2) {
+        area = area + next_two(references[k], references[k + 1]);
+    }
+    return area;
+}
+
+/// The angle between two sides [rad].
+template <Real Scalar>
+[[nodiscard]] Scalar angle_between(const Vector3<Scalar>& a, const Vector3<Scalar>& b) noexcept {
+    return std::atan2(norm(cross(a, b)), dot(a, b));
+}
+
+}  // namespace detail
+
+template <Real Scalar>
+VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
+    : borders_(static_cast<std::size_t>(mesh.vertex_count())),
+      values_(3, mesh.vertex_count()),
+      at_rest_(Vector3<Scalar>::UnitZ().eigen().replicate(1, mesh.vertex_count())),
+      updated_(mesh.vertex_count()),
+      areas_(static_cast<std::size_t>(at_a_time)) {
+    const CompressedRows<Index> whole = detail::borders_of(mesh);
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        detail::Border& border = borders_[static_cast<std::size_t>(v)];
+        const auto points = whole[v];
+        const std::size_t here = (std::min)(points.size(), border.vertices.size());
+        border.vertices.fill(points[0]);
+        border.rest = static_cast<Index>(rests_.size());
+        border.rest_size = static_cast<Index>(points.size() - here);
+        for (std::size_t k = 0; k < here; ++k) border.vertices[k] = points[k];
+        for (const Index w : points.subspan(here)) rests_.push_back(w);
+    }
+    update(mesh.positions());
+    at_rest_ = values_;
+}
+
+template <Real Scalar>
+void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
+    MEMBRANE_ASSERT(x.cols() == values_.cols());
+    face(x, static_cast<Index>(values_.cols()), [](Index v) { return v; });
+}
+
+template <Real Scalar>
+std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x,
+                                                     std::span<const Index> moved) noexcept {
+    MEMBRANE_ASSERT(x.cols() == values_.cols());
+    updated_.clear();
+    for (const Index v : moved) updated_.insert(v);
+    // The neighbours of what moves have nearly all moved too: one branch for all of them is predicted.
+    for (const Index v : moved) {
+        const detail::Border& border = borders_[static_cast<std::size_t>(v)];
+        bool all_in = true;
+        for (const Index w : border.vertices) all_in &= updated_.contains(w);
+        if (!all_in) {
+            for (const Index w : border.vertices) updated_.insert(w);
+        }
+        for (Index k = border.rest; k < border.rest + border.rest_size; ++k) {
+            updated_.insert(rests_[static_cast<std::size_t>(k)]);
+        }
+    }
+    const auto updated = updated_.items();
+    face(x, updated_.count(), [&](Index n) { return updated[static_cast<std::size_t>(n)]; });
+    return updated;
+}
+
+/// Finds the normals of `vertex(n)` for n from 0 to `count` - 1.
+template <Real Scalar>
+template <class VertexAt>
+void VertexNormals<Scalar>::face(const ConstPointsRef<Scalar>& x, Index count, const VertexAt& vertex) noexcept {
+    // Read once: for all the compiler knows, what is stored below changes them.
+    const detail::Border* borders = borders_.data();
+    const Index* references = rests_.data();
+    const Scalar* places = x.data();
+    PaddedPoint<Scalar>* areas = areas_.data();
+    const std::ptrdiff_t stride = x.outerStride();
+    for (Index first = 0; first < count; first += at_a_time) {
+        const Index some = (std::min)(at_a_time, count - first);
+        for (Index k = 0; k < some; ++k) {
+            const auto area = detail::area_within(borders[vertex(first + k)], references, places, stride);
+            area.store(areas[k].number.data());
+        }
+        const auto at_hand = [&](Index k) { return vertex(first + k); };
+        Index k = 0;
+        for (; k + lanes <= some; k += lanes) normalise(x, at_hand, k, k + lanes);
+        if (k < some) normalise(x, at_hand, k, some);
+    }
+}
+
+/// Makes normals of areas `first` to `end` - 1, those of `vertex(first)` and so on; as many as there are lanes at most:
+/// square root and division are slow one by one.
+template <Real Scalar>
+template <class VertexAt>
+[[gnu::always_inline]] inline void VertexNormals<Scalar>::normalise(const ConstPointsRef<Scalar>& x,
+                                                                    const VertexAt& vertex, Index first,
+                                                                    Index end) noexcept {
+    std::array<Index, Lanes<Scalar>::count> begins, vertices;
+    PaddedVector<Scalar> places;
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        const Index k = (std::min)(first + static_cast<Index>(i), end - 1);
+        begins[i] = numbers_in_point * k;
+        vertices[i] = vertex(k);
+        places = places + PaddedVector<Scalar>::load_point(x.data() + vertices[i] * x.outerStride());
+    }
+    const Vector3<Lanes<Scalar>> turned = gather(areas_.data(), begins.data());
+    const Vector3<Lanes<Scalar>> area(turned.y(), turned.z(), turned.x());
+    const Lanes<Scalar> squared = squared_norm(area), length = sqrt(squared);
+    scatter<Scalar>({area.x() / length, area.y() / length, area.z() / length}, areas_.data(), begins.data());
+    for (std::size_t i = 0; i < vertices.size(); ++i) {
+        const Scalar* normal = areas_.front().number.data() + begins[i];
+        values_.col(vertices[i]) = Vector3<Scalar>(normal[0], normal[1], normal[2]);
+    }
+
+    Scalar all = places.sum();  // finite only if all that is added is; a vertex is no part of its border
+    for (std::size_t i = 0; i < vertices.size(); ++i) all += squared[i];
+    if (is_finite(all) && !any(squared < (std::numeric_limits<Scalar>::min)())) [[likely]]
+        return;
+    for (std::size_t i = 0; i < vertices.size(); ++i) check(point(x, vertices[i]), vertices[i], squared[i]);
+}
+
+/// Gives vertex `v` its normal at rest unless it has one; `squared` is the square of twice its area.
+template <Real Scalar>
+[[gnu::noinline]] void VertexNormals<Scalar>::check(const Vector3<Scalar>& place, Index v, Scalar squared) noexcept {
+    const bool measurable = is_finite(squared) && squared >= (std::numeric_limits<Scalar>::min)();
+    if (!measurable || !is_finite(place)) values_.col(v) = at_rest_.col(v);
+}
+
+template <class Positions>
+Vector3<typename Positions::Scalar> pseudo_normal(const Positions& x, const Triangles& triangles,
+                                                  const Adjacency& adjacency, Index f,
+                                                  const Vector3<typename Positions::Scalar>& barycentric) noexcept {
+    using Scalar = typename Positions::Scalar;
+    MEMBRANE_ASSERT(f >= 0 && f < triangles.cols());
+    const Vector3<Scalar> none(0, 0, 0);
+    const auto face_normal = [&](Index g) {
+        return detail::unit_or(area_vector(triangle_at(x, triangles.col(g))), none);
+    };
+    const auto zeros = std::count(barycentric.begin(), barycentric.end(), Scalar(0));
+    if (zeros == 0) return face_normal(f);
+    if (zeros == 1) {
+        const Index k = barycentric[0] == 0 ? 0 : barycentric[1] == 0 ? 1 : 2;
+        const Index across = adjacency.triangle_neighbours(f)[static_cast<std::size_t>((k + 1) % 3)];
+        if (across == no_index) return face_normal(f);
+        return detail::unit_or<Scalar>(face_normal(f) + face_normal(across), none);
+    }
+    const Index v = triangles(barycentric[0] != 0 ? 0 : barycentric[1] != 0 ? 1 : 2, f);
+    Vector3<Scalar> sum = none;
+    for (const Index g : adjacency.triangles_of(v)) {
+        const auto corner = triangles.col(g);
+        const Index k = corner[0] == v ? 0 : corner[1] == v ? 1 : 2;
+        const Vector3<Scalar> next = point(x, corner[(k + 1) % 3]) - point(x, v);
+        const Vector3<Scalar> last = point(x, corner[(k + 2) % 3]) - point(x, v);
+        sum += detail::angle_between(next, last) * face_normal(g);
+    }
+    return detail::unit_or(sum, none);
+}
+
+}  // namespace membrane

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/contact/grasper.hpp>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <utility>
+
+#include <membrane/surface/moving_body.hpp>
+#include <membrane/surface/shapes.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+template <class S>
+Contact<S> contact_at(const TriangleMesh<S>& mesh, Index f, const Vector3<S>& barycentric) {
+    Contact<S> contact;
+    contact.phase = ContactPhase::ongoing;
+    contact.triangle = f;
+    contact.corners = {mesh.triangles()(0, f), mesh.triangles()(1, f), mesh.triangles()(2, f)};
+    contact.barycentric = barycentric;
+    return contact;
+}
+
+template <class S>
+bool same(const Grasp<S>& a, const Grasp<S>& b) {
+    return a.triangle == b.triangle && a.corners == b.corners && a.barycentric == b.barycentric &&
+           a.offset == b.offset && a.origin == b.origin;
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("forceps take hold of the point they touch, and it goes with them", "[grasp]", double, float) {
+    using S = TestType;
+    const S tolerance = 16 * std::numeric_limits<S>::epsilon();
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
+        Points<S> x = test::jittered(mesh.positions(), S(0.1), random);
+        Grasper<S> grasper(mesh);
+        const Index f = random.index(80);
+        const auto contact = contact_at<S>(mesh, f, random.barycentric<S>());
+        Tool<S> tool{.position = random.vector<S>(), .radius = S(0.1)};
+        REQUIRE_FALSE(grasper.update(contact, x, tool).holding());
+
+        tool.grasping = true;
+        const auto grasp = grasper.update(contact, x, tool);
+        REQUIRE(grasp.holding());
+        REQUIRE(grasp.triangle == f);
+        REQUIRE(grasp.corners == contact.corners);
+        REQUIRE(grasp.barycentric == contact.barycentric);
+        const Vector3<S> held = point_at(triangle_at(x, grasp.corners), grasp.barycentric);
+        REQUIRE(norm<S>(tool.position + grasp.offset - held) <= tolerance);
+        const Vector3<S> at_first = point_at(triangle_at(mesh.positions(), grasp.corners), grasp.barycentric);
+        REQUIRE(norm<S>(grasp.origin - at_first) <= tolerance);
+
+        const Vector3<S> displacement = random.vector<S>(), so_far = grasp.displacement(tool);
+        REQUIRE(norm<S>(so_far - (held - at_first)) <= tolerance);
+        Tool<S> taken = tool;
+        taken.position += displacement;
+        REQUIRE(norm<S>(grasp.displacement(taken) - (so_far + displacement)) <= tolerance);
+
+        // Closed, they hold the same whatever else they touch, lose, or how the membrane moves.
+        tool.position += random.vector<S>();
+        x = test::jittered(x, S(0.1), random);
+        REQUIRE(same(grasper.update(contact_at<S>(mesh, (f + 1) % 80, {1, 0, 0}), x, tool), grasp));
+        REQUIRE(same(grasper.update(Contact<S>::none(), x, tool), grasp));
+
+        tool.grasping = false;
+        REQUIRE_FALSE(grasper.update(contact, x, tool).holding());
+        tool.grasping = true;  // and once more, elsewhere
+        REQUIRE(grasper.update(contact_at<S>(mesh, (f + 1) % 80, {1, 0, 0}), x, tool).triangle == (f + 1) % 80);
+    }
+}
+
+TEST_CASE("forceps that were closed before they touched hold nothing", "[grasp]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    Grasper<double> grasper(mesh);
+    Tool<double> tool{.grasping = true};
+    const auto contact = contact_at<double>(mesh, 3, {0.2, 0.3, 0.5});
+    CHECK_FALSE(grasper.update(Contact<double>::none(), mesh.positions(), tool).holding());
+    CHECK_FALSE(grasper.update(contact, mesh.positions(), tool).holding());
+    tool.grasping = false;
+    CHECK_FALSE(grasper.update(contact, mesh.positions(), tool).holding());
+    tool.grasping = true;
+    CHECK(grasper.update(contact, mesh.positions(), tool).holding());
+    grasper.reset();
+    CHECK_FALSE(grasper.update(Contact<double>::none(), mesh.positions(), tool).holding());
+    grasper.reset();
+    CHECK(grasper.update(contact, mesh.positions(), tool).holding());  // as a new one takes hold
+}
+
+TEST_CASE("a contact that has ended is not held, one that begins is", "[grasp]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    for (const auto& [phase, holds] : {std::pair(ContactPhase::none, false),
+                                       {ContactPhase::began, true},
+                                       {ContactPhase::ongoing, true},
+                                       {ContactPhase::ended, false}}) {
+        Grasper<double> grasper(mesh);
+        auto contact = contact_at<double>(mesh, 3, {0.2, 0.3, 0.5});
+        contact.phase = phase;
+        CHECK(grasper.update(contact, mesh.positions(), Tool<double>{.grasping = true}).holding() == holds);
+    }
+}
+
+TEST_CASE("on request they hold the nearest vertex", "[grasp]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    for (int k = 0; k < 3; ++k) {
+        Grasper<double> grasper(mesh, {.snap_to_vertex = true});
+        Vector3<double> barycentric(0.3, 0.3, 0.3);
+        barycentric[k] = 0.4;
+        const auto contact = contact_at(mesh, 3, barycentric);
+        const Tool<double> tool{.position = {1, 2, 3}, .grasping = true};
+        const auto grasp = grasper.update(contact, mesh.positions(), tool);
+        CHECK(grasp.barycentric == Vector3<double>::Unit(k));
+        const Vector3<double> vertex = point(mesh.positions(), contact.corners[static_cast<std::size_t>(k)]);
+        CHECK(norm<double>(tool.position + grasp.offset - vertex) < 1e-15);
+        CHECK(grasp.origin == vertex);
+    }
+}
+
+TEST_CASE("a tool that is no tool takes no hold", "[grasp][bad]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    Grasper<double> grasper(mesh);
+    const auto contact = contact_at<double>(mesh, 3, {0.2, 0.3, 0.5});
+    Tool<double> tool{.position = {std::nan(""), 0, 0}, .grasping = true};
+    CHECK_FALSE(grasper.update(contact, mesh.positions(), tool).holding());
+}
+
+TEST_CASE("forceps are copied and moved with what they hold", "[grasp]") {
+    auto mesh = std::make_unique<TriangleMesh<double>>(icosphere({.radius = 1, .subdivisions = 0}));
+    const Points<double> x = mesh->positions();
+    const auto contact = contact_at<double>(*mesh, 3, {0.2, 0.3, 0.5});
+    auto first = std::make_unique<Grasper<double>>(*mesh);
+    const Tool<double> tool{.grasping = true};
+    const auto grasp = first->update(contact, x, tool);
+    mesh.reset();
+    Grasper<double> copy = *first, moved = std::move(*first);
+    first.reset();
+    CHECK(same(copy.update(Contact<double>::none(), x, tool), grasp));
+    CHECK(same(moved.update(Contact<double>::none(), x, tool), grasp));
+    CHECK_FALSE(copy.update(contact, x, Tool<double>{}).holding());
+    CHECK(copy.update(contact, x, tool).origin == grasp.origin);
+    STATIC_REQUIRE(noexcept(copy.update(contact, std::declval<const ConstPointsRef<double>&>(), tool)));
+}
+
+TEST_CASE("on a body that moves they turn with it, and the way is that on it", "[grasp]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
+        MovingBody body(mesh);
+        Points<double> x = mesh.positions(), still = x;
+        Grasper<double> grasper(mesh), at_rest(mesh);
+        const auto contact = contact_at<double>(mesh, random.index(80), random.barycentric());
+        Tool<double> tool{.position = random.vector(), .grasping = true};
+        for (int move = 0; move < 10; ++move) {
+            RigidFrame<double> pose{.rotation = random.rotation(), .origin = random.vector()};
+            pose.velocity = random.vector();
+            pose.angular_velocity = random.vector();
+            REQUIRE(body.move_to(pose, x));
+            Tool<double> seen = tool;
+            seen.position = pose.point_to_world(tool.position);
+            const auto grasp = grasper.update(contact, x, seen, body);
+            const auto expected = at_rest.update(contact, still, tool);
+            REQUIRE(grasp.holding());
+            REQUIRE(norm<double>(grasp.offset - pose.vector_to_world(expected.offset)) < 1e-14);
+            REQUIRE(norm<double>(grasp.displacement(seen) - pose.vector_to_world(expected.displacement(tool))) < 1e-14);
+            REQUIRE(norm<double>(grasp.body_velocity - pose.velocity_at(seen.position)) < 1e-14);
+            tool.position += 0.1 * random.vector();
+        }
+        grasper.reset();  // as a new one, to the bit
+        Grasper<double> fresh(mesh);
+        REQUIRE(same(grasper.update(contact, x, tool, body), fresh.update(contact, x, tool, body)));
+    }
+}

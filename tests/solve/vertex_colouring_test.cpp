@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/vertex_colouring.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include <membrane/model/mass_spring_network.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/meshes.hpp"
+#include "support/random.hpp"
+
+using namespace membrane;
+using test::Random;
+
+TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[groups]") {
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = test::random_surface<double>(random).mesh();
+        const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 1.0});
+        IndexSet set(mesh.vertex_count());
+        for (Index i = random.index(2 * mesh.vertex_count()); i > 0; --i) set.insert(random.index(mesh.vertex_count()));
+        const std::vector<Index> before(set.items().begin(), set.items().end());
+        // In two parts, after a first that stays as it is.
+        const auto somewhere = [&] { return static_cast<std::size_t>(random.index(set.count() + 1)); };
+        const auto [begin, middle] = std::minmax({somewhere(), somewhere()});
+
+        std::vector<Index> expected(before.begin(), before.begin() + static_cast<std::ptrdiff_t>(begin));
+        std::vector<std::size_t> ends;
+        const auto joined = [&](Index v, Index w) {
+            return std::ranges::any_of(network.springs_of(v), [&](const auto& end) { return end.other == w; });
+        };
+        const auto order = [&](std::size_t from, std::size_t to) {
+            std::vector<std::vector<Index>> groups;
+            for (std::size_t i = from; i < to; ++i) {
+                const auto holds_none = [&](const std::vector<Index>& group) {
+                    return std::ranges::none_of(group, [&](Index w) { return joined(before[i], w); });
+                };
+                auto group = std::ranges::find_if(groups, holds_none);
+                if (group == groups.end()) group = groups.insert(groups.end(), std::vector<Index>());
+                group->push_back(before[i]);
+            }
+            for (const auto& group : groups) {
+                expected.insert(expected.end(), group.begin(), group.end());
+                ends.push_back(expected.size());
+            }
+        };
+        order(begin, middle);
+        order(middle, before.size());
+
+        VertexColouring groups(mesh.vertex_count());
+        for (int again = 0; again < 2; ++again) {
+            for (std::size_t i = 0; i < before.size(); ++i) set.reorder(i, {&before[i], 1});
+            groups.clear();
+            REQUIRE(groups.ends().empty());
+            groups.add(network, set, begin, middle);
+            groups.add(network, set, middle, before.size());
+            REQUIRE(std::ranges::equal(set.items(), expected));
+            REQUIRE(std::ranges::equal(groups.ends(), ends));
+        }
+    }
+}
