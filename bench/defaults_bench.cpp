@@ -6,9 +6,9 @@
 
 #include "support/strokes.hpp"
 
-// What do the solver's defaults buy? Each option alone is varied, the others as they are when nobody sets them. A tool
-// slides along spheres of three sizes; forceps draw out one of them: a tool touches many vertices, forceps hold one
-// triangle and the rest is up to the layers. The foundation is a tenth of the springs.
+// Effect of the solver's defaults: each option is varied alone, the others at their defaults. A tool slides along
+// spheres of three sizes; forceps draw out one of them. A tool touches many vertices; forceps hold one triangle, and
+// the motion of the rest depends on the layers. The foundation is a tenth of the springs.
 
 namespace {
 
@@ -24,22 +24,22 @@ static_assert(defaults.order == membrane::UpdateOrder::colour_layers && defaults
 
 std::string mesh_of(const Place& place) { return "/vertices:" + std::to_string(place.vertices); }
 
-/// `play()` gives the outcome. One play of a small scene is short, and whoever else is at work makes some slower, none
-/// faster: of all so far the fastest counts.
+/// `play()` returns the outcome. One run of a small scene is short, and other processes only slow it down: the shortest
+/// time so far counts.
 template <class Play>
 void add(const std::string& name, Play play) {
     constexpr int repetitions = 3;
-    const auto run = [play, least = std::numeric_limits<double>::infinity()](benchmark::State& state) mutable {
+    const auto run = [play, min_time = std::numeric_limits<double>::infinity()](benchmark::State& state) mutable {
         for (auto _ : state) {
             membrane::Outcome outcome = play();
-            outcome.time = least = std::min(least, outcome.time);
+            outcome.time = min_time = std::min(min_time, outcome.time);
             record(state, outcome);
         }
     };
     benchmark::RegisterBenchmark(name.c_str(), run)->Iterations(repetitions)->UseManualTime();
 }
 
-/// Sets one option, a number, to each of these.
+/// Sets one integer option to each of these numbers.
 void vary(const Place& place, const std::string& option, Index Options<double>::*member,
           std::initializer_list<Index> numbers) {
     for (const Index number : numbers) {
@@ -56,11 +56,11 @@ void choose(const Place& place, const std::string& choice, const Options<Scalar>
 }
 
 void choose_each(const Place& place) {
-    constexpr auto arrival = membrane::UpdateOrder::breadth_first;
+    constexpr auto breadth_first = membrane::UpdateOrder::breadth_first;
     choose<double>(place, "default", {});
-    choose<double>(place, "arrival", {.order = arrival});
+    choose<double>(place, "breadth_first", {.order = breadth_first});
     choose<float>(place, "float", {});
-    choose<float>(place, "arrival_float", {.order = arrival});
+    choose<float>(place, "breadth_first_float", {.order = breadth_first});
     choose<double>(place, "unpredicted", {.predict = false});
     choose<double>(place, "safe", {}, membrane::SafeStep{});
     add("scene:" + place.scene + "/published" + mesh_of(place),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "support/scene.hpp"
 
-// How long does a frame take, and where does the time go?
+// Time of a frame and of its stages.
 
 namespace {
 

@@ -4,7 +4,7 @@
 
 #include <benchmark/benchmark.h>
 
-// Google Benchmark's own main, and what a figure means nothing without: machine, compiler, flags.
+// The main function of Google Benchmark, which also records machine, compiler and flags.
 
 namespace {
 

@@ -17,10 +17,10 @@
 
 #include "support/scene.hpp"
 
-// Our mesher of signed distances against CGAL's, on the same closed bodies, about as large as the unit ball, with the same
-// mean edge: how long it takes, and how even the triangles are. CGAL's refines a Delaunay triangulation until no angle is
-// below 30 degrees and no triangle too large; its bound on the size is found beforehand, so that edges come out as long.
-// (A box is not among them: on its flat faces CGAL's edges jump from half the wanted length to twice of it.)
+// Our mesher of signed distances against CGAL's, on the same closed bodies, about as large as the unit ball, with the
+// same mean edge: time, and quality of the triangles. CGAL's refines a Delaunay triangulation until no angle is below
+// 30 degrees and no triangle too large; its bound on the size is found beforehand, so that the mean edges agree. (A box
+// is not among the bodies: on its flat faces CGAL's edges jump from half the target length to twice of it.)
 
 namespace {
 
@@ -28,7 +28,7 @@ using namespace bench;
 using membrane::MeshQuality;
 using Mesh = membrane::TriangleMesh<double>;
 
-constexpr double max_off = 1e-9;  // that a vertex may be from the surface
+constexpr double max_off = 1e-9;  // distance of a vertex from the surface [m]
 
 /// A body, bounds for ours, a point inside for CGAL's.
 template <class Distance>
@@ -65,10 +65,10 @@ struct Cgal {
     static Mesh mesh(const Body<Distance>& body, double size) {
         CGAL::get_default_random() = CGAL::Random(1);
         const auto function = [&](const Traits::Point_3& p) { return body.distance(Vector3(p.x(), p.y(), p.z())); };
-        const double reach = (body.bounds.high - body.bounds.low).norm();
+        const double diagonal = (body.bounds.high - body.bounds.low).norm();
         const Traits::Point_3 inside(body.inside.x(), body.inside.y(), body.inside.z());
         const CGAL::Implicit_surface_3<Traits, std::decay_t<decltype(function)>> surface(
-            function, Traits::Sphere_3(inside, reach * reach), max_off / reach / 10);
+            function, Traits::Sphere_3(inside, diagonal * diagonal), max_off / diagonal / 10);
         Triangulation triangulation;
         CGAL::Complex_2_in_triangulation_3<Triangulation> complex(triangulation);
         const CGAL::Surface_mesh_default_criteria_3<Triangulation> criteria(30, size, size);
@@ -109,12 +109,13 @@ struct Cgal {
 
 template <class Mesher, class Distance>
 void measure(benchmark::State& state, const Body<Distance>& body) {
-    const double wanted = 1e-3 * static_cast<double>(state.range(0)), size = Mesher::size_for(body, wanted);
+    const double target_length = 1e-3 * static_cast<double>(state.range(0)),
+                 size = Mesher::size_for(body, target_length);
     Mesh mesh = Mesher::mesh(body, size);
     for (auto _ : state) mesh = Mesher::mesh(body, size);
     const MeshQuality quality = membrane::quality_of(mesh);
     require(membrane::Adjacency(mesh).closed(), "the surface must be closed");
-    require(std::abs(quality.mean_edge / wanted - 1) < 0.2, "edges must be about as long as wanted");
+    require(std::abs(quality.mean_edge / target_length - 1) < 0.2, "the mean edge must be near its target");
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         require(std::abs(body.distance(membrane::point(mesh.positions(), v))) <= max_off,
                 "vertices are on the surface");

@@ -3,15 +3,15 @@
 
 #include "support/sparse_newton.hpp"
 
-// How long from a membrane at rest to a force within 1 % of the equilibrium's, when a vertex is held 0.2 R inside: our
-// steps by the default rule and by (4) with its best mass, both over the same layers, and Newton's method with the sparse
+// Time from the rest shape to a force within 1 % of the equilibrium's, with a vertex prescribed 0.2 R inside: our steps
+// by the default rule and by (4) with its best mass, both over the same layers, and Newton's method with the sparse
 // factors of Eigen, on the whole mesh or on these layers.
 
 namespace {
 
 using namespace bench;
 
-constexpr double wanted = 0.01;  // error of the force, as a part of it
+constexpr double max_error = 0.01;  // of the force, relative
 constexpr Index held = 0;
 constexpr int max_iterations = 1000;
 
@@ -28,11 +28,11 @@ struct Problem {
     [[nodiscard]] Vector3 equilibrium() const {
         const auto rest =
             membrane::equilibrium(mesh.positions(), mesh, network, volume, {}, membrane::pull(held, target));
-        require(rest.converged, "there is an equilibrium");
+        require(rest.converged, "the equilibrium must converge");
         return rest.reactions[0];
     }
 
-    /// How far off a reaction is, as a part of the equilibrium's.
+    /// Relative error of a reaction against the equilibrium's.
     [[nodiscard]] double error(const Vector3& reaction) const {
         return membrane::norm<double>(reaction - expected) / membrane::norm(expected);
     }
@@ -43,29 +43,29 @@ struct Problem {
     Vector3 target, expected;
 };
 
-/// Goes on until the reaction is near enough; the iterations that takes.
-template <class Way>
-int iterations_of(Way& displacement, const Problem& problem) {
-    displacement.reset();
+/// Number of iterations until the error of the reaction is at most `max_error`.
+template <class Method>
+int iterations_of(Method& method, const Problem& problem) {
+    method.reset();
     for (int i = 1; i < max_iterations; ++i) {
-        displacement.iterate();
-        if (problem.error(displacement.reaction()) <= wanted) return i;
+        method.iterate();
+        if (problem.error(method.reaction()) <= max_error) return i;
     }
     return max_iterations;
 }
 
-/// Measures so many iterations, without a look at the error in between.
-template <class Way>
-void measure(benchmark::State& state, Way& displacement, const Problem& problem) {
-    const int iterations = iterations_of(displacement, problem);
+/// Measures this number of iterations, without computing the error in between.
+template <class Method>
+void measure(benchmark::State& state, Method& method, const Problem& problem) {
+    const int iterations = iterations_of(method, problem);
     for (auto _ : state) {
-        displacement.reset();
-        for (int i = 0; i < iterations; ++i) displacement.iterate();
-        benchmark::DoNotOptimize(displacement.reaction());
+        method.reset();
+        for (int i = 0; i < iterations; ++i) method.iterate();
+        benchmark::DoNotOptimize(method.reaction());
     }
-    require(problem.error(displacement.reaction()) <= wanted, "the force must be near the equilibrium's");
+    require(problem.error(method.reaction()) <= max_error, "the force must be near the equilibrium's");
     state.counters["iterations"] = iterations;
-    state.counters["force_error"] = problem.error(displacement.reaction());
+    state.counters["force_error"] = problem.error(method.reaction());
 }
 
 /// Our solver; an iteration is a step of one sweep.

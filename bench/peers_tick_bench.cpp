@@ -19,7 +19,7 @@ void sizes_between(benchmark::internal::Benchmark* measured, int least, int most
 void sizes_of_same(benchmark::internal::Benchmark* measured) { sizes_between(measured, 162, 40962); }
 void sizes_of_fine(benchmark::internal::Benchmark* measured) { sizes_between(measured, 642, 655362); }
 
-/// The same tool on all meshes: the finer, the more it touches.
+/// The same tool on all meshes: on finer ones it touches more triangles.
 Path same(std::int64_t) { return {}; }
 
 /// A tool that is as many edges wide, goes as deep and as far on all meshes as the usual one does on 642 vertices.
@@ -27,7 +27,7 @@ Path fine(std::int64_t vertices) { return {.scale = std::sqrt(640 / static_cast<
 
 using Way = Path (*)(std::int64_t vertices);
 
-/// The loop with the tool pressed in; kept until another is asked for.
+/// The loop with the tool pressed in; kept until another one is requested.
 template <membrane::Real Scalar, class Rule>
 const LoopOf<Scalar, Rule>& sliding(std::int64_t vertices, const Path& path) {
     static std::unique_ptr<LoopOf<Scalar, Rule>> loop;
@@ -58,7 +58,7 @@ BENCHMARK(ours<double, membrane::SafeStep, fine>)->Name("fine/double/safe")->App
 BENCHMARK(ours<float, membrane::BlockStep, fine>)->Name("fine/float/block")->Apply(sizes_of_fine);
 BENCHMARK(ours<float, membrane::SafeStep, fine>)->Name("fine/float/safe")->Apply(sizes_of_fine);
 
-/// Bullet's body under a tool that goes on its path from tick to tick.
+/// Bullet's body under a tool that follows its path from tick to tick.
 struct BulletSlide {
     BulletSlide(std::int64_t vertices, const Path& displacement)
         : path(displacement), scene(vertices, displacement.scale * displacement.tool_radius) {
@@ -71,7 +71,7 @@ struct BulletSlide {
     Index now = 0;  // ticks
 };
 
-/// With the tool pressed in; it goes on from where the last measurement ended, until another size is asked for.
+/// With the tool pressed in; continues from the end of the last measurement, until another size is requested.
 template <Way displacement>
 BulletSlide& bullet_sliding(std::int64_t vertices) {
     static std::unique_ptr<BulletSlide> slide;
@@ -91,7 +91,7 @@ void bullet(benchmark::State& state) {
         touched += slide.scene.touched();
     }
     require(slide.scene.finite() && touched > 0, "the tool must press on Bullet's body");
-    require(slide.scene.overlap() < slide.path.scale * depth / 2, "Bullet's nodes must go out of the tool's way");
+    require(slide.scene.penetration() < slide.path.scale * depth / 2, "Bullet's nodes must not penetrate the tool");
     state.counters["touched"] = benchmark::Counter(touched, benchmark::Counter::kAvgIterations);
 }
 BENCHMARK(bullet<same>)->Name("same/bullet")->Apply(sizes_of_same);

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MIT
 #include "support/tree_peers.hpp"
 
-// Our tree against those of others, on the same spheres, with the same questions, whose answers must be the same: Embree 3
-// (float; it takes what the processor has, AVX-512 too), CGAL (double), FCL (double, up to 81,920 triangles: larger ones
-// take it too long) and Bullet (float). And the tracker, that follows a contact in place of asking a tree.
+// Our tree against those of others, on the same spheres, with the same queries, whose results must agree: Embree 3
+// (float; it takes what the processor has, AVX-512 too), CGAL (double), FCL (double, up to 81,920 triangles: it is
+// too slow for larger ones) and Bullet (float). And the tracker, which tracks a contact without tree queries.
 
 namespace {
 
 using namespace bench;
 
-constexpr double reach = 3e-4;         // of the spheres [m]
-constexpr double displacement = 1e-3;  // of the segments, towards the centre [m]
+constexpr double range = 3e-4;           // radius of the spheres [m]
+constexpr double segment_length = 1e-3;  // towards the centre [m]
 constexpr std::size_t asked = 4096;
 
 const Mesh& mesh_of(std::int64_t triangles) {
@@ -26,7 +26,7 @@ Tree& tree_over(std::int64_t triangles) {
     return made.try_emplace(triangles, mesh_of(triangles)).first->second;
 }
 
-/// A way near the surface, 0.05 mm from each point to the next: what a tool does in a tick.
+/// A path near the surface, 0.05 mm from each point to the next, as a tool moves in a tick.
 std::vector<Vector3> points_along(std::size_t count) {
     const Vector3 u(1, 0, 0), v = Vector3(0, 0.8, 0.6), w(0, -0.6, 0.8);
     std::vector<Vector3> points;
@@ -38,39 +38,39 @@ std::vector<Vector3> points_along(std::size_t count) {
     return points;
 }
 
-// What is asked of a tree. The answers are numbers.
+// Queries of a tree. Each returns one number.
 struct Closest {
     static double of(auto& tree, const Vector3& q) { return tree.closest(q); }
 };
 struct Touching {
-    static double of(auto& tree, const Vector3& q) { return tree.touching(q, reach); }
+    static double of(auto& tree, const Vector3& q) { return tree.touching(q, range); }
 };
 struct Hit {
     static double of(auto& tree, const Vector3& q) {
-        return tree.first_hit(q, (1 - displacement / membrane::norm(q)) * q);
+        return tree.first_hit(q, (1 - segment_length / membrane::norm(q)) * q);
     }
 };
 
-/// The answers must be those of our tree in double but for roundings, which decide about what is hardly touched or hit.
-template <class Question, class Tree>
+/// Requires the results of our tree in double, up to rounding, which decides about triangles that are barely touched.
+template <class Query, class Tree>
 void compare(Tree& tree, std::int64_t triangles, const std::vector<Vector3>& points) {
     auto& ours = tree_over<Ours<double>>(triangles);
     std::size_t compared = 0, same = 0;
     for (std::size_t i = 0; i < points.size(); i += 7, ++compared) {
-        const double expected = Question::of(ours, points[i]), found = Question::of(tree, points[i]);
-        const double rounding = std::is_same_v<Question, Hit> ? 1e-3 : 1e-6 * radius;
+        const double expected = Query::of(ours, points[i]), found = Query::of(tree, points[i]);
+        const double rounding = std::is_same_v<Query, Hit> ? 1e-3 : 1e-6 * radius;
         if (std::abs(found - expected) <= rounding) ++same;
     }
-    require(100 * same >= 98 * compared, "all trees must answer the same");
+    require(100 * same >= 98 * compared, "all trees must give the same results");
 }
 
-template <class Tree, class Question, std::vector<Vector3> (*points_of)(std::size_t)>
+template <class Tree, class Query, std::vector<Vector3> (*points_of)(std::size_t)>
 void ask(benchmark::State& state) {
     auto& tree = tree_over<Tree>(state.range(0));
     const auto points = points_of(asked);
-    compare<Question>(tree, state.range(0), points);
+    compare<Query>(tree, state.range(0), points);
     std::size_t i = 0;
-    for (auto _ : state) benchmark::DoNotOptimize(Question::of(tree, points[i++ % asked]));
+    for (auto _ : state) benchmark::DoNotOptimize(Query::of(tree, points[i++ % asked]));
 }
 
 template <class Tree>
@@ -80,7 +80,7 @@ void build(benchmark::State& state) {
     compare<Closest>(tree, state.range(0), points_near(asked));
 }
 
-/// To and fro: the sphere, and a sphere of which one half is drawn in.
+/// Alternates between the sphere and a sphere with one half drawn in.
 template <class Tree>
 void refit(benchmark::State& state) {
     auto& tree = tree_over<Tree>(state.range(0));
@@ -96,17 +96,17 @@ void refit(benchmark::State& state) {
     compare<Closest>(tree, state.range(0), points_near(asked));
 }
 
-void sizes_up_to(benchmark::internal::Benchmark* measured, int most) {
+void sizes_up_to(benchmark::internal::Benchmark* measured, int max_triangles) {
     measured->ArgName("triangles");
     for (const int triangles : {1'280, 81'920, 1'310'720}) {
-        if (triangles <= most) measured->Arg(triangles);
+        if (triangles <= max_triangles) measured->Arg(triangles);
     }
 }
 
 template <class Tree>
-void add(const std::string& name, int most = 1'310'720) {
+void add(const std::string& name, int max_triangles = 1'310'720) {
     const auto add_one = [&](const char* what, void (*measure)(benchmark::State&)) {
-        sizes_up_to(benchmark::RegisterBenchmark((what + ("/" + name)).c_str(), measure), most);
+        sizes_up_to(benchmark::RegisterBenchmark((what + ("/" + name)).c_str(), measure), max_triangles);
     };
     if constexpr (requires(Tree tree, Vector3 q) { tree.closest(q); }) {
         add_one("path", ask<Tree, Closest, points_along>);
@@ -116,7 +116,7 @@ void add(const std::string& name, int most = 1'310'720) {
     if constexpr (requires(Tree tree, Vector3 q) { tree.first_hit(q, q); })
         add_one("segment", ask<Tree, Hit, points_near>);
     if constexpr (requires(Tree tree, Points x) { tree.refit(x); }) add_one("refit", refit<Tree>);
-    // The last: Embree does not refit afterwards.
+    // Last, because Embree does not refit after it.
     if constexpr (requires(Tree tree) { tree.build(); }) add_one("build", build<Tree>);
 }
 
@@ -136,7 +136,7 @@ void ask_tree(const Loop& loop) {
                              [](Index f) { benchmark::DoNotOptimize(f); });
 }
 
-/// The contact while the tool of the scene slides: by the tracker, or what it would ask the tree for in each tick.
+/// The contact while the tool of the scene slides: by the tracker, or by its tree queries in each tick.
 void contact(benchmark::State& state, bool tracked) {
     Loop loop = pressed(state.range(0) / 2 + 2);
     double touched = 0;

@@ -16,9 +16,9 @@
 #include "support/peers_tables.hpp"
 #include "support/tick_tables.hpp"
 
-// report FOLDER TOPIC...: prints tables of what the benchmarks of these topics left in FOLDER, and leaves the same
-// figures there as summary.json and, for the plots, a .tsv for each table; of `trade`, all that was tried as trade.csv, of
-// `tick` the figures of all instruction sets as tick.csv.
+// report FOLDER TOPIC...: prints tables of the results of these topics in FOLDER, and writes the figures there as
+// summary.json and, for the plots, a .tsv for each table; all settings of `trade` as trade.csv, the figures of `tick`
+// for all instruction sets as tick.csv.
 
 namespace {
 
@@ -45,9 +45,9 @@ Table threshold_table(const std::string& vertices) {
 }
 
 Table trade_table(const std::string& vertices) {
-    const auto of = [](const std::string& rule, const std::string& visits, const std::string& predicted = "1") {
+    const auto of = [](const std::string& rule, const std::string& iterations, const std::string& predicted = "1") {
         return "scene:slide/foundation:0.1/scalar:double/rule:" + rule + "/predicted:" + predicted +
-               "/layers:3/contact_iterations:" + visits;
+               "/layers:3/contact_iterations:" + iterations;
     };
     return {.topic = "trade",
             .key = "trade_" + vertices,
@@ -68,7 +68,7 @@ Table trade_table(const std::string& vertices) {
             .scene = "/vertices:" + vertices};
 }
 
-/// By one option, a number, the others at their defaults.
+/// By one integer option, the others at their defaults.
 Table option_table(const std::string& option, const std::string& title, const std::vector<int>& numbers) {
     Table table{.topic = "defaults",
                 .key = "defaults_" + option,
@@ -87,7 +87,7 @@ Table option_table(const std::string& option, const std::string& title, const st
     return table;
 }
 
-/// With one thing that is chosen for another.
+/// By alternatives to one default each.
 Table choice_table(const std::string& scene, const std::string& title, const std::vector<int>& vertices) {
     Table table{.topic = "defaults", .key = "defaults_" + scene, .title = title, .rows = {}, .columns = vertices};
     const auto add = [&](const std::string& name, const std::string& short_name, const std::string& choice) {
@@ -96,9 +96,9 @@ Table choice_table(const std::string& scene, const std::string& title, const std
         table.rows.push_back({"  error, " + short_name, benchmark, Row::percent, "force_error", ""});
     };
     add("default", "default", "default");
-    add("order of arrival", "arrival", "arrival");
+    add("breadth first", "breadth first", "breadth_first");
     add("default, float", "float", "float");
-    add("order of arrival, float", "arrival, float", "arrival_float");
+    add("breadth first, float", "breadth first, float", "breadth_first_float");
     add("not predicted", "not predicted", "unpredicted");
     add("safe step", "safe", "safe");
     add("(4), lightest stable mass", "(4)", "published");
@@ -107,7 +107,7 @@ Table choice_table(const std::string& scene, const std::string& title, const std
 
 Table sweep_table(const std::string& topic, const std::string& title) {
     const auto row = [](const std::string& name, const std::string& benchmark) {
-        return Row{name, benchmark, Row::each, "visits"};
+        return Row{name, benchmark, Row::each, "vertex_updates"};
     };
     return {
         .topic = topic,
@@ -116,11 +116,12 @@ Table sweep_table(const std::string& topic, const std::string& title) {
         .rows = {row("(4), plain loop, double", "plain/double/mass"), row("(4), double", "lanes/double/mass"),
                  row("safe step, double", "lanes/double/safe"),
                  row("block step, plain loop, double", "plain/double/newton"),
-                 row("block step, double", "lanes/double/newton"), row("numbers in a row, double", "contiguous/double"),
+                 row("block step, double", "lanes/double/newton"),
+                 row("contiguous numbers, double", "contiguous/double"),
                  row("(4), plain loop, float", "plain/float/mass"), row("(4), float", "lanes/float/mass"),
                  row("safe step, float", "lanes/float/safe"),
                  row("block step, plain loop, float", "plain/float/newton"),
-                 row("block step, float", "lanes/float/newton"), row("numbers in a row, float", "contiguous/float")},
+                 row("block step, float", "lanes/float/newton"), row("contiguous numbers, float", "contiguous/float")},
         .columns = {642, 2562, 10242}};
 }
 
@@ -128,19 +129,19 @@ Table sweep_table(const std::string& topic, const std::string& title) {
 Table threads_table() {
     Table table{.topic = "threads",
                 .key = "threads",
-                .title = "A step over the whole mesh, 16 sweeps; groups and colours by one thread",
+                .title = "A step over the whole mesh, 16 sweeps; one thread, unless all are named",
                 .rows = {},
                 .columns = {2562, 10242, 40962, 163842}};
     for (const std::string scalar : {"double", "float"}) {
-        const std::string first = "groups/" + scalar;
-        table.rows.push_back({"groups, " + scalar, first});
-        if (scalar == "double") table.rows.push_back({"  one by one", "arrival/double", Row::gain, first});
-        table.rows.push_back({"  colours", "colours/" + scalar, Row::gain, first});
-        table.rows.push_back({"  colours, all threads", "threads/" + scalar, Row::gain, first});
+        const std::string first = "colour_layers/" + scalar;
+        table.rows.push_back({"colour_layers, " + scalar, first});
+        if (scalar == "double") table.rows.push_back({"  breadth_first", "breadth_first/double", Row::gain, first});
+        table.rows.push_back({"  colour_all", "colour_all/" + scalar, Row::gain, first});
+        table.rows.push_back({"  colour_all, all threads", "threads/" + scalar, Row::gain, first});
     }
     table.rows.push_back({"threads", "threads/double", Row::counter, "threads", ""});
-    table.rows.push_back({"left out of balance by groups", "groups/double", Row::counter, "residual", "N"});
-    table.rows.push_back({"  by colours", "colours/double", Row::counter, "residual", "N"});
+    table.rows.push_back({"residual, colour_layers", "colour_layers/double", Row::counter, "residual", "N"});
+    table.rows.push_back({"  residual, colour_all", "colour_all/double", Row::counter, "residual", "N"});
     return table;
 }
 
@@ -166,7 +167,7 @@ const std::vector<Table> all_tables{
     threads_table(),
     {"frame",
      "frame",
-     "A frame, and where the time goes: the tool presses and slides",
+     "A frame and its parts: the tool presses and slides",
      {{"frame", "whole"},
       {"  contact", "part/contact", Row::share, "whole"},
       {"  solve", "part/solve", Row::share, "whole"},
@@ -176,7 +177,7 @@ const std::vector<Table> all_tables{
       {"frames in a second", "whole", Row::rate, {}, ""}}},
     {"solver",
      "solver",
-     "From a vertex held 0.2 R inside to rest, to the same residual",
+     "To equilibrium with a vertex prescribed 0.2 R inside, to the same residual",
      {{"explicit Euler at its best", "explicit_euler"},
       {"quasi-static, all layers", "quasi_static/all_layers", Row::gain, "explicit_euler"},
       {"  with omega 1.4", "quasi_static/omega_1_4", Row::gain, "explicit_euler"},
@@ -184,16 +185,16 @@ const std::vector<Table> all_tables{
       {"Euler: best dt", "explicit_euler", Row::counter, "dt"},
       {"Euler: best viscosity", "explicit_euler", Row::counter, "viscosity", "Ns/m"},
       {"Euler: steps", "explicit_euler", Row::counter, "steps", ""},
-      {"Euler: a vertex and step", "explicit_euler", Row::each, "visits"},
-      {"quasi-static: a visit", "quasi_static/all_layers", Row::each, "visits"}}},
+      {"Euler: a vertex and step", "explicit_euler", Row::each, "vertex_updates"},
+      {"quasi-static: a vertex update", "quasi_static/all_layers", Row::each, "vertex_updates"}}},
     {"tree",
      "tree",
-     "The tree against trying every triangle",
-     {{"closest point, every one", "all_triangles/closest"},
+     "The tree against brute force over all triangles",
+     {{"closest point, brute force", "all_triangles/closest"},
       {"closest point, tree", "tree/closest", Row::gain, "all_triangles/closest"},
-      {"touching sphere, every one", "all_triangles/sphere"},
+      {"touching sphere, brute force", "all_triangles/sphere"},
       {"touching sphere, tree", "tree/sphere", Row::gain, "all_triangles/sphere"},
-      {"first hit, every one", "all_triangles/segment"},
+      {"first hit, brute force", "all_triangles/segment"},
       {"first hit, tree", "tree/segment", Row::gain, "all_triangles/segment"},
       {"build", "tree/build"}}},
     trade_table("162"),
@@ -201,21 +202,21 @@ const std::vector<Table> all_tables{
     option_table("layers", "Time of a tick, and error of its force in percent, by layers: the default is 6",
                  {1, 2, 3, 4, 6, 8, 12}),
     option_table("sweeps", "The same by sweeps: the default is 2", {1, 2, 3, 4, 6, 8}),
-    option_table("contact_iterations", "The same by visits of the contact in a sweep: the default is 3",
+    option_table("contact_iterations", "The same by contact iterations in a sweep: the default is 3",
                  {1, 2, 3, 4, 6, 8}),
-    choice_table("slide", "The same with one thing chosen for another: a tool slides", {162, 642, 2562}),
+    choice_table("slide", "The same with an alternative to one default: a tool slides", {162, 642, 2562}),
     choice_table("draw_out", "The same: forceps draw out", {642}),
     stability_table("dt", "Of 200 scenes, percent that diverge; dt in hundredths of sqrt(m / k)",
                     {20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 90, 100, 200, 500, 1000}),
-    stability_table("limit", "The same; dt in hundredths of what theory allows each scene",
+    stability_table("limit", "The same; dt in hundredths of the theoretical limit of each scene",
                     {80, 85, 90, 95, 98, 99, 100, 101, 102, 105, 110, 115, 120, 125, 130}),
-    sweep_table("sweep", "A visit, in a sweep over all vertices; registers of 16 bytes"),
+    sweep_table("sweep", "A vertex update, in a sweep over all vertices; registers of 16 bytes"),
     sweep_table("sweep_avx2", "The same; registers of 32 bytes"),
     threshold_table("642"),
     threshold_table("10242"),
     {"tracker",
      "tracker",
-     "The contact: asked of the tree in every frame, or followed by the tracker",
+     "The contact: by tree queries in every frame, or by the tracker",
      {{"sphere of 2 mm, tree", "tree/sphere_2mm"},
       {"sphere of 2 mm, tracker", "tracker/sphere_2mm", Row::gain, "tree/sphere_2mm"},
       {"sphere of 4 mm, tree", "tree/sphere_4mm"},
@@ -224,7 +225,7 @@ const std::vector<Table> all_tables{
       {"capsule of 2 mm, tracker", "tracker/capsule_2mm", Row::gain, "tree/capsule_2mm"}}},
     {"update",
      "update",
-     "Boxes and normals: of all vertices, or of those that moved",
+     "Boxes and normals: of all vertices, or of the moved ones",
      {{"refit, all", "update/refit_all"},
       {"refit, moved", "update/refit_moved", Row::gain, "update/refit_all"},
       {"normals, all", "update/normals_all"},
@@ -234,7 +235,7 @@ const std::vector<Table> all_tables{
       {"  ours, float", "normals<float>", Row::gain, "normals_plain"},
       {"moved vertices", "update/refit_moved", Row::counter, "moved", ""}}}};
 
-/// Reads what Google Benchmark wrote: its medians, or the one figure there is.
+/// Reads the output of Google Benchmark: its medians, or the single figure.
 void read(const std::string& folder, const std::string& topic, Results& results, Json& context) {
     const std::string path = folder + "/" + topic + ".json";
     std::ifstream file(path);
@@ -286,7 +287,7 @@ std::string readable(std::optional<double> value, const std::string& unit) {
     return digits + " " + (at == 3 ? "" : prefix.substr(at, 1)) + unit;
 }
 
-/// How the row stands to the one it is set against: "87 %" of it, or "19 x" as fast.
+/// The row relative to the one it is compared with: "87 %" of it, or "19 x" as fast.
 std::string comparison(const Results& results, const Table& table, const Row& row, int column) {
     if (row.kind != Row::share && row.kind != Row::gain) return "";
     const auto value = value_in(results, table, row, column);
@@ -316,7 +317,7 @@ void print_line(std::string line) {
 }
 
 void print_table(const Results& results, const Table& table) {
-    const auto first = [](std::string name) { return name.append(27 - std::min<std::size_t>(27, name.size()), ' '); };
+    const auto first = [](std::string name) { return name.append(33 - std::min<std::size_t>(33, name.size()), ' '); };
     const bool grows = table.column == "vertices";
     const bool compares = std::any_of(table.rows.begin(), table.rows.end(),
                                       [](const Row& row) { return row.kind == Row::gain || row.kind == Row::share; });
@@ -376,7 +377,7 @@ std::map<std::string, std::string> words_of(const std::string& name) {
     return values;
 }
 
-/// A setting of the solver in a scene, and what it comes to.
+/// A setting of the solver in a scene, with its time and errors.
 struct Trial {
     std::map<std::string, std::string> setting;  ///< by the words of its name, as in "rule:block/sweeps:2"
     double time, force_error, position_error;
@@ -402,8 +403,8 @@ std::vector<Trial> trials_in(const Results& results) {
     return trials;
 }
 
-/// All settings in SI units, from the fastest to the slowest. On the front are those that no other of the same scene
-/// and rule beats in both time and force; errors of the position are parts of the depth.
+/// All settings in SI units, by increasing time. A setting is on the front if no other of the same scene and rule beats
+/// it in both time and force error; position errors are relative to the depth.
 void write_trials(const std::string& path, const std::vector<Trial>& trials) {
     std::ofstream file(path);
     for (const auto& word : Trial::words) file << word << ',';
@@ -450,13 +451,13 @@ void report(const std::string& folder, const std::vector<std::string>& topics) {
     Json summary{{"context", {}}, {"tables", Json::object()}};
     Json& context = summary["context"];
     for (const auto& topic : topics) read(folder, topic, results, context);
-    const auto said = [&](const char* name) { return context.at(name).get<std::string>(); };
+    const auto context_text = [&](const char* name) { return context.at(name).get<std::string>(); };
     std::printf(
-        "%s at %d MHz\n%s %s\none core, medians of the processor time; %%: of the frame; x: so many times as fast as "
-        "the first "
+        "%s at %d MHz\n%s %s\none core, medians of the processor time; %%: of the frame; x: speed relative to the "
+        "first "
         "line of its kind\n",
-        said("processor").c_str(), context.at("mhz_per_cpu").get<int>(), said("compiler").c_str(),
-        said("flags").c_str());
+        context_text("processor").c_str(), context.at("mhz_per_cpu").get<int>(), context_text("compiler").c_str(),
+        context_text("flags").c_str());
     std::vector<Table> tables = all_tables;
     for (const auto& more : {bench::peers_tables(), bench::tick_tables()}) {
         tables.insert(tables.end(), more.begin(), more.end());

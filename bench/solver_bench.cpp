@@ -3,8 +3,8 @@
 
 #include "support/scene.hpp"
 
-// How long until the membrane is at rest: the quasi-static step against explicit Euler, on the same problem to the same
-// residual? A vertex is held 0.2 R inside; the membrane starts at rest everywhere else.
+// Time to equilibrium: the quasi-static step against explicit Euler, on the same problem to the same residual. A vertex
+// is prescribed 0.2 R inside; all others start at their rest positions.
 
 namespace {
 
@@ -27,25 +27,25 @@ struct Problem {
         return weight / mesh.vertex_count();
     }
 
-    membrane::MassSpringNetwork<double, membrane::LinearSpring> network;  // the held vertex pinned
+    membrane::MassSpringNetwork<double, membrane::LinearSpring> network;  // the prescribed vertex pinned
     membrane::VirtualVolumeSprings<double> volume;
     Points start;
     Vector3 target;
 };
 
-// Quasi-static, no further than `layers`; returns the visits of vertices it took.
+// Quasi-static, up to the solver's layers; returns the number of vertex updates.
 template <class Network>
-std::int64_t come_to_rest(Points& x, membrane::QuasiStaticSolver<double>& solver, const Network& network,
-                          const Problem& problem) {
+std::int64_t run_to_equilibrium(Points& x, membrane::QuasiStaticSolver<double>& solver, const Network& network,
+                                const Problem& problem) {
     x = problem.start;
     solver.reset();
-    std::int64_t visits = 0;
+    std::int64_t vertex_updates = 0;
     for (int step = 0; step < 1000; ++step) {
         const auto report = solver.step(x, tick, network, problem.volume, membrane::pull(held, problem.target));
-        visits += report.vertex_updates;
-        if (report.converged) return visits;
+        vertex_updates += report.vertex_updates;
+        if (report.converged) return vertex_updates;
     }
-    require(false, "the quasi-static solver does not come to rest");
+    require(false, "the quasi-static solver must converge");
     return 0;
 }
 
@@ -54,16 +54,17 @@ struct EulerChoice {
     int steps = 2000;
 };
 
-// Explicit Euler; returns the steps it took, `most` where they are not enough.
-int come_to_rest(Points& x, double dt, membrane::ExplicitEuler<double>& euler, const Problem& problem, int most) {
+// Explicit Euler; returns the number of steps, or `max_steps` if they do not suffice.
+int run_to_equilibrium(Points& x, double dt, membrane::ExplicitEuler<double>& euler, const Problem& problem,
+                       int max_steps) {
     x = problem.start;
     x.col(held) = problem.target;
     Points velocity = Points::Zero(3, x.cols());
-    for (int step = 1; step < most; ++step) {
-        if (!euler.step(x, velocity, dt, problem.network, problem.volume)) return most;
+    for (int step = 1; step < max_steps; ++step) {
+        if (!euler.step(x, velocity, dt, problem.network, problem.volume)) return max_steps;
         if (euler.residual() <= residual) return step;
     }
-    return most;
+    return max_steps;
 }
 
 // The time step and viscosity with which Euler needs the fewest steps: a coarse sweep, then a finer around its best.
@@ -78,7 +79,7 @@ EulerChoice sweep_euler(const membrane::TriangleMesh<double>& mesh) {
                 const double dt = middle.dt * (1 + width * i / 4), viscosity = middle.viscosity * (1 + width * j / 4);
                 const Problem problem(mesh, viscosity);
                 membrane::ExplicitEuler<double> euler(problem.network);
-                const int steps = come_to_rest(x, dt, euler, problem, best.steps);
+                const int steps = run_to_equilibrium(x, dt, euler, problem, best.steps);
                 if (steps < best.steps) best = {dt, viscosity, steps};
             }
         }
@@ -99,17 +100,17 @@ void quasi_static(benchmark::State& state, Index layers, double omega) {
     membrane::QuasiStaticSolver solver(network, {.layers = layers, .sweeps = 16, .force_tolerance = residual},
                                        membrane::BlockStep{.omega = omega});
     Points x;
-    std::int64_t visits = 0;
-    for (auto _ : state) visits = come_to_rest(x, solver, network, problem);
-    state.counters["visits"] = static_cast<double>(visits);
+    std::int64_t vertex_updates = 0;
+    for (auto _ : state) vertex_updates = run_to_equilibrium(x, solver, network, problem);
+    state.counters["vertex_updates"] = static_cast<double>(vertex_updates);
     if (layers != membrane::unlimited) return;
 
     const EulerChoice& best = best_euler(state.range(0));
     const Problem moving(mesh, best.viscosity);
     membrane::ExplicitEuler<double> euler(moving.network);
     Points y;
-    come_to_rest(y, best.dt, euler, moving, best.steps + 1);
-    require((x - y).cwiseAbs().maxCoeff() < 1e-4 * press, "both must come to rest in the same place");
+    run_to_equilibrium(y, best.dt, euler, moving, best.steps + 1);
+    require((x - y).cwiseAbs().maxCoeff() < 1e-4 * press, "both must converge to one equilibrium");
 }
 BENCHMARK_CAPTURE(quasi_static, all_layers, membrane::unlimited, 1)->Apply(sizes);
 BENCHMARK_CAPTURE(quasi_static, omega_1_4, membrane::unlimited, 1.4)->Apply(sizes);
@@ -121,12 +122,12 @@ void explicit_euler(benchmark::State& state) {
     membrane::ExplicitEuler<double> euler(problem.network);
     Points x;
     int steps = 0;
-    for (auto _ : state) steps = come_to_rest(x, best.dt, euler, problem, 2 * best.steps);
-    require(steps == best.steps, "explicit Euler must do the same every time");
+    for (auto _ : state) steps = run_to_equilibrium(x, best.dt, euler, problem, 2 * best.steps);
+    require(steps == best.steps, "explicit Euler must take the same number of steps");
     state.counters["dt"] = best.dt;
     state.counters["viscosity"] = best.viscosity;
     state.counters["steps"] = steps;
-    state.counters["visits"] = static_cast<double>(steps) * static_cast<double>(state.range(0));
+    state.counters["vertex_updates"] = static_cast<double>(steps) * static_cast<double>(state.range(0));
 }
 BENCHMARK(explicit_euler)->Apply(sizes);
 

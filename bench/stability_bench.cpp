@@ -6,27 +6,28 @@
 
 #include "support/scene.hpp"
 
-// How large may the time step be? 200 spheres of 162 vertices, jittered, each with stiffnesses of its own and a foundation
-// of a hundredth to ten times the springs, begin a little out of shape; a run diverges when that grows a hundredfold, or
-// the solver says so. dt is in hundredths of sqrt(mass / stiffness), or of each scene's own limit.
+// Stability limits of the time step. 200 spheres of 162 vertices, jittered, each with its own stiffness and a
+// foundation of a hundredth to ten times the springs, start with small displacements; a run diverges if these grow a
+// hundredfold, or the solver refuses a step. dt is in hundredths of sqrt(mass / stiffness), or of each scene's own
+// limit.
 
 namespace {
 
 using namespace bench;
 
 constexpr int scene_count = 200, steps = 400;
-constexpr double out_of_shape = 1e-4 * radius;
+constexpr double start_displacement = 1e-4 * radius;
 
 struct Scene {
     explicit Scene(std::mt19937_64& engine)
         : rest(sphere(162).positions()), spring(std::pow(10, number(engine, 0, 2))), start(162 * 3) {
         for (double& coordinate : rest.reshaped()) coordinate += 0.02 * radius * number(engine, -1, 1);
-        for (double& coordinate : start) coordinate = out_of_shape * number(engine, -1, 1);
+        for (double& coordinate : start) coordinate = start_displacement * number(engine, -1, 1);
         volume.emplace(mesh(), membrane::VolumeSpringOptions<double>{spring * std::pow(10, number(engine, -2, 1))});
         network.emplace(mesh(), membrane::LinearSpring{},
                         membrane::NetworkOptions<double>{.stiffness = spring, .mass = 1.0});
         for (Index v = 0; v < 162; ++v) {
-            largest_block = std::max(largest_block, membrane::largest_curvature<double>(*network, v, rest));
+            largest_block = std::max(largest_block, membrane::largest_eigenvalue_at<double>(*network, v, rest));
         }
         largest_block += volume->stiffness(0);
         find_largest();
@@ -44,9 +45,9 @@ struct Scene {
             next = volume->stiffness(0) * displacement;
             for (const auto& s : network->springs()) {
                 const Vector3 u = (rest.col(s.second) - rest.col(s.first)).normalized();
-                const Vector3 pull = s.stiffness * u.dot(displacement.col(s.second) - displacement.col(s.first)) * u;
-                next.col(s.first) -= pull;
-                next.col(s.second) += pull;
+                const Vector3 force = s.stiffness * u.dot(displacement.col(s.second) - displacement.col(s.first)) * u;
+                next.col(s.first) -= force;
+                next.col(s.second) += force;
             }
             largest = next.norm();
             displacement = next / largest;
@@ -76,12 +77,12 @@ const std::vector<Scene>& scenes() {
     return made;
 }
 
-/// Whether `move(x)` carries the membrane off; it says itself whether it could move at all.
+/// Whether repeated `move(x)` diverges; `move` returns whether its step advanced.
 template <class Move>
 bool diverges(const Scene& scene, Move move) {
     Points x = scene.rest + Eigen::Map<const Points>(scene.start.data(), 3, 162);
     for (int i = 0; i < steps; ++i) {
-        if (!move(x) || !((x - scene.rest).cwiseAbs().maxCoeff() < 100 * out_of_shape)) return true;
+        if (!move(x) || !((x - scene.rest).cwiseAbs().maxCoeff() < 100 * start_displacement)) return true;
     }
     return false;
 }
@@ -108,7 +109,7 @@ struct AllAtOnce {
     }
 };
 
-/// (4), vertex by vertex, which nobody stops.
+/// (4), vertex by vertex, without a check of stability.
 struct OneByOne {
     static double limit(const Scene& scene) { return std::sqrt(2 / scene.largest_block); }
     static bool diverges_at(const Scene& scene, double dt) {

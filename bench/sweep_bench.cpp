@@ -5,8 +5,8 @@
 
 #include "support/sweep.hpp"
 
-// What does one visit of a vertex cost, in a sweep over all of the mesh? Packs against the loop one would
-// write, and against the same arithmetic on numbers that lie side by side, which no order of vertices can beat.
+// Time of one vertex update in a sweep over the whole mesh: packs against a plain loop, and against the same arithmetic
+// on contiguous numbers, which is a lower bound for every order of the vertices.
 
 namespace {
 
@@ -28,7 +28,7 @@ BENCHMARK(packs<float, membrane::MassStep>)->Name("lanes/float/mass")->Apply(siz
 BENCHMARK(packs<float, membrane::SafeStep>)->Name("lanes/float/safe")->Apply(sizes_in_cache);
 BENCHMARK(packs<float, membrane::BlockStep>)->Name("lanes/float/newton")->Apply(sizes_in_cache);
 
-/// Six springs and a volume spring for each vertex, all numbers in the order of their use.
+/// Six springs and a volume spring for each vertex, all numbers contiguous in the order of their use.
 template <Real Scalar>
 void contiguous(benchmark::State& state) {
     using Wide = Lanes<Scalar>;
@@ -60,15 +60,15 @@ void contiguous(benchmark::State& state) {
         for (Group& group : groups) {
             membrane::Vector3<Wide> force = Wide(Scalar(foundation)) * (group.anchor - group.here);
             for (const Slot& slot : group.slots) {
-                const membrane::Vector3<Wide> reach = slot.there - group.here;
-                const Wide length = membrane::norm(reach);
-                force += (slot.stiffness * (length - slot.rest_length) / length) * reach;
+                const membrane::Vector3<Wide> edge = slot.there - group.here;
+                const Wide length = membrane::norm(edge);
+                force += (slot.stiffness * (length - slot.rest_length) / length) * edge;
             }
             group.here += step * force;
         }
         benchmark::DoNotOptimize(groups.data());
     }
-    count_visits(state);
+    count_updates(state);
 }
 BENCHMARK(contiguous<double>)->Name("contiguous/double")->Apply(sizes_in_cache);
 BENCHMARK(contiguous<float>)->Name("contiguous/float")->Apply(sizes_in_cache);

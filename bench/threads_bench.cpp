@@ -3,8 +3,8 @@
 
 #include "support/scene.hpp"
 
-// What do orders of visits and threads do for a whole mesh? A vertex is pulled out by a third of the radius, and all others
-// follow: 16 sweeps a step. These programs may use every processor.
+// Update orders and threads on a whole mesh. A vertex is pulled out by 0.3 R, and all others follow: 16 sweeps a step.
+// This program may use every processor.
 
 namespace {
 
@@ -25,14 +25,14 @@ void step(benchmark::State& state, UpdateOrder order, const membrane::AnyExecuto
     membrane::QuasiStaticSolver<Scalar> solver(network, options, {}, executor);
     auto x = mesh.positions();
     const membrane::Vector3<Scalar> out = Scalar(1.3) * membrane::point(x, 0);
-    double visits = 0, residual = 0;
+    double vertex_updates = 0, residual = 0;
     for (auto _ : state) {
-        const auto report = solver.step(x, Scalar(tick), network, volume, membrane::force_on(Index(0), out));
+        const auto report = solver.step(x, Scalar(tick), network, volume, membrane::pull(Index(0), out));
         require(report.status == membrane::StepStatus::advanced && report.residual > 0, "the membrane must follow");
-        visits += report.vertex_updates;
+        vertex_updates += report.vertex_updates;
         residual = report.residual;
     }
-    state.counters["visits"] = benchmark::Counter(visits, benchmark::Counter::kAvgIterations);
+    state.counters["vertex_updates"] = benchmark::Counter(vertex_updates, benchmark::Counter::kAvgIterations);
     state.counters["residual"] = residual;
 }
 
@@ -43,15 +43,15 @@ void sizes_of_whole(benchmark::internal::Benchmark* measured) {
 }
 
 template <membrane::Real Scalar>
-void arrival(benchmark::State& state) {
+void breadth_first(benchmark::State& state) {
     step<Scalar>(state, UpdateOrder::breadth_first, {});
 }
 template <membrane::Real Scalar>
-void groups(benchmark::State& state) {
+void colour_layers(benchmark::State& state) {
     step<Scalar>(state, UpdateOrder::colour_layers, {});
 }
 template <membrane::Real Scalar>
-void colours(benchmark::State& state) {
+void colour_all(benchmark::State& state) {
     step<Scalar>(state, UpdateOrder::colour_all, {});
 }
 template <membrane::Real Scalar>
@@ -60,12 +60,12 @@ void threads(benchmark::State& state) {
     step<Scalar>(state, UpdateOrder::colour_all, pool.executor());
     state.counters["threads"] = pool.threads();
 }
-BENCHMARK_TEMPLATE(arrival, double)->Name("arrival/double")->Apply(sizes_of_whole);
-BENCHMARK_TEMPLATE(groups, double)->Name("groups/double")->Apply(sizes_of_whole);
-BENCHMARK_TEMPLATE(colours, double)->Name("colours/double")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(breadth_first, double)->Name("breadth_first/double")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(colour_layers, double)->Name("colour_layers/double")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(colour_all, double)->Name("colour_all/double")->Apply(sizes_of_whole);
 BENCHMARK_TEMPLATE(threads, double)->Name("threads/double")->Apply(sizes_of_whole);
-BENCHMARK_TEMPLATE(groups, float)->Name("groups/float")->Apply(sizes_of_whole);
-BENCHMARK_TEMPLATE(colours, float)->Name("colours/float")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(colour_layers, float)->Name("colour_layers/float")->Apply(sizes_of_whole);
+BENCHMARK_TEMPLATE(colour_all, float)->Name("colour_all/float")->Apply(sizes_of_whole);
 BENCHMARK_TEMPLATE(threads, float)->Name("threads/float")->Apply(sizes_of_whole);
 
 }  // namespace

@@ -15,9 +15,9 @@
 #include "support/slide.hpp"
 #include "support/tick_scenes.hpp"
 
-// What does one whole tick take, and how far off is its force? A tool of 2 mm is pressed 1 mm deep and slides at 50 mm/s: by
-// scalar, mesh, layers and sweeps, beside the tick of Bullet's soft body on the same way. Then the same with other tools,
-// laws, rules and bodies.
+// Time of a whole tick, and error of its force: a tool of 2 mm is pressed 1 mm deep and slides at 50 mm/s, by scalar,
+// mesh, layers and sweeps, beside the tick of Bullet's soft body with the same trajectory. Then a tick with other
+// tools, laws, rules and bodies.
 
 namespace {
 
@@ -27,26 +27,26 @@ using namespace bench;
 #define BENCH_TEXT_OF(name) BENCH_TEXT(name)
 constexpr const char* instruction_set = BENCH_TEXT_OF(MEMBRANE_INSTRUCTION_SET);
 
-// Ours and Bullet's take turns of so many ticks: what else the machine does meets both, and the median leaves out the
-// first ticks of a turn, which find little of theirs in the caches.
+// Ours and Bullet's alternate after this number of ticks: other load of the machine affects both, and the median omits
+// the first ticks of a turn, whose caches are cold.
 constexpr Index ticks_in_turn = 20;
 static_assert(Slide::ticks % ticks_in_turn == 0);
 
-/// What the stages of a tick took [s], tick by tick.
+/// Times of the stages of each tick [s].
 struct Times {
     std::vector<double> whole, contact, sweep, other;
 };
 
-/// How far the loop's forces and its membrane are off.
+/// Errors of the loop's forces and penetration of its tool.
 struct Errors {
-    double squares = 0;  // of the differences to the reference's forces [N^2]
-    double largest = 0;  // force [N]
-    double overlap = 0;  // of the tool with a triangle [m]
+    double squares = 0;      // of the differences to the reference's forces [N^2]
+    double largest = 0;      // force [N]
+    double penetration = 0;  // of the tool into a triangle [m]
 };
 
-/// How deep the tool is in one of the triangles that it touches [m]. Its centre is on the outer side.
+/// Largest penetration of the tool into a triangle in contact [m]. Its centre is on the outer side.
 template <Real Scalar>
-double overlap_of(const SlidingLoop<Scalar>& loop) {
+double penetration_of(const SlidingLoop<Scalar>& loop) {
     const Vector3 centre = loop.tool.position.template cast<double>();
     double nearest = std::numeric_limits<double>::infinity();
     for (const auto& touched : loop.contact.triangles) {
@@ -58,8 +58,8 @@ double overlap_of(const SlidingLoop<Scalar>& loop) {
     return std::max(static_cast<double>(loop.tool.radius) - nearest, 0.0);
 }
 
-/// One tick, each stage by the clock. What a step does for the contact in its sweeps is in `sweep`: between the visits it
-/// cannot be told apart.
+/// Times the stages of one tick. The contact iterations of a step are part of `sweep`: between the vertex updates they
+/// cannot be timed.
 template <Real Scalar>
 void measure(SlidingLoop<Scalar>& loop, Times& times) {
     std::array<double, 3> taken{};
@@ -80,7 +80,7 @@ void compare(const SlidingLoop<Scalar>& loop, const Reference& reference, Errors
     const auto at = static_cast<std::size_t>(loop.now - Slide::first_measured - 1);
     errors.squares += membrane::squared_norm<double>(force - reference.forces[at]);
     errors.largest = std::max(errors.largest, membrane::norm(force));
-    errors.overlap = std::max(errors.overlap, overlap_of(loop));
+    errors.penetration = std::max(errors.penetration, penetration_of(loop));
 }
 
 /// Bullet's body at rest; made once for each mesh.
@@ -120,7 +120,7 @@ void path(benchmark::State& state) {
         }
         loop.check();
         require(bullet.finite() && touched > 0, "the tool must press on Bullet's body");
-        require(bullet.overlap() < depth / 2, "Bullet's nodes must go out of the tool's way");
+        require(bullet.penetration() < depth / 2, "Bullet's nodes must not penetrate the tool");
 
         const double time = median(times.whole), theirs = median(bullets);
         state.SetIterationTime(time);
@@ -130,7 +130,7 @@ void path(benchmark::State& state) {
         state.counters["force_error"] =
             std::sqrt(errors.squares / static_cast<double>(reference.forces.size())) / reference.rms;
         state.counters["largest_force"] = errors.largest / reference.largest;
-        state.counters["overlap"] = errors.overlap / static_cast<double>(membrane::mean_edge(loop.mesh));
+        state.counters["penetration"] = errors.penetration / static_cast<double>(membrane::mean_edge(loop.mesh));
         state.counters["bullet"] = theirs;
         state.counters["ratio"] = theirs / time;
     }
@@ -147,7 +147,7 @@ void settings(benchmark::internal::Benchmark* measured) {
 BENCHMARK(path<double>)->Name("path/scalar:double")->Apply(settings);
 BENCHMARK(path<float>)->Name("path/scalar:float")->Apply(settings);
 
-/// A scene's tick is measured with all that is in it.
+/// Measures a scene's whole tick.
 template <class Scene>
 void scene(benchmark::State& state) {
     for (auto _ : state) {
@@ -163,7 +163,7 @@ void scene(benchmark::State& state) {
             times.push_back(time);
         }
         require(advanced, "every step must advance");
-        require(felt, "whatever acts must be felt");
+        require(felt, "every reaction must be felt");
         state.SetIterationTime(median(times));
     }
     state.SetLabel(instruction_set);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "support/scene.hpp"
 
-// What does following the contact save against asking the tree in every frame? The tool presses and slides. The tree is
-// asked for the triangles within reach and the nearest of them; the tracker's time includes side, depth and normal.
+// The tracker against tree queries in every frame. The tool presses and slides. The queries are the triangles within
+// the detection distance and the nearest of them; the tracker's time includes side, depth and normal.
 
 namespace {
 
@@ -38,7 +38,7 @@ void tree(benchmark::State& state, const Path& path) {
     for (const Index f : touched.items()) {
         const auto is_f = [&](const auto& seen) { return seen.triangle == f; };
         require(std::any_of(loop.contact.triangles.begin(), loop.contact.triangles.end(), is_f),
-                "the tracker must see what the tree sees");
+                "the tracker must find the triangles of the tree");
     }
 }
 BENCHMARK_CAPTURE(tree, sphere_2mm, sphere_2mm)->Apply(sizes_around);

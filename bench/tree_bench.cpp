@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "support/scene.hpp"
 
-// What does the tree save against trying every triangle, and what does its balance threshold do? The surface is pressed
-// in, the tree refitted to it; queries are near the surface.
+// The tree against brute force over all triangles, and the effect of its balance threshold. The surface is pressed in,
+// the tree refitted to it; queries are near the surface.
 
 namespace {
 
 using namespace bench;
 using Tree = membrane::AabbTree<double>;
 
-constexpr double reach = 1e-3;  // of the spheres and segments [m]
+constexpr double range = 1e-3;  // radius of the spheres, length of the segments [m]
 
-// Each query both ways. The answers are numbers that must be the same.
+// Each query by the tree and by brute force. Both return numbers that must be equal.
 struct ClosestPoint {
     static double by_tree(const Tree& tree, const Loop& loop, const Vector3& q) {
         return tree.closest_point(loop.x, q).squared_distance;
@@ -24,21 +24,21 @@ struct ClosestPoint {
 struct TouchingSphere {
     static double by_tree(const Tree& tree, const Loop& loop, const Vector3& q) {
         int touched = 0;
-        tree.overlap_sphere(loop.x, q, reach, [&](Index) { ++touched; });
+        tree.overlap_sphere(loop.x, q, range, [&](Index) { ++touched; });
         return touched;
     }
     static double of_all(const Loop& loop, const Vector3& q) {
         int touched = 0;
         for (const auto& corners : loop.mesh.triangles().colwise()) {
             const auto triangle = membrane::triangle_at(loop.x, corners);
-            if (membrane::closest_point(triangle, q).squared_distance <= reach * reach) ++touched;
+            if (membrane::closest_point(triangle, q).squared_distance <= range * range) ++touched;
         }
         return touched;
     }
 };
 
 struct FirstHit {
-    static Vector3 end(const Vector3& q) { return (1 - reach / membrane::norm(q)) * q; }
+    static Vector3 end(const Vector3& q) { return (1 - range / membrane::norm(q)) * q; }
     static double by_tree(const Tree& tree, const Loop& loop, const Vector3& q) {
         const auto hit = tree.first_hit(loop.x, q, end(q));
         return hit.triangle == membrane::no_index ? 2 : hit.along;
@@ -53,19 +53,19 @@ struct FirstHit {
     }
 };
 
-// Every query is about another point.
-template <class Answer>
-void ask(benchmark::State& state, Answer answer) {
+// Each query has another point.
+template <class Query>
+void ask(benchmark::State& state, Query query) {
     const auto points = points_near(4096);
     std::size_t i = 0;
-    for (auto _ : state) benchmark::DoNotOptimize(answer(points[i++ % points.size()]));
+    for (auto _ : state) benchmark::DoNotOptimize(query(points[i++ % points.size()]));
 }
 
 template <class Query>
 void ask_tree(benchmark::State& state, const Tree& tree, const Loop& loop) {
     for (const auto& q : points_near(16)) {
         const double expected = Query::of_all(loop, q), found = Query::by_tree(tree, loop, q);
-        require(std::abs(found - expected) <= 1e-12 * expected, "the tree's answer");
+        require(std::abs(found - expected) <= 1e-12 * expected, "the result of the tree");
     }
     ask(state, [&](const Vector3& q) { return Query::by_tree(tree, loop, q); });
 }
@@ -94,7 +94,7 @@ void build(benchmark::State& state) {
 }
 BENCHMARK(build)->Name("tree/build")->Apply(sizes);
 
-// The same for other thresholds.
+// The tree with other thresholds.
 
 void thresholds(benchmark::internal::Benchmark* measured) {
     measured->ArgNames({"vertices", "threshold"})->ArgsProduct({{642, 10242}, {1, 2, 4, 8, 16, 32, 64}});

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "support/scene.hpp"
 
-// What does it save to update boxes and normals of the moved vertices only? And of all of them, against a plain loop?
+// Updates of boxes and normals of the moved vertices against those of all, and of all against a plain loop.
 
 namespace {
 
 using namespace bench;
 
-// After every frame, once more, what moved in it or everything.
+// After every frame, one more update, of the moved vertices or of all.
 template <class Update>
 void update(benchmark::State& state, Update update) {
     Loop loop = pressed(state.range(0));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Are two runs the same? Compares two recordings tick by tick and draws what the hand did and felt in both. With none
-// named, records a press itself, plays it again, and keeps both.
+// Compares two recordings tick by tick and draws displacement and force of the hand in both. Without arguments, records
+// a press, replays it, and keeps both.
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// The paper's figure 2: the unit sphere of its signed distance, by truss forces in 200 iterations, with edges of 0.4 and
-// 0.1. Prints how even the triangles are, and draws them.
+// The paper's figure 2: the unit sphere of its signed distance, by truss forces in 200 iterations, with edges of 0.4
+// and 0.1. Prints how even the triangles are, and draws them.
 #include <filesystem>
 #include <iomanip>
 #include <iostream>
@@ -17,7 +17,7 @@
 
 using namespace examples;
 
-constexpr double half = 300, head = 46;  // of a square picture, of the room above it [px]
+constexpr double half = 300, head = 46;  // of a square picture, of the margin above it [px]
 
 double paper_sphere(const membrane::Vector3<double>& p) { return membrane::norm(p) - 1; }  // [m]
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Which constants make a membrane answer as a measured one did? Fits springs and foundation of a lens to a table of forces
-// and depths, says how sure they are and which of them the table does not tell, and draws both.
+// Constants from a measurement: fits springs and foundation of a lens to a table of forces and depths, prints their
+// confidence intervals and whether the table identifies them, and draws both curves.
 #include <algorithm>
 #include <cstddef>
 #include <cstdio>
@@ -54,7 +54,7 @@ void run(const std::filesystem::path& data, const examples::Specimen& body, cons
     const membrane::Indentation model(lens, tip, Eigen::Vector3d(-body.outward), build);
     const auto found = membrane::fit(table, {10, 10}, model);  // from a first guess [N/m]
 
-    std::printf("constant          value    95 %% interval      told\n");
+    std::printf("constant          value    95 %% interval      identifiable\n");
     for (std::size_t k = 0; k < 2; ++k) {
         std::printf("%-8s [N/m] %8.2f   %6.2f to %6.2f    %s\n", k == 0 ? "springs" : "foundation", found.constants[k],
                     found.intervals[k].lower, found.intervals[k].upper, found.identifiable[k] ? "yes" : "no");

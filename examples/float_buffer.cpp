@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// An engine's vertices, interleaved and in floats, are deformed where they are: the loop copies no position in or out,
-// and writes the normals that have changed.
+// An engine's vertices, interleaved and in floats, are deformed in place: the loop copies no position, and writes only
+// the normals that have changed.
 #include <cstdint>
 #include <cstdio>
 #include <vector>

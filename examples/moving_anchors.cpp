@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
 // The body under the membrane moves. An eye that turns is handled in its own frame, at no cost per vertex; a vessel
-// that beats takes new anchors in every tick, told to all parts by one `MovingBody`.
+// that beats takes new anchors in every tick, from one `MovingBody` for all parts.
 #include <cmath>
 #include <cstdio>
 #include <numbers>
@@ -33,7 +33,7 @@ struct Membrane {
     membrane::Points<double> x;  // [m]
 };
 
-/// An eye turns under a tool that stands still: the tool is carried into the eye's frame, the force out of it.
+/// An eye turns under a tool that stands still: the tool is transformed to the eye's frame, the force to the world.
 void turning_eye(const examples::Specimen& specimen) {
     Membrane eye(membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles));
     const membrane::Tool<double> tool{.position = specimen.above(0.12), .radius = specimen.tool_radius()};
@@ -44,7 +44,7 @@ void turning_eye(const examples::Specimen& specimen) {
         membrane::RigidFrame<double> frame;
         frame.rotation << 1, 0, 0, 0, std::cos(angle), -std::sin(angle), 0, std::sin(angle), std::cos(angle);
         frame.angular_velocity = {rate, 0, 0};
-        frame.origin = specimen.centre - frame.rotation * specimen.centre;  // the centre stays where it is
+        frame.origin = specimen.centre - frame.rotation * specimen.centre;  // the centre is fixed
         frame.velocity = frame.angular_velocity.cross(frame.origin - specimen.centre);
         const auto seen = to_body_frame(tool, frame);
         const auto contact = eye.tracker.update(eye.tree, eye.x, seen);
@@ -68,7 +68,7 @@ void beating_vessel(const examples::Specimen& specimen) {
         const double swollen = 0.05 * std::sin(2 * std::numbers::pi * dt * tick);  // of the radius, once a second
         const membrane::Points<double> anchors =
             ((1 + swollen) * mesh.positions()).colwise() - swollen * specimen.centre;
-        if (!body.move_to(anchors, dt, vessel.x)) return;  // the membrane goes along
+        if (!body.move_to(anchors, dt, vessel.x)) return;  // the membrane moves along
         vessel.tree.refit(vessel.x);
         const auto contact = vessel.tracker.update(vessel.tree, vessel.x, tool, body);
         const auto report =

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// A constraint of one's own: a suction cup draws the membrane to itself, by the same pressure on all vertices below its
-// mouth.
+// A custom constraint: a suction cup draws the membrane to itself, by equal forces on all vertices below its mouth.
 #include <algorithm>
 #include <cstdio>
 #include <span>
@@ -13,7 +12,7 @@
 
 /// A pressure on some vertices, along the axis of the cup.
 struct Suction {
-    std::span<const membrane::Index> vertices;  ///< below the mouth; of the caller
+    std::span<const membrane::Index> vertices;  ///< below the mouth; the caller owns them
     Eigen::Vector3d force;                      ///< on each [N]
 
     using Context = membrane::ConstraintContext<double>;

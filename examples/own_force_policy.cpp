@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// A force policy of one's own: tissue is too soft for a hand to feel and a device has a limit, so the membrane's
-// reaction is magnified and held below what the device can bear.
+// A custom force policy: tissue is too soft for a hand to feel and a device has a force limit, so the membrane's
+// reaction is magnified and limited.
 #include <cstdio>
 #include <fstream>
 #include <string>
@@ -58,9 +58,9 @@ int main(int argc, char** argv) {
     LimitedReaction feel{.scale = 20, .limit = 3.3};
     std::string file;
     examples::CommandLine command("Presses a sphere; the hand feels the membrane's reaction, magnified and limited.");
-    command.add_file("--script", file, "the tool's way, a CSV file: time [s], x, y, z [m]");
+    command.add_file("--script", file, "the tool's trajectory, a CSV file: time [s], x, y, z [m]");
     command.add("--scale", feel.scale, "from tissue to hand");
-    command.add("--limit", feel.limit, "of the device [N]");
+    command.add("--limit", feel.limit, "force limit of the device [N]");
     examples::MeshOptions options;
     options.add_to(command);
     return command.run(argc, argv, [&] {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// A spring law of one's own: collagen is wavy at rest, gives way at first and stiffens once its fibres are straight.
+// A custom spring law: collagen fibres are wavy at rest, soft at first, and stiffen when they are straight.
 #include <algorithm>
 #include <cstdio>
 
@@ -23,7 +23,7 @@ struct Collagen {
 };
 static_assert(membrane::SpringLaw<Collagen, double>);
 
-/// Force that holds the middle of a membrane `height` [m] above where it is at rest, its rim clamped [N].
+/// Force [N] that holds the middle of a membrane `height` [m] above its rest position, with a clamped rim.
 template <class Law>
 double holding_force(const examples::Specimen& specimen, const Law& law, double height) {
     const auto mesh = membrane::TriangleMesh(specimen.surface.points, specimen.surface.triangles);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// The whole paper in one run: spheres of 162 and 642 vertices and a cornea are pressed, grasped, pulled and let go, with
-// virtual volume springs and without, or a membrane of a file. Prints how fast that is and how far off, draws the paper's
+// The whole paper in one run: spheres of 162 and 642 vertices and a cornea are pressed, grasped, pulled and let go,
+// with virtual volume springs and without, or a membrane from a file. Prints speed and shape errors, draws the paper's
 // figures 3 to 5, and writes a time series for ParaView.
 #include <filesystem>
 #include <iostream>
@@ -48,13 +48,13 @@ Record run(const Scene& scene, const Volume& foundation, const Motion& motion, c
         watch.lap();
         device.write(feel({tool, contact, report, grasp}));
         watch.lap();
-        const Vector3d displacement = tool.position + grasp.offset - grasp.origin;  // of what is held
+        const Vector3d displacement = tool.position + grasp.offset - grasp.origin;  // of the held point
         record.add({.tool = tool,
                     .depth = contact.depth,
                     .pulled = grasp.holding() ? displacement.norm() : 0,
                     .felt = device.force(),
                     .reaction = report.reactions[0] + report.reactions[1],
-                    .at_work = report.vertex_updates > 0,
+                    .active = report.vertex_updates > 0,
                     .seconds = watch.seconds()},
                    x);
         if (series.due(tool.time))
@@ -70,13 +70,13 @@ Outcome run_both(const Scene& scene, const Settings& settings) {
     };
     std::cout << scene.name << ": with volume springs ..." << std::flush;
     const auto foundation = membrane::VirtualVolumeSprings(
-        scene.mesh, {.stiffness = scene.backing_stiffness, .damping = scene.backing_damping});
-    auto with = run(scene, foundation, motion(scene, joined(press, pull), settings.pace), settings, series(""));
+        scene.mesh, {.stiffness = scene.foundation_stiffness, .damping = scene.foundation_damping});
+    auto with = run(scene, foundation, motion(scene, joined(press, pull), settings.speed_factor), settings, series(""));
 
-    std::cout << " without ..." << std::flush;  // and the pull from rest: it does not come back from the press
+    std::cout << " without ..." << std::flush;  // the pull starts from the rest shape: the press leaves a dent
     const membrane::NoFoundation none;
-    auto pressed = run(scene, none, motion(scene, press, settings.pace), settings, series("_without_pressed"));
-    auto pulled = run(scene, none, motion(scene, pull, settings.pace, pressed.phases.back().end), settings,
+    auto pressed = run(scene, none, motion(scene, press, settings.speed_factor), settings, series("_without_pressed"));
+    auto pulled = run(scene, none, motion(scene, pull, settings.speed_factor, pressed.phases.back().end), settings,
                       series("_without_pulled"));
     std::cout << " done" << std::endl;
     return {scene, std::move(with), std::move(pressed).then(std::move(pulled))};

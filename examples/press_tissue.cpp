@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Two tissues of the eye from their constants: the lens capsule on the lens, and the cornea under the pressure in the eye,
-// both meshed from a formula, pressed, and drawn with their tension as colour.
+// Two tissues of the eye from their constants: the lens capsule on the lens, and the cornea under the pressure in the
+// eye, both meshed from a formula, pressed, and drawn with their tension as colour.
 #include <algorithm>
 #include <filesystem>
 #include <iomanip>
@@ -30,8 +30,8 @@ struct Scene {
     std::string name;
     Specimen body;
     Material material;
-    double rigidity, stretch, pressure;    // [N m]; how far the tissue is stretched at rest; in the eye [Pa]
-    membrane::FoundationLayer foundation;  // what the tissue lies on
+    double rigidity, stretch, pressure;    // [N m]; stretch in the undeformed mesh; in the eye [Pa]
+    membrane::FoundationLayer foundation;  // under the tissue
     double radius, depth;                  // of the press [m]
 };
 
@@ -86,7 +86,8 @@ int main(int argc, char** argv) {
         const auto front = trimmed(Ball{.radius = 7.8e-3}, HalfSpace{.point = {0, 0, 5.2e-3}, .normal = {0, 0, -1}});
         const Material thin = materials::lens_capsule().typical, thick = materials::cornea().typical;
         const FoundationLayer fibres{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
-        const FoundationLayer aqueous{.young_modulus = 10, .poisson_ratio = 0.3, .thickness = 1e-3};  // next to nothing
+        const FoundationLayer aqueous{
+            .young_modulus = 10, .poisson_ratio = 0.3, .thickness = 1e-3};  // almost no stiffness
         const Specimen body = mesh.specimen(lens);
         std::filesystem::create_directories(folder);
         const auto show = [&](const Scene& s) { save(folder / ("tissue_" + s.name + ".svg"), drawn(press(s))); };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// A sphere slides over a membrane, at 50 mm/s over the stock one: what the hand feels of its triangles, with their own
-// normals and with smooth ones, over time and as a spectrum above 100 Hz.
+// A sphere slides over a membrane, at 50 mm/s over the stock one: the force on the hand with the normals of the
+// triangles and with smooth ones, over time and as a spectrum above 100 Hz.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,16 +18,16 @@
 
 using namespace examples;
 
-constexpr double turn = 4.8, widest = 0.7;  // [rad/s]; on either side of the middle [rad]
-constexpr double tick = 1e-3, press_for = 0.05, slide_for = 2 * widest / turn;  // [s]
+constexpr double turn = 4.8, max_angle = 0.7;  // [rad/s]; on either side of the middle [rad]
+constexpr double tick = 1e-3, press_for = 0.05, slide_for = 2 * max_angle / turn;  // [s]
 
 struct Felt {
     std::vector<Eigen::Vector3d> flat, smooth;  // in each tick [N]
 };
 
-/// On its way about a point under the surface, as far off as a ball of this size curves.
+/// The tool at time `now` [s], on an arc of radius 1.05 sizes around a point one size below the surface.
 membrane::Tool<double> tool_at(double now, const Specimen& body) {
-    const double height = 1.05 * body.size, radius = 0.1 * body.size, angle = turn * (now - press_for) - widest;
+    const double height = 1.05 * body.size, radius = 0.1 * body.size, angle = turn * (now - press_for) - max_angle;
     const Eigen::Vector3d up = body.outward;
     const auto aside = membrane::direction<double>(membrane::cross<double>(up, {1, 3, 2}), up);
     const Eigen::Vector3d out = std::cos(angle) * up + std::sin(angle) * aside;
@@ -60,7 +60,7 @@ Felt slide(const Specimen& body) {
     return felt;
 }
 
-/// Force over time and spectrum of each way to it.
+/// Force over time and its spectrum, for both kinds of normals.
 std::string picture(const Felt& felt) {
     Curve before{.name = "normals of the triangles", .colour = "#d0532f"},
         after{.name = "smooth normals", .colour = "#12507b"};
@@ -85,7 +85,7 @@ double largest_change(const std::vector<Eigen::Vector3d>& forces) {
 int main(int argc, char** argv) {
     auto folder = std::filesystem::path(argv[0]).parent_path() / "pictures";
     MeshOptions mesh;
-    CommandLine command("Slides over a membrane, and draws what the hand feels of its triangles.");
+    CommandLine command("Slides over a membrane, and draws the force of its triangles on the hand.");
     mesh.add_to(command);
     command.add("--out", folder, "folder for pictures");
     return command.run(argc, argv, [&] {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// A haptic loop of 1 kHz and a drawing loop of 60 Hz, each with its thread and positions, share one membrane. What moves
-// goes to the one that draws; where the tool should be comes from there, as from a mouse; a simulated hand follows it.
+// A haptic loop of 1 kHz and a drawing loop of 60 Hz, each with its thread and positions, share one membrane. Moved
+// positions go to the drawing loop; the target of the tool comes back, as from a mouse; a simulated hand follows it.
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -17,7 +17,8 @@
 
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
-/// Sleeps until the next round, `period` [s] after the one that was due, and returns when it is due. Rounds lost are lost.
+/// Sleeps until the next round, `period` [s] after the one that was due, and returns when it is due. Rounds lost are
+/// lost.
 double next(double due, double period) {
     std::this_thread::sleep_for(std::chrono::duration<double>(due + period - now()));
     return std::max(due + period, now() - period);
@@ -29,13 +30,13 @@ void print(const char* what, std::vector<double>& seconds) {
     std::printf("%s p50 %.1f, p99 %.1f, p99.9 %.1f, worst %.1f us\n", what, at(500), at(990), at(999), at(1000));
 }
 
-/// What the loops share, and what the haptic one tells at its end.
+/// The state that the loops share, and the statistics of the haptic loop.
 struct Loops {
     membrane::MovedPoints<double> moved;
     membrane::Latest<membrane::Tool<double>> wanted{};
     std::atomic<bool> over{false};
     std::vector<double> ticks = {};  // time each took [s]
-    std::size_t missed = 0;          // that were over after the next was due
+    std::size_t missed = 0;          // ticks that ended after the next was due
 };
 
 void touch(const membrane::TriangleMesh<double>& mesh, double dt, Loops& loops) {
@@ -80,7 +81,7 @@ void run(const examples::Specimen& body, double seconds, double rate, double fra
         const auto news = loops.moved.read();
         for (const auto v : news.moved) shown.col(v) = news.x.col(v);
         normals.update(shown, news.moved);
-        if (news.number > 0) ages.push_back(news.age(now()));  // here one would draw
+        if (news.number > 0) ages.push_back(news.age(now()));  // drawing goes here
         loops.wanted.publish(mouse.read(), now());
     }
     loops.over = true;

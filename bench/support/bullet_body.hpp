@@ -11,8 +11,8 @@
 
 #include "scene.hpp"
 
-/// The scene's sphere as a soft body of Bullet: a node for each vertex, a link for each spring, a face for each triangle;
-/// in millimetres, near the lengths that Bullet's constants are made for.
+/// The scene's sphere as a soft body of Bullet: a node for each vertex, a link for each spring, a face for each
+/// triangle; in millimetres, which suit Bullet's constants.
 namespace bench {
 
 inline constexpr double bullet_unit = 1e-3;  // [m]
@@ -44,7 +44,7 @@ class BulletBody {
     [[nodiscard]] btSoftBody& operator*() noexcept { return *body_; }
     [[nodiscard]] btSoftBody* operator->() noexcept { return body_.get(); }
 
-    /// Whether every node is somewhere.
+    /// Whether the position of every node is finite.
     [[nodiscard]] bool finite() const {
         for (int i = 0; i < body_->m_nodes.size(); ++i) {
             if (!std::isfinite(body_->m_nodes[i].m_x.length2())) return false;

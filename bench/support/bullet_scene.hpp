@@ -8,8 +8,8 @@
 
 namespace bench {
 
-/// Bullet's body, and the tool as a rigid body that goes its way whatever it meets: 4 position iterations a tick, contact,
-/// normals, Bullet's own shape matching for a foundation.
+/// Bullet's body, and the tool as a kinematic rigid body: 4 position iterations a tick, contact, normals, Bullet's own
+/// shape matching as the foundation.
 ///
 ///     BulletScene scene(642, 2e-3);
 ///     scene.frame(tool.position);                                                                       // each tick
@@ -28,20 +28,20 @@ class BulletScene {
         for (int i = 0; i < body_->m_nodes.size(); ++i) rest_.push_back(body_->m_nodes[i].m_x);
     }
 
-    /// One tick with the tool's centre there [m].
+    /// One tick with the tool's centre at `tool_position` [m].
     void frame(const Vector3& tool_position) {
-        const btTransform place(btQuaternion::getIdentity(), bullet_point(tool_position));
-        tool_.setWorldTransform(place);
-        tool_.setInterpolationWorldTransform(place);
+        const btTransform transform(btQuaternion::getIdentity(), bullet_point(tool_position));
+        tool_.setWorldTransform(transform);
+        tool_.setInterpolationWorldTransform(transform);
         body_->predictMotion(btScalar(tick));
-        const btCollisionObjectWrapper tool(nullptr, &ball_, &tool_, place, -1, -1);
+        const btCollisionObjectWrapper tool(nullptr, &ball_, &tool_, transform, -1, -1);
         body_->defaultCollisionHandler(&tool);
         touched_ = body_->m_rcontacts.size();
         body_->solveConstraints();
         body_->integrateMotion();
     }
 
-    /// All nodes are where they were when it was made, and do not move.
+    /// Moves all nodes to their initial positions, with zero velocity.
     void reset() {
         for (int i = 0; i < body_->m_nodes.size(); ++i) {
             auto& node = body_->m_nodes[i];
@@ -51,11 +51,11 @@ class BulletScene {
         }
     }
 
-    /// Nodes that met the tool in the last tick.
+    /// Number of nodes in contact with the tool in the last tick.
     [[nodiscard]] int touched() const noexcept { return touched_; }
 
-    /// How deep a node is in the tool at most [m].
-    [[nodiscard]] double overlap() {
+    /// Largest penetration of a node into the tool [m].
+    [[nodiscard]] double penetration() {
         double deepest = 0;
         for (int i = 0; i < body_->m_nodes.size(); ++i) {
             const double gap =

@@ -15,7 +15,7 @@ set border 3 lc '#444444'
 set style data linespoints
 set pointsize 0.5
 
-# A table has the time of a tick and the error of its force, by mesh or by what was chosen.
+# A table has the time of a tick and the error of its force, by mesh or by alternative.
 names = '"162 vertices" "642 vertices" "2562 vertices" "642 vertices, forceps"'
 errors = '"error, 162" "error, 642" "error, 2562" "error, forceps"'
 titles = '"162 vertices" "642" "2562" "642, forceps"'
@@ -43,7 +43,7 @@ do for [k = 1:3] {
     unset ylabel
 }
 
-# From what is chosen instead to the default.
+# From the alternative to the default.
 tables = 'defaults_slide.tsv defaults_draw_out.tsv'
 mesh(vertices) = vertices == 162 ? 1 : vertices == 642 ? 2 : 3
 hue(file) = colour(file eq word(tables, 2) ? 4 : mesh(column('vertices')))
@@ -73,7 +73,7 @@ do for [k = 1:2] {
 
 # Times only: the errors are the same.
 unset logscale
-set title 'order: time by arrival over time by groups'
+set title 'order: time breadth first over time by colours'
 set xlabel 'vertices'
 set xrange [0.4:4.6]
 set yrange [0:2.2]
@@ -81,10 +81,10 @@ set xtics nomirror ('162' 1, '642' 2, '2562' 3, '642, forceps' 4)
 set ytics nomirror 0, 0.5, 2
 place(file) = file eq word(tables, 2) ? 4 : column(0) + 1
 part(other, default) = column(other) / column(default)
-plot for [file in tables] file using (place(file) - 0.18):(part('order of arrival', 'default')):(0.32):(hue(file)) \
+plot for [file in tables] file using (place(file) - 0.18):(part('breadth first', 'default')):(0.32):(hue(file)) \
          with boxes fill solid 1 lc rgb variable notitle, \
      for [file in tables] file \
-         using (place(file) + 0.18):(part('order of arrival, float', 'default, float')):(0.32):(hue(file)) \
+         using (place(file) + 0.18):(part('breadth first, float', 'default, float')):(0.32):(hue(file)) \
          with boxes fill empty lw 1.5 lc rgb variable notitle, \
      1 with lines lc '#777777' dt 2 notitle, \
      keyentry with boxes fill solid 1 lc '#444444' title 'double', \

@@ -17,7 +17,7 @@ set key outside right center reverse Left spacing 1.3 samplen 2
 set style data linespoints
 set pointsize 0.6
 
-# What fits into one tick of a haptic loop.
+# The duration of one tick of a haptic loop.
 set arrow from graph 0, first 1000 to graph 1, first 1000 nohead dt 2 lc '#999999'
 set label '1 kHz' at graph 0.01, first 1000 offset 0, 0.6 textcolor '#777777' font ',11'
 

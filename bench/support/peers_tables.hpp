@@ -7,15 +7,15 @@
 
 #include "table.hpp"
 
-/// The tables of what was measured beside others.
+/// The tables of the comparisons with other libraries.
 namespace bench {
 
-/// One question to all trees, or one thing done to them.
-inline void add_question(std::vector<Row>& rows, const std::string& title, const std::string& question,
-                         const std::vector<std::pair<std::string, std::string>>& trees) {
-    const std::string first = question + "/double";
+/// One query or operation, for all trees.
+inline void add_query(std::vector<Row>& rows, const std::string& title, const std::string& query,
+                      const std::vector<std::pair<std::string, std::string>>& trees) {
+    const std::string first = query + "/double";
     rows.push_back({title + ", double", first});
-    for (const auto& [name, tree] : trees) rows.push_back({"  " + name, question + "/" + tree, Row::gain, first});
+    for (const auto& [name, tree] : trees) rows.push_back({"  " + name, query + "/" + tree, Row::gain, first});
 }
 
 inline Table peers_tree_table() {
@@ -25,17 +25,17 @@ inline Table peers_tree_table() {
     const Trees with_refit{{"float", "float"}, {"Embree", "embree"}, {"FCL", "fcl"}};
     Table table{.topic = "peers_tree",
                 .key = "peers_tree",
-                .title = "Our tree, and how many times as fast others are; queries near a sphere",
+                .title = "Our tree, and the speed of others relative to it; queries near a sphere",
                 .rows = {},
                 .column = "triangles",
                 .columns = {1'280, 81'920, 1'310'720}};
-    add_question(table.rows, "closest, along a path", "path", all);
-    add_question(table.rows, "closest, at random", "random", all);
-    add_question(table.rows, "triangles in a ball", "sphere", all);
-    add_question(table.rows, "first hit of a segment", "segment", with_rays);
-    add_question(table.rows, "build", "build", all);
-    add_question(table.rows, "refit of all", "refit", with_refit);
-    table.rows.push_back({"contact, asked of our tree", "contact/tree"});
+    add_query(table.rows, "closest, along a path", "path", all);
+    add_query(table.rows, "closest, at random", "random", all);
+    add_query(table.rows, "triangles in a ball", "sphere", all);
+    add_query(table.rows, "first hit of a segment", "segment", with_rays);
+    add_query(table.rows, "build", "build", all);
+    add_query(table.rows, "refit of all", "refit", with_refit);
+    table.rows.push_back({"contact, by our tree", "contact/tree"});
     table.rows.push_back({"  by the tracker", "contact/tracker", Row::gain, "contact/tree"});
     table.rows.push_back({"  a triangle touched", "contact/tracker", Row::each, "touched"});
     table.rows.push_back({"  triangles touched", "contact/tracker", Row::counter, "touched", ""});
@@ -44,7 +44,7 @@ inline Table peers_tree_table() {
 
 inline Table peers_sweep_table() {
     const auto row = [](const std::string& name, const std::string& benchmark) {
-        return Row{name, benchmark, Row::each, "visits"};
+        return Row{name, benchmark, Row::each, "vertex_updates"};
     };
     return {.topic = "peers_sweep",
             .key = "peers_sweep",
@@ -98,7 +98,7 @@ inline Table peers_rest_table() {
 inline Table peers_distmesh_table() {
     Table table{.topic = "peers_distmesh",
                 .key = "peers_distmesh",
-                .title = "A mesh of a signed distance, and how many times as fast CGAL's mesher is; angles in degrees",
+                .title = "A mesh of a signed distance, and the relative speed of CGAL's mesher; angles in degrees",
                 .rows = {},
                 .column = "thousandths",
                 .columns = {200, 100}};
@@ -106,12 +106,12 @@ inline Table peers_distmesh_table() {
         const std::string ours = body + "/ours", theirs = body + "/cgal";
         table.rows.push_back({body, ours});
         table.rows.push_back({"  CGAL", theirs, Row::gain, ours});
-        for (const auto& [who, benchmark] : {std::pair<std::string, std::string>{"", ours}, {", CGAL", theirs}}) {
-            table.rows.push_back({"  smallest angle" + who, benchmark, Row::counter, "smallest_angle", ""});
-            table.rows.push_back({"  mean smallest" + who, benchmark, Row::counter, "mean_smallest_angle", ""});
-            table.rows.push_back({"  even edges, %" + who, benchmark, Row::percent, "even_edges", ""});
-            table.rows.push_back({"  mean edge" + who, benchmark, Row::counter, "mean_edge", ""});
-            table.rows.push_back({"  vertices" + who, benchmark, Row::counter, "vertices", ""});
+        for (const auto& [suffix, benchmark] : {std::pair<std::string, std::string>{"", ours}, {", CGAL", theirs}}) {
+            table.rows.push_back({"  smallest angle" + suffix, benchmark, Row::counter, "smallest_angle", ""});
+            table.rows.push_back({"  mean smallest" + suffix, benchmark, Row::counter, "mean_smallest_angle", ""});
+            table.rows.push_back({"  even edges, %" + suffix, benchmark, Row::percent, "even_edges", ""});
+            table.rows.push_back({"  mean edge" + suffix, benchmark, Row::counter, "mean_edge", ""});
+            table.rows.push_back({"  vertices" + suffix, benchmark, Row::counter, "vertices", ""});
         }
     }
     return table;

@@ -16,7 +16,7 @@ set key bottom right reverse Left spacing 1.1 samplen 2 font ',12'
 set style data linespoints
 set pointsize 0.6
 
-# What fits into one tick of a haptic loop.
+# The duration of one tick of a haptic loop.
 set arrow from graph 0, first 1000 to graph 1, first 1000 nohead dt 2 lc '#999999'
 set label '1 kHz' at graph 0.9, first 1000 offset 0, 0.6 textcolor '#777777' font ',11'
 

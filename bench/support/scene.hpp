@@ -36,23 +36,23 @@ inline constexpr double stiffness = 40;     // of its springs [N/m]
 inline constexpr double foundation = 8;     // stiffness of the volume springs [N/m]
 inline constexpr double depth = 1e-3;       // of the tool's press [m]
 inline constexpr double tick = 1e-3;        // [s]
-inline constexpr Index ticks_around = 600;  // that the tool takes to come round
+inline constexpr Index ticks_around = 600;  // of one turn of the tool
 
-/// Ends the program: what was about to be measured is wrong.
+/// If `right` is false, ends the program: a wrong result would be measured.
 inline void require(bool right, const char* what) {
     if (right) return;
     std::fprintf(stderr, "error: wrong result: %s\n", what);
     std::abort();
 }
 
-/// The icosphere with so many vertices.
+/// The icosphere with this number of vertices.
 [[nodiscard]] inline membrane::TriangleMesh<double> sphere(std::int64_t vertices) {
     Index subdivisions = 0;
     while (10 * (std::int64_t{1} << 2 * subdivisions) + 2 < vertices) ++subdivisions;
     return membrane::icosphere<double>({.radius = radius, .subdivisions = subdivisions});
 }
 
-/// The same with points of this scalar.
+/// The icosphere with points of this scalar.
 template <membrane::Real Scalar>
 [[nodiscard]] membrane::TriangleMesh<Scalar> sphere_of(std::int64_t vertices) {
     const auto mesh = sphere(vertices);
@@ -65,19 +65,19 @@ inline void sizes(benchmark::internal::Benchmark* measured) {
     for (const int vertices : {162, 642, 2562, 10242}) measured->Arg(vertices);
 }
 
-/// The same for what is measured frame by frame: a third of the way round.
+/// The sizes for a measurement frame by frame: a third of a turn.
 inline void sizes_around(benchmark::internal::Benchmark* measured) {
     sizes(measured);
     measured->Iterations(ticks_around / 3)->UseManualTime();
 }
 
-/// A tool by its shape, and where it is: some ticks straight in, then around and around.
+/// A tool by its shape, and its trajectory: `ticks_in` straight in, then around the pole.
 struct Path {
     static constexpr Index ticks_in = 100;
 
     double tool_radius = 2e-3;  ///< [m]
     double shaft = 0;           ///< its length, zero for a sphere [m]
-    double scale = 1;           ///< of tool, press and way: 1/2 is the same, seen by a mesh of half the edges
+    double scale = 1;           ///< of tool, depth and trajectory: 1/2 suits a mesh of half the edge length
 
     friend auto operator<=>(const Path&, const Path&) = default;
 
@@ -104,13 +104,13 @@ struct Path {
 
 enum class Stage { contact, solve, refit, normals, force };
 
-/// The loop of the README, its stages one by one, with a tool that goes a way like `Path`.
-template <membrane::Real Scalar, class Rule = membrane::BlockStep, class Way = Path>
+/// The loop of the README, its stages one by one, with a tool on a trajectory like `Path`.
+template <membrane::Real Scalar, class Rule = membrane::BlockStep, class Trajectory = Path>
 struct LoopOf {
-    explicit LoopOf(std::int64_t vertices, const Way& displacement = {},
+    explicit LoopOf(std::int64_t vertices, const Trajectory& trajectory = {},
                     const membrane::SolverOptions<Scalar>& options = usual(),
-                    Index ticks = Way::ticks_in + ticks_around)
-        : path(displacement), mesh(sphere_of<Scalar>(vertices)), solver(network, options) {
+                    Index ticks = Trajectory::ticks_in + ticks_around)
+        : path(trajectory), mesh(sphere_of<Scalar>(vertices)), solver(network, options) {
         while (now < ticks) frame();
     }
 
@@ -121,7 +121,7 @@ struct LoopOf {
         frame([](Stage, auto work) { work(); });
     }
 
-    /// One frame, each stage by the hands of `run(stage, work)`.
+    /// One frame; `run(stage, work)` executes each stage.
     template <class Run>
     void frame(Run run) {
         tool = path.template at<Scalar>(now++);
@@ -130,15 +130,15 @@ struct LoopOf {
         run(Stage::refit, [&] { tree.refit(x, report.moved); });
         run(Stage::normals, [&] { normals.update(x, report.moved); });
         run(Stage::force, [&] { force = feel({tool, contact, report}); });
-        pressing =
-            pressing && report.status == membrane::StepStatus::advanced && (now < Way::ticks_in || contact.touching());
+        pressing = pressing && report.status == membrane::StepStatus::advanced &&
+                   (now < Trajectory::ticks_in || contact.touching());
     }
 
-    /// Requires that the tool has pressed all the way, that nothing lags behind the positions, and that the membrane
-    /// pushes back.
+    /// Requires that the tool was in contact since `ticks_in`, that normals and tree match the positions, and that the
+    /// reaction is outward.
     void check() const;
 
-    Way path;
+    Trajectory path;
     Index now = 0;  // ticks
     membrane::TriangleMesh<Scalar> mesh;
     membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network{mesh, {}, {.stiffness = Scalar(stiffness)}};
@@ -159,14 +159,14 @@ struct LoopOf {
 
 using Loop = LoopOf<double>;
 
-/// The loop with the tool pressed in after its first way around; made once.
+/// The loop with the tool pressed in after its first turn; made once.
 [[nodiscard]] inline const Loop& pressed(std::int64_t vertices, const Path& path = {}) {
     static std::map<std::pair<std::int64_t, Path>, Loop> made;
     return made.try_emplace({vertices, path}, vertices, path).first->second;
 }
 
-/// Time that `work` takes, less what reading the clocks takes [s]: by the wall clock, or by the processor's own where
-/// somebody else has had the processor meanwhile.
+/// Time that `work` takes, less the time to read the clocks [s]: the smaller of wall clock and processor time, so that
+/// other processes do not count.
 template <class Work>
 [[nodiscard]] double seconds(Work work) {
     const auto read = [](clockid_t clock) {
@@ -182,18 +182,18 @@ template <class Work>
         return std::pair(wall_end - wall, read(CLOCK_THREAD_CPUTIME_ID) - cpu);
     };
     static const auto reading = [&] {
-        std::pair least(1.0, 1.0);
+        std::pair shortest(1.0, 1.0);
         for (int i = 0; i < 1000; ++i) {
             const auto [wall, cpu] = both([] {});
-            least = {std::min(least.first, wall), std::min(least.second, cpu)};
+            shortest = {std::min(shortest.first, wall), std::min(shortest.second, cpu)};
         }
-        return least;
+        return shortest;
     }();
     const auto [wall, cpu] = both(work);
     return std::max(std::min(wall - reading.first, cpu - reading.second), 0.0);
 }
 
-/// The processor's own time for this thread [s], whoever else has had the processor meanwhile.
+/// The processor time of this thread [s], without that of other processes.
 struct ProcessorSeconds {
     double operator()() const noexcept {
         std::timespec time;
@@ -216,7 +216,7 @@ inline void measure_stage(benchmark::State& state, Loop loop, Stage part) {
     loop.check();
 }
 
-/// Points between half a tool inside the sphere and half a tool outside, the same every time.
+/// Points within 0.87 to 1.13 radii of the centre, equal in every run.
 [[nodiscard]] inline std::vector<Vector3> points_near(std::size_t count) {
     std::mt19937_64 engine(20071101);
     const auto number = [&](double low, double high) {
@@ -232,7 +232,7 @@ inline void measure_stage(benchmark::State& state, Loop loop, Stage part) {
     return points;
 }
 
-/// The nearest point by trying every triangle.
+/// The nearest point by brute force over all triangles.
 template <membrane::Real Scalar>
 [[nodiscard]] membrane::TrianglePoint<Scalar> closest_of_all(const membrane::TriangleMesh<Scalar>& mesh,
                                                              const membrane::Points<Scalar>& x,
@@ -245,12 +245,12 @@ template <membrane::Real Scalar>
     return best;
 }
 
-template <membrane::Real Scalar, class Rule, class Way>
-void LoopOf<Scalar, Rule, Way>::check() const {
+template <membrane::Real Scalar, class Rule, class Trajectory>
+void LoopOf<Scalar, Rule, Trajectory>::check() const {
     const membrane::Vector3<Scalar>& reaction = report.reactions[0];
-    require(pressing, "the tool has lost the membrane, or a step was refused");
-    require(report.residual < membrane::norm(reaction) / 2, "the forces must nearly balance");
-    require(reaction.dot(tool.position) > 0 && force.dot(tool.position) > 0, "the membrane must push back");
+    require(pressing, "the tool has lost contact, or a step was refused");
+    require(report.residual < membrane::norm(reaction) / 2, "the residual must be below half the reaction");
+    require(reaction.dot(tool.position) > 0 && force.dot(tool.position) > 0, "the reaction must be outward");
     membrane::VertexNormals<Scalar> anew(mesh);
     anew.update(x);
     require(normals.values() == anew.values(), "normals of the moved vertices");

@@ -10,7 +10,8 @@
 
 #include "scene.hpp"
 
-/// A tool that is pressed in and slides along a great circle, and the force on it if a tick had all the time it wants.
+/// A tool that is pressed in and slides along a great circle, and the reference force of each tick, without a time
+/// limit.
 ///
 ///     SlidingLoop<double> loop(642, {}, {.layers = 6, .sweeps = 2}, 0);
 ///     for (Index t = 0; t < Slide::ticks; ++t) loop.frame();
@@ -18,14 +19,14 @@ namespace bench {
 
 using membrane::Real;
 
-/// Straight in at one place, then along.
+/// Straight in at one point, then along a great circle.
 struct Slide {
     static constexpr Index ticks_in = 60, ticks = ticks_in + 240;
-    static constexpr Index first_measured = 80;  // the press and what it leaves are over
+    static constexpr Index first_measured = 80;  // the transient of the press is over
     static constexpr double speed = 0.05;        // [m/s]
 
     double tool_radius = 2e-3;  ///< zero for a point [m]
-    double shaft = 0;           ///< its length, across the way; zero for a sphere [m]
+    double shaft = 0;           ///< its length, across the motion; zero for a sphere [m]
 
     [[nodiscard]] static Vector3 start() { return Vector3(0.31, 0.17, 0.93).normalized(); }
     [[nodiscard]] static Vector3 along() {
@@ -43,26 +44,26 @@ struct Slide {
                 .time = static_cast<Scalar>(tick * t)};
     }
 
-    /// The middle of the tool, from -1, where it begins to press [m].
+    /// The middle of the tool [m]; the press begins at t = -1.
     [[nodiscard]] Vector3 position(Index t) const {
         const double pressed = depth * std::min(t + 1, ticks_in) / ticks_in;
-        const double displacement = std::max(t - ticks_in + 1, 0) * speed * tick / radius;
-        return (radius + tool_radius - pressed) * (std::cos(displacement) * start() + std::sin(displacement) * along());
+        const double angle = std::max(t - ticks_in + 1, 0) * speed * tick / radius;
+        return (radius + tool_radius - pressed) * (std::cos(angle) * start() + std::sin(angle) * along());
     }
 };
 
 template <Real Scalar>
 using SlidingLoop = LoopOf<Scalar, membrane::BlockStep, Slide>;
 
-/// What a step with so many layers and sweeps feels in each measured tick.
+/// The reaction in each measured tick, by a step with many layers and sweeps.
 struct Reference {
     static constexpr membrane::SolverOptions<double> options{.layers = 40, .sweeps = 200};
 
     std::vector<Vector3> forces;  ///< [N]
-    double rms = 0, largest = 0;  ///< of their sizes [N]
+    double rms = 0, largest = 0;  ///< of their norms [N]
 };
 
-/// Of a mesh of so many vertices; found once: of 40,962 that takes some minutes.
+/// The reference for a mesh of this number of vertices; computed once: some minutes for 40,962.
 [[nodiscard]] inline const Reference& reference_of(std::int64_t vertices) {
     static std::map<std::int64_t, Reference> known;
     Reference& reference = known[vertices];

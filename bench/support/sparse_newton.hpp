@@ -12,14 +12,14 @@
 
 namespace bench {
 
-/// Newton's method with sparse factors, as one would write it for linear springs and volume springs: the vertices in
-/// `moving` go, the others stay where they are.
+/// Newton's method with sparse factors for linear springs and volume springs: the vertices in `moving` are free, the
+/// others fixed.
 ///
 ///     SparseNewton newton(network, volume, moving);
 ///     while (...) newton.step(x);
 ///
-/// What short springs push across is left out of the second derivatives, so that they are positive definite. The matrix
-/// has all its places from the start, and its factors their pattern.
+/// The Hessian omits the negative transverse stiffness of compressed springs, so that it is positive definite. The
+/// sparsity pattern of the matrix and of its factors is fixed.
 class SparseNewton {
   public:
     using Network = membrane::MassSpringNetwork<double, membrane::LinearSpring>;
@@ -33,11 +33,11 @@ class SparseNewton {
           force_(3 * static_cast<Index>(moving_.size())),
           matrix_(force_.size(), force_.size()) {
         for (std::size_t i = 0; i < moving_.size(); ++i) row_of(moving_[i]) = 3 * static_cast<Index>(i);
-        std::vector<Eigen::Triplet<double>> places;
+        std::vector<Eigen::Triplet<double>> entries;
         const auto add_block = [&](Index row, Index column) {
             if (row < 0 || column < 0) return;
             for (int i = 0; i < 3; ++i) {
-                for (int k = 0; k < 3; ++k) places.emplace_back(row + i, column + k, 0.0);
+                for (int k = 0; k < 3; ++k) entries.emplace_back(row + i, column + k, 0.0);
             }
         };
         for (const Index v : moving_) add_block(row_of(v), row_of(v));
@@ -45,7 +45,7 @@ class SparseNewton {
             add_block(row_of(spring.first), row_of(spring.second));
             add_block(row_of(spring.second), row_of(spring.first));
         }
-        matrix_.setFromTriplets(places.begin(), places.end());
+        matrix_.setFromTriplets(entries.begin(), entries.end());
         for (const auto& spring : network.springs()) {
             const Index a = row_of(spring.first), b = row_of(spring.second);
             if (a >= 0 || b >= 0)
@@ -54,7 +54,7 @@ class SparseNewton {
         analyse();
     }
 
-    /// Finds the order of the factors and their places.
+    /// Computes the order and the pattern of the factors.
     void analyse() { factors_.analyzePattern(matrix_); }
 
     /// One iteration.
@@ -69,25 +69,25 @@ class SparseNewton {
   private:
     using Block = Eigen::Map<Eigen::Matrix3d, 0, Eigen::OuterStride<>>;
 
-    struct Place {
+    struct BlockLocation {
         Eigen::Index first = -1, stride = 0;
     };
     struct Joint {
         membrane::Spring<double> spring;
-        Index row_a, row_b;  // -1: the vertex stays
-        Place aa, bb, below;
+        Index row_a, row_b;  // -1: the vertex is fixed
+        BlockLocation aa, bb, below;
     };
 
     [[nodiscard]] Index& row_of(Index v) { return row_[static_cast<std::size_t>(v)]; }
 
-    /// Of the 3 x 3 block that begins in this row and column.
-    [[nodiscard]] Place block(Index row, Index column) {
+    /// Location of the 3 x 3 block that begins in this row and column.
+    [[nodiscard]] BlockLocation block(Index row, Index column) {
         if (row < 0 || column < 0) return {};
         const auto* starts = matrix_.outerIndexPtr();
         return {&matrix_.coeffRef(row, column) - matrix_.valuePtr(), starts[column + 1] - starts[column]};
     }
-    void add(const Place& place, const Eigen::Matrix3d& what) {
-        if (place.first >= 0) Block(matrix_.valuePtr() + place.first, Eigen::OuterStride<>(place.stride)) += what;
+    void add(const BlockLocation& at, const Eigen::Matrix3d& added) {
+        if (at.first >= 0) Block(matrix_.valuePtr() + at.first, Eigen::OuterStride<>(at.stride)) += added;
     }
 
     void assemble(const Points& x) {
@@ -99,15 +99,15 @@ class SparseNewton {
         }
         for (const Joint& joint : springs_) {
             const auto& spring = joint.spring;
-            const Vector3 reach = x.col(spring.second) - x.col(spring.first);
-            const double length = reach.norm(), tension = spring.stiffness * (length - spring.rest_length);
-            const Vector3 along = reach / length;
+            const Vector3 edge = x.col(spring.second) - x.col(spring.first);
+            const double length = edge.norm(), tension = spring.stiffness * (length - spring.rest_length);
+            const Vector3 along = edge / length;
             const double across = std::max(tension / length, 0.0);
-            const Eigen::Matrix3d curvature =
+            const Eigen::Matrix3d hessian =
                 (spring.stiffness - across) * along * along.transpose() + across * Eigen::Matrix3d::Identity();
-            add(joint.aa, curvature);
-            add(joint.bb, curvature);
-            add(joint.below, -curvature);
+            add(joint.aa, hessian);
+            add(joint.bb, hessian);
+            add(joint.below, -hessian);
             if (joint.row_a >= 0) force_.segment<3>(joint.row_a) += tension * along;
             if (joint.row_b >= 0) force_.segment<3>(joint.row_b) -= tension * along;
         }

@@ -1,9 +1,9 @@
-# Run in the folder of the stability tables: which part of 200 scenes diverges, by rule and time step.
+# Run in the folder of the stability tables: fraction of 200 scenes that diverge, by rule and time step.
 set terminal svg size 900,400 font 'Helvetica,Arial,sans-serif,13' background '#ffffff'
 set output 'stability.svg'
 set datafile separator tab
 set datafile columnheaders
-set multiplot layout 1,2 title 'Which part of 200 membranes diverges' font ',15'
+set multiplot layout 1,2 title 'Fraction of 200 membranes that diverge' font ',15'
 set yrange [-4:104]
 set ytics nomirror 0, 25, 100
 set grid lc '#d8d8d8' lw 0.7
@@ -26,7 +26,7 @@ plot for [i = 1:6] 'stability_dt.tsv' using (column('dt') / 100):(column(word(na
 unset logscale x
 unset ylabel
 unset key
-set xlabel 'dt, as a part of the limit that theory gives the scene'
+set xlabel 'dt, relative to the theoretical limit of the scene'
 set xrange [0.795:1.305]
 set xtics nomirror 0.8, 0.1, 1.3
 set arrow from 1, graph 0 to 1, graph 1 nohead dt 2 lc '#999999'

@@ -13,8 +13,8 @@
 
 #include "scene.hpp"
 
-/// A tool of 3 mm on a sphere of 10 mm, 1.5 mm deep, played with one setting of the solver after the other: what a tick
-/// takes, and how far its force is from that of the tick's equilibrium.
+/// A tool of 3 mm on a sphere of 10 mm, 1.5 mm deep, run with one setting of the solver after the other: the time of a
+/// tick, and the error of its force against that of the tick's equilibrium.
 ///
 ///     const auto outcome = play<double>({"slide", 642, 0.1}, {.layers = 3}, membrane::BlockStep{});
 ///     record(state, outcome);
@@ -24,7 +24,8 @@ using membrane::Real;
 
 inline constexpr double wide_tool = 3e-3, deep = 1.5e-3;  // radius and depth [m]
 
-/// A scene by its name, `slide`, `put_down` or `draw_out`, on so many vertices, its foundation a part of the springs.
+/// A scene by its name, `slide`, `put_down` or `draw_out`, its number of vertices, and its foundation stiffness over
+/// the spring stiffness, `part`.
 struct Place {
     std::string scene;
     int vertices;
@@ -45,14 +46,14 @@ struct Place {
     const Vector3 along = membrane::cross<double>(start, across);
     std::vector<membrane::Tool<double>> tools;
     for (Index t = 1; t <= ticks_in + ticks_along; ++t) {
-        const double displacement = speed * tick * std::max(t - ticks_in, 0) / radius;
+        const double angle = speed * tick * std::max(t - ticks_in, 0) / radius;
         const double from_centre = radius + wide_tool - deep * std::min(t, ticks_in) / ticks_in;
-        tools.push_back(wide_tool_at(from_centre * (std::cos(displacement) * start + std::sin(displacement) * along)));
+        tools.push_back(wide_tool_at(from_centre * (std::cos(angle) * start + std::sin(angle) * along)));
     }
     return tools;
 }
 
-/// All the way in at once here and there, for three ticks each time.
+/// At full depth in the first tick, at eight points, for three ticks each.
 [[nodiscard]] inline std::vector<membrane::Tool<double>> put_down() {
     constexpr int presses = 8, ticks_each = 3;
     std::vector<membrane::Tool<double>> tools;
@@ -64,7 +65,7 @@ struct Place {
     return tools;
 }
 
-/// Forceps take hold of the surface, draw it out by 1.5 mm within 30 ticks, and go along at 25 mm/s.
+/// Forceps grasp the surface, draw it out by 1.5 mm within 30 ticks, and move along at 25 mm/s.
 [[nodiscard]] inline std::vector<membrane::Tool<double>> draw_out() {
     constexpr Index ticks_out = 30, ticks_along = 60;
     constexpr double tip = 5e-4, out = 1.5e-3, speed = 0.025;  // [m], [m/s]
@@ -78,7 +79,7 @@ struct Place {
     return tools;
 }
 
-/// What is played.
+/// Membrane and stroke of a scene.
 template <Real Scalar>
 struct StrokeScene {
     explicit StrokeScene(const Place& place, double mass = 1)
@@ -104,15 +105,15 @@ struct StrokeScene {
     membrane::Stroke<Scalar> stroke;
 };
 
-/// The equilibria of every sixth tick: of those down, the last ones. Found once.
-[[nodiscard]] inline const std::vector<membrane::ReferenceTick>& rests_of(const Place& place) {
+/// The equilibria of every sixth tick: in `put_down`, the last tick of each press. Computed once.
+[[nodiscard]] inline const std::vector<membrane::ReferenceTick>& references_of(const Place& place) {
     static std::map<Place, std::vector<membrane::ReferenceTick>> known;
     auto& references = known[place];
     if (!references.empty()) return references;
     const StrokeScene<double> scene(place);
-    constexpr Index every = 6;
-    references = equilibria(scene.mesh, scene.network, scene.volume, scene.stroke, every);
-    require(references.size() == static_cast<std::size_t>(scene.stroke.ticks() / every),
+    constexpr Index tick_stride = 6;
+    references = equilibria(scene.mesh, scene.network, scene.volume, scene.stroke, tick_stride);
+    require(references.size() == static_cast<std::size_t>(scene.stroke.ticks() / tick_stride),
             "all ticks have an equilibrium");
     return references;
 }
@@ -121,12 +122,12 @@ template <Real Scalar, class Rule>
 [[nodiscard]] membrane::Outcome play(const Place& place, const membrane::SolverOptions<Scalar>& options,
                                      const Rule& rule, double mass = 1) {
     const StrokeScene<Scalar> scene(place, mass);
-    return trial(scene.mesh, scene.network, scene.volume, scene.stroke, rests_of(place), options, rule,
+    return trial(scene.mesh, scene.network, scene.volume, scene.stroke, references_of(place), options, rule,
                  ProcessorSeconds{});
 }
 
-/// By (4), with the lightest mass that is stable for all of the scene, to a fiftieth: `part`, which is dt^2 stiffness /
-/// mass, begins with 0.5 and is taken down to that.
+/// By (4), with the lightest mass that is stable in the whole scene: reduces `part`, dt^2 stiffness / mass, from 0.5 in
+/// steps of 0.01 until it is.
 template <Real Scalar>
 [[nodiscard]] membrane::Outcome play_published(const Place& place, const membrane::SolverOptions<Scalar>& options,
                                                double& part) {
@@ -136,7 +137,7 @@ template <Real Scalar>
     }
 }
 
-/// For the benchmark's iteration: its time is that of a tick.
+/// Sets the benchmark's iteration time to that of a tick, and its counters to the errors.
 inline void record(benchmark::State& state, const membrane::Outcome& outcome) {
     require(outcome.advanced, "no step may be refused");
     state.SetIterationTime(outcome.time);

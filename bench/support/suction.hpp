@@ -7,14 +7,14 @@
 
 namespace bench {
 
-/// A cup that sucks: the vertices under its mouth share a force along its axis. A constraint as a user writes one.
+/// A suction cup: the vertices under its mouth share a force along its axis. An example of a user's constraint.
 ///
 ///     const auto report = solver.step(x, dt, network, foundation, Suction<double>{under, mouth, force});
 template <membrane::Real Scalar>
 struct Suction {
-    std::span<const membrane::Index> vertices;  ///< under the mouth; of the caller
+    std::span<const membrane::Index> vertices;  ///< under the mouth; the caller owns them
     membrane::Vector3<Scalar> mouth;            ///< its centre [m]
-    membrane::Vector3<Scalar> force;            ///< of all of it [N]
+    membrane::Vector3<Scalar> force;            ///< the sum over all vertices [N]
 
     [[nodiscard]] bool valid() const noexcept { return membrane::is_finite(mouth) && membrane::is_finite(force); }
     [[nodiscard]] membrane::DrivingInput<Scalar> driving_input() const noexcept {

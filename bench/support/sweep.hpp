@@ -15,13 +15,13 @@
 
 #include "scene.hpp"
 
-/// A sweep over all vertices of a mesh: in packs, and the loop one would write.
+/// A sweep over all vertices of a mesh: in packs, and as a plain loop.
 namespace bench {
 
 using membrane::Lanes;
 using membrane::Real;
 
-/// A sphere out of balance, every vertex joined to vertex 0.
+/// A sphere with random displacements from its rest shape.
 template <Real Scalar>
 struct Field {
     explicit Field(std::int64_t vertices)
@@ -45,16 +45,18 @@ struct Field {
     membrane::Points<Scalar> x = mesh.positions();
 };
 
-inline void count_visits(benchmark::State& state) { state.counters["visits"] = static_cast<double>(state.range(0)); }
+inline void count_updates(benchmark::State& state) {
+    state.counters["vertex_updates"] = static_cast<double>(state.range(0));
+}
 
-/// (4), as one would write it.
+/// (4), without SIMD.
 struct PlainMass {
     template <Real Scalar, class Springs>
     static Eigen::Matrix<Scalar, 3, 1> move(const Springs& springs, const Eigen::Matrix<Scalar, 3, 1>& from_anchor) {
         Eigen::Matrix<Scalar, 3, 1> force = -Scalar(foundation) * from_anchor;
-        springs([&](const auto& reach, Scalar stiffness, Scalar rest_length) {
-            const Scalar length = reach.norm();
-            force += stiffness * (length - rest_length) / length * reach;
+        springs([&](const auto& edge, Scalar stiffness, Scalar rest_length) {
+            const Scalar length = edge.norm();
+            force += stiffness * (length - rest_length) / length * edge;
         });
         return static_cast<Scalar>(tick * tick / 4e-4) * force;
     }
@@ -68,9 +70,9 @@ struct PlainNewton {
         Eigen::Matrix<Scalar, 3, 1> force = -Scalar(foundation) * from_anchor;
         Matrix3 dyads = Matrix3::Zero();
         Scalar sum = Scalar(foundation), trace = 0, size = std::numeric_limits<Scalar>::max();
-        springs([&](const auto& reach, Scalar stiffness, Scalar rest_length) {
-            const Scalar length = reach.norm();
-            const Eigen::Matrix<Scalar, 3, 1> direction = reach / length;
+        springs([&](const auto& edge, Scalar stiffness, Scalar rest_length) {
+            const Scalar length = edge.norm();
+            const Eigen::Matrix<Scalar, 3, 1> direction = edge / length;
             force += stiffness * (length - rest_length) * direction;
             const Scalar part = stiffness * std::min(rest_length / length, Scalar(1));
             dyads.noalias() += (part * direction).lazyProduct(direction.transpose());
@@ -78,15 +80,15 @@ struct PlainNewton {
             sum += stiffness;
             size = std::min(size, length);
         });
-        const Scalar longest = force.norm() / (sum * size), slack = 1 - trace / sum - longest;
-        const Scalar rho = (std::sqrt(slack * slack + 4 * longest) - slack) / 2;
-        // The relief is trace I - dyads.
+        const Scalar ratio = force.norm() / (sum * size), slack = 1 - trace / sum - ratio;
+        const Scalar rho = (std::sqrt(slack * slack + 4 * ratio) - slack) / 2;
+        // The stiffness reduction is trace I - dyads.
         const Matrix3 block = (sum - trace / (1 + rho)) * Matrix3::Identity() + dyads / (1 + rho);
         return block.inverse() * force;
     }
 };
 
-/// Vertex by vertex.
+/// A plain loop, vertex by vertex.
 template <Real Scalar, class Rule>
 void plain(benchmark::State& state) {
     struct End {
@@ -107,8 +109,8 @@ void plain(benchmark::State& state) {
             const auto at = static_cast<std::size_t>(v);
             const auto springs = [&](const auto& add) {
                 for (std::size_t e = row[at]; e < row[at + 1]; ++e) {
-                    const Eigen::Matrix<Scalar, 3, 1> reach = x.col(ends[e].other) - x.col(v);
-                    add(reach, ends[e].stiffness, ends[e].rest_length);
+                    const Eigen::Matrix<Scalar, 3, 1> edge = x.col(ends[e].other) - x.col(v);
+                    add(edge, ends[e].stiffness, ends[e].rest_length);
                 }
             };
             x.col(v) += Rule::template move<Scalar>(springs, x.col(v) - anchor.col(v));
@@ -116,10 +118,10 @@ void plain(benchmark::State& state) {
         benchmark::DoNotOptimize(x.data());
     }
     require(membrane::is_finite(x), "the plain loop must not diverge");
-    count_visits(state);
+    count_updates(state);
 }
 
-/// In packs, as a step does it beyond layer 0.
+/// In packs, as in a step beyond layer 0.
 template <Real Scalar, class Rule>
 void packs(benchmark::State& state) {
     Field<Scalar> field(state.range(0));
@@ -132,7 +134,7 @@ void packs(benchmark::State& state) {
     queue.group(field.network);
     membrane::PackedVertices<Scalar> packed(field.network);
     packed.assign(queue.vertices(), queue.colour_ends(), field.network);
-    require(packed.size() == static_cast<std::size_t>(state.range(0)), "all vertices have room in the packs");
+    require(packed.size() == static_cast<std::size_t>(state.range(0)), "the packs must have capacity for all vertices");
     packed.begin_step(scene);
     for (auto _ : state) {
         for (std::size_t p = 0, end = 0; p < packed.count(); p = end) {
@@ -142,7 +144,7 @@ void packs(benchmark::State& state) {
         }
     }
     require(membrane::is_finite(membrane::Points<Scalar>(now)), "the sweep must not diverge");
-    count_visits(state);
+    count_updates(state);
     state.counters["filled"] =
         static_cast<double>(packed.size()) / static_cast<double>(packed.count() * Lanes<Scalar>::count);
 }

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-/// What a table of the report is made of.
+/// The tables of the report.
 namespace bench {
 
 /// One line of a table: a benchmark in all columns.
@@ -13,7 +13,8 @@ struct Row {
 
     std::string name, benchmark;
     Kind kind = time;
-    std::string other = {};  ///< share, gain: the benchmark it is set against; the last three: a counter of its own
+    std::string other =
+        {};  ///< share, gain: the benchmark to compare with; each, counter, percent: a counter of this one
     std::string unit = "s";
 };
 
@@ -22,7 +23,7 @@ struct Table {
     std::vector<Row> rows;
     std::string column = "vertices";
     std::vector<int> columns = {162, 642, 2562, 10242};
-    std::string scene = {};  ///< what is the same in all columns
+    std::string scene = {};  ///< end of the benchmark's name in all columns
 };
 
 }  // namespace bench

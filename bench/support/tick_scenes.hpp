@@ -17,10 +17,10 @@
 #include "slide.hpp"
 #include "suction.hpp"
 
-/// The loop with other tools, networks, rules, bodies: what a tick of each takes.
+/// The loop with other tools, networks, rules and bodies, to measure a tick of each.
 ///
 ///     CapsuleTool scene(sphere(2562));
-///     scene.aim(t);                                                        // where the tool is, outside of what is timed
+///     scene.aim(t);                                                        // sets the tool, not timed
 ///     scene.frame();                                                       // one tick
 namespace bench {
 
@@ -29,11 +29,10 @@ using LinearNetwork = membrane::MassSpringNetwork<double, membrane::LinearSpring
 
 [[nodiscard]] inline LinearNetwork linear_network(const Mesh& mesh) { return {mesh, {}, {.stiffness = stiffness}}; }
 
-/// All parts of one membrane and the usual tool. Other scenes aim otherwise, or have a tick of their own.
+/// All parts of one membrane and the usual tool. Other scenes replace `aim` or `frame`.
 template <class Network = LinearNetwork, class Rule = membrane::BlockStep>
 struct Membrane {
-    Membrane(const Mesh& on, const Network& of, const Slide& displacement = {})
-        : slide(displacement), mesh(on), network(of) {}
+    Membrane(const Mesh& on, const Network& of, const Slide& path = {}) : slide(path), mesh(on), network(of) {}
 
     void aim(Index t) { tool = slide.at<double>(t); }
 
@@ -42,13 +41,13 @@ struct Membrane {
         finish(solver.step(x, tick, network, volume, press(tool, contact)));
     }
 
-    /// Whether something pushes or pulls back.
+    /// Whether a reaction is not zero.
     [[nodiscard]] bool felt() const {
         return std::any_of(report.reactions.begin(), report.reactions.end(),
                            [](const Vector3& reaction) { return !reaction.isZero(0); });
     }
 
-    /// What a tick ends with: the boxes and normals of what moved, and the force.
+    /// The end of a tick: boxes and normals of the moved vertices, and the force.
     void finish(const membrane::StepReport<double>& done, const membrane::Grasp<double>& grasp = {}) {
         report = done;
         tree.refit(x, report.moved);
@@ -73,12 +72,12 @@ struct Membrane {
     Vector3 force = Vector3::Zero();
 };
 
-/// What the others are set against.
+/// The scene that the others are compared with.
 struct SphereScene : Membrane<> {
     explicit SphereScene(const Mesh& on) : Membrane(on, linear_network(on)) {}
 };
 
-/// The second presses and slides on the other side of the body.
+/// A second tool presses and slides on the other side of the body.
 struct TwoTools : SphereScene {
     using SphereScene::SphereScene;
 
@@ -104,7 +103,7 @@ struct TwoTools : SphereScene {
     Vector3 second_force = Vector3::Zero();
 };
 
-/// A shaft of 5 mm that lies on the membrane and slides to its side.
+/// A shaft of 5 mm that lies on the membrane and slides sideways.
 struct CapsuleTool : Membrane<> {
     explicit CapsuleTool(const Mesh& on) : Membrane(on, linear_network(on), {.tool_radius = 5e-4, .shaft = 5e-3}) {}
 };
@@ -113,7 +112,7 @@ struct PointTool : Membrane<> {
     explicit PointTool(const Mesh& on) : Membrane(on, linear_network(on), {.tool_radius = 0}) {}
 };
 
-/// Close where they touch, draw that out by 1 mm, and move it to and fro by as much, at 50 mm/s in the middle.
+/// Forceps grasp the membrane, draw it out by 1 mm, and move it to and fro by 1 mm, at 50 mm/s in the middle.
 struct Forceps : SphereScene {
     using SphereScene::SphereScene;
 
@@ -138,7 +137,7 @@ struct Forceps : SphereScene {
     membrane::Grasper<double> grasper{mesh};
 };
 
-/// All below half the radius is pinned.
+/// All vertices below half the radius are pinned.
 struct PinnedRim : Membrane<> {
     explicit PinnedRim(const Mesh& on) : Membrane(on, {on, {}, {.stiffness = stiffness, .pinned = low_vertices(on)}}) {}
 
@@ -151,7 +150,7 @@ struct PinnedRim : Membrane<> {
     }
 };
 
-/// On a body that moves: all of the tree and of the normals goes along with it.
+/// On a body that moves: the whole tree and all normals are updated with it.
 struct OnMovingBody : SphereScene {
     using SphereScene::SphereScene;
 
@@ -168,7 +167,7 @@ struct OnMovingBody : SphereScene {
     bool moved = true;
 };
 
-/// The body turns about its centre, across the tool's way, and is not deformed.
+/// The body turns about its centre, across the tool's motion, and does not deform.
 struct TurningBody : OnMovingBody {
     using OnMovingBody::OnMovingBody;
 
@@ -189,7 +188,7 @@ struct TurningBody : OnMovingBody {
     membrane::RigidFrame<double> pose;
 };
 
-/// The body swells and shrinks by a hundredth, four times a second: every vertex is at work in every tick.
+/// The body swells and shrinks by a hundredth, four times a second: every vertex is active in every tick.
 struct BeatingBody : OnMovingBody {
     using OnMovingBody::OnMovingBody;
 
@@ -212,13 +211,13 @@ struct StiffeningLaw : Membrane<membrane::MassSpringNetwork<double, membrane::Ex
     explicit StiffeningLaw(const Mesh& on) : Membrane(on, {on, {}, {.stiffness = stiffness}}) {}
 };
 
-/// (4), its mass so large that it is stable.
+/// (4), with a mass large enough to be stable.
 struct Published : Membrane<LinearNetwork, membrane::MassStep> {
     explicit Published(const Mesh& on)
         : Membrane(on, {on, {}, {.stiffness = stiffness, .mass = tick * tick * stiffness / 0.1}}) {}
 };
 
-/// A cup of 1 mm radius that sucks with 5 kPa, in the tool's place.
+/// A suction cup of 1 mm radius and 5 kPa, in place of the tool.
 struct Cup : SphereScene {
     using SphereScene::SphereScene;
 
@@ -229,7 +228,7 @@ struct Cup : SphereScene {
         SphereScene::aim(t);
         axis = tool.position.normalized();
         tool.position = radius * axis;
-        pull_of_cup = max_force * std::min(t + 1, Slide::ticks_in) / Slide::ticks_in * axis;
+        cup_force = max_force * std::min(t + 1, Slide::ticks_in) / Slide::ticks_in * axis;
     }
 
     void frame() {
@@ -237,15 +236,15 @@ struct Cup : SphereScene {
         tree.overlap_sphere(x, tool.position, cup_radius, [&](Index f) {
             for (const Index v : mesh.triangles().col(f)) under.insert(v);
         });
-        finish(solver.step(x, tick, network, volume, Suction<double>{under.items(), tool.position, pull_of_cup}));
+        finish(solver.step(x, tick, network, volume, Suction<double>{under.items(), tool.position, cup_force}));
         force = report.reactions[0];
     }
 
     membrane::IndexSet under{mesh.vertex_count()};
-    Vector3 axis = Vector3::Zero(), pull_of_cup = Vector3::Zero();
+    Vector3 axis = Vector3::Zero(), cup_force = Vector3::Zero();
 };
 
-/// So much time that no step is cut short.
+/// A deadline that truncates no step.
 struct WithDeadline : SphereScene {
     using SphereScene::SphereScene;
 
@@ -265,7 +264,7 @@ struct WithDeadline : SphereScene {
 using BentSheet = membrane::Tissue<LinearNetwork, membrane::Elements<double, membrane::TriangularSpring<double>>,
                                    membrane::Elements<double, membrane::Hinge<double>>>;
 
-/// Triangular springs in place of the others, as stiff as a sheet of those, and bending.
+/// Triangular springs, as stiff as a sheet of the linear springs that they replace, and bending.
 struct BentTissue : Membrane<BentSheet> {
     explicit BentTissue(const Mesh& on) : Membrane(on, sheet(on)) {}
 

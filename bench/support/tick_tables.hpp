@@ -26,7 +26,7 @@ inline Table tick_table(const std::string& topic, const std::string& title) {
             add("other" + of, Row::counter, "other", "s");
             add("error, %" + of, Row::percent, "force_error", "");
             add("largest force" + of, Row::counter, "largest_force", "");
-            add("overlap, %" + of, Row::percent, "overlap", "");
+            add("penetration, %" + of, Row::percent, "penetration", "");
             add("Bullet" + of, Row::counter, "bullet", "s");
             add("Bullet / ours" + of, Row::counter, "ratio", "");
         }
@@ -59,7 +59,7 @@ inline Table tick_scenes_table(const std::string& topic, const std::string& titl
 }
 
 inline std::vector<Table> tick_tables() {
-    const std::string title = "A tick by {layers, sweeps}, and its parts; overlap in percent of an edge; ";
+    const std::string title = "A tick by {layers, sweeps}, and its parts; penetration in percent of an edge; ";
     const std::string scenes = "A tick of other scenes, double {6, 2}; ";
     std::vector<Table> tables;
     for (const auto& [topic, set] : {std::pair<std::string, std::string>{"tick", "registers of 16 bytes"},

@@ -1,9 +1,9 @@
-# Run in the folder of trade.csv: what the error of a tick's force costs. Dots: all settings; lines above: 1 to 16 sweeps
+# Run in the folder of trade.csv: time of a tick against the error of its force. Dots: all settings; lines above: 1 to 16 sweeps
 # of 3 layers, below: the Pareto fronts of the default rule.
 set terminal svg size 900,800 font 'Helvetica,Arial,sans-serif,13' background '#ffffff'
 set output 'trade.svg'
 set datafile separator comma
-set multiplot layout 2,2 title 'What accuracy costs: a tool slides at 50 mm/s, 1.5 mm deep' font ',15'
+set multiplot layout 2,2 title 'Time against accuracy: a tool slides at 50 mm/s, 1.5 mm deep' font ',15'
 set logscale xy
 set yrange [0.0001:50]
 set ytics nomirror (0.001, 0.01, 0.1, 1, 10)
@@ -13,13 +13,13 @@ set key bottom left opaque reverse Left spacing 1.2 samplen 2
 set style data linespoints
 set pointsize 0.6
 
-# Columns of the file: scene, vertices, foundation, scalar, rule, predicted, layers, sweeps, contact_iterations, time, force_error,
-# position_error, front.
+# Columns of the file: scene, vertices, foundation, scalar, rule, predicted, layers, sweeps, contact_iterations, time,
+# force_error, position_error, front.
 rows(what) = sprintf("< awk -F, '$1 == \"slide\" && %s' trade.csv", what)
 by_sweeps(what) = rows(what) . ' | sort -t , -k 8n'
 of(vertices, foundation) = sprintf('$2 == %d && $3 == %g', vertices, foundation)
-by(rule, predicted, visits) = \
-    sprintf(' && $4 == "double" && $5 == "%s" && $6 == %d && $7 == 3 && $9 == %d', rule, predicted, visits)
+by(rule, predicted, iterations) = \
+    sprintf(' && $4 == "double" && $5 == "%s" && $6 == %d && $7 == 3 && $9 == %d', rule, predicted, iterations)
 all_by(rule, predicted) = sprintf(' && $4 == "double" && $5 == "%s" && $6 == %d', rule, predicted)
 front(scalar) = sprintf(' && $4 == "%s" && $5 == "block" && $6 && $13', scalar)
 

@@ -1,9 +1,9 @@
-# Run in the folder of the threshold tables: what the tree's balance threshold does, against the default.
+# Run in the folder of the threshold tables: times by the tree's balance threshold, relative to the default.
 set terminal svg size 900,400 font 'Helvetica,Arial,sans-serif,13' background '#ffffff'
 set output 'tree.svg'
 set datafile separator tab
 set datafile columnheaders
-set multiplot layout 1,2 title "What the tree's balance threshold costs" font ',15' \
+set multiplot layout 1,2 title "Times by the tree's balance threshold" font ',15' \
     margins 0.085, 0.87, 0.16, 0.89 spacing 0.06
 set xlabel 'balance threshold'
 set logscale x 2

@@ -20,12 +20,12 @@
 
 #include "scene.hpp"
 
-/// The triangles of a mesh in our tree and in those of others, each asked the same, as far as it can be:
+/// The triangles of a mesh in our tree and in those of others, with the same queries, as far as each supports them:
 ///
 ///     Tree tree(mesh);
 ///     tree.closest(q);            // distance to the surface [m]
-///     tree.touching(q, reach);    // how many triangles are that near
-///     tree.first_hit(p, q);       // where a segment meets the surface, 0 to 1; 2 if it does not
+///     tree.touching(q, range);    // number of triangles within this distance [m]
+///     tree.first_hit(p, q);       // fraction of the segment at the hit, 0 to 1; if none, 2
 ///     tree.refit(x);              // to other positions
 ///     tree.build();               // all anew
 namespace bench {
@@ -42,9 +42,9 @@ class Ours {
     [[nodiscard]] double closest(const Vector3& q) const {
         return std::sqrt(tree_.closest_point(x_, q.cast<Scalar>()).squared_distance);
     }
-    [[nodiscard]] int touching(const Vector3& q, double reach) const {
+    [[nodiscard]] int touching(const Vector3& q, double range) const {
         int count = 0;
-        tree_.overlap_sphere(x_, q.cast<Scalar>(), static_cast<Scalar>(reach), [&](Index) { ++count; });
+        tree_.overlap_sphere(x_, q.cast<Scalar>(), static_cast<Scalar>(range), [&](Index) { ++count; });
         return count;
     }
     [[nodiscard]] double first_hit(const Vector3& p, const Vector3& q) const {
@@ -62,7 +62,7 @@ class Ours {
     membrane::AabbTree<Scalar> tree_;
 };
 
-/// Embree asks its caller about each triangle; that is answered with our own closest point.
+/// Embree calls back for each triangle; the callback uses our own closest point.
 class Embree {
   public:
     explicit Embree(const Mesh& mesh) : corners_(mesh.triangles()) {
@@ -88,7 +88,7 @@ class Embree {
     Embree(const Embree&) = delete;
     Embree& operator=(const Embree&) = delete;
 
-    /// Fast, and not as good for queries as at first; what follows is no refit.
+    /// Fast build, less good for queries than the first; later updates rebuild in place of a refit.
     void build() {
         rtcSetGeometryBuildQuality(geometry_, RTC_BUILD_QUALITY_LOW);
         commit();
@@ -101,9 +101,9 @@ class Embree {
             return true;
         });
     }
-    [[nodiscard]] int touching(const Vector3& q, double reach) {
+    [[nodiscard]] int touching(const Vector3& q, double range) {
         touched_ = 0;
-        ask(q, static_cast<float>(reach), [](RTCPointQueryFunctionArguments* asked) {
+        ask(q, static_cast<float>(range), [](RTCPointQueryFunctionArguments* asked) {
             auto* self = static_cast<Embree*>(asked->userPtr);
             if (self->distance(*asked) <= asked->query->radius) ++self->touched_;
             return false;
@@ -113,10 +113,9 @@ class Embree {
     [[nodiscard]] double first_hit(const Vector3& p, const Vector3& q) const {
         RTCIntersectContext context;
         rtcInitIntersectContext(&context);
-        const Eigen::Vector3f from = p.cast<float>(), displacement = (q - p).cast<float>();
+        const Eigen::Vector3f from = p.cast<float>(), direction = (q - p).cast<float>();
         RTCRayHit asked{};
-        asked.ray = {from.x(), from.y(), from.z(), 0, displacement.x(), displacement.y(), displacement.z(), 0,
-                     1,        ~0U,      0,        0};
+        asked.ray = {from.x(), from.y(), from.z(), 0, direction.x(), direction.y(), direction.z(), 0, 1, ~0U, 0, 0};
         asked.hit.geomID = RTC_INVALID_GEOMETRY_ID;
         rtcIntersect1(scene_, &context, &asked);
         return asked.hit.geomID == RTC_INVALID_GEOMETRY_ID ? 2 : asked.ray.tfar;
@@ -138,12 +137,12 @@ class Embree {
         const auto triangle = membrane::triangle_at(x_, corners_.col(static_cast<Index>(asked.primID)));
         return std::sqrt(membrane::closest_point<float>(triangle, q).squared_distance);
     }
-    float ask(const Vector3& q, float radius_of_query, RTCPointQueryFunction answer) {
+    float ask(const Vector3& q, float radius_of_query, RTCPointQueryFunction callback) {
         RTCPointQueryContext context;
         rtcInitPointQueryContext(&context);
         const Eigen::Vector3f at = q.cast<float>();
         RTCPointQuery query{at.x(), at.y(), at.z(), 0, radius_of_query};
-        rtcPointQuery(scene_, &query, &context, answer, this);
+        rtcPointQuery(scene_, &query, &context, callback, this);
         return query.radius;
     }
 
@@ -170,11 +169,11 @@ class Cgal {
         build();
     }
 
-    /// But for the search tree of points near which distances begin: that is made with the first of these.
+    /// Builds all but the search tree of start points for distances, which the first distance query builds.
     void build() { tree_.rebuild(triangles_.begin(), triangles_.end()); }
     [[nodiscard]] double closest(const Vector3& q) const { return std::sqrt(tree_.squared_distance(point(q))); }
-    [[nodiscard]] int touching(const Vector3& q, double reach) const {
-        Near near{point(q), reach * reach};
+    [[nodiscard]] int touching(const Vector3& q, double range) const {
+        Near near{point(q), range * range};
         tree_.traversal(near.centre, near);
         return near.count;
     }
@@ -192,15 +191,15 @@ class Cgal {
 
     static Kernel::Point_3 point(const Vector3& p) { return {p.x(), p.y(), p.z()}; }
 
-    /// Counts what a ball touches: CGAL's own spheres are hollow.
+    /// Counts the triangles that a ball touches: CGAL's own spheres are hollow.
     struct Near {
         Kernel::Point_3 centre;
-        double squared_reach;
+        double squared_range;
         int count = 0;
 
         [[nodiscard]] static bool go_further() { return true; }
         void intersection(const Kernel::Point_3&, const Primitive& primitive) {
-            if (CGAL::squared_distance(centre, primitive.datum()) <= squared_reach) ++count;
+            if (CGAL::squared_distance(centre, primitive.datum()) <= squared_range) ++count;
         }
         [[nodiscard]] bool do_intersect(const Kernel::Point_3&, const auto& node) const {
             double squared = 0;
@@ -208,7 +207,7 @@ class Cgal {
                 const double outside = std::max({node.bbox().min(k) - centre[k], centre[k] - node.bbox().max(k), 0.0});
                 squared += outside * outside;
             }
-            return squared <= squared_reach;
+            return squared <= squared_range;
         }
     };
 
@@ -216,8 +215,8 @@ class Cgal {
     CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree_;
 };
 
-/// FCL asks how far two bodies are apart, and which triangles they have in common: a ball, of hardly any size for a
-/// point. It has no rays.
+/// FCL computes the distance of two bodies, and the triangles in which they meet; a point is a ball of radius `tiny`.
+/// It has no rays.
 class Fcl {
   public:
     explicit Fcl(const Mesh& mesh) : points_(static_cast<std::size_t>(mesh.vertex_count())) {
@@ -242,8 +241,8 @@ class Fcl {
                              result) +
                tiny;
     }
-    [[nodiscard]] int touching(const Vector3& q, double reach) const {
-        const fcl::Sphered ball(reach);
+    [[nodiscard]] int touching(const Vector3& q, double range) const {
+        const fcl::Sphered ball(range);
         fcl::CollisionResultd result;
         fcl::collide(&ball, at(q), model_.get(), fcl::Transform3d::Identity(), fcl::CollisionRequestd(max_contacts),
                      result);
@@ -251,7 +250,7 @@ class Fcl {
     }
     void refit(const Points& x) {
         copy(x);
-        constexpr bool bottom_up = false;  // gives boxes that do not hold their triangles
+        constexpr bool bottom_up = false;  // would give boxes that do not contain their triangles
         model_->beginReplaceModel();
         model_->replaceSubModel(points_);
         model_->endReplaceModel(true, bottom_up);
@@ -273,8 +272,8 @@ class Fcl {
     std::unique_ptr<Model> model_;
 };
 
-/// Bullet's shape of a mesh that does not deform, for rays only; in millimetres, for its boxes of 16 bits have a margin
-/// of one unit.
+/// Bullet's shape of a mesh that does not deform, for rays only; in millimetres, because its boxes of 16 bits have a
+/// margin of one unit.
 class Bullet {
   public:
     explicit Bullet(const Mesh& mesh)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Press a membrane with a Touch or another device of the OpenHaptics family, and feel it. Needs the vendor's SDK.
+// Press a membrane with a device of the OpenHaptics family, such as the Touch, and feel it. Needs the vendor's SDK.
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -27,7 +27,8 @@ void press(const examples::Specimen& body, const std::string& name, double secon
     auto x = mesh.positions();
     std::uint64_t solves = 0;
 
-    // 5 cm of the hand are the membrane's size. The middle of the device's workspace is just above it, "up" is outward.
+    // 5 cm of the hand correspond to the membrane's size. The middle of the device's workspace is just above it, "up"
+    // is outward.
     membrane::DeviceScale scale{.motion = body.size / 0.05};
     scale.device.rotation =
         Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitY(), body.outward).toRotationMatrix();
@@ -43,7 +44,7 @@ void press(const examples::Specimen& body, const std::string& name, double secon
         return examples::Answer{feel({tool, contact, report}), solves};
     });
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
-    while (device.running() && std::chrono::steady_clock::now() < end) {  // here one would draw
+    while (device.running() && std::chrono::steady_clock::now() < end) {  // drawing goes here
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     device.stop();

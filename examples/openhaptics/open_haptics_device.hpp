@@ -23,18 +23,19 @@
 namespace examples {
 
 struct OpenHapticsOptions {
-    std::string name = {};               ///< Of the device, as the vendor's set-up knows it; empty: the default one.
+    std::string name = {};               ///< Of the device in the vendor's set-up; if empty, the default device.
     membrane::DeviceScale scale = {};    ///< How hand and scene correspond.
     double radius = 0;                   ///< Of the tool [m].
     double shaft = 0;                    ///< Of the tool, from the tip along the stylus [m]; zero for a sphere.
     membrane::LimitOptions limits = {};  ///< All are on; each can be taken off.
-    membrane::DeviceProfile profile = membrane::devices::touch;  ///< The gentlest of the family, unless told.
+    membrane::DeviceProfile profile =
+        membrane::devices::touch;  ///< Default: the one with the lowest forces of the family.
 };
 
-/// What the body of the loop answers.
+/// Result of the body of the loop.
 struct Answer {
     membrane::Vector3<double> force;  ///< On the tool, in the scene [N].
-    std::uint64_t solves;             ///< A number that each solve changes: the force fades when there are no more.
+    std::uint64_t solves;             ///< A number that changes with each solve; if it stops changing, the force fades.
 };
 
 /// A device of the OpenHaptics family (Touch, Omni, Desktop, Premium). Its own thread calls back, a thousand times a
@@ -46,16 +47,16 @@ struct Answer {
 ///     device.stop();
 ///     if (!device.trouble().empty()) { ... }                                            // may be started again
 ///
-/// What is written has passed the library's limits, with the profile narrowed to the forces that the device names as its
-/// own. As the vendor's library sorts errors:
-///   - motors too warm, too much force or speed: the device gets over these by itself. No force at once, and while they
-///     last; then it comes back softly, in 0.1 s.
-///   - any other, such as a lost connection: the run ends, without force, and `trouble` tells which it was. So it does
-///     when the callback throws.
+/// Written forces have passed the library's limits, with the profile narrowed to the forces that the device reports. By
+/// the vendor's kinds of errors:
+///   - motors too warm, too much force or speed: the device recovers by itself. The force is zero at once and while the
+///     error lasts; then it rises in 0.1 s.
+///   - any other, such as a lost connection, or an exception of the callback: the run ends, without force, and `trouble`
+///     describes the error.
 /// The device's own frame is x to the right, y up, z towards the user. One device for each program: the vendor's
-/// scheduler has no more. While a callback does not return the device holds its force: it must keep to its millisecond.
+/// scheduler supports no more. Until the callback returns the device holds its force: it must return within 1 ms.
 ///
-/// `Hd` is `VendorHd`, or what stands in for it. Only start and stop call it outside the device's own thread.
+/// `Hd` is `VendorHd` or a test double. Only start and stop call it outside the device's own thread.
 template <class Hd>
 class OpenHapticsDevice {
   public:
@@ -68,8 +69,8 @@ class OpenHapticsDevice {
     OpenHapticsDevice(const OpenHapticsDevice&) = delete;
     OpenHapticsDevice& operator=(const OpenHapticsDevice&) = delete;
 
-    /// Opens the device and calls `tick` from now on. Started once more, motors are as warm as they were.
-    /// @throws std::runtime_error that says which step failed, and why; everything is closed again
+    /// Opens the device and calls `tick` from now on. A second start keeps the thermal load of the motors.
+    /// @throws std::runtime_error that names the failed step and its error; everything is closed again
     void start(Tick tick);
 
     /// Zero force, then scheduler, callback and device, in this order. Not from within a tick, which ends by throwing.
@@ -77,17 +78,17 @@ class OpenHapticsDevice {
 
     /// Whether it was started and is neither stopped nor in trouble. From any thread.
     [[nodiscard]] bool running() const noexcept { return started_ && !failed_; }
-    /// The error for which there is no force at the moment, but will be again; null if there is none. From any thread.
+    /// The error that suspends the force at present; null if there is none. From any thread.
     [[nodiscard]] const char* warning() const noexcept { return warning_; }
 
-    /// Between `stop` and the next start: what the device said or the callback threw, empty if all was well.
+    /// Between `stop` and the next start: the error of the device or of the callback, empty if there was none.
     [[nodiscard]] std::string trouble() const;
-    /// The same.
+    /// Between `stop` and the next start: the report of the ticks.
     [[nodiscard]] const ServoReport& report() const noexcept { return report_; }
-    /// Of the device, narrowed once it was started.
+    /// The profile, narrowed to the device after the first start.
     [[nodiscard]] const membrane::DeviceProfile& profile() const noexcept { return limiter_.device(); }
 
-    /// One tick, called by the scheduler: false when it was the last.
+    /// One tick, called by the scheduler; returns false after the last.
     bool servo() noexcept;
 
   private:
@@ -96,9 +97,9 @@ class OpenHapticsDevice {
     void need(bool well, const char* step);
     void narrow(double peak, double continuous);
     [[nodiscard]] Tool read(double now) noexcept;
-    [[nodiscard]] Force answer(const Tool& tool) noexcept;
+    [[nodiscard]] Force compute_force(const Tool& tool) noexcept;
     void write(const Force& force) noexcept;
-    bool look_for_errors() noexcept;
+    bool take_errors() noexcept;
     static void forget_errors() noexcept;
     void release() noexcept;
     void close() noexcept;
@@ -110,17 +111,17 @@ class OpenHapticsDevice {
 
     std::atomic<bool> started_{false};
     std::atomic<bool> failed_{false};    // an error or an exception: the next force is zero and the last
-    std::atomic<bool> stopping_{false};  // the same, on request
-    std::atomic<bool> ended_{false};     // that zero has been written
+    std::atomic<bool> stopping_{false};  // on request: the next force is zero and the last
+    std::atomic<bool> ended_{false};     // the last zero force has been written
     std::atomic<const char*> warning_{nullptr};
 
-    Tick tick_;  // from here on the device's own thread's, while there is one
+    Tick tick_;  // this and all below: of the device's own thread, while it runs
     membrane::ForceLimiter limiter_;
     ServoReport report_;
     std::uint64_t solves_ = 0;
     double first_ = 0, last_ = 0;  // [s]
     bool grasping_ = false;
-    bool held_ = false;  // by an error that passes, since the last force
+    bool held_ = false;  // a temporary error occurred since the last force
     unsigned error_ = 0;
     const char* error_text_ = "";
     std::exception_ptr exception_;
@@ -128,7 +129,7 @@ class OpenHapticsDevice {
 
 namespace detail {
 
-inline constexpr int max_errors = 100;  // on a stack; more are not worth waiting for
+inline constexpr int max_errors = 100;  // taken from the stack at most
 inline constexpr int patience = 100;    // ticks that `stop` waits for the last one
 
 }  // namespace detail
@@ -144,7 +145,7 @@ OpenHapticsDevice<Hd>::OpenHapticsDevice(OpenHapticsOptions options)
 template <class Hd>
 void OpenHapticsDevice<Hd>::start(Tick tick) {
     if (device_ != Hd::no_device) throw std::runtime_error("OpenHapticsDevice: must be stopped to be started");
-    forget_errors();  // what others have left behind
+    forget_errors();  // of earlier calls
     tick_ = std::move(tick);
     report_ = {};
     error_ = 0;
@@ -170,7 +171,7 @@ void OpenHapticsDevice<Hd>::start(Tick tick) {
     started_ = true;
 }
 
-/// The step before was well, and left no error.
+/// If the last step failed or left an error, closes the device and throws.
 template <class Hd>
 void OpenHapticsDevice<Hd>::need(bool well, const char* step) {
     const unsigned error = Hd::take_error();
@@ -207,10 +208,10 @@ template <class Hd>
 void OpenHapticsDevice<Hd>::close() noexcept {
     started_ = false;
     if (scheduling_) Hd::stop_scheduler();
-    if (scheduling_ && !ended_) release();  // the device's own thread is gone and has not done so
+    if (scheduling_ && !ended_) release();  // the device's own thread ended without it
     if (schedule_ != Hd::not_scheduled) Hd::unschedule(schedule_);
     if (device_ != Hd::no_device) Hd::close(device_);
-    forget_errors();  // nobody is left to tell
+    forget_errors();
     scheduling_ = false;
     schedule_ = Hd::not_scheduled;
     device_ = Hd::no_device;
@@ -232,13 +233,13 @@ bool OpenHapticsDevice<Hd>::servo() noexcept {
     last_ = now;
     Hd::begin_frame(device_);
     const Tool tool = read(now - first_);
-    look_for_errors();
+    take_errors();
     Force force = Force::Zero();
-    if (!failed_ && !stopping_) force = answer(tool);
+    if (!failed_ && !stopping_) force = compute_force(tool);
     const bool over = failed_ || stopping_;
     write(over ? Force::Zero() : force);
     Hd::end_frame(device_);
-    look_for_errors();  // the next tick's force answers for these
+    take_errors();  // these act on the force of the next tick
     report_.max_tick = std::max(report_.max_tick, Hd::seconds() - now);
     if (over) ended_ = true;
     return !over;
@@ -256,14 +257,14 @@ membrane::Tool<double> OpenHapticsDevice<Hd>::read(double now) noexcept {
 }
 
 template <class Hd>
-typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::answer(const Tool& tool) noexcept {
-    constexpr double none = std::numeric_limits<double>::quiet_NaN();  // the limiter starts softly after one
+typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::compute_force(const Tool& tool) noexcept {
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();  // after a NaN the limiter ramps up
     Force force(none, none, none);
     if (is_valid(tool)) {
         try {
-            const Answer given = tick_(tool);
-            force = options_.scale.to_device(membrane::Newtons(given.force)).device_force.value();
-            solves_ = given.solves;
+            const Answer result = tick_(tool);
+            force = options_.scale.to_device(membrane::Newtons(result.force)).device_force.value();
+            solves_ = result.solves;
         } catch (...) {
             exception_ = std::current_exception();
             failed_ = true;
@@ -280,16 +281,16 @@ typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::answer(const Tool& 
 template <class Hd>
 void OpenHapticsDevice<Hd>::write(const Force& force) noexcept {
     Hd::set_force(membrane::Newtons(force));
-    if (look_for_errors()) {
+    if (take_errors()) {
         Hd::set_force(membrane::Newtons(Force::Zero()));
     } else {
         report_.max_force = std::max(report_.max_force, membrane::norm<double>(force));
     }
 }
 
-/// Whether there were any.
+/// Takes all errors off the stack; returns whether there were any.
 template <class Hd>
-bool OpenHapticsDevice<Hd>::look_for_errors() noexcept {
+bool OpenHapticsDevice<Hd>::take_errors() noexcept {
     int found = 0;
     for (; found < detail::max_errors; ++found) {
         const unsigned error = Hd::take_error();

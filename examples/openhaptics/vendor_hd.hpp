@@ -23,13 +23,13 @@ struct VendorHd {
     /// The last error, taken off the stack; 0 if there is none.
     static unsigned take_error() noexcept { return static_cast<unsigned>(hdGetError().errorCode); }
     static const char* text_of(unsigned error) noexcept { return hdGetErrorString(static_cast<HDerror>(error)); }
-    /// Whether the device gets over it by itself: what the vendor calls force errors.
+    /// Whether the device recovers from it by itself: force errors, in the vendor's terms.
     static bool passes(unsigned error) noexcept {
         return error == HD_WARM_MOTORS || error == HD_EXCEEDED_MAX_FORCE || error == HD_EXCEEDED_MAX_FORCE_IMPULSE ||
                error == HD_EXCEEDED_MAX_VELOCITY || error == HD_FORCE_ERROR;
     }
 
-    /// No name: the default device.
+    /// If `name` is null, opens the default device.
     static Device open(const char* name) noexcept { return hdInitDevice(name); }
     static void close(Device device) noexcept { hdDisableDevice(device); }
     static void select(Device device) noexcept { hdMakeCurrentDevice(device); }
@@ -51,7 +51,7 @@ struct VendorHd {
     static void begin_frame(Device device) noexcept { hdBeginFrame(device); }
     static void end_frame(Device device) noexcept { hdEndFrame(device); }
 
-    // Not numbers where the device does not answer.
+    // NaN if the device does not respond.
     static membrane::Millimetres position() noexcept { return membrane::Millimetres(vector(HD_CURRENT_POSITION)); }
     static membrane::MillimetresPerSecond velocity() noexcept {
         return membrane::MillimetresPerSecond(vector(HD_CURRENT_VELOCITY));
@@ -61,7 +61,7 @@ struct VendorHd {
         const auto columns = numbers<16>(HD_CURRENT_TRANSFORM);
         return {columns[8], columns[9], columns[10]};
     }
-    /// `before` where the device does not answer.
+    /// If the device does not respond, returns `before`.
     static bool button(bool before) noexcept {
         HDint buttons = before ? HD_DEVICE_BUTTON_1 : 0;
         hdGetIntegerv(HD_CURRENT_BUTTONS, &buttons);

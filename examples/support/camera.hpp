@@ -20,12 +20,12 @@ using Eigen::Vector3d;
 class Camera {
   public:
     struct Options {
-        Vector3d target = Vector3d::Zero();  ///< Comes to lie in the middle of the picture [m].
-        double azimuth = 0;                  ///< Turns the eye about z, 0 looks along +y [degrees].
+        Vector3d target = Vector3d::Zero();  ///< In the middle of the picture [m].
+        double azimuth = 0;                  ///< Turns the eye about z, 0 is a view along +y [degrees].
         double elevation = 20;               ///< Of the eye above the plane z = 0 [degrees].
         double distance = 1;                 ///< From the eye to the target [m].
-        double metre = 100;                  ///< How long one metre at the target is in the picture [px].
-        Pixel middle = {};                   ///< Where the target lies in the picture.
+        double metre = 100;                  ///< Length of one metre at the target in the picture [px].
+        Pixel middle = {};                   ///< Position of the target in the picture.
     };
 
     explicit Camera(const Options& options) : options_(options) {
@@ -39,7 +39,7 @@ class Camera {
 
     [[nodiscard]] Vector3d eye() const { return options_.target + options_.distance * toward_; }
 
-    /// How long a metre is in the picture when it stands across the view at `p` [px/m].
+    /// Length in the picture of a metre across the view at `p` [px/m].
     [[nodiscard]] double scale(const Vector3d& p) const {
         return options_.metre * options_.distance / (options_.distance - (p - options_.target).dot(toward_));
     }

@@ -13,7 +13,7 @@ namespace examples {
 struct CommandLine::Parser {
     explicit Parser(const std::string& purpose) : app(purpose) {}
 
-    /// What is empty is no default to show.
+    /// Empty defaults are not shown.
     template <class Value>
     CLI::Option* add(const std::string& name, Value& value, const std::string& what) {
         auto* option = app.add_option(name, value, what);

@@ -36,7 +36,7 @@ class CommandLine {
 
     /// Reads the command line into the options and runs the program; returns the exit code.
     [[nodiscard]] int run(int argc, char** argv, const std::function<void()>& program);
-    /// Reads the command line and runs what comes before the program itself: ends the program unless that has been done.
+    /// Reads the command line and runs the preparation of the program; if that fails, ends the program.
     void run_first(int argc, char** argv, const std::function<void()>& first);
 
   private:

@@ -18,10 +18,10 @@ struct Panel {
     Picture picture;
 };
 
-/// Several pictures side by side under one camera, on one scale and with one range of colours.
+/// Pictures side by side with one camera, scale and range of colours.
 struct Figure {
     std::string name;   ///< Short, unique on a page.
-    std::string title;  ///< For those who do not see it.
+    std::string title;  ///< For screen readers.
     std::vector<Panel> panels = {};
     Camera::Options camera;  ///< Its `middle` is set for each panel.
     std::size_t columns = 3;

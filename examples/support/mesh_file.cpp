@@ -29,7 +29,7 @@ namespace {
 
 using membrane::refuse;
 
-/// A surface as it grows.
+/// A surface under construction.
 struct Soup {
     const std::string& file;
     std::vector<Eigen::Vector3d> points = {};
@@ -47,7 +47,7 @@ struct Soup {
     }
 };
 
-/// What a library says, as a part of one line.
+/// A library's message, as a part of one line.
 std::string one_line(const std::string& says) { return says.substr(0, std::min<std::size_t>(says.find('\n'), 120)); }
 
 Soup read_obj(const std::string& file, const std::string& text) {

@@ -17,7 +17,7 @@
 #include "support/surface_state.hpp"
 
 /// Membranes for other programs: files of VTK for ParaView, a time series of them, and PLY for MeshLab. Numbers are
-/// written with as many digits as it takes to read the same ones.
+/// written with enough digits to read equal ones.
 ///
 ///     write_vtp("pressed.vtp", mesh.triangles(), surface_state(mesh, x, network, foundation));
 ///     Series series("frames", "sphere", mesh.triangles(), 0.02);
@@ -80,8 +80,8 @@ inline void write_vtp(const std::filesystem::path& file, const membrane::Triangl
     detail::save(file, text + "</Polys>\n</Piece>\n</PolyData>\n</VTKFile>\n");
 }
 
-/// PLY in ASCII with the same for each vertex, and as `quality`, which MeshLab turns into colours, how far it is
-/// displaced [m].
+/// PLY in ASCII with these values for each vertex, and the norm of its displacement [m] as `quality`, which MeshLab
+/// turns into colours.
 /// @throws std::runtime_error for a file that cannot be written
 inline void write_ply(const std::filesystem::path& file, const membrane::Triangles& triangles,
                       const SurfaceState& state) {
@@ -102,8 +102,8 @@ inline void write_ply(const std::filesystem::path& file, const membrane::Triangl
     detail::save(file, text);
 }
 
-/// A time series for ParaView: FOLDER/NAME.pvd, which names a .vtp for each time. Beside it, for MeshLab, NAME.ply: the state
-/// that is displaced farthest.
+/// A time series for ParaView: FOLDER/NAME.pvd, which names a .vtp for each time. Beside it, for MeshLab, NAME.ply: the
+/// state with the largest displacement.
 class Series {
   public:
     /// At most one state each `interval` [s]. Nothing is written if `folder` is empty.

@@ -224,7 +224,7 @@ void check_words(const Lines& lines, const std::vector<std::string_view>& words)
 
 }  // namespace
 
-/// Binary as it is. ASCII in lower case and without the names, in which assimp looks for keywords.
+/// Binary unchanged. ASCII in lower case and without the names, in which assimp searches for keywords.
 std::string checked_stl(const std::string& file, std::string_view bytes) {
     if (bytes.size() >= 84) {
         std::uint32_t count = 0;

@@ -10,9 +10,8 @@
 
 #include <membrane/core/check.hpp>
 
-/// A look at a mesh file before a library reads it: libraries crash on some malformed files, and mend others in
-/// silence. No coordinate is taken from here: what is returned is the text that the library is to read, with the
-/// comments left out, and whatever else it stumbles over.
+/// Checks a mesh file before a library reads it: libraries crash on some malformed files, and repair others silently.
+/// Returns no coordinates, only the text for the library, without comments and without other parts that it misreads.
 namespace examples {
 
 /// The words of a text, line by line.
@@ -27,7 +26,7 @@ class Lines {
 
     /// Goes to the next line with a word in it; false at the end. What follows `#` is a comment, if `comments`.
     bool next(bool comments = true);
-    /// The same where there must be one: "the file ends, expected vertex 7 of 8".
+    /// Goes to the next line; at the end refuses the file: "the file ends, expected vertex 7 of 8".
     template <class... Parts>
     void expect(const Parts&... what) {
         if (!next()) membrane::refuse(file_, "the file ends after line ", line_, ", expected ", what...);
@@ -44,7 +43,7 @@ class Lines {
         return integer(word(i), least, most);
     }
     [[nodiscard]] std::int64_t integer(std::string_view text, std::int64_t least, std::int64_t most) const;
-    /// Refuses a line that has not so many words.
+    /// Refuses a line with another number of words.
     void check_size(std::size_t count) const;
 
     template <class... Parts>
@@ -66,8 +65,8 @@ class Lines {
 /// @throws InvalidInput for UTF-16, or NUL bytes
 [[nodiscard]] std::string plain_text(const std::string& file, std::string_view bytes);
 
-/// What a library is to read of the file with these bytes.
-/// @throws InvalidInput where that is not what the format says, or what the library does not read aright
+/// The text for the library from a file with these bytes.
+/// @throws InvalidInput if the file violates the format, or the library would misread it
 [[nodiscard]] std::string checked_obj(const std::string& file, std::string_view bytes);
 [[nodiscard]] std::string checked_off(const std::string& file, std::string_view bytes);
 [[nodiscard]] std::string checked_stl(const std::string& file, std::string_view bytes);

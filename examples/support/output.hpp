@@ -16,7 +16,7 @@
 
 namespace examples {
 
-/// Where `press_and_pull` writes to, as options of the command line. No file for an empty name.
+/// The output files of `press_and_pull`, as options of the command line. For an empty name no file.
 struct OutputOptions {
     std::filesystem::path pictures;
     std::string json = {}, csv = {};
@@ -28,8 +28,8 @@ struct OutputOptions {
     }
 };
 
-/// Where `press_and_pull` writes to. That it can is found out before the work begins, and what was there before is
-/// overwritten only at its end.
+/// The output files of `press_and_pull`. The constructor checks that they can be written; `write` overwrites existing
+/// ones.
 ///
 ///     Output output({.pictures = "pictures", .json = "figures.json"});
 ///     output.write(outcomes, layers);
@@ -46,7 +46,7 @@ class Output {
         }
     }
 
-    /// Prints the tables, writes the pictures and whatever else was asked for.
+    /// Prints the tables, writes the pictures and the requested files.
     void write(const std::vector<Outcome>& outcomes, membrane::Index layers) const {
         print(std::cout, speed_table(outcomes, layers), speed_note());
         print(std::cout, force_table(outcomes), force_note());

@@ -12,9 +12,9 @@ namespace examples {
 /// Rows of text, numbers to the right; the first row names the columns.
 using Table = std::vector<std::vector<std::string>>;
 
-/// One HTML page that needs nothing beside it: drawings are inline.
+/// One self-contained HTML page: drawings are inline.
 ///
-///     Page page("ToolContact and pull");
+///     Page page("Press and pull");
 ///     page.heading("Sphere, 642 vertices");
 ///     page.figure(svg.str(), "Figure 4. At rest, pressed, pulled.");
 ///     std::ofstream("index.html") << page.str();

@@ -28,23 +28,23 @@
 ///     draw(svg, camera, picture, "pressed");
 namespace examples {
 
-/// What colours stand for.
+/// A quantity shown as colour.
 struct ColourScale {
     std::string name = "displacement", unit = "mm";
-    double per_unit = 1e3;  ///< How many of `unit` make one in SI.
-    double low = 0;         ///< What has the palest colour, in SI.
-    double high = 1e-3;     ///< What has the strongest, in SI.
+    double per_unit = 1e3;  ///< Number of `unit` in one SI unit.
+    double low = 0;         ///< Value of the palest colour, in SI.
+    double high = 1e-3;     ///< Value of the strongest colour, in SI.
 
     [[nodiscard]] double share(double value) const { return (value - low) / (high - low); }
 };
 
-/// What one picture shows.
+/// The contents of one picture.
 struct Picture {
-    membrane::TriangleMesh<double> mesh;              ///< At rest: triangles, and where displacements start.
-    membrane::Points<double> points;                  ///< As it is, 3 x V [m].
-    ColourScale colours = {};                         ///< Of what is shown as colour.
+    membrane::TriangleMesh<double> mesh;              ///< Rest shape: triangles, and origin of displacements.
+    membrane::Points<double> points;                  ///< Deformed, 3 x V [m].
+    ColourScale colours = {};                         ///< Of the quantity shown as colour.
     std::optional<Eigen::VectorXd> values = {};       ///< Of each triangle, in SI; if none, displacements [m].
-    std::optional<membrane::Tool<double>> tool = {};  ///< Drawn as what it is, a sphere or a capsule.
+    std::optional<membrane::Tool<double>> tool = {};  ///< Drawn as a sphere or a capsule.
     Vector3d force = Vector3d::Zero();                ///< On the tool [N], drawn as an arrow with its value.
     double arrow = 0.1;                               ///< Length of an arrow of one newton [m].
 };
@@ -52,15 +52,15 @@ struct Picture {
 /// Draws `picture` as `camera` sees it; `name` must be unique among the drawings of a page.
 void draw(Svg& svg, const Camera& camera, const Picture& picture, const std::string& name);
 
-/// A bar of a round length, at most `width` pixels, with that length in millimetres.
+/// A bar of a round length, at longest `width` pixels, with that length in millimetres.
 void draw_scale_bar(Svg& svg, const Camera& camera, Pixel left, double width);
 
-/// The colours, and what they stand for.
+/// The colours with their values.
 void draw_colour_bar(Svg& svg, Pixel corner, double width, const ColourScale& colours, const std::string& name);
 
 namespace detail {
 
-/// What can be seen of one triangle.
+/// A visible triangle.
 struct Facet {
     membrane::Index triangle;
     bool over_tool;   // lies between the eye and the tool
@@ -151,7 +151,7 @@ inline void draw_sphere(Svg& svg, Pixel middle, double radius, const std::string
             tool_border, "/>\n");
 }
 
-/// Two circles and what is between them.
+/// A capsule: two circles and the region between them.
 inline void draw_capsule(Svg& svg, Pixel p, double p_radius, Pixel q, double q_radius, const std::string& name) {
     const double length = std::hypot(q.x - p.x, q.y - p.y);
     const Pixel across{-(q.y - p.y) / length, (q.x - p.x) / length};
@@ -222,11 +222,11 @@ inline void draw(Svg& svg, const Camera& camera, const Picture& picture, const s
 }
 
 inline void draw_scale_bar(Svg& svg, const Camera& camera, Pixel left, double width) {
-    const double most = width / camera.options().metre;  // [m]
-    double length = std::pow(10, std::floor(std::log10(most)));
-    if (5 * length <= most)
+    const double longest = width / camera.options().metre;  // [m]
+    double length = std::pow(10, std::floor(std::log10(longest)));
+    if (5 * length <= longest)
         length *= 5;
-    else if (2 * length <= most)
+    else if (2 * length <= longest)
         length *= 2;
     const double right = left.x + length * camera.options().metre;
     svg.line(left, {right, left.y}, "stroke='#333' stroke-width='2'");

@@ -12,10 +12,11 @@
 #include "support/report.hpp"
 #include "support/scenes.hpp"
 
-/// What `press_and_pull` shows: the paper's figures 3 to 5, force and depth over time, and a page with all of them.
+/// The pictures of `press_and_pull`: the paper's figures 3 to 5, force and depth over time, and a page with all of
+/// them.
 namespace examples {
 
-/// A drawing, what it shows, and its file's name without ".svg".
+/// A drawing with its caption and its file's name without ".svg".
 struct Drawing {
     std::string name, caption, svg;
 };
@@ -77,7 +78,7 @@ inline std::string after_figure(const std::string& number) {
     for (const Record* record : {&without, &with}) {
         for (const Step step : {recover, recover_again}) {
             Panel panel{step == recover ? "After the press, " : "After the pull, ",
-                        power_of_ten(shape_error(scene, *record, step)) + " of the radius off its shape",
+                        power_of_ten(shape_error(scene, *record, step)) + " of the radius: shape error",
                         detail::picture(scene, record->snapshots[step])};
             panel.title += record == &with ? "with volume springs" : "without volume springs";
             panel.picture.tool.reset();
@@ -87,7 +88,7 @@ inline std::string after_figure(const std::string& number) {
     return {(scene.paper_figure.empty() ? "" : "figure_5_") + scene.key + "_recovered",
             detail::after_figure(scene.paper_figure.empty() ? "" : "5") + "The " + scene.name +
                 ", let go: after the press (a, c) and after the pull (b, d), without virtual volume springs (a, b) as "
-                "in the paper, and with them (c, d). Off its shape: the largest distance, rigid drift removed.",
+                "in the paper, and with them (c, d). Shape error: the largest distance, rigid drift removed.",
             drawn(figure)};
 }
 
@@ -98,7 +99,7 @@ inline std::string after_figure(const std::string& number) {
     Curve reaction{.name = "reaction", .colour = "#12507b"};
     Curve loose{.name = "reaction without volume springs", .colour = "#d0532f", .dashed = true};
     Curve depth{.name = "depth of the tool", .colour = "#333"};
-    Curve pulled{.name = "way of what it holds", .colour = "#7a4ea3"};
+    Curve pulled{.name = "displacement of the held point", .colour = "#7a4ea3"};
     for (const Frame& frame : with.frames) {
         felt.samples.push_back({frame.tool.time, 1e3 * frame.felt.norm()});
         reaction.samples.push_back({frame.tool.time, 1e3 * frame.reaction.norm()});
@@ -113,7 +114,7 @@ inline std::string after_figure(const std::string& number) {
                     .panels = {{"force [mN]", {felt, reaction, loose}}, {"depth [mm]", {depth, pulled}}}};
     return {scene.key + "_force",
             "Force and depth over time. Felt is the paper's formula, a function of depth and velocity alone; the "
-            "reaction is what the membrane does to the tool.",
+            "reaction is the force of the membrane on the tool.",
             drawn(plot)};
 }
 
@@ -124,9 +125,9 @@ inline std::string after_figure(const std::string& number) {
     const Scene& scene = outcomes.front().scene;
     page.paragraph(
         "A sphere presses a membrane, slides, lets go, grasps it, pulls and lets go; with virtual volume springs under "
-        "the membrane, and without, where the pull starts from rest again. Springs of " +
-        number(scene.stiffness) + " N/m along the edges, volume springs of " + number(scene.backing_stiffness) +
-        " N/m with " + number(scene.backing_damping, 3) + " N s/m, one tick a millisecond.");
+        "the membrane, and without, where the pull starts from the rest shape. Springs of " +
+        number(scene.stiffness) + " N/m along the edges, volume springs of " + number(scene.foundation_stiffness) +
+        " N/m with " + number(scene.foundation_damping, 3) + " N s/m, one tick a millisecond.");
     page.table(speed_table(outcomes, layers), speed_note());
     page.table(force_table(outcomes), force_note());
     for (const Drawing& drawing : drawings) page.figure(drawing.svg, drawing.caption);

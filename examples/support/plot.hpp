@@ -41,18 +41,18 @@ struct Phase {
 
 struct Plot {
     std::string title;
-    std::vector<Phase> phases;  ///< At least one; together they are the time axis.
+    std::vector<Phase> phases;  ///< At min_distance one; together they are the time axis.
     std::vector<PlotPanel> panels = {};
-    std::string axis = "time [s]";  ///< Or whatever the curves are over: all that is said of times is of this.
+    std::string axis = "time [s]";  ///< Or another quantity, which then replaces time everywhere.
 };
 
 namespace detail {
 
 /// 1, 2 or 5 times a power of ten: at most `count` such steps cover `range`.
 inline double round_step(double range, int count) {
-    const double least = range / count, power = std::pow(10, std::floor(std::log10(least)));
+    const double min_distance = range / count, power = std::pow(10, std::floor(std::log10(min_distance)));
     for (const double factor : {1.0, 2.0, 5.0}) {
-        if (factor * power >= 0.999 * least) return factor * power;
+        if (factor * power >= 0.999 * min_distance) return factor * power;
     }
     return 10 * power;
 }
@@ -70,7 +70,7 @@ struct Axes {
     [[nodiscard]] double bottom() const { return top + height; }
 };
 
-/// Where the samples are: of those that share a column of pixels, the first, the lowest, the highest and the last.
+/// Pixels of the samples: of those that share a column of pixels, the first, the lowest, the highest and the last.
 inline std::vector<Pixel> pixels(const Axes& axes, const std::vector<Sample>& samples) {
     const auto column = [&](const Sample& sample) { return std::floor(axes.at(sample).x); };
     std::vector<Pixel> result;
@@ -88,13 +88,13 @@ inline std::vector<Pixel> pixels(const Axes& axes, const std::vector<Sample>& sa
     return result;
 }
 
-/// The curve as a path, without samples that would not show.
+/// The curve as a path, without invisible samples.
 inline std::string path(const Axes& axes, const Curve& curve) {
-    constexpr double least = 0.6;  // [px]
+    constexpr double min_distance = 0.6;  // [px]
     std::string d;
     Pixel last;
     for (const Pixel& p : pixels(axes, curve.samples)) {
-        if (!d.empty() && std::hypot(p.x - last.x, p.y - last.y) < least) continue;
+        if (!d.empty() && std::hypot(p.x - last.x, p.y - last.y) < min_distance) continue;
         d += (d.empty() ? 'M' : 'L') + number(p.x) + ' ' + number(p.y);
         last = p;
     }

@@ -15,7 +15,7 @@ using membrane::refuse;
 
 bool blank_or_end(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
-/// How a number lies in a binary file.
+/// Type of a number in a binary file.
 struct Type {
     std::size_t size = 0;
     bool is_signed = false, real = false;
@@ -23,7 +23,7 @@ struct Type {
 
 struct Property {
     std::string name;
-    Type type, count;  ///< `count.size` is 0 but for a list.
+    Type type, count;  ///< `count.size` is 0 except for a list.
 };
 
 struct Element {

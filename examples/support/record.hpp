@@ -14,7 +14,7 @@
 #include "support/camera.hpp"
 #include "support/plot.hpp"
 
-/// What is kept of a run of `press_and_pull`.
+/// The record of a run of `press_and_pull`.
 namespace examples {
 
 /// The parts of a frame, in their order.
@@ -23,7 +23,7 @@ inline constexpr std::array<std::string_view, 5> parts{"contact", "solve", "refi
 /// Times the parts of a frame, one after the other.
 class Stopwatch {
   public:
-    /// The part that has just been done is over.
+    /// Ends the current part.
     void lap() {
         const auto now = std::chrono::steady_clock::now();
         seconds_[part_++] = std::chrono::duration<double>(now - last_).count();
@@ -42,11 +42,11 @@ class Stopwatch {
 struct Frame {
     membrane::Tool<double> tool;
     double depth = 0;                            ///< Of the tool in the membrane [m].
-    double pulled = 0;                           ///< How far what it holds is from where that was at rest [m].
-    Vector3d felt = Vector3d::Zero();            ///< What the device gets from the force policy [N].
+    double pulled = 0;                           ///< Displacement of the held point from its rest position [m].
+    Vector3d felt = Vector3d::Zero();            ///< Force policy's force on the device [N].
     Vector3d reaction = Vector3d::Zero();        ///< Of the membrane on the tool, from the solver [N].
-    bool at_work = false;                        ///< The tool touches, or the membrane is not yet at rest.
-    std::array<double, parts.size()> seconds{};  ///< That each part took.
+    bool active = false;                         ///< The tool is in contact, or the membrane not yet in equilibrium.
+    std::array<double, parts.size()> seconds{};  ///< Duration of each part.
 };
 
 /// The membrane and the tool at one time.
@@ -61,7 +61,7 @@ struct Record {
     std::vector<Snapshot> snapshots = {};  ///< The last of each phase.
 
     void add(const Frame& frame, const membrane::Points<double>& x) {
-        const double time = frame.tool.time + 1e-9;  // phases end on ticks, but for rounding
+        const double time = frame.tool.time + 1e-9;  // phases end on ticks, up to rounding
         if (snapshots.empty() || (time >= phases[snapshots.size() - 1].end && snapshots.size() < phases.size())) {
             snapshots.emplace_back();
         }

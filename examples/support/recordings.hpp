@@ -39,7 +39,7 @@ inline void save(const std::filesystem::path& path, const membrane::Recording<do
 
 namespace detail {
 
-/// `value(i)` of so many ticks; what is not finite is left out.
+/// `value(i)` of each of the first ticks; omits values that are not finite.
 template <class Value>
 [[nodiscard]] Curve traced(Curve curve, std::size_t ticks, Value value) {
     for (std::size_t i = 0; i < ticks; ++i) {
@@ -51,9 +51,9 @@ template <class Value>
 
 }  // namespace detail
 
-/// What the hand did and felt in two runs: its way from the first tool on, the force, and how far the forces are apart.
+/// Two runs: displacement of the tool from its first position, force, and difference of the forces.
 [[nodiscard]] inline Plot plot_of(const membrane::Recording<double>& first, const membrane::Recording<double>& second) {
-    PlotPanel displacement{"way [mm]", {}}, force{"force [N]", {}};
+    PlotPanel displacement{"displacement [mm]", {}}, force{"force [N]", {}};
     const auto add = [&](const auto& ticks, const Curve& curve) {
         const auto millimetres = [&](std::size_t i) {
             return 1e3 * (ticks[i].tool.position - ticks[0].tool.position).norm();

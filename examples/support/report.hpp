@@ -20,7 +20,7 @@
 #include "support/rigid_fit.hpp"
 #include "support/scenes.hpp"
 
-/// What `press_and_pull` tells about its runs in numbers: tables for people, JSON and CSV for programs.
+/// The results of `press_and_pull`: tables for people, JSON and CSV for programs.
 namespace examples {
 
 /// A scene run with and without virtual volume springs.
@@ -29,9 +29,9 @@ struct Outcome {
     Record with, without;
 };
 
-/// How fast the frames at work were.
+/// Times of the frames with an active membrane.
 struct Speed {
-    std::size_t frames = 0;                      ///< At work.
+    std::size_t frames = 0;                      ///< With an active membrane.
     std::array<double, parts.size()> seconds{};  ///< Of each part, mean over the frames.
 
     [[nodiscard]] double frames_per_second() const { return 1 / std::accumulate(seconds.begin(), seconds.end(), 0.0); }
@@ -40,7 +40,7 @@ struct Speed {
 [[nodiscard]] inline Speed speed(const Record& record) {
     Speed result;
     for (const Frame& frame : record.frames) {
-        if (!frame.at_work) continue;
+        if (!frame.active) continue;
         ++result.frames;
         for (std::size_t k = 0; k < parts.size(); ++k) result.seconds[k] += frame.seconds[k];
     }
@@ -50,12 +50,12 @@ struct Speed {
 
 /// Largest force of a run [N]: `&Frame::felt` or `&Frame::reaction`.
 [[nodiscard]] inline double peak(const Record& record, Vector3d Frame::*force) {
-    double most = 0;
-    for (const Frame& frame : record.frames) most = std::max(most, (frame.*force).norm());
-    return most;
+    double largest = 0;
+    for (const Frame& frame : record.frames) largest = std::max(largest, (frame.*force).norm());
+    return largest;
 }
 
-/// How far the membrane is from its shape at the end of `step`, as a part of its radius; rigid drift removed.
+/// Largest distance of the membrane from its rest shape at the end of `step`, over its radius; rigid drift removed.
 [[nodiscard]] inline double shape_error(const Scene& scene, const Record& record, Step step) {
     return distance_from_shape(record.snapshots[step].points, scene.mesh.positions()) / scene.radius;
 }
@@ -66,7 +66,7 @@ struct Speed {
     return text;
 }
 
-/// The processor and the compiler, as far as they say what they are.
+/// The names of processor and compiler, as far as known.
 [[nodiscard]] inline std::string machine() {
     std::string processor = "an unknown processor";
     std::ifstream cpuinfo("/proc/cpuinfo");
@@ -100,7 +100,7 @@ struct Speed {
 
 [[nodiscard]] inline Table force_table(const std::vector<Outcome>& outcomes) {
     Table table{
-        {"scene", "volume springs", "peak felt [N]", "peak reaction [N]", "off its shape after press", "after pull"}};
+        {"scene", "volume springs", "peak felt [N]", "peak reaction [N]", "shape error after press", "after pull"}};
     for (const auto& [scene, with, without] : outcomes) {
         for (const Record* record : {&with, &without}) {
             table.push_back({scene.name, record == &with ? "with" : "without", significant(peak(*record, &Frame::felt)),
@@ -112,15 +112,15 @@ struct Speed {
     return table;
 }
 
-/// What the tables say, in a sentence or two.
+/// The notes above the tables.
 [[nodiscard]] inline std::string speed_note() {
-    return "Whole frames a second (contact, solve, refit, normals, force) while the membrane is at work, on " +
+    return "Whole frames a second (contact, solve, refit, normals, force) while the membrane is active, on " +
            machine() + ". The paper's 84 and 23 include drawing, on hardware of 2007 (Xeon 3.2 GHz, Quadro FX 4400).";
 }
 
 [[nodiscard]] inline std::string force_note() {
-    return "Felt: the paper's F = -k x - mu v. Reaction: of the membrane, from the solver. Off its shape: the largest "
-           "distance from the membrane at rest after it was let go, rigid drift removed, in radii.";
+    return "Felt: the paper's F = -k x - mu v. Reaction: of the membrane, from the solver. Shape error: the largest "
+           "distance from the rest shape after it was let go, rigid drift removed, in radii.";
 }
 
 /// The table with aligned columns, the first to the left, under its note.
@@ -148,11 +148,11 @@ inline void print(std::ostream& out, const Table& table, const std::string& note
                                    {"triangles", scene.mesh.triangle_count()},
                                    {"radius_m", scene.radius},
                                    {"spring_stiffness_N_per_m", scene.stiffness},
-                                   {"volume_spring_stiffness_N_per_m", scene.backing_stiffness},
-                                   {"volume_spring_damping_N_s_per_m", scene.backing_damping},
+                                   {"volume_spring_stiffness_N_per_m", scene.foundation_stiffness},
+                                   {"volume_spring_damping_N_s_per_m", scene.foundation_damping},
                                    {"layers", layers},
                                    {"frames", with.frames.size()},
-                                   {"frames_at_work", s.frames},
+                                   {"frames_active", s.frames},
                                    {"frames_per_second", s.frames_per_second()}};
         if (scene.paper_frames > 0) one["frames_per_second_in_paper_with_drawing"] = scene.paper_frames;
         for (std::size_t k = 0; k < parts.size(); ++k) one["seconds"][std::string(parts[k])] = s.seconds[k];
@@ -160,8 +160,8 @@ inline void print(std::ostream& out, const Table& table, const std::string& note
             one[record == &with ? "with_volume_springs" : "without_volume_springs"] = {
                 {"peak_force_felt_N", peak(*record, &Frame::felt)},
                 {"peak_reaction_N", peak(*record, &Frame::reaction)},
-                {"off_shape_after_press_radius", shape_error(scene, *record, recover)},
-                {"off_shape_after_pull_radius", shape_error(scene, *record, recover_again)}};
+                {"shape_error_after_press_radius", shape_error(scene, *record, recover)},
+                {"shape_error_after_pull_radius", shape_error(scene, *record, recover_again)}};
         }
         all["scenes"].push_back(one);
     }

@@ -9,8 +9,8 @@
 
 namespace examples {
 
-/// How far `x` is from the shape `rest`: the largest distance between corresponding points, after the rigid motion that
-/// brings them together best in the least squares [Kabsch76]. Both 3 x V, in one unit, which is also the result's.
+/// Distance of `x` from the shape `rest`: the largest distance between corresponding points, after the rigid motion
+/// that brings them together best in the least squares [Kabsch76]. Both 3 x V, in one unit, which is also the result's.
 [[nodiscard]] inline double distance_from_shape(const membrane::Points<double>& x,
                                                 const membrane::Points<double>& rest) {
     const Eigen::Vector3d x_middle = x.rowwise().mean(), rest_middle = rest.rowwise().mean();

@@ -19,30 +19,30 @@
 #include "support/plot.hpp"
 #include "support/specimen.hpp"
 
-/// The membranes of `press_and_pull`, and what the tool does to them.
+/// The membranes of `press_and_pull`, and the motions of the tool.
 namespace examples {
 
-/// A membrane that is part of a sphere around the origin, or seen from there much as one, and how the tool meets it.
+/// A membrane that is part of a sphere around the origin, or similar to one, with its tool.
 struct Scene {
     std::string key, name;  ///< For files, and for people.
     membrane::TriangleMesh<double> mesh;
     std::vector<membrane::Index> pinned;
     double radius;                       ///< Of the membrane at rest [m].
     double tool_radius;                  ///< [m]
-    double depth;                        ///< How far it is pressed in, and pulled out [m].
-    Vector3d pressed, slid;              ///< Unit vectors to where it is pressed, and to where the tool slides then.
+    double depth;                        ///< Of the press, and height of the pull [m].
+    Vector3d pressed, slid;              ///< Unit vectors to the point of the press, and to the end of the slide.
     Camera::Options camera;              ///< Sees the tool from the side.
-    Camera::Options camera_after;        ///< Sees where the tool has been.
+    Camera::Options camera_after;        ///< Sees the point of the press.
     double stiffness = 40;               ///< Of the springs [N/m].
-    double backing_stiffness = 4;        ///< Of the volume springs [N/m],
-    double backing_damping = 0.02;       ///< and their damping [N s/m].
+    double foundation_stiffness = 4;     ///< Of the volume springs [N/m],
+    double foundation_damping = 0.02;    ///< and their damping [N s/m].
     double picture_height;               ///< [px]
     std::string paper_figure = {};       ///< Empty where the paper has no such scene.
     double paper_frames = 0;             ///< A second, in [Liu07] 3; zero where the paper has no such scene.
     bool uneven = false;                 ///< Not everywhere `radius` from the origin.
-    Vector3d origin = Vector3d::Zero();  ///< Where the scene's origin is in the file of the mesh [m].
+    Vector3d origin = Vector3d::Zero();  ///< Position of the scene's origin in the file of the mesh [m].
 
-    /// How far from the origin the surface is at rest, in the direction of a unit vector [m].
+    /// Distance of the rest surface from the origin, in the direction of a unit vector [m].
     [[nodiscard]] double surface(const Vector3d& direction) const;
 };
 
@@ -104,7 +104,7 @@ inline double Scene::surface(const Vector3d& direction) const {
             .picture_height = 136};
 }
 
-/// The membrane of a file, with the origin below the place where the tool meets it.
+/// The membrane of a file, with the origin below the point of contact.
 [[nodiscard]] inline Scene file_scene(const Specimen& specimen) {
     const Vector3d origin = specimen.above(-1);
     auto mesh = membrane::TriangleMesh<double>(specimen.surface.points.colwise() - origin, specimen.surface.triangles);
@@ -137,16 +137,16 @@ inline double Scene::surface(const Vector3d& direction) const {
     return {file_scene(options.specimen(stock_sphere()))};
 }
 
-/// One move of the tool.
+/// One motion of the tool.
 struct Move {
     std::string name;
     double duration;  ///< [s]
-    Vector3d toward;  ///< Where it ends: a unit vector,
+    Vector3d toward;  ///< Unit vector to its end,
     double height;    ///< and the height of the tool's surface above the membrane at rest [m].
     bool grasping = false;
 };
 
-/// Places in the moves of press and pull together, and in the phases, frames and snapshots that come of them.
+/// Indices of the moves of press and pull together, and of their phases and snapshots.
 enum Step : std::size_t { approach, press_in, slide, let_go, recover, touch, pull_out, open, recover_again };
 
 [[nodiscard]] inline std::vector<Move> press_moves(const Scene& scene) {
@@ -171,31 +171,32 @@ enum Step : std::size_t { approach, press_in, slide, let_go, recover, touch, pul
     return first;
 }
 
-/// Moves as a device plays them, and what they are called when.
+/// Moves as the script of a device, with the name and time of each phase.
 struct Motion {
     std::vector<membrane::Waypoint<double>> script;
     std::vector<Phase> phases;
 };
 
-/// The moves one after the other from `start` [s], each beginning and ending gently, `pace` times as fast. Where the
-/// tool stands still, the time is not shortened: a membrane recovers no faster.
-[[nodiscard]] inline Motion motion(const Scene& scene, const std::vector<Move>& moves, double pace, double start = 0) {
+/// The moves one after the other from `start` [s], each with zero velocity at its ends, `speed_factor` times as fast.
+/// If the tool stands still, the time is not shortened, because the membrane recovers no faster.
+[[nodiscard]] inline Motion motion(const Scene& scene, const std::vector<Move>& moves, double speed_factor,
+                                   double start = 0) {
     constexpr int steps = 40;  // of a move
     Motion result;
     double time = start, height = 0.7 * scene.depth;
     Vector3d toward = moves.front().toward;
-    const auto place = [&](const Vector3d& direction, double above) {
+    const auto position = [&](const Vector3d& direction, double above) {
         const Vector3d unit = direction.normalized();
         return Vector3d((scene.surface(unit) + scene.tool_radius + above) * unit);
     };
     for (const Move& move : moves) {
         const bool still = move.toward == toward && move.height == height;
-        const double duration = still ? move.duration : move.duration / pace;
+        const double duration = still ? move.duration : move.duration / speed_factor;
         for (int i = 0; i < steps; ++i) {
             const double s = static_cast<double>(i) / steps, share = s * s * (3 - 2 * s);
             result.script.push_back(
                 {time + s * duration,
-                 place(toward + share * (move.toward - toward), height + share * (move.height - height)),
+                 position(toward + share * (move.toward - toward), height + share * (move.height - height)),
                  move.grasping});
         }
         result.phases.push_back({move.name, time, time + duration});
@@ -203,7 +204,7 @@ struct Motion {
         toward = move.toward;
         height = move.height;
     }
-    result.script.push_back({time, place(toward, height)});
+    result.script.push_back({time, position(toward, height)});
     return result;
 }
 

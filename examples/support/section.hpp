@@ -12,7 +12,7 @@
 #include "support/picture.hpp"
 #include "support/svg.hpp"
 
-/// The membrane cut open through the tool: what the tool hides in a picture.
+/// A section of the membrane through the tool: the part that the tool hides in a picture.
 namespace examples {
 
 /// The plane of a cut through the tool and the origin, outward upwards.
@@ -51,8 +51,8 @@ inline std::string profile(const Cut& cut, const membrane::Points<double>& point
 
 }  // namespace detail
 
-/// Draws the cut through the membrane as it is, over the one at rest, in a window of `width` x `height` pixels whose
-/// upper left corner is `corner`.
+/// Draws the cut through the deformed membrane, over that of the rest shape, in a window of `width` x `height` pixels
+/// whose upper left corner is `corner`.
 inline void draw_section(Svg& svg, const Camera& camera, const Picture& picture, Pixel corner, double width,
                          double height, double metre, const std::string& name) {
     const Vector3d up = picture.tool->position.normalized();

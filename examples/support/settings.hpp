@@ -10,12 +10,12 @@
 
 namespace examples {
 
-/// What `press_and_pull` can be told on the command line.
+/// The options of `press_and_pull` on the command line.
 struct Settings {
     MeshOptions mesh = {};
     OutputOptions out = {};
     membrane::SolverOptions<double> solver{.layers = 6, .sweeps = 2};
-    double pace = 1;          ///< Of the tool.
+    double speed_factor = 1;  ///< Of the tool.
     std::string series = {};  ///< Folder, or empty.
 
     void add_to(CommandLine& command) {
@@ -25,7 +25,7 @@ struct Settings {
         command.add("--layers", solver.layers, "threshold of the propagation queue");
         command.add("--sweeps", solver.sweeps, "passes over the queue in a step");
         command.add_flag(
-            "--quick", [this] { pace = 10; }, "the tool moves ten times as fast");
+            "--quick", [this] { speed_factor = 10; }, "the tool moves ten times as fast");
     }
 };
 

@@ -16,20 +16,20 @@ namespace examples {
 
 namespace {
 
-/// The vertex that takes the most edges to the rim; of several, the one nearest to `centre`.
+/// The vertex with the most edges to the rim; of several, the one nearest to `centre`.
 membrane::Index farthest_from_rim(const membrane::Adjacency& adjacency, const membrane::Points<double>& x,
                                   const Eigen::Vector3d& centre) {
     std::vector<membrane::Index> front(adjacency.border_vertices().begin(), adjacency.border_vertices().end()), next;
-    std::vector<char> reached(static_cast<std::size_t>(x.cols()));
-    const auto reach = [&](membrane::Index v) {
-        return std::exchange(reached[static_cast<std::size_t>(v)], char{1}) == 0;
+    std::vector<char> is_visited(static_cast<std::size_t>(x.cols()));
+    const auto visit = [&](membrane::Index v) {
+        return std::exchange(is_visited[static_cast<std::size_t>(v)], char{1}) == 0;
     };
-    for (const membrane::Index v : front) reach(v);
+    for (const membrane::Index v : front) visit(v);
     while (true) {
         next.clear();
         for (const membrane::Index v : front) {
             for (const membrane::Index w : adjacency.neighbours(v)) {
-                if (reach(w)) next.push_back(w);
+                if (visit(w)) next.push_back(w);
             }
         }
         if (next.empty()) break;
@@ -39,7 +39,7 @@ membrane::Index farthest_from_rim(const membrane::Adjacency& adjacency, const me
     return *std::min_element(front.begin(), front.end(), [&](auto v, auto w) { return distance(v) < distance(w); });
 }
 
-/// A note, if it looks as if the unit had been forgotten.
+/// Prints a note if the unit was probably forgotten.
 void doubt_unit(const std::string& file, const membrane::Points<double>& x) {
     const double size = (x.rowwise().maxCoeff() - x.rowwise().minCoeff()).maxCoeff();
     if (membrane::likely_unit(size) != membrane::LengthUnit::millimetre) return;

@@ -9,32 +9,32 @@
 #include "support/command_line.hpp"
 #include "support/mesh_file.hpp"
 
-/// The membrane an example works on: its own, or one from a file, whatever its size and place.
+/// The membrane of an example: its own, or one from a file, of any size and position.
 namespace examples {
 
-/// A membrane, and where a tool meets it.
+/// A membrane, and the point of contact with a tool.
 struct Specimen {
     Surface surface;
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of the box around it [m].
-    double size = 0;  ///< Half of its extent along x, y or z, whichever is neither the longest nor the shortest [m].
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Of its bounding box [m].
+    double size = 0;                                   ///< Half of the middle one of its extents along x, y and z [m].
     membrane::Index vertex =
-        0;  ///< Where it is met: the highest, or that which is farthest from the rim if it has one.
-    Eigen::Vector3d outward = Eigen::Vector3d::UnitZ();  ///< There, of length 1.
+        0;  ///< The point of contact: if it has a rim, the vertex farthest from it, else the highest.
+    Eigen::Vector3d outward = Eigen::Vector3d::UnitZ();  ///< Normal at `vertex`, of length 1.
 
-    /// A sphere's centre is `above(0)` when it is on the surface, deeper where `height` [sizes] is negative.
+    /// The centre of a sphere on the surface is `above(0)`; if `height` [sizes] is negative, deeper.
     [[nodiscard]] Eigen::Vector3d above(double height) const {
         return surface.points.col(vertex) + height * size * outward;
     }
     /// A radius for a tool [m].
     [[nodiscard]] double tool_radius() const { return 0.2 * size; }
-    /// What can be clamped: the vertices on the rim, or the lower half where there is no rim.
+    /// Vertices to clamp: those on the rim or, if there is none, the lower half.
     [[nodiscard]] std::vector<membrane::Index> rim() const;
 };
 
 /// @throws InvalidInput for a surface that is no membrane
 [[nodiscard]] Specimen specimen_of(const membrane::TriangleMesh<double>& mesh);
 
-/// What the examples press if no file is named: a sphere of 642 vertices.
+/// The default membrane of the examples: a sphere of 642 vertices.
 [[nodiscard]] membrane::TriangleMesh<double> stock_sphere();
 
 /// The options `--mesh FILE` and `--unit UNIT`, the same for all examples.

@@ -13,8 +13,8 @@
 
 namespace examples {
 
-/// How much of which frequency is in the forces of even ticks [N]: amplitudes [mN] over frequencies from `lowest` on [Hz].
-/// Under a Hann window, which leaves out that a record has ends.
+/// Amplitude spectrum [mN] of equidistant forces [N], over frequencies from `lowest` on [Hz]. Uses a Hann window, which
+/// removes the effect of the ends of the record.
 [[nodiscard]] inline std::vector<Sample> spectrum(const std::vector<Eigen::Vector3d>& forces, double tick,
                                                   double lowest) {
     const auto count = static_cast<double>(forces.size());

@@ -1,4 +1,4 @@
-# membrane_example_support: what the examples share, compiled once: how they read meshes and the command line.
+# membrane_example_support: code shared by the examples, compiled once: readers of meshes and of the command line.
 include_guard(GLOBAL)
 
 find_package(assimp REQUIRED)

@@ -7,19 +7,19 @@
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// What there is to see on a membrane at one time.
+/// The state of a membrane at one time.
 namespace examples {
 
 struct SurfaceState {
     membrane::Points<double> points;        ///< 3 x V [m]
-    membrane::Points<double> displacement;  ///< From where the vertex is at rest [m].
-    membrane::Points<double> force;         ///< With which others, a tool or a pin, hold the vertex where it is [N].
+    membrane::Points<double> displacement;  ///< From the rest position [m].
+    membrane::Points<double> force;         ///< External force on the vertex, of a tool or a pin [N].
     Eigen::VectorXd tension;                ///< Of the surface at the vertex, as of a film of liquid [N/m].
 };
 
-/// The membrane at `x`. The force on a vertex is what balances its springs and volume springs, but for their drag.
+/// The membrane at `x`. The force on a vertex balances its springs and volume springs, without their damping.
 ///
-/// The tension is that of a film that stores energy alike: a surface of area A that grows by a small part e in all
+/// The tension is that of a film with equal energy: a surface of area A that grows by a small part e in all
 /// directions takes 2 A e times its tension, and springs of tension T and length l take e times the sum of T l. Each
 /// spring counts half at either end, and a vertex has a third of its triangles: its tension is the sum of T l over 4 of
 /// its areas. Where the vertex has no area, it is 0.

@@ -19,7 +19,7 @@
 ///     save("force.svg", svg.str());
 namespace examples {
 
-/// A place on the drawing, y downwards [px].
+/// A position on the drawing, y downwards [px].
 struct Pixel {
     double x = 0, y = 0;
 };
@@ -57,7 +57,7 @@ struct Pixel {
     return result;
 }
 
-/// `text` as it must stand in XML and HTML.
+/// `text`, escaped for XML and HTML.
 [[nodiscard]] inline std::string escaped(std::string_view text) {
     std::string safe;
     for (const char c : text) {

@@ -11,8 +11,8 @@
 /// Tension as colour.
 namespace examples {
 
-/// The mean tension of each triangle at `x` [N/m], as it is on average around its corners: that of a single triangle, in which
-/// it is constant, jumps from one to the next.
+/// The mean tension of each triangle at `x` [N/m], as it is on average around its corners: that of a single triangle,
+/// in which it is constant, jumps from one to the next.
 template <class Sheet>
 [[nodiscard]] Eigen::VectorXd tensions(const Sheet& sheet, const membrane::Points<double>& x) {
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(x.cols()), count = sum;

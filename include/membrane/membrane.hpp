@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-// What the loop needs, in the order of the data flow. Scripts, the explicit Euler method, threads and what tells how
-// accurate a step is are included by their own names.
+// Headers of the haptic loop, in the order of the data flow. Scripts, the explicit Euler method, threads and error
+// measures are included separately.
 //
 // clang-format off
 #include <membrane/core/types.hpp>

@@ -142,9 +142,9 @@ struct Scene {
 struct Judge {
     const Scene& scene;
     CountedStroke stroke;
-    std::vector<ReferenceTick> references = equilibria(scene.mesh, scene.network, scene.foundation, stroke, every);
+    std::vector<ReferenceTick> references = equilibria(scene.mesh, scene.network, scene.foundation, stroke, tick_stride);
 
-    static constexpr Index every = 2;  // most of the error is in few ticks, where the tool sets on or turns
+    static constexpr Index tick_stride = 2;  // most of the error is in few ticks, where the tool sets on or turns
     Outcome operator()(const SolverOptions<double>& options) const {
         return trial(scene.mesh, scene.network, scene.foundation, stroke, references, options, BlockStep{},
                      WorkClock{});
@@ -263,9 +263,9 @@ TEST_CASE("a chosen setting keeps the wanted error on unseen strokes, at hardly 
         const double error = std::pow(10, random.number(-3.0, -1.0));
         const auto choice =
             choose_settings(scene.mesh, scene.network, scene.foundation, scene.stroke(random), {.force_error = error},
-                            {.every = Judge::every, .repetitions = 1}, BlockStep{}, WorkClock{});
-        if (!choice.met) continue;
-        CHECK(choice.force_error <= error / GridSearchOptions<double>{}.margin);
+                            {.tick_stride = Judge::tick_stride, .repetitions = 1}, BlockStep{}, WorkClock{});
+        if (!choice.satisfied) continue;
+        CHECK(choice.force_error <= error / GridSearchOptions<double>{}.safety_factor);
         const Judge unseen{scene, scene.stroke(random)};
         const auto outcome = unseen(choice.options);
         if (outcome.force_error <= error) {
@@ -299,19 +299,19 @@ TEST_CASE("of all settings the cheapest that keeps the error, the most accurate 
         };
 
         const auto cheapest = choose_settings(GridSearchOptions<double>{}, {.force_error = error}, attempt);
-        const double most = error / GridSearchOptions<double>{}.margin;
+        const double most = error / GridSearchOptions<double>{}.safety_factor;
         const auto expected = known.best(by_time, [&](const Outcome& o) { return o.force_error <= most; });
-        CHECK(cheapest.met == (expected.layers != no_index));
-        CHECK(cheapest.met == (cheapest.force_error <= most));
-        if (cheapest.met) check_same(cheapest, expected);
+        CHECK(cheapest.satisfied == (expected.layers != no_index));
+        CHECK(cheapest.satisfied == (cheapest.force_error <= most));
+        if (cheapest.satisfied) check_same(cheapest, expected);
         max_tried = std::max(max_tried, tried);
         all_tried += tried;
 
         const auto finest = choose_settings(GridSearchOptions<double>{}, {.time = time}, attempt);
         const auto in_time = known.best(by_error, [&](const Outcome& o) { return o.time <= time; });
-        CHECK(finest.met == (in_time.layers != no_index));
-        CHECK(finest.met == (finest.time <= time));
-        if (finest.met) CHECK(finest.force_error == known.of(in_time).force_error);
+        CHECK(finest.satisfied == (in_time.layers != no_index));
+        CHECK(finest.satisfied == (finest.time <= time));
+        if (finest.satisfied) CHECK(finest.force_error == known.of(in_time).force_error);
     }
     CHECK(max_tried < 256);
     CHECK(all_tried <= 64 * cases(200));
@@ -323,7 +323,7 @@ TEST_CASE("what is chosen is what the solver then does, in any tick") {
     for (const Requirement wanted :
          {Requirement{.force_error = 0.02}, Requirement{.force_error = 2e-3}, Requirement{.time = 100e-6}}) {
         const auto choice = scene.choose(wanted);
-        REQUIRE(choice.met);
+        REQUIRE(choice.satisfied);
         const auto outcome = trial(scene.mesh, scene.network, scene.foundation, scene.stroke(), references,
                                    choice.options, BlockStep{}, WorkClock{});
         CHECK(outcome.force_error == choice.force_error);
@@ -336,12 +336,12 @@ TEST_CASE("what is chosen is what the solver then does, in any tick") {
 TEST_CASE("what cannot be kept is said, and the nearest to it given") {
     const SmallScene scene;
     const auto dear = scene.choose({.time = 1e-6});
-    CHECK_FALSE(dear.met);
+    CHECK_FALSE(dear.satisfied);
     CHECK(dear.options.layers == 1);
     CHECK(dear.options.sweeps == 1);
     CHECK(dear.options.contact_iterations == 1);
     const auto coarse = scene.choose({.force_error = 1e-3}, {.layers = {1, 2}, .sweeps = {1}, .repetitions = 1});
-    CHECK_FALSE(coarse.met);
+    CHECK_FALSE(coarse.satisfied);
     CHECK(coarse.force_error > 1e-3 / 1.8);
     CHECK(coarse.options.sweeps == 1);
     CHECK(coarse.options.contact_iterations == 8);
@@ -360,7 +360,7 @@ TEST_CASE("by default the clock is a real one, the options besides are kept") {
     const Stroke stroke(scene.mesh, scene.tools, 1e-3);
     const auto choice = choose_settings(scene.mesh, scene.network, scene.foundation, stroke, {.force_error = 0.02},
                                         {.others = {.force_tolerance = 1e-7}});
-    CHECK(choice.met);
+    CHECK(choice.satisfied);
     CHECK(choice.time > 0);
     CHECK(choice.time < 1);
     CHECK(choice.options.force_tolerance == 1e-7);
@@ -374,13 +374,13 @@ TEST_CASE("another rule is tried as it is, one that diverges is never chosen") {
     const MassSpringNetwork light(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 4e-7});
     const auto stable =
         choose_settings(mesh, heavy, foundation, stroke, {.force_error = 0.05}, {.repetitions = 1}, MassStep{});
-    CHECK(stable.met);
+    CHECK(stable.satisfied);
     const auto wild =
         choose_settings(mesh, light, foundation, stroke, {.force_error = 0.05}, {.repetitions = 1}, MassStep{});
-    CHECK_FALSE(wild.met);
+    CHECK_FALSE(wild.satisfied);
     CHECK_FALSE(wild.advanced);
     const auto late = choose_settings(mesh, light, foundation, stroke, {.time = 1.0}, {.repetitions = 1}, MassStep{});
-    CHECK_FALSE(late.met);
+    CHECK_FALSE(late.satisfied);
 }
 
 TEST_CASE("what makes no sense is refused") {
@@ -408,9 +408,9 @@ TEST_CASE("what makes no sense is refused") {
           "choose_settings: contact_iterations must be at least 1, got 0");
     CHECK(refused(percent, {.others = {.max_vertex_updates = 0}}) ==
           "QuasiStaticSolver: max_vertex_updates must be at least 1, got 0");
-    CHECK(refused(percent, {.margin = 0.5}) == "choose_settings: margin must be finite and at least 1, got 0.5");
-    CHECK_THAT(refused(percent, {.margin = nan}), ContainsSubstring("margin must be finite and at least 1, got"));
-    CHECK(refused(percent, {.every = 0}) == "choose_settings: every must be at least 1, got 0");
+    CHECK(refused(percent, {.safety_factor = 0.5}) == "choose_settings: safety_factor must be finite and at least 1, got 0.5");
+    CHECK_THAT(refused(percent, {.safety_factor = nan}), ContainsSubstring("safety_factor must be finite and at least 1, got"));
+    CHECK(refused(percent, {.tick_stride = 0}) == "choose_settings: tick_stride must be at least 1, got 0");
     CHECK(refused(percent, {.repetitions = 0}) == "choose_settings: plays must be at least 1, got 0");
 
     const SmallScene apart(2 * radius);

@@ -20,7 +20,7 @@ const Vector3<double> middle = Vector3<double>::Constant(1.0 / 3), target(1, 2, 
 /// Four vertices, the last one pinned; told by constraint 5.
 EquilibriumScene scene() {
     EquilibriumScene scene(Points<double>::Zero(3, 4), {0, 0, 0, 1});
-    scene.turn_to(5);
+    scene.select_constraint(5);
     return scene;
 }
 

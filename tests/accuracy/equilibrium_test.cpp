@@ -600,7 +600,7 @@ TEST_CASE("equilibrium in floats is the one in doubles, as near as floats come",
     touching.normal = contact.normal.cast<float>();
     touching.axis_point = contact.axis_point.cast<float>();
     touching.gap = static_cast<float>(contact.gap);
-    touching.reach = static_cast<float>(contact.detection_distance);
+    touching.detection_distance = static_cast<float>(contact.detection_distance);
     touching.radius = static_cast<float>(contact.radius);
 
     const auto rest = sphere.rest({}, press(stroke.at(1), contact), load<double>(sphere.corners(9), weights, force));

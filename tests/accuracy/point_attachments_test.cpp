@@ -39,7 +39,7 @@ TEST_CASE("held points are put in their places, and what is projected leaves the
         CHECK(places.slip(y) >= before);
         CHECK(places.slip(y) <= before * (1 + 1e-6));
         const Points<double> start = y;
-        places.settle(y);
+        places.project_positions(y);
         CHECK((y - start).norm() == Approx(before));  // by the shortest way
         CHECK(off(one, y) + off(two, y) < 1e-14);
         CHECK(places.slip(y) < 1e-13);

@@ -132,9 +132,9 @@ TEST_CASE("a stroke gives what the loop of the README does") {
 TEST_CASE("the errors of a trial are those to the equilibrium of each tick") {
     const Scene<double> scene;
     const SolverOptions<double> options{.layers = 4, .sweeps = 2};
-    for (const Index every : {1, 3}) {
-        const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), every);
-        REQUIRE(references.size() == static_cast<std::size_t>(scene.ticks() / every));
+    for (const Index tick_stride : {1, 3}) {
+        const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), tick_stride);
+        REQUIRE(references.size() == static_cast<std::size_t>(scene.ticks() / tick_stride));
         const auto outcome = scene.play(scene.stroke(), references, options);
 
         auto stroke = scene.stroke();
@@ -146,8 +146,8 @@ TEST_CASE("the errors of a trial are those to the equilibrium of each tick") {
             const auto [presses, pulls] = stroke(tick, x, moved);
             const auto report = solver.step(x, dt, scene.network, scene.foundation, presses, pulls);
             moved.assign(report.moved.begin(), report.moved.end());
-            if ((tick + 1) % every != 0) continue;
-            const auto& rest = references[static_cast<std::size_t>(tick / every)];
+            if ((tick + 1) % tick_stride != 0) continue;
+            const auto& rest = references[static_cast<std::size_t>(tick / tick_stride)];
             CHECK(rest.tick == tick);
             const auto exact = equilibrium(x, scene.mesh, scene.network, scene.foundation, {}, presses, pulls);
             CHECK((exact.x - rest.x).norm() < 0.02 * radius);
@@ -160,7 +160,7 @@ TEST_CASE("the errors of a trial are those to the equilibrium of each tick") {
         CHECK(outcome.force_error == Approx(std::sqrt(errors / squares)));
         CHECK(outcome.position_error == Approx(std::sqrt(displacements / static_cast<double>(references.size()))));
         CHECK(outcome.force_error < 0.1);
-        CHECK(outcome.ticks_compared == scene.ticks() / every);
+        CHECK(outcome.ticks_compared == scene.ticks() / tick_stride);
         CHECK(outcome.advanced);
     }
 }
@@ -248,16 +248,16 @@ TEST_CASE("a stroke or a trial that makes no sense is refused") {
     CHECK(refusal([&] { Stroke(scene.mesh, tools, dt); }) ==
           "Stroke: the tool of tick 7 must be finite, its radius not negative, got one that is not");
 
-    const auto rests_of = [&](const auto& history, Index every = 1) {
-        return equilibria(scene.mesh, scene.network, scene.foundation, history, every);
+    const auto rests_of = [&](const auto& history, Index tick_stride = 1) {
+        return equilibria(scene.mesh, scene.network, scene.foundation, history, tick_stride);
     };
     CHECK(refusal([&] { (void)rests_of(Odd{.count = 0}); }) == "equilibria: the history must have a tick, got 0");
     CHECK(refusal([&] { (void)rests_of(Odd{.step = -1}); }) ==
           "equilibria: dt of the history must be finite and positive [s], got -1");
-    CHECK(refusal([&] { (void)rests_of(Odd{}, 0); }) == "equilibria: every must be at least 1, got 0");
+    CHECK(refusal([&] { (void)rests_of(Odd{}, 0); }) == "equilibria: tick_stride must be at least 1, got 0");
 
     auto references = rests_of(Pinch{}, 5);
-    const std::string others = "trial: rests must be of ticks of the history, one at least, in their order, got others";
+    const std::string others = "trial: references must be of ticks of the history, one at least, in order, got others";
     CHECK(refusal([&] { (void)scene.play(Pinch{}, {}); }) == others);
     CHECK(refusal([&] { (void)scene.play(Pinch{.last = 12}, references); }) == others);
     CHECK(refusal([&] { (void)scene.play(Odd{.count = 0}, references); }) ==
@@ -266,7 +266,7 @@ TEST_CASE("a stroke or a trial that makes no sense is refused") {
           "QuasiStaticSolver: sweeps must be at least 1, got 0");
     references[1].reactions.pop_back();
     CHECK(refusal([&] { (void)scene.play(Pinch{}, references); }) ==
-          "trial: the rest of tick 9 must have 162 vertices and 3 reactions, got 162 and 2");
+          "trial: the reference of tick 9 must have 162 vertices and 3 reactions, got 162 and 2");
     references = rests_of(Pinch{}, 5);
     std::swap(references[0], references[1]);
     CHECK(refusal([&] { (void)scene.play(Pinch{}, references); }) == others);

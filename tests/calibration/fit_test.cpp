@@ -199,7 +199,7 @@ TEST_CASE("Rows with deviations of their own count by these: weighted least squa
     }
 }
 
-TEST_CASE("Constants of which only the product shows are not told, the one beside them is") {
+TEST_CASE("Constants of which only the product shows are not identifiable, the one beside them is") {
     Random random(4);
     for (int i = 0; i < cases(100); ++i) {
         CAPTURE(i);
@@ -220,10 +220,10 @@ TEST_CASE("Constants of which only the product shows are not told, the one besid
     }
 }
 
-TEST_CASE("Stiffening is told from deep presses and not from shallow ones, whatever the start") {
+TEST_CASE("Stiffening is identifiable from deep presses and not from shallow ones, whatever the start") {
     Random random(5);
     const int tables = cases(500);
-    int told = 0;
+    int identified = 0;
     for (int i = 0; i < tables; ++i) {
         CAPTURE(i);
         const std::vector<double> truth{random.number(5.0, 50.0), random.number(0.5, 1.5)};
@@ -233,14 +233,14 @@ TEST_CASE("Stiffening is told from deep presses and not from shallow ones, whate
         const auto shallow = fit(noisy(table_of(stiffening, truth, depths(15, 0.01)), 0.02, random), start, stiffening);
         CHECK((shallow.converged && shallow.identifiable[0]));
         CHECK(shallow.constants[0] == Approx(truth[0]).epsilon(0.05));
-        told += shallow.identifiable[1] ? 1 : 0;
+        identified += shallow.identifiable[1] ? 1 : 0;
         const auto exact = fit(table_of(stiffening, truth, depths(15, 1e-4)), start, stiffening);
         CHECK((exact.identifiable[0] && !exact.identifiable[1]));
     }
-    CHECK(told <= tables / 20);  // noise that looks like stiffening: the intervals may miss as often
+    CHECK(identified <= tables / 20);  // noise that looks like stiffening: the intervals may miss as often
 }
 
-TEST_CASE("A constant that does nothing stays where it started and is not told") {
+TEST_CASE("A constant without effect keeps its start value and is not identifiable") {
     const auto idle = each_depth([](Numbers c, double d) { return c[1] * d; });
     Random random(6);
     const auto found = fit(noisy(table_of(idle, {3, 4}, depths(9)), 0.02, random), {5, 1}, idle);
@@ -256,19 +256,19 @@ TEST_CASE("A constant that does nothing stays where it started and is not told")
     CHECK(none.constants[0] == Approx(2));
 }
 
-TEST_CASE("A constant that wants to leave its span ends there, not told, and the others are right") {
+TEST_CASE("A constant that leaves its search range ends at its edge, not identifiable, and the others are right") {
     Random random(7);
     // There is no stiffening: the best is none at all.
     const auto table = noisy(table_of(proportional, {20}, depths(15)), 0.02, random);
-    const auto found = fit(table, {10, 1}, stiffening, {.span = 50});
+    const auto found = fit(table, {10, 1}, stiffening, {.search_factor = 50});
     CHECK(found.converged);
     CHECK_FALSE(found.identifiable[1]);
     CHECK(found.constants[1] >= 0.9999 / 50);
     CHECK(found.identifiable[0]);
     CHECK(found.constants[0] == Approx(20).epsilon(0.05));
-    const auto held_back = fit(table, {2}, proportional, {.span = 5});
-    CHECK(held_back.constants[0] == Approx(10));
-    CHECK_FALSE(held_back.identifiable[0]);
+    const auto bounded = fit(table, {2}, proportional, {.search_factor = 5});
+    CHECK(bounded.constants[0] == Approx(10));
+    CHECK_FALSE(bounded.identifiable[0]);
 }
 
 TEST_CASE("Units of force and depth change nothing but units") {
@@ -362,9 +362,9 @@ TEST_CASE("A fit refuses what it cannot work with") {
     };
     CHECK(asking({.tolerance = 0}) == "FitOptions: tolerance must be above 0 and below 1, got 0");
     CHECK(asking({.step = 1}) == "FitOptions: step must be above 0 and below 1, got 1");
-    CHECK(asking({.span = nan}) == "FitOptions: span must be above 1 and below 1e+30, got nan");
+    CHECK(asking({.search_factor = nan}) == "FitOptions: search_factor must be above 1 and below 1e+30, got nan");
     CHECK(asking({.confidence = 1}) == "FitOptions: confidence must be above 0 and below 1, got 1");
-    CHECK(asking({.widest = 1}) == "FitOptions: widest must be above 1 and below 1e+30, got 1");
+    CHECK(asking({.max_interval_ratio = 1}) == "FitOptions: max_interval_ratio must be above 1 and below 1e+30, got 1");
     CHECK(asking({.min_sensitivity = -1}) == "FitOptions: min_sensitivity must be above 0 and below 1, got -1");
     CHECK(asking({.max_iterations = 0}) == "FitOptions: max_iterations must be at least 1, got 0");
 }

@@ -245,7 +245,7 @@ TEST_CASE("The 95 % intervals of stiffnesses hold the truth in 90 to 99 % of ind
     }
 }
 
-TEST_CASE("Stiffening is told from deep indentations and not from shallow ones, the stiffness from both") {
+TEST_CASE("Stiffening is identifiable from deep indentations and not from shallow ones, the stiffness from both") {
     Random random(4);
     const auto mesh = sphere(1);
     const Indentation model(mesh, tip(), down, stiffening_on(mesh));
@@ -271,12 +271,12 @@ TEST_CASE("An indentation refuses a tool that cannot touch, and depths that are 
     const auto invalid = "Indentation: the tool must be finite and have a radius [m], got one that is not or has none";
     CHECK(with(tip(0), down) == invalid);
     CHECK(with(tip(nan), down) == invalid);
-    const auto nowhere = "Indentation: the way must be finite and have a direction, got none";
+    const auto nowhere = "Indentation: the direction must be finite and not zero, got one that is not";
     CHECK(with(tip(), Point::Zero()) == nowhere);
     CHECK(with(tip(), {0, nan, 1}) == nowhere);
     const auto touching = "Indentation: the tool must stand outside the surface, got one that touches it";
     CHECK(with(tip(0.02), down) == touching);
-    const auto passing = "Indentation: the tool must meet the surface on its way, got one that passes by";
+    const auto passing = "Indentation: the tool must meet the surface along its direction, got one that misses it";
     CHECK(with(tip(), {0, 1, 0}) == passing);
     CHECK(with(tip(), -down) == passing);
     const Indentation valid(mesh, tip(), down, linear_on(mesh));

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// What does a part cost that a scene leaves out? Each pair of functions does the same with every vertex of a sphere:
-// ours leaves a part out by the library's means (no foundation, volume springs without damping, a law of whose answer only
-// the tension is used), the other does not know it. The last one is the loop one would write by hand. `left_out` counts
-// their instructions; here they must come to the same bits.
+// Cost of a part that a scene leaves out. Each pair of functions computes the same for every vertex of a sphere: ours leaves
+// a part out by the library's means (no foundation, volume springs without damping, a law of whose result only the tension
+// is used), the other has no such part. The last one is a loop written by hand. `left_out` counts their instructions; here
+// their results must have the same bits.
 #include <algorithm>
 #include <cmath>
 #include <concepts>
@@ -104,11 +104,11 @@ struct Rows {
 
 extern "C" {
 
-COUNTED void backing_ours(const SceneOf<membrane::NoFoundation>& scene) {
+COUNTED void foundation_ours(const SceneOf<membrane::NoFoundation>& scene) {
     for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v)
         visit(scene, v, membrane::state_of<Rule>(scene, v));
 }
-COUNTED void backing_bare(const SceneOf<membrane::NoFoundation>& scene) {
+COUNTED void foundation_bare(const SceneOf<membrane::NoFoundation>& scene) {
     for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v) visit(scene, v, bare_state(scene, v));
 }
 
@@ -192,7 +192,7 @@ int main(int argc, char** argv) {
             x = now;
         };
     };
-    compare("foundation", visited(backing_ours, none), visited(backing_bare, none));
+    compare("foundation", visited(foundation_ours, none), visited(foundation_bare, none));
     compare("damping", visited(damping_ours, springs), visited(damping_bare, undamped));
     compare(
         "energy", [&](Points& x) { energy_ours(network, start, x); },
@@ -200,8 +200,8 @@ int main(int argc, char** argv) {
     const Rows rows(network);
     const Points no_forces = Points::Zero(3, mesh.vertex_count());
     const std::vector<S> no_stiffness(static_cast<std::size_t>(mesh.vertex_count()), S(0));
-    compare("by_hand", visited(backing_ours, none),
+    compare("by_hand", visited(foundation_ours, none),
             [&](Points& x) { by_hand_bare(rows, x.data(), no_forces.data(), no_stiffness.data()); });
-    std::printf("%d visits\n", static_cast<int>(mesh.vertex_count()));
+    std::printf("%d vertices\n", static_cast<int>(mesh.vertex_count()));
     return same ? 0 : 1;
 }

@@ -124,7 +124,7 @@ TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangl
             REQUIRE(near->barycentric.minCoeff() >= 0);
             REQUIRE(std::abs(near->barycentric.sum() - 1) <= 4 * std::numeric_limits<S>::epsilon());
             // `reach` leads from the point of the triangle to the axis; to the pair's own end of it.
-            const Vector3<S> axis_point = point_at(triangle, near->barycentric) + near->reach;
+            const Vector3<S> axis_point = point_at(triangle, near->barycentric) + near->separation;
             const Vector3<S> from_position = axis_point - tool.position;
             if (pair == 0) REQUIRE(norm(from_position) <= tolerance);
             if (pair == 1) REQUIRE(norm<S>(from_position - tool.axis) <= tolerance);
@@ -132,8 +132,8 @@ TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangl
                 REQUIRE(norm(cross(from_position, tool.axis)) <= tolerance * norm(tool.axis));
                 REQUIRE(near->barycentric[(pair - 2 + 2) % 3] == 0);  // on its edge
             }
-            if (!(norm(near->reach) < least)) continue;
-            least = norm(near->reach);
+            if (!(norm(near->separation) < least)) continue;
+            least = norm(near->separation);
             nearest_pair = pair;
         }
         const auto expected = static_cast<S>(distance_from_axis(triangle, tool));
@@ -156,17 +156,17 @@ TEMPLATE_TEST_CASE("a shaft along a triangle, by hand", "[tool]", double, float)
     const Triangle<S> triangle{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}};
     // Across the corner, one unit above: both ends are beyond the edges, the axis over two of them.
     const Tool<S> shaft{.position = {-1, 1, 1}, .axis = {6, 0, 0}, .radius = S(0.5)};
-    CHECK(proximity(triangle, shaft, 0)->reach == Vector3<S>(-1, 0, 1));
-    CHECK(proximity(triangle, shaft, 1)->reach == Vector3<S>(1, 1, 1));
+    CHECK(proximity(triangle, shaft, 0)->separation == Vector3<S>(-1, 0, 1));
+    CHECK(proximity(triangle, shaft, 1)->separation == Vector3<S>(1, 1, 1));
     const auto over_hypotenuse = proximity(triangle, shaft, 3);
     REQUIRE(over_hypotenuse);
     CHECK((over_hypotenuse->barycentric - Vector3<S>(0, S(0.75), S(0.25))).norm() < S(1e-6));
-    CHECK((over_hypotenuse->reach - Vector3<S>(0, 0, 1)).norm() < S(1e-6));
+    CHECK((over_hypotenuse->separation - Vector3<S>(0, 0, 1)).norm() < S(1e-6));
     const auto over_side = proximity(triangle, shaft, 4);
     REQUIRE(over_side);
-    CHECK((over_side->reach - Vector3<S>(0, 0, 1)).norm() < S(1e-6));
+    CHECK((over_side->separation - Vector3<S>(0, 0, 1)).norm() < S(1e-6));
     // A sphere over the inside.
     const Tool<S> sphere{.position = {1, 1, 2}, .radius = S(0.5)};
-    CHECK(proximity(triangle, sphere, 0)->reach == Vector3<S>(0, 0, 2));
+    CHECK(proximity(triangle, sphere, 0)->separation == Vector3<S>(0, 0, 2));
     CHECK((proximity(triangle, sphere, 0)->barycentric - Vector3<S>(S(0.5), S(0.25), S(0.25))).norm() < S(1e-6));
 }

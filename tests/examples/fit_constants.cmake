@@ -11,7 +11,7 @@ foreach(expected "springs;25" "foundation;3")
     list(GET expected 0 name)
     list(GET expected 1 truth)
     if(NOT output MATCHES "${name}  ?\\[N/m\\] +[0-9.]+ +([0-9.]+) to +([0-9.]+) +yes")
-        message(FATAL_ERROR "${name} is not told:\n${output}")
+        message(FATAL_ERROR "${name} is not identifiable:\n${output}")
     endif()
     if(NOT (CMAKE_MATCH_1 LESS truth AND truth LESS CMAKE_MATCH_2))
         message(FATAL_ERROR "the interval of ${name} does not hold ${truth}:\n${output}")
@@ -24,7 +24,7 @@ if(NOT count EQUAL 13 OR NOT svg MATCHES "^<svg .*</svg>\n$" OR svg MATCHES "nan
     message(FATAL_ERROR "expected a drawing of 12 rows and a legend, got ${count} dots")
 endif()
 
-# From three shallow presses, springs and foundation cannot be told apart.
+# From three shallow presses, springs and foundation are not identifiable.
 file(WRITE ${folder}/shallow.csv "1e-5,2.0e-5\n2e-5,4.1e-5\n\n# no more\n3e-5,6.1e-5\n")
 execute_process(COMMAND ${program} --data ${folder}/shallow.csv --out ${folder} RESULT_VARIABLE code OUTPUT_VARIABLE output)
 if(NOT code EQUAL 0 OR NOT output MATCHES " no\n")

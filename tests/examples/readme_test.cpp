@@ -15,7 +15,7 @@
 #include <membrane/membrane.hpp>
 
 // [threads]
-#include <membrane/core/thread_pool.hpp>  // the stock one; waking its threads is a system call
+#include <membrane/core/thread_pool.hpp>  // the stock pool; waking its threads is a system call
 // [/threads]
 
 // [hand]
@@ -205,7 +205,7 @@ TEST_CASE_METHOD(Touched, "the README's hand") {
     const auto force = device.force();
     std::stringstream file;
     // [recording]
-    membrane::Recorder<double> recorder(60'000, mesh.vertex_count());              // room for a minute at 1 kHz
+    membrane::Recorder<double> recorder(60'000, mesh.vertex_count());              // capacity: a minute at 1 kHz
     recorder.add(tool, force);                                                     // each tick
     membrane::write_recording(file, recorder.recording());                         // afterwards; write_csv for a table
     membrane::ReplayDevice<double> again(membrane::read_recording<double>(file));  // in place of the device
@@ -255,7 +255,8 @@ TEST_CASE("the README's device in millimetres") {
     const membrane::Vector3<double> force(0, 0, 0.01);
     membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
     // [units]
-    const auto scale = membrane::DeviceScale{.force = 40, .motion = 0.1};  // 40 times the force, 10 times the way
+    const auto scale =
+        membrane::DeviceScale{.force = 40, .motion = 0.1};  // 40 times the force, 10 times the displacement
     const auto seen = scale.to_scene(membrane::Millimetres(position), membrane::MillimetresPerSecond(velocity));
     device.write(scale.to_device(membrane::Newtons(force)).device_force.value());
     // [/units]
@@ -304,11 +305,11 @@ TEST_CASE("the README's mesh from elsewhere") {
     }
     // [validate]
     const auto report = membrane::validate(points, triangles);  // any numbers, 3 x V [m] and 3 x F
-    std::cout << to_string(report);                             // each defect with its indices and what to do
-    if (report.facts.likely_unit == membrane::LengthUnit::millimetre) points /= 1000;  // facts: what the mesh is
+    std::cout << to_string(report);                             // each defect with its indices and a remedy
+    if (report.facts.likely_unit == membrane::LengthUnit::millimetre) points /= 1000;  // facts of the mesh
     const auto repaired =
         membrane::repair(points, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true, .flip_inward = true});
-    const auto mesh = membrane::TriangleMesh(repaired.positions, repaired.triangles);  // throws where more is wrong
+    const auto mesh = membrane::TriangleMesh(repaired.positions, repaired.triangles);  // throws if a defect remains
     // [/validate]
     CHECK_FALSE(report.valid());
     CHECK(membrane::validate(mesh).empty());
@@ -339,13 +340,13 @@ TEST_CASE("the README's constants") {
 TEST_CASE_METHOD(Touched, "the README's equilibrium") {
     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [equilibrium]
-    const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
-    const double displacement = (x - rest.x).colwise().norm().maxCoeff();   // error of the positions [m]
-    const double force = (report.reactions[0] - rest.reactions[0]).norm();  // and of the force [N]
+    const auto equilibrium = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
+    const double displacement = (x - equilibrium.x).colwise().norm().maxCoeff();   // error of the positions [m]
+    const double force = (report.reactions[0] - equilibrium.reactions[0]).norm();  // and of the force [N]
     // [/equilibrium]
-    CHECK(rest.converged);
+    CHECK(equilibrium.converged);
     CHECK(displacement < 1e-5);
-    CHECK(force < 0.1 * rest.reactions[0].norm());
+    CHECK(force < 0.1 * equilibrium.reactions[0].norm());
 }
 
 TEST_CASE_METHOD(Touched, "the README's bound") {
@@ -370,9 +371,9 @@ TEST_CASE_METHOD(AtRest, "the README's settings") {
     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);  // a tool for each tick of 1 ms
     const auto choice =
         membrane::choose_settings(mesh, network, foundation, stroke, {.force_error = 0.05});  // or .time
-    if (!choice.met) std::puts("Nothing that was tried is enough. What came nearest:");
-    std::printf("%g of the force, %g s\n", choice.force_error, choice.time);  // as the experiment has measured
+    if (!choice.satisfied) std::puts("No setting is accurate enough. The nearest one:");
+    std::printf("%g of the force, %g s\n", choice.force_error, choice.time);  // as measured in the trial
     auto solver = membrane::QuasiStaticSolver(network, choice.options);
     // [/settings]
-    CHECK(choice.met);
+    CHECK(choice.satisfied);
 }

@@ -523,5 +523,5 @@ TEST_CASE("what is not passive is refused, and the message says what would be", 
     CHECK(refused({.stiffness = 1}, {.hand_damping = -1}) ==
           "Dissipation: hand_damping must be finite and not negative [N s/m], got -1");
     CHECK(refused({.stiffness = 1}, {.hand_damping = 1, .max_speed = 0}) ==
-          "Dissipation: fastest must be positive [m/s], got 0");
+          "Dissipation: max_speed must be positive [m/s], got 0");
 }

@@ -21,14 +21,14 @@ TEST_CASE("what cannot be worked with is left out, and the rest keeps its number
     CHECK(found ==
           std::vector{MeshDefect::coordinate_not_finite, MeshDefect::index_out_of_range, MeshDefect::repeated_vertex});
     CHECK(mesh.has_size);
-    CHECK(mesh.named.size() == 78);
+    CHECK(mesh.referenced.size() == 78);
     CHECK(mesh.sides.size() == 3 * 78);
     CHECK(mesh.points.size() == 41);
     for (Index f = 0; f < 80; ++f) {
         const auto corners = surface.triangles.col(f);
         const bool left_out = f == 3 || f == 8;
         CHECK((mesh.triangles(0, f) == no_index) == left_out);
-        CHECK(mesh.measured[static_cast<std::size_t>(f)] == (!left_out && (corners.array() != 7).all()));
+        CHECK(mesh.finite[static_cast<std::size_t>(f)] == (!left_out && (corners.array() != 7).all()));
         if (!left_out) CHECK(mesh.triangles.col(f) == corners);
     }
     for (const HalfEdge& side : mesh.sides) {

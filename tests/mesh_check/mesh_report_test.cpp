@@ -25,5 +25,5 @@ TEST_CASE("a report lists what is found, and counts what it does not list", "[me
           "warning: isolated vertex: no triangle names vertex 1; repair with .drop_isolated\n"
           "error: repeated vertex: triangle 7 names vertex 3 twice; repair with .drop_repeated\n"
           "3 more: isolated vertex\n"
-          "not everything was looked at\n");
+          "the search is not complete\n");
 }

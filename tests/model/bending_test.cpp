@@ -125,7 +125,7 @@ TEST_CASE("a mesh is at rest on its hinges, borders have none", "[bending]") {
                     const auto pull = placed.element.force_on(x, i);
                     const S size = norm<S>(x[1] - x[0]);
                     REQUIRE(norm(pull.force) <=
-                            S(1e3) * std::numeric_limits<S>::epsilon() * (1 + norm(pull.curvature * x[i])));
+                            S(1e3) * std::numeric_limits<S>::epsilon() * (1 + norm(pull.hessian * x[i])));
                     REQUIRE(size > 0);
                 }
             }

@@ -106,7 +106,7 @@ TEMPLATE_TEST_CASE("a foundation pulls with a stiffness along the normal and one
         const Vector3<S> expected = -stiffness * ((now - anchor) + rate * (now - start));
         REQUIRE((pull.force - expected).norm() <= tolerance);
         REQUIRE(pull.stiffness == Approx(std::max(normal[at], tangential[at]) * (1 + rate)));
-        REQUIRE((full(foundation.curvature(v)) - stiffness).norm() <= tolerance);
+        REQUIRE((full(foundation.hessian(v)) - stiffness).norm() <= tolerance);
         const S energy = (now - anchor).dot(stiffness * (now - anchor)) / 2;
         REQUIRE(std::abs(foundation.energy(v, now) - energy) <= tolerance);
         const auto endless = foundation.force_on(v, now, start, std::numeric_limits<S>::infinity());

@@ -530,7 +530,7 @@ TEST_CASE("a spring is an element: force, blocks and changes are of one energy",
         const Vector3<double> reach = there - here;
         for (const auto& [i, towards] : {std::pair(0, reach), std::pair(1, Vector3<double>(-reach))}) {
             const auto pull = spring.force_on(x, static_cast<std::size_t>(i));
-            REQUIRE(pull.force == pull_of(law, towards, k, rest).force());
+            REQUIRE(pull.force == spring_force(law, towards, k, rest).force());
         }
     };
     for (int seed = 1; seed <= cases(200); ++seed) {

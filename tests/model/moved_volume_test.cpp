@@ -77,10 +77,10 @@ TEMPLATE_TEST_CASE("on a body that moves rigidly every model pulls as at rest, t
         REQUIRE(spring.anchor == point(body.anchors(), v));
         REQUIRE(norm<S>(spring.force_on(pose.point_to_world(position)).force -
                         pose.vector_to_world(volume.force_on(v, position, start, S(0.01)).force)) <= tolerance);
-        const auto k = on(body, foundation).curvature(v);
+        const auto k = on(body, foundation).hessian(v);
         const Vector3<S> displacement = random.vector<S>();
         REQUIRE(norm<S>(k * pose.vector_to_world(displacement) -
-                        pose.vector_to_world(foundation.curvature(v) * displacement)) <= tolerance);
+                        pose.vector_to_world(foundation.hessian(v) * displacement)) <= tolerance);
     }
 }
 
@@ -102,7 +102,7 @@ TEST_CASE("on a body that is deformed springs pull to the anchors, and a foundat
             REQUIRE(on(body, volume).energy(v, here) == Approx(1.5 * squared_norm(off)));
             const auto k = outward_stiffness<double>(5, 2, point(body.normals(), v));
             REQUIRE(norm<double>(on(body, foundation).force_on(v, here, here, 1.0).force + k * off) < 1e-13);
-            REQUIRE(norm<double>((on(body, foundation).curvature(v) * off) - k * off) < 1e-13);
+            REQUIRE(norm<double>((on(body, foundation).hessian(v) * off) - k * off) < 1e-13);
         }
         CHECK(on(body, volume).anchors() == bent);
     }

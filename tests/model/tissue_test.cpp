@@ -68,7 +68,7 @@ TEST_CASE("a tissue pulls with all its parts", "[tissue]") {
                     const auto pull = placed.element.force_on(corners, i);
                     force += pull.force;
                     for (Eigen::Index k = 0; k < 3; ++k) {
-                        curvature.col(k) += pull.curvature * Vector3<double>(Eigen::Vector3d::Unit(k));
+                        curvature.col(k) += pull.hessian * Vector3<double>(Eigen::Vector3d::Unit(k));
                     }
                     for (const Index w : placed.corners) joined.insert(w);
                 });

@@ -44,7 +44,7 @@ struct Patch {
                 const auto nearest = proximity(triangle(f), tool, feature);
                 if (!nearest) continue;
                 points.push_back({f, feature, corners(f), nearest->barycentric,
-                                  direction<S>(nearest->reach, Vector3<S>::UnitZ()), Vector3<S>::Zero()});
+                                  direction<S>(nearest->separation, Vector3<S>::UnitZ()), Vector3<S>::Zero()});
             }
         }
         state.packs.append(std::span<const ContactPoint<S>>(points), 0, [](Index) { return false; });
@@ -121,7 +121,7 @@ TEMPLATE_TEST_CASE("located points are the nearest ones of their features", "[co
             }
             REQUIRE(norm<S>(weights - nearest->barycentric) <= slack);
             REQUIRE(std::abs(norm(normal) - 1) <= slack);
-            REQUIRE(norm<S>(pack.distance[i] * normal - nearest->reach) <= slack);
+            REQUIRE(norm<S>(pack.distance[i] * normal - nearest->separation) <= slack);
         });
     }
 }
@@ -139,7 +139,7 @@ TEMPLATE_TEST_CASE("forces that act add the stiffness of rocking faces, and take
         for_each_located(patch, [&](const auto&, std::size_t, const auto& point, const auto& nearest) {
             if (!nearest) return;
             const Vector3<S> stiffness =
-                rocking_of_one<S>(patch.triangle(point.triangle), nearest->barycentric, norm(nearest->reach));
+                rocking_of_one<S>(patch.triangle(point.triangle), nearest->barycentric, norm(nearest->separation));
             for (std::size_t k = 0; k < 3; ++k) {
                 expected[static_cast<std::size_t>(point.corners[k])] += stiffness[static_cast<Eigen::Index>(k)];
             }
@@ -173,7 +173,7 @@ TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by 
         apply_forces(state, state.packs.items());
         for (const auto& point : patch.unpacked()) {
             const S force = -dot(point.force, point.normal);
-            const S gap = norm(proximity(patch.triangle(point.triangle), patch.tool, 0)->reach) - patch.tool.radius;
+            const S gap = norm(proximity(patch.triangle(point.triangle), patch.tool, 0)->separation) - patch.tool.radius;
             REQUIRE(force >= 0);
             REQUIRE(norm<S>(point.force + force * point.normal) <= slack);
             REQUIRE(gap >= -slack);
@@ -214,7 +214,7 @@ TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corn
                 REQUIRE(norm<S>(moved - by) <= slack * (1 + force));
             }
             const auto before = triangle_at(patch.x, point.corners);
-            const S gap = norm(proximity(before, patch.tool, 0)->reach) - patch.tool.radius;
+            const S gap = norm(proximity(before, patch.tool, 0)->separation) - patch.tool.radius;
             REQUIRE(std::abs(force - std::max(-gap / compliance, S(0))) <= 100 * slack * (1 + force));
         }
         REQUIRE(std::abs(pass.largest - largest) <= slack * (1 + largest));
@@ -245,8 +245,8 @@ TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals",
             moves = push_out(patch.state, patch.shape(), patch.state.packs.items());
         for (const auto& point : patch.points) {
             const auto now = patch.triangle(point.triangle), before = triangle_at(patch.x, point.corners);
-            const bool was_inside = norm(proximity(before, patch.tool, 0)->reach) < patch.tool.radius - slack;
-            REQUIRE(norm(proximity(now, patch.tool, 0)->reach) >= patch.tool.radius * (1 - 100 * slack) - 10 * slack);
+            const bool was_inside = norm(proximity(before, patch.tool, 0)->separation) < patch.tool.radius - slack;
+            REQUIRE(norm(proximity(now, patch.tool, 0)->separation) >= patch.tool.radius * (1 - 100 * slack) - 10 * slack);
             if (!was_inside) REQUIRE(norm<S>(now.a - before.a) <= slack);
         }
     }

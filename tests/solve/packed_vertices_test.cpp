@@ -260,7 +260,7 @@ TEMPLATE_TEST_CASE("the residual forces of packs are those of their vertices, to
         for (std::size_t p = 0; p < packed.count(); ++p) {
             packed.evaluate_residual(p, scene);
             for (const Index v : packed.vertices(p)) {
-                const Vector3<S> force = pull_on(scene, v).force;
+                const Vector3<S> force = total_force(scene, v).force;
                 REQUIRE(state.residual_force(v) == force);
                 REQUIRE(state.unbalanced_force(v) == norm(undamped_force(scene, v, force)));
             }

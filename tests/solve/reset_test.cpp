@@ -121,7 +121,7 @@ bool same(const Contact<S>& a, const Contact<S>& b) {
     };
     return a.phase == b.phase && a.triangle == b.triangle && a.gap == b.gap && a.depth == b.depth &&
            a.tunnelled == b.tunnelled && same_bits(a.point, b.point) && same_bits(a.normal, b.normal) &&
-           std::equal(a.touched.begin(), a.touched.end(), b.touched.begin(), b.touched.end(), listed) &&
+           std::equal(a.triangles.begin(), a.triangles.end(), b.triangles.begin(), b.triangles.end(), listed) &&
            std::equal(a.candidates.begin(), a.candidates.end(), b.candidates.begin(), b.candidates.end(), listed) &&
            std::equal(a.points.begin(), a.points.end(), b.points.begin(), b.points.end(), same_point);
 }

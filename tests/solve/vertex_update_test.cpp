@@ -66,8 +66,8 @@ TEST_CASE("the state of a vertex has all that pulls on it", "[update]") {
         const Vector3<double> force = springs.force + foundation.force + step.force;
         const double stiffness = springs.stiffness + foundation.stiffness + 7;
 
-        REQUIRE(norm<double>(pull_on(step.scene, v).force - force) < 1e-13);
-        REQUIRE(pull_on(step.scene, v).stiffness == Approx(stiffness));
+        REQUIRE(norm<double>(total_force(step.scene, v).force - force) < 1e-13);
+        REQUIRE(total_force(step.scene, v).stiffness == Approx(stiffness));
         for (const auto& state : {state_of<Numbers>(step.scene, v), state_of<Blocks>(step.scene, v)}) {
             REQUIRE(norm<double>(state.force - force) < 1e-13);
             REQUIRE(state.stiffness == Approx(stiffness));
@@ -95,7 +95,7 @@ TEST_CASE("a displacement on which springs stiffen is halved until the energy do
         CAPTURE(seed);
         const auto check = [&](auto& step) {
             const Index v = step.v;
-            const Vector3<double> pull = pull_on(step.scene, v).force;
+            const Vector3<double> pull = total_force(step.scene, v).force;
             const Vector3<double> displacement = step.random.number(0.0, 0.5) * direction<double>(pull, pull);
             const Vector3<double> found = backtracked<BlockStep>(step.scene, v, displacement);
             const auto others = others_on(step.scene, v);
@@ -128,7 +128,7 @@ TEST_CASE("a step diverges beyond two over the curvature", "[update]") {
         CAPTURE(seed);
         MidStep<LinearSpring> step(static_cast<std::uint64_t>(seed));
         const double others = others_on(step.scene, step.v).stiffness;
-        const double limit = 2 / (largest_curvature<double>(step.network, step.v, step.x) + others);
+        const double limit = 2 / (largest_eigenvalue_at<double>(step.network, step.v, step.x) + others);
         REQUIRE_FALSE(diverges(step.scene, step.v, 0.999 * limit));
         REQUIRE(diverges(step.scene, step.v, 1.001 * limit));
     }

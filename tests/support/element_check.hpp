@@ -38,7 +38,7 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
         const auto change = element.energy_change(x, i, displacement);
         const double difference = element.energy(moved(displacement)) - element.energy(x);
         REQUIRE(std::abs(change.change - difference) < 1e-12 * energy + 1e-15 * change.size);
-        REQUIRE(eigenvalues_of(dense(pull.curvature))[0] > -1e-12 * energy / (size * size));
+        REQUIRE(eigenvalues_of(dense(pull.hessian))[0] > -1e-12 * energy / (size * size));
         membrane::Corners<float, E::corner_count> y;
         for (std::size_t k = 0; k < y.size(); ++k) y[k] = x[k].template cast<float>();
         const auto single = element.force_on(y, i);
@@ -86,8 +86,8 @@ void check_lanes(const std::array<E, membrane::Lanes<double>::count>& elements,
         for (std::size_t l = 0; l < Wide::count; ++l) {
             const auto alone = elements[l].force_on(x[l], i);
             for (Eigen::Index k = 0; k < 3; ++k) REQUIRE(pull.force[k][l] == alone.force[k]);
-            const auto& a = pull.curvature;
-            const auto& b = alone.curvature;
+            const auto& a = pull.hessian;
+            const auto& b = alone.hessian;
             REQUIRE((a.xx[l] == b.xx && a.yy[l] == b.yy && a.zz[l] == b.zz));
             REQUIRE((a.xy[l] == b.xy && a.xz[l] == b.xz && a.yz[l] == b.yz));
             const auto changes = elements[l].energy_change(x[l], i, displacement);

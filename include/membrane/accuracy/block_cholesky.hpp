@@ -13,13 +13,13 @@
 #include <membrane/core/compressed_rows.hpp>
 #include <membrane/core/symmetric3.hpp>
 
-/// Whether a symmetric matrix of 3 x 3 blocks, one for each vertex and each spring, is positive definite.
+/// Proves that a symmetric matrix of 3 x 3 blocks, one for each vertex and each spring, is positive definite.
 ///
 ///     membrane::BlockCholesky factors(vertex_count, springs);                // offline
 ///     factors.open();
 ///     factors.add(v, block);                                                // on the diagonal
 ///     factors.subtract(s, block);                                           // at spring s, off the diagonal
-///     if (factors.definite_above(0.5)) ...                                  // no eigenvalue is below 0.5, proven
+///     if (factors.definite_above(0.5)) ...                                  // proven: no eigenvalue is below 0.5
 namespace membrane {
 
 namespace detail {
@@ -30,15 +30,15 @@ namespace detail {
 
 }  // namespace detail
 
-/// Sparse Cholesky factors in the order of minimum degree [George89], found once with all the memory they need. One
-/// thread at a time for each.
+/// Sparse Cholesky factorisation in minimum degree order [George89]. The constructor computes the order and allocates
+/// all memory. One thread at a time for each instance.
 class BlockCholesky {
   public:
     /// `links` (springs) have a `first` and a `second` vertex. Offline. Cost for a mesh: O(V log V) blocks.
     template <class Links>
     BlockCholesky(Index vertex_count, const Links& links);
 
-    /// Begins a matrix of zeros.
+    /// Sets the matrix to zero.
     void open() noexcept;
 
     void add(Index v, const Symmetric3<double>& block) noexcept {
@@ -50,37 +50,38 @@ class BlockCholesky {
         size_ += 2 * detail::size_of(block);
     }
 
-    /// Whether it is certain that no eigenvalue is below `shift`: Cholesky's algorithm comes to its end with
-    /// A - (shift + c) I, where c, n epsilon times all the numbers that A was made of, is more than rounding can do
-    /// [Rump06]. The matrix stays. Online. Cost for a mesh: O(V^1.5).
+    /// True only if no eigenvalue is below `shift`: Cholesky's algorithm succeeds for A - (shift + c) I, where c, n
+    /// epsilon times the sum of all magnitudes added to A, exceeds the rounding error [Rump06]. The matrix is not
+    /// changed. Online. Cost for a mesh: O(V^1.5).
     [[nodiscard]] bool definite_above(double shift) noexcept;
 
   private:
     using Block = Eigen::Matrix3d;
-    struct Place {  // of a block below the diagonal: its column, and where its number is in `blocks_`
+    struct Entry {  // of a block below the diagonal: its column, and its index in `blocks_`
         std::size_t column, number;
     };
     [[nodiscard]] static std::size_t at(Index v) noexcept { return static_cast<std::size_t>(v); }
     template <class Links>
     [[nodiscard]] std::vector<std::vector<Index>> eliminate(const Links& links);
     void fill(double shift) noexcept;
-    void take_columns_before(std::size_t column) noexcept;
-    [[nodiscard]] bool close(std::size_t column) noexcept;
+    void subtract_previous_columns(std::size_t column) noexcept;
+    [[nodiscard]] bool factorise_column(std::size_t column) noexcept;
 
     // Rows and columns are numbered in the order of elimination.
     std::vector<std::size_t> rank_;                      // of each vertex, its number
     std::vector<std::size_t> begin_{0}, row_;            // of each column, its blocks; of each block, its row
-    CompressedRows<Place> before_;                       // of each row, its blocks
+    CompressedRows<Entry> before_;                       // of each row, its blocks
     std::vector<std::size_t> number_;                    // of each link, its block
     std::vector<Symmetric3<double>> diagonal_, linked_;  // the matrix
     std::vector<Block> pivots_, blocks_;                 // the factors
-    std::vector<std::size_t> place_;                     // of each row, its block in the column at work
-    double size_ = 0;                                    // of all numbers in the matrix
+    std::vector<std::size_t> block_of_row_;              // of each row, its block in the current column
+    double size_ = 0;                                    // sum of the magnitudes added to the matrix
 };
 
 namespace detail {
 
-/// Cholesky factor of a 3 x 3 matrix of which the lower triangle counts; false if it is not positive definite.
+/// Cholesky factor of a 3 x 3 matrix, read from and written to its lower triangle; false if it is not positive
+/// definite.
 inline bool factorise(Eigen::Matrix3d& a) noexcept {
     for (int j = 0; j < 3; ++j) {
         for (int k = 0; k < j; ++k) a(j, j) -= a(j, k) * a(j, k);
@@ -110,7 +111,7 @@ BlockCholesky::BlockCholesky(Index vertex_count, const Links& links)
       diagonal_(rank_.size()),
       linked_(links.size()),
       pivots_(rank_.size(), Block::Zero()),
-      place_(rank_.size()) {
+      block_of_row_(rank_.size()) {
     const auto columns = eliminate(links);
     for (const auto& column : columns) {
         for (const Index v : column) row_.push_back(rank_[at(v)]);
@@ -118,10 +119,10 @@ BlockCholesky::BlockCholesky(Index vertex_count, const Links& links)
         begin_.push_back(row_.size());
     }
     blocks_.assign(row_.size(), Block::Zero());
-    before_ = CompressedRows<Place>(vertex_count, [&](auto put) {
+    before_ = CompressedRows<Entry>(vertex_count, [&](auto put) {
         for (std::size_t column = 0; column < columns.size(); ++column) {
             for (std::size_t b = begin_[column]; b < begin_[column + 1]; ++b) {
-                put(static_cast<Index>(row_[b]), Place{column, b});
+                put(static_cast<Index>(row_[b]), Entry{column, b});
             }
         }
     });
@@ -133,8 +134,8 @@ BlockCholesky::BlockCholesky(Index vertex_count, const Links& links)
     }
 }
 
-// Numbers the vertices, always next the one that is linked to the fewest; its neighbours, which that links to one
-// another, are the rows of its column.
+// Numbers the vertices: next is the vertex with the fewest neighbours. These become the rows of its column and are
+// linked to one another.
 template <class Links>
 std::vector<std::vector<Index>> BlockCholesky::eliminate(const Links& links) {
     std::vector<std::set<Index>> neighbours(rank_.size());
@@ -171,8 +172,8 @@ inline void BlockCholesky::open() noexcept {
 inline bool BlockCholesky::definite_above(double shift) noexcept {
     fill(shift);
     for (std::size_t column = 0; column < pivots_.size(); ++column) {
-        take_columns_before(column);
-        if (!close(column)) return false;
+        subtract_previous_columns(column);
+        if (!factorise_column(column)) return false;
     }
     return true;
 }
@@ -188,18 +189,18 @@ inline void BlockCholesky::fill(double shift) noexcept {
     for (std::size_t l = 0; l < linked_.size(); ++l) blocks_[number_[l]] += dense(linked_[l]);
 }
 
-inline void BlockCholesky::take_columns_before(std::size_t column) noexcept {
-    for (std::size_t b = begin_[column]; b < begin_[column + 1]; ++b) place_[row_[b]] = b;
-    for (const auto& place : before_[static_cast<Index>(column)]) {
-        const Block across = blocks_[place.number].transpose();
-        pivots_[column].noalias() -= blocks_[place.number] * across;
-        for (std::size_t b = place.number + 1; b < begin_[place.column + 1]; ++b) {
-            blocks_[place_[row_[b]]].noalias() -= blocks_[b] * across;
+inline void BlockCholesky::subtract_previous_columns(std::size_t column) noexcept {
+    for (std::size_t b = begin_[column]; b < begin_[column + 1]; ++b) block_of_row_[row_[b]] = b;
+    for (const auto& entry : before_[static_cast<Index>(column)]) {
+        const Block across = blocks_[entry.number].transpose();
+        pivots_[column].noalias() -= blocks_[entry.number] * across;
+        for (std::size_t b = entry.number + 1; b < begin_[entry.column + 1]; ++b) {
+            blocks_[block_of_row_[row_[b]]].noalias() -= blocks_[b] * across;
         }
     }
 }
 
-inline bool BlockCholesky::close(std::size_t column) noexcept {
+inline bool BlockCholesky::factorise_column(std::size_t column) noexcept {
     if (!detail::factorise(pivots_[column])) return false;
     for (std::size_t b = begin_[column]; b < begin_[column + 1]; ++b) detail::divide(blocks_[b], pivots_[column]);
     return true;

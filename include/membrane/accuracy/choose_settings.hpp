@@ -12,92 +12,92 @@
 
 #include <membrane/accuracy/trial.hpp>
 
-/// How many layers and sweeps? The experiment that answers it for one's own network and load.
+/// Finds by experiment how many layers and sweeps a network needs under a given load.
 ///
 ///     #include <membrane/accuracy/choose_settings.hpp>
-///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: a tool for each tick of 1 ms
+///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: one tool for each tick
 ///     const auto choice = membrane::choose_settings(mesh, network, foundation, stroke, {.force_error = 0.01});
-///     if (!choice.met) ...                                                    // nothing that was tried is enough
+///     if (!choice.satisfied) ...                                              // no setting of the grid is sufficient
 ///     auto solver = membrane::QuasiStaticSolver(network, choice.options);
 namespace membrane {
 
-/// What is wanted, one of the two.
+/// The requirement: exactly one of the two.
 struct Requirement {
-    double force_error = 0;  ///< at the most, see `Outcome`: the cheapest setting that keeps it
-    double time = 0;         ///< of a tick, at the most [s]: the most accurate setting that keeps it
+    double force_error = 0;  ///< upper bound, see `Outcome`; the cheapest setting within it is chosen
+    double time = 0;         ///< upper bound, of a tick [s]; the most accurate setting within it is chosen
 };
 
-/// What is tried: every number of layers with every number of sweeps and of contact visits.
+/// The grid: every number of layers with every number of sweeps and of contact iterations.
 template <Real Scalar>
 struct GridSearchOptions {
     std::vector<Index> layers = {1, 2, 3, 4, 6, 8, 12, 16};
     std::vector<Index> sweeps = {1, 2, 3, 4, 6, 8, 12, 16};
     std::vector<Index> contact_iterations = {1, 2, 4, 8};
-    SolverOptions<Scalar> others = {};  ///< the options besides these
-    double margin = 1.8;                ///< the error in the experiment is below the wanted one by this factor
-    Index every = 1;                    ///< errors are taken in every so many ticks: fewer equilibria
-    Index repetitions = 3;              ///< of each setting; the shortest time counts
+    SolverOptions<Scalar> others = {};  ///< all other options
+    double safety_factor = 1.8;         ///< required error over the largest error accepted in the experiment
+    Index tick_stride = 1;  ///< errors are taken in every `tick_stride`-th tick; more than 1 needs fewer equilibria
+    Index repetitions = 3;  ///< of each setting; the shortest time counts
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
 };
 
-/// The chosen setting, and what the experiment has measured of it.
+/// The chosen setting, with its measured cost and error.
 template <Real Scalar>
 struct ChosenSettings : Outcome {
     SolverOptions<Scalar> options;
-    bool met = false;  ///< what was wanted is kept; if not, this is what came nearest to it
+    bool satisfied = false;  ///< the requirement is met; if not, this setting came closest
 };
 
-/// The best setting of the solver for this membrane and this history of loads, found by experiment ([Liu07] finds the
-/// threshold of the queue so): the equilibria once, then one setting after the other, those left out of which the ones
-/// before tell that they cannot be the best: less of everything is cheaper, and farther off.
+/// The best solver setting for this membrane and load history, found by experiment, as [Liu07] finds the threshold of
+/// the queue. Computes the equilibria once, then tries one setting after the other. A setting is skipped if earlier
+/// ones show that it cannot be the best: reducing layers, sweeps or iterations lowers cost and accuracy.
 ///
-/// The history stands for what is to come: it should last, press at many places, and be as fast as the hand will be; most
-/// errors come with the change from one tick to the next. Other histories of the same kind are off by somewhat more or
-/// less: hence `margin`. In 500 random scenes, spheres, ellipsoids and caps of 42 to 642 vertices on backings of 0.01 to
-/// 10 times the springs, under 12 presses, 374 could be judged: under 12 other presses elsewhere 96 % kept the wanted
-/// error, of 0.1 to 10 %, and 82 % took no more than 1.5 times the time of the cheapest setting that does. A wanted time
-/// has no margin.
+/// The history must represent later use: it should be long, press at many positions, and be as fast as the user's hand;
+/// most errors come with changes between ticks. Errors under other histories of the same kind differ somewhat: hence
+/// `safety_factor`. In 500 random scenes (spheres, ellipsoids and caps of 42 to 642 vertices, foundations of 0.01 to 10
+/// times the springs, 12 presses), 374 could be compared. Under 12 other presses at other positions, 96 % kept the
+/// required error, of 0.1 to 10 %, and 82 % took at most 1.5 times the time of the cheapest setting that keeps it. A
+/// required time has no safety factor.
 ///
-/// @throws InvalidInput for a wanted error or time that is not positive, none or both of them, an option out of its range,
-/// a history in which no force is felt or that has no equilibrium, and for what `trial` and `equilibria` refuse. Offline.
-/// Cost: an `equilibrium` for each tick that is judged, and some 30 to 300 times the history.
+/// @throws InvalidInput for a required error or time that is not positive, neither or both of them, an option out of
+/// its range, a history without a felt force or without an equilibrium, and for arguments that `trial` and `equilibria`
+/// refuse. Offline. Cost: an `equilibrium` for each compared tick, and about 30 to 300 runs of the history.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] ChosenSettings<Scalar> choose_settings(
     const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume, const History& history,
-    const Requirement& wanted, const std::type_identity_t<GridSearchOptions<Scalar>>& experiment = {},
+    const Requirement& requirement, const std::type_identity_t<GridSearchOptions<Scalar>>& experiment = {},
     const Rule& rule = {}, const Clock& clock = {});
 
-/// The same by any trial: `attempt(options)` gives the `Outcome` of these options.
+/// The best setting by a user-defined trial: `attempt(options)` returns the `Outcome` of these options.
 template <Real Scalar, class Attempt>
 [[nodiscard]] ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experiment,
-                                                     const Requirement& wanted, Attempt attempt);
+                                                     const Requirement& requirement, Attempt attempt);
 
 namespace detail {
 
 inline constexpr std::string_view choose_name = "choose_settings";
 
-inline void check(const Requirement& wanted) {
-    if ((wanted.force_error != 0) == (wanted.time != 0)) {
-        refuse(choose_name, "either a force_error or a time must be wanted, got ", wanted.force_error, " and ",
-               wanted.time, " s");
+inline void check(const Requirement& requirement) {
+    if ((requirement.force_error != 0) == (requirement.time != 0)) {
+        refuse(choose_name, "either a force_error or a time must be wanted, got ", requirement.force_error, " and ",
+               requirement.time, " s");
     }
-    const double number = wanted.time != 0 ? wanted.time : wanted.force_error;
+    const double number = requirement.time != 0 ? requirement.time : requirement.force_error;
     if (is_finite(number) && number > 0) return;
-    refuse(choose_name, "the wanted ", wanted.time != 0 ? "time" : "force_error", " must be finite and positive",
-           wanted.time != 0 ? " [s]" : "", ", got ", number);
+    refuse(choose_name, "the wanted ", requirement.time != 0 ? "time" : "force_error", " must be finite and positive",
+           requirement.time != 0 ? " [s]" : "", ", got ", number);
 }
 
-/// Whether `setting` has no less of anything than `other`.
+/// Whether `setting` has at least the layers, sweeps and contact iterations of `other`.
 template <Real Scalar>
 [[nodiscard]] bool covers(const SolverOptions<Scalar>& setting, const SolverOptions<Scalar>& other) noexcept {
     return setting.layers >= other.layers && setting.sweeps >= other.sweeps &&
            setting.contact_iterations >= other.contact_iterations;
 }
 
-/// All settings of the experiment, roughly from the cheapest to the dearest.
+/// All settings of the grid, in ascending order of estimated work.
 template <Real Scalar>
 [[nodiscard]] std::vector<SolverOptions<Scalar>> settings_of(const GridSearchOptions<Scalar>& experiment) {
     std::vector<SolverOptions<Scalar>> settings;
@@ -111,7 +111,7 @@ template <Real Scalar>
             }
         }
     }
-    const auto work = [](const SolverOptions<Scalar>& setting) {  // rings grow evenly in a mesh of triangles
+    const auto work = [](const SolverOptions<Scalar>& setting) {  // layers of a triangle mesh grow linearly
         const double rings = setting.layers;
         return setting.sweeps * (4.0 * setting.contact_iterations + 3 * rings * (rings + 2));
     };
@@ -119,33 +119,33 @@ template <Real Scalar>
     return settings;
 }
 
-/// The settings that were tried, and the best of them.
+/// The settings tried so far, and the best of them.
 template <Real Scalar>
 class Search {
   public:
-    Search(const GridSearchOptions<Scalar>& experiment, const Requirement& wanted)
+    Search(const GridSearchOptions<Scalar>& experiment, const Requirement& requirement)
         : layers_(experiment.layers),
-          time_wanted_(wanted.time > 0),
-          max_error_(wanted.force_error / experiment.margin),
-          max_time_(time_wanted_ ? wanted.time : std::numeric_limits<double>::infinity()) {}
+          time_required_(requirement.time > 0),
+          max_error_(requirement.force_error / experiment.safety_factor),
+          max_time_(time_required_ ? requirement.time : std::numeric_limits<double>::infinity()) {}
 
-    /// Whether the ones before tell that this cannot be better: fewer layers are all there are, less of everything was
-    /// too dear, more of everything not enough, or enough for the time.
+    /// Whether earlier settings show that this one cannot be better: fewer layers contain the whole mesh; a setting
+    /// that it covers was too slow; or a setting that covers it missed the required error, or met the required time.
     [[nodiscard]] bool is_needless(const SolverOptions<Scalar>& setting) const noexcept {
         return std::any_of(layers_.begin(), layers_.end(),
                            [&](Index fewer) { return fewer < setting.layers && fewer >= all_layers_; }) ||
                std::any_of(tried_.begin(), tried_.end(), [&](const ChosenSettings<Scalar>& other) {
                    if (!other.advanced) return false;
                    return (covers(setting, other.options) && other.time >= max_time_) ||
-                          (covers(other.options, setting) && other.met == time_wanted_);
+                          (covers(other.options, setting) && other.satisfied == time_required_);
                });
     }
 
     void add(const SolverOptions<Scalar>& setting, const Outcome& outcome) {
         ChosenSettings<Scalar> now{outcome, setting, false};
-        now.met = now.advanced && (time_wanted_ ? now.time <= max_time_ : now.force_error <= max_error_);
+        now.satisfied = now.advanced && (time_required_ ? now.time <= max_time_ : now.force_error <= max_error_);
         if (tried_.empty() || is_better(now, best_)) best_ = now;
-        if (!time_wanted_ && now.met) max_time_ = best_.time;
+        if (!time_required_ && now.satisfied) max_time_ = best_.time;
         if (now.layers_reached < setting.layers) all_layers_ = now.layers_reached;
         tried_.push_back(now);
     }
@@ -153,11 +153,12 @@ class Search {
     [[nodiscard]] const ChosenSettings<Scalar>& best() const noexcept { return best_; }
 
   private:
-    // What is wanted before all, then the error if time is no matter, or the time if the error is none.
+    // A satisfied setting is better than one that is not. Among satisfied ones the time decides if an error is
+    // required, and the error if a time is required; among others the required quantity decides.
     [[nodiscard]] bool is_better(const ChosenSettings<Scalar>& now,
                                  const ChosenSettings<Scalar>& other) const noexcept {
-        if (now.met != other.met) return now.met;
-        const bool by_error = time_wanted_ == now.met;
+        if (now.satisfied != other.satisfied) return now.satisfied;
+        const bool by_error = time_required_ == now.satisfied;
         return by_error ? now.force_error < other.force_error : now.time < other.time;
     }
 
@@ -165,8 +166,8 @@ class Search {
     Index all_layers_ = unlimited;
     std::vector<ChosenSettings<Scalar>> tried_;
     ChosenSettings<Scalar> best_;
-    bool time_wanted_;
-    double max_error_, max_time_;  // max_time_ [s]: wanted, or that of the best
+    bool time_required_;
+    double max_error_, max_time_;  // max_time_ [s]: required, or that of the best
 };
 
 }  // namespace detail
@@ -185,28 +186,28 @@ void GridSearchOptions<Scalar>::check() const {
     check_numbers(sweeps, 1, "sweeps");
     check_numbers(contact_iterations, 1, "contact_iterations");
     others.check();
-    if (!is_finite(margin) || !(margin >= 1)) {
-        refuse(detail::choose_name, "margin must be finite and at least 1, got ", margin);
+    if (!is_finite(safety_factor) || !(safety_factor >= 1)) {
+        refuse(detail::choose_name, "safety_factor must be finite and at least 1, got ", safety_factor);
     }
-    if (every < 1) refuse(detail::choose_name, "every must be at least 1, got ", every);
+    if (tick_stride < 1) refuse(detail::choose_name, "tick_stride must be at least 1, got ", tick_stride);
     if (repetitions < 1) refuse(detail::choose_name, "repetitions must be at least 1, got ", repetitions);
 }
 
 template <Real Scalar, class Attempt>
-ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experiment, const Requirement& wanted,
+ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experiment, const Requirement& requirement,
                                        Attempt attempt) {
-    detail::check(wanted);
+    detail::check(requirement);
     experiment.check();
     const auto settings = detail::settings_of(experiment);
-    detail::Search<Scalar> search(experiment, wanted);
-    if (wanted.force_error > 0) {  // first with how many sweeps it can be done at all
+    detail::Search<Scalar> search(experiment, requirement);
+    if (requirement.force_error > 0) {  // first finds the sweeps needed, with all else at its maximum
         const auto most = settings.back();
         for (const auto& setting : settings) {
             if (setting.layers != most.layers || setting.contact_iterations != most.contact_iterations) continue;
             search.add(setting, attempt(setting));
-            if (search.best().met) break;
+            if (search.best().satisfied) break;
         }
-        if (!search.best().met) return search.best();
+        if (!search.best().satisfied) return search.best();
     }
     for (const auto& setting : settings) {
         if (!search.is_needless(setting)) search.add(setting, attempt(setting));
@@ -217,16 +218,17 @@ ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experime
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule, class Clock>
 ChosenSettings<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
-                                       const History& history, const Requirement& wanted,
+                                       const History& history, const Requirement& requirement,
                                        const std::type_identity_t<GridSearchOptions<Scalar>>& experiment,
                                        const Rule& rule, const Clock& clock) {
-    detail::check(wanted);
+    detail::check(requirement);
     experiment.check();
-    const auto references = equilibria(mesh, network, volume, history, experiment.every);
-    if (std::none_of(references.begin(), references.end(), [](const ReferenceTick& rest) { return rest.force > 0; })) {
+    const auto references = equilibria(mesh, network, volume, history, experiment.tick_stride);
+    if (std::none_of(references.begin(), references.end(),
+                     [](const ReferenceTick& reference) { return reference.force > 0; })) {
         refuse(detail::choose_name, "the history must have a tick with a force that is felt, got none in equilibrium");
     }
-    return choose_settings(experiment, wanted, [&](const SolverOptions<Scalar>& options) {
+    return choose_settings(experiment, requirement, [&](const SolverOptions<Scalar>& options) {
         auto outcome = trial(mesh, network, volume, history, references, options, rule, clock);
         for (Index play = 1; play < experiment.repetitions && outcome.advanced; ++play) {
             const double time = trial(mesh, network, volume, history, references, options, rule, clock).time;

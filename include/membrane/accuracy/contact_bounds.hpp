@@ -13,75 +13,79 @@
 #include <membrane/accuracy/equilibrium_scene.hpp>
 #include <membrane/accuracy/tool_points.hpp>
 
-/// What tools may press on in a neighbourhood of a state, how hard, and what that takes away of the stiffness.
+/// Bounds, in a neighbourhood of a state, where tools press, with which forces, and how much these reduce the
+/// stiffness.
 ///
 ///     membrane::ContactBounds pressed(problem);
 ///     pressed.take(problem, triangles, y, scene.tools(), rest.contacts);
 ///     if (pressed.around(problem, force, magnitude, displacement)) ... pressed.softening(v) ...
 namespace membrane {
 
-/// Tools in contact, for a proof that holds at all states whose vertices are within `displacement` of y.
+/// Bounds for tools in contact that hold at all states whose vertices are within `max_displacement` of y.
 ///
-/// A tool of radius R keeps every point p of the surface, a mean of three corners by weights b, at least R away from each
-/// point c of its axis: h = |p - c| - R >= 0. Each h is a convex function of the corners, and where the distance is d it
-/// does not curve by more than 1/d times the square of the way of p, which is no more than the mean of the squares of
-/// the corners' ways. So a multiplier l curves the energy by no more than l/d times that: all of them together take
-/// away from the stiffness, at each vertex, the multipliers that its corners bear over d.
+/// A tool of radius R keeps each point p of the surface, a mean of three corners with weights b, at least R away from
+/// each point c of its axis: h = |p - c| - R >= 0. Each h is a convex function of the corners. At distance d, its
+/// second derivative is at most 1/d times the squared displacement of p, which is at most the mean of the squared
+/// displacements of the corners. So a multiplier l reduces the second derivative of the energy by at most l/d times
+/// that mean: all of them together reduce the stiffness, at each vertex, by the multipliers on its corners over d.
 ///
-/// What a vertex may bear: let u be the unit vector between the nearest points of axis and triangle at y, g their
-/// distance. As the two are convex, no pair of points is nearer along u. So where, in the neighbourhood, a pair has the
-/// distance R, the direction between them has a cosine of at least (g - way) / R with u. All that presses on a vertex
-/// at rest balances its springs and foundation; if the directions are within an angle a of one another's middle, the sum of
-/// the pressures is at most that force over cos a.
+/// Bound of the multipliers at a vertex: let u be the unit vector between the closest points of axis and triangle at y,
+/// g their distance. As both are convex, no pair of points is closer along u. So if a pair has the distance R in the
+/// neighbourhood, the cosine of its direction with u is at least (g - max_displacement) / R. In equilibrium the contact
+/// forces on a vertex balance its springs and foundation. If their directions are within an angle a of a common middle,
+/// the sum of their magnitudes is at most that force over cos a.
 class ContactBounds {
   public:
     /// Cost: O(V) memory.
     explicit ContactBounds(const EquilibriumProblem& problem)
         : marks_(static_cast<std::size_t>(problem.vertex_count())), borne_(marks_.size()), stiffness_(marks_.size()) {}
 
-    /// No tools.
+    /// Removes all tools.
     void clear() noexcept;
 
-    /// The tools of a scene, and the pressures that are thought to balance the membrane at `y` (3 x V [m]). Offline.
-    /// @pre the touches are of these tools
+    /// Takes the tools of a scene, and the contact points whose forces approximately balance the membrane at `y` (3 x V
+    /// [m]). Offline.
+    /// @pre the contact points are of these tools
     void take(const EquilibriumProblem& problem, const Triangles& triangles, const Points<double>& y,
               std::span<const ScenePress> tools, std::span<const ToolPoint> contacts);
 
-    /// Finds what is below for all states within `displacement` [m] of y, where the membrane acts on its vertices with `force`,
-    /// made of numbers of this `magnitude` [N]. False where a tool may touch a vertex that is fixed or that another tool
-    /// may touch, or is so small, or the way so long, that it may be pressed from anywhere.
+    /// Computes the bounds below for all states within `max_displacement` [m] of y, where the membrane acts on its
+    /// vertices with `force`, a sum of terms of this `magnitude` [N]. False if a tool may touch a vertex that is fixed
+    /// or that another tool may touch, or if the tool is too small or the displacement too large to bound the contact
+    /// directions.
     bool around(const EquilibriumProblem& problem, const Points<double>& force, std::span<const double> magnitude,
-                double displacement) noexcept;
+                double max_displacement) noexcept;
 
-    /// What the pressures take away of the stiffness at vertex `v` [N/m].
+    /// Upper bound of the reduction of stiffness by contact forces at vertex `v` [N/m].
     [[nodiscard]] double softening(Index v) const noexcept { return marks_[at(v)].softening; }
 
-    /// Adds 1 to the weights of the vertices that tool number `i` of the scene may press on: what pushes there, pushes back
-    /// at the tool.
+    /// Adds 1 to the weights of the vertices that tool number `i` of the scene may touch: the forces on them are
+    /// balanced by reactions on the tool.
     void share(std::size_t i, std::vector<double>& weights) const noexcept {
         for (std::size_t v = 0; v < marks_.size(); ++v) weights[v] += marks_[v].tool == i ? 1 : 0;
     }
 
-    /// How deep y is in a tool, or may be, given rounding [m].
+    /// Upper bound of the penetration of a tool at y, rounding included [m].
     [[nodiscard]] double overlap() const noexcept { return overlap_; }
 
-    /// Work that is left over at y: pressures by the gaps they act across, and what pressures may do across overlaps [J].
+    /// Upper bound of the residual work at y: contact forces times their gaps, plus the work of contact forces across
+    /// penetrations [J].
     [[nodiscard]] double work() const noexcept { return work_ + max_normal_force_ * overlap_; }
 
-    /// A ball around y of this radius, or a larger one, holds a state without overlap, with room to spare [m].
+    /// A ball around y with at least this radius contains a state without penetration, with clearance [m].
     [[nodiscard]] double min_radius() const noexcept { return 4 * clearance_; }
 
-    /// A ball must be no larger [m].
+    /// Upper limit of the radius of a ball around y [m].
     [[nodiscard]] double max_radius() const noexcept { return max_radius_; }
 
-    /// Adds the pressures to the forces on the vertices [N], and to their magnitudes.
+    /// Adds the contact forces to the forces on the vertices [N], and to their magnitudes.
     void push(Points<double>& force, std::vector<double>& magnitude) const noexcept;
 
   private:
     static constexpr std::size_t none = (std::numeric_limits<std::size_t>::max)();
 
     using Wide = Eigen::Matrix<long double, 3, 1>;
-    struct Near {  // a triangle that a tool may come to touch
+    struct Near {  // a triangle that a tool may touch
         std::size_t tool;
         std::array<Index, 3> corners;
         Vector3<double> u;  // from the axis to the triangle
@@ -95,21 +99,21 @@ class ContactBounds {
     };
     [[nodiscard]] static std::size_t at(Index v) noexcept { return static_cast<std::size_t>(v); }
     void find_near(std::size_t i, const Triangles& triangles, const Points<double>& y, const Tool<double>& tool);
-    [[nodiscard]] Vector3<double> take_touch(const ToolPoint& touch, const Points<double>& y,
-                                             const Tool<double>& tool) noexcept;
+    [[nodiscard]] Vector3<double> take_contact(const ToolPoint& contact, const Points<double>& y,
+                                               const Tool<double>& tool) noexcept;
     [[nodiscard]] static Wide wide(const Vector3<double>& a) noexcept { return {a.x(), a.y(), a.z()}; }
     [[nodiscard]] static Wide seen_from(const Tool<double>& tool, const Points<double>& y, Index v) noexcept {
         return wide(point(y, v)) - wide(tool.position);
     }
-    bool mark(const EquilibriumProblem& problem, double displacement) noexcept;
-    bool narrow(double displacement) noexcept;
+    bool mark(const EquilibriumProblem& problem, double max_displacement) noexcept;
+    bool narrow(double max_displacement) noexcept;
     [[nodiscard]] double radius_of(const Near& near) const noexcept { return radii_[near.tool]; }
 
     std::vector<double> radii_;  // of the tools [m]
     std::vector<Near> near_;
-    std::vector<ToolPoint> touches_;
+    std::vector<ToolPoint> contacts_;
     std::vector<Mark> marks_;
-    std::vector<double> borne_, stiffness_;         // of vertices: multipliers at y [N], most stiffness [N/m]
+    std::vector<double> borne_, stiffness_;         // of vertices: multipliers at y [N], stiffness bound [N/m]
     double overlap_ = 0, work_ = 0, rounding_ = 0;  // at y
     double max_normal_force_ = 0, clearance_ = 0, max_radius_ = std::numeric_limits<double>::infinity();
 };
@@ -117,7 +121,7 @@ class ContactBounds {
 inline void ContactBounds::clear() noexcept {
     radii_.clear();
     near_.clear();
-    touches_.clear();
+    contacts_.clear();
     std::fill(marks_.begin(), marks_.end(), Mark{});
     overlap_ = work_ = rounding_ = max_normal_force_ = clearance_ = 0;
     max_radius_ = std::numeric_limits<double>::infinity();
@@ -131,11 +135,11 @@ inline void ContactBounds::take(const EquilibriumProblem& problem, const Triangl
         find_near(i, triangles, y, tools[i].tool);
     }
     std::fill(borne_.begin(), borne_.end(), 0.0);
-    for (const auto& touch : contacts) {
-        touches_.push_back(touch);
-        touches_.back().normal = take_touch(touch, y, tools[touch.tool].tool);
+    for (const auto& contact : contacts) {
+        contacts_.push_back(contact);
+        contacts_.back().normal = take_contact(contact, y, tools[contact.tool].tool);
         for (std::size_t k = 0; k < 3; ++k) {
-            borne_[at(touch.corners[k])] += touch.multiplier * touch.weight(k);
+            borne_[at(contact.corners[k])] += contact.multiplier * contact.weight(k);
         }
     }
     for (Index v = 0; v < problem.vertex_count(); ++v) stiffness_[at(v)] = problem.foundation(v);
@@ -145,9 +149,9 @@ inline void ContactBounds::take(const EquilibriumProblem& problem, const Triangl
     }
 }
 
-// Seen from the tool, where numbers are small, and in long double: a bound is no better than the square root of rounding
-// here. No corner is nearer to the axis along u than the triangle is: the least of them is a lower bound of its distance
-// even where u is off by rounding.
+// Computed relative to the tool, where numbers are small, and in long double: the bound is no better than the square
+// root of rounding. The smallest projection of a corner onto u is a lower bound of the distance from the axis, even if
+// u is off by rounding.
 inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, const Points<double>& y,
                                      const Tool<double>& tool) {
     const Vector3<double> end = tool.position + tool.axis;
@@ -155,8 +159,8 @@ inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, 
         const auto triangle = triangle_at(y, corners);
         if (detail::is_far(triangle, tool, 1.25 * tool.radius)) continue;
         const auto nearest = closest_to_segment(triangle, tool.position, end);
-        const Vector3<double> reach = nearest.on_triangle.point - tool.position - nearest.along * tool.axis;
-        const Vector3<double> u = direction<double>(reach, Vector3<double>::Zero());
+        const Vector3<double> separation = nearest.on_triangle.point - tool.position - nearest.along * tool.axis;
+        const Vector3<double> u = direction<double>(separation, Vector3<double>::Zero());
         const Wide wide_u = wide(u), axis = wide(tool.axis);
         long double distance = std::numeric_limits<long double>::infinity(), size = axis.norm() + tool.radius;
         for (const Index v : corners) {
@@ -172,31 +176,34 @@ inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, 
     }
 }
 
-// The normal at the contact point, where `y` is; the gap there goes into the work.
-inline Vector3<double> ContactBounds::take_touch(const ToolPoint& touch, const Points<double>& y,
-                                                 const Tool<double>& tool) noexcept {
-    Wide place = Wide::Zero();
+// The normal at the contact point at `y`; adds the work across its gap.
+inline Vector3<double> ContactBounds::take_contact(const ToolPoint& contact, const Points<double>& y,
+                                                   const Tool<double>& tool) noexcept {
+    Wide position = Wide::Zero();
     long double weights = 0;
     for (std::size_t k = 0; k < 3; ++k) {
-        const long double weight = touch.weight(k);
-        place += weight * seen_from(tool, y, touch.corners[k]);
+        const long double weight = contact.weight(k);
+        position += weight * seen_from(tool, y, contact.corners[k]);
         weights += weight;
     }
-    place /= weights;
+    position /= weights;
     const Wide axis = wide(tool.axis);
     const long double length = axis.squaredNorm();
-    const long double along = touch.part() == 2 && length > 0 ? place.dot(axis) / length : touch.part() == 1 ? 1 : 0;
-    const Wide reach = along * axis - place;
-    const auto gap = static_cast<double>(reach.norm() - tool.radius);
-    work_ += touch.multiplier * ((std::max)(gap, 0.0) + rounding_);
-    return direction<double>(reach.cast<double>(), touch.normal);
+    const long double along = contact.part() == 2 && length > 0 ? position.dot(axis) / length
+                              : contact.part() == 1             ? 1
+                                                                : 0;
+    const Wide separation = along * axis - position;
+    const auto gap = static_cast<double>(separation.norm() - tool.radius);
+    work_ += contact.multiplier * ((std::max)(gap, 0.0) + rounding_);
+    return direction<double>(separation.cast<double>(), contact.normal);
 }
 
 inline bool ContactBounds::around(const EquilibriumProblem& problem, const Points<double>& force,
-                                  std::span<const double> magnitude, double displacement) noexcept {
+                                  std::span<const double> magnitude, double max_displacement) noexcept {
     if (radii_.empty()) return true;
-    displacement = (1 + 1e-9) * displacement + rounding_ + 1e-15 * *std::max_element(radii_.begin(), radii_.end());
-    if (!mark(problem, displacement) || !narrow(displacement)) return false;
+    max_displacement =
+        (1 + 1e-9) * max_displacement + rounding_ + 1e-15 * *std::max_element(radii_.begin(), radii_.end());
+    if (!mark(problem, max_displacement) || !narrow(max_displacement)) return false;
     max_normal_force_ = 0;
     max_radius_ = std::numeric_limits<double>::infinity();
     double min_cosine = 1, count = 0;
@@ -204,9 +211,9 @@ inline bool ContactBounds::around(const EquilibriumProblem& problem, const Point
         auto& mark = marks_[at(v)];
         if (mark.tool == none) continue;
         const double max_force =
-            norm(point(force, v)) + problem.rounding() * magnitude[at(v)] + stiffness_[at(v)] * displacement;
+            norm(point(force, v)) + problem.rounding() * magnitude[at(v)] + stiffness_[at(v)] * max_displacement;
         const double borne = (std::max)(borne_[at(v)], max_force / mark.cosine);
-        const double min_distance = radii_[mark.tool] - 2 * displacement - overlap_;
+        const double min_distance = radii_[mark.tool] - 2 * max_displacement - overlap_;
         if (!(min_distance > radii_[mark.tool] / 4)) return false;
         mark.softening = (1 + 1e-9) * borne / min_distance;
         max_normal_force_ += (1 + 1e-9) * borne;
@@ -215,14 +222,14 @@ inline bool ContactBounds::around(const EquilibriumProblem& problem, const Point
         count += 1;
     }
     clearance_ = overlap_ * std::sqrt(count) / min_cosine;
-    return clearance_ <= displacement;
+    return clearance_ <= max_displacement;
 }
 
-// Who may be pressed by whom.
-inline bool ContactBounds::mark(const EquilibriumProblem& problem, double displacement) noexcept {
+// Assigns to each vertex the tool that may touch it; false if there are two, or the vertex is fixed.
+inline bool ContactBounds::mark(const EquilibriumProblem& problem, double max_displacement) noexcept {
     std::fill(marks_.begin(), marks_.end(), Mark{});
     for (const auto& near : near_) {
-        if (near.distance - radius_of(near) > displacement) continue;
+        if (near.distance - radius_of(near) > max_displacement) continue;
         for (const Index v : near.corners) {
             auto& mark = marks_[at(v)];
             if (problem.fixed(v) || (mark.tool != none && mark.tool != near.tool)) return false;
@@ -231,36 +238,36 @@ inline bool ContactBounds::mark(const EquilibriumProblem& problem, double displa
         }
     }
     for (auto& mark : marks_) mark.middle = direction<double>(mark.middle, Vector3<double>::Zero());
-    return std::all_of(touches_.begin(), touches_.end(), [&](const ToolPoint& touch) {
-        return std::all_of(touch.corners.begin(), touch.corners.end(),
-                           [&](Index v) { return marks_[at(v)].tool == touch.tool; });
+    return std::all_of(contacts_.begin(), contacts_.end(), [&](const ToolPoint& contact) {
+        return std::all_of(contact.corners.begin(), contact.corners.end(),
+                           [&](Index v) { return marks_[at(v)].tool == contact.tool; });
     });
 }
 
-// From which directions.
-inline bool ContactBounds::narrow(double displacement) noexcept {
-    constexpr double widest = 0.2;  // cosine
+// Bounds the contact directions at each vertex; false if they are too wide.
+inline bool ContactBounds::narrow(double max_displacement) noexcept {
+    constexpr double min_allowed = 0.2;  // of a cosine
     const auto sine = [](double cosine) { return std::sqrt((std::max)(1 - cosine * cosine, 0.0)); };
     for (const auto& near : near_) {
-        if (near.distance - radius_of(near) > displacement) continue;
-        const double from_u = (std::min)((near.distance - displacement) / radius_of(near), 1.0);
+        if (near.distance - radius_of(near) > max_displacement) continue;
+        const double from_u = (std::min)((near.distance - max_displacement) / radius_of(near), 1.0);
         for (const Index v : near.corners) {
             auto& mark = marks_[at(v)];
             const double u_from_middle = (std::min)(dot(mark.middle, near.u), 1.0);
-            if (!(from_u > widest && u_from_middle > widest)) return false;
+            if (!(from_u > min_allowed && u_from_middle > min_allowed)) return false;
             const double together = from_u * u_from_middle - sine(from_u) * sine(u_from_middle) - 1e-12;
             mark.cosine = (std::min)(mark.cosine, together);
-            if (!(mark.cosine > widest)) return false;
+            if (!(mark.cosine > min_allowed)) return false;
         }
     }
     return true;
 }
 
 inline void ContactBounds::push(Points<double>& force, std::vector<double>& magnitude) const noexcept {
-    for (const auto& touch : touches_) {
+    for (const auto& contact : contacts_) {
         for (std::size_t k = 0; k < 3; ++k) {
-            const Index v = touch.corners[k];
-            const Vector3<double> part = touch.multiplier * touch.gradient(k);
+            const Index v = contact.corners[k];
+            const Vector3<double> part = contact.multiplier * contact.gradient(k);
             force.col(v) += part;
             magnitude[at(v)] += norm(part);
         }

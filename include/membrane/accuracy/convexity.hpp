@@ -11,15 +11,16 @@
 #include <membrane/accuracy/equilibrium_problem.hpp>
 #include <membrane/core/symmetric3.hpp>
 
-/// How convex the energy of a membrane is, not only where it is but in a whole neighbourhood.
+/// A lower bound of the convexity of a membrane's energy in a whole neighbourhood of a state.
 ///
 ///     membrane::BlockConvexity convexity(problem);                  // offline
-///     const double mu = convexity.around(problem, 1e-5);            // [N/m]; not convex, as far as one can see: <= 0
+///     const double mu = convexity.around(problem, 1e-5);            // [N/m]; <= 0 if not shown to be convex
 namespace membrane {
 
-/// Gives a lower bound of the smallest eigenvalue of the stiffness at every state in which each free vertex is within
-/// `radius` [m] of the problem's centre and what is held is in its place; not above zero where it knows none. Where it
-/// is above, each spring has a `min_stiffness` there. What the compiler cannot see: the bound holds, with rounding.
+/// Computes a lower bound of the smallest eigenvalue of the stiffness over all states in which each free vertex is
+/// within `radius` [m] of the problem's centre and point attachments are at their targets; not above 0 if it finds
+/// none. If the bound is positive, each spring has a `min_stiffness` there. The compiler cannot check: the bound holds,
+/// rounding included.
 template <class Model>
 concept ConvexityModel = std::copyable<Model> && std::constructible_from<Model, const EquilibriumProblem&> &&
     requires(Model& model, const EquilibriumProblem& problem, double radius) {
@@ -41,18 +42,18 @@ consteval bool check_convexity_model() noexcept {
 
 }  // namespace detail
 
-/// A `ConvexityModel`; where it is none, the error says what is missing.
+/// A `ConvexityModel`; if a type is not one, the compile error names the missing requirement.
 template <class Model>
 concept CheckedConvexityModel = detail::check_convexity_model<Model>();
 
-/// A block for each vertex, at no more cost than a few sums of forces.
+/// Bounds the stiffness by one block for each vertex, at the cost of a few sums of forces.
 ///
-/// The springs that may push take away p (I - u u^T), p > 0, of the difference of their ends a and b; for any weights
-/// w > 0 of the vertices, |a - b|^2 <= (1 + w_b / w_a) |a|^2 + (1 + w_a / w_b) |b|^2. With that a 3 x 3 block for each
-/// vertex is left, and no eigenvalue of the whole is below the smallest of theirs. The weights that make the blocks
-/// even are the best; some rounds of the power method come near them (Collatz and Wielandt [Varga62]), and the bound
-/// holds for all. What springs that pull do for others is left out: where the foundation is soft beside the springs,
-/// `FactoredConvexity` finds more.
+/// Springs that may be compressed subtract p (I - u u^T), p > 0, from the stiffness between their ends a and b. For any
+/// weights w > 0 of the vertices, |a - b|^2 <= (1 + w_b / w_a) |a|^2 + (1 + w_a / w_b) |b|^2. This leaves a 3 x 3 block
+/// for each vertex, and no eigenvalue of the whole matrix is below the smallest eigenvalue of a block. The best weights
+/// make the blocks equal; some iterations of the power method approximate them (Collatz and Wielandt [Varga62]), and
+/// the bound holds for any weights. Springs in tension between free vertices are neglected: if the foundation is soft
+/// compared with the springs, `FactoredConvexity` finds a larger bound.
 class BlockConvexity {
   public:
     /// Cost: O(V + springs) memory.
@@ -74,11 +75,11 @@ class BlockConvexity {
 
     std::vector<Push> pushes_;
     std::size_t push_count_ = 0;
-    std::vector<Symmetric3<double>> own_,
-        blocks_;                             // of each vertex: foundation and springs to what is fixed; minus all
-    std::vector<double> own_sizes_, sizes_;  // of each vertex, the numbers that make up its block
-    std::vector<double> weights_, least_;    // of each vertex: w, its eigenvalue
-    double most_ = 0;                        // of the foundation
+    std::vector<Symmetric3<double>> own_;     // of each vertex: foundation and springs to fixed vertices
+    std::vector<Symmetric3<double>> blocks_;  // of each vertex: minus its block
+    std::vector<double> own_sizes_, sizes_;   // of each vertex: sum of the magnitudes in its block
+    std::vector<double> weights_, least_;     // of each vertex: w, its smallest eigenvalue
+    double most_ = 0;                         // largest stiffness of the foundation [N/m]
 };
 static_assert(ConvexityModel<BlockConvexity>);
 
@@ -104,7 +105,7 @@ inline double BlockConvexity::around(const EquilibriumProblem& problem, double r
     return best;
 }
 
-// False where a spring may become too short.
+// False if a spring may become too short to bound its stiffness.
 inline bool BlockConvexity::gather(const EquilibriumProblem& problem, double radius) noexcept {
     push_count_ = 0;
     most_ = 0;
@@ -130,9 +131,9 @@ inline bool BlockConvexity::gather(const EquilibriumProblem& problem, double rad
     return true;
 }
 
-// The smallest eigenvalue of any vertex.
+// The smallest eigenvalue of any block.
 inline double BlockConvexity::sum_up(const EquilibriumProblem& problem) noexcept {
-    constexpr double rounding = 1e-7;  // of an eigenvalue in closed form, twice
+    constexpr double rounding = 1e-7;  // twice that of a closed-form eigenvalue
     for (std::size_t v = 0; v < own_.size(); ++v) {
         blocks_[v] = -1.0 * own_[v];
         sizes_[v] = own_sizes_[v];
@@ -154,7 +155,7 @@ inline double BlockConvexity::sum_up(const EquilibriumProblem& problem) noexcept
     return least;
 }
 
-// New weights: less for vertices that have more than the `least` one, nothing being below zero in what is multiplied.
+// New weights: smaller for vertices with an eigenvalue above `least`; the shifted blocks are not negative.
 inline void BlockConvexity::balance(double least) noexcept {
     constexpr double smallest = 0.05;
     for (std::size_t v = 0; v < own_.size(); ++v) {

@@ -13,7 +13,7 @@
 #include <membrane/solve/propagation_queue.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Where the membrane really comes to rest, and what it then pushes back with: the reference for one's own scenes.
+/// The static equilibrium of a membrane with its reactions: the reference solution of a scene.
 ///
 ///     #include <membrane/accuracy/equilibrium.hpp>
 ///     const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact),
@@ -23,23 +23,24 @@
 ///     rest.reactions[0];                                                     // force of the membrane on the tool [N]
 namespace membrane {
 
-/// The equilibrium near `x` (3 x V [m]) under the constraints of a step, to the last digits of a double, whatever the
-/// scalar of network and foundation (a foundation of one's own that is not linear, see `FoundationModel`, is evaluated in its own);
-/// reactions are as in `StepReport`. Not `converged` if none was found: then `x` is how far it came.
+/// The equilibrium near `x` (3 x V [m]) under the constraints of a step, to double precision for any scalar of network
+/// and foundation. A user-defined foundation that is not linear (see `FoundationModel`) is evaluated in its own scalar.
+/// Reactions are as in `StepReport`. If the method does not converge, `converged` is false and `x` is the last iterate.
 ///
-/// All vertices at once by Newton's method, with exact second derivatives and sparse factors; what is near a tool is
-/// an inequality with a curvature of its own, sequential quadratic programming [Nocedal06] 18. A line search on the
-/// energy, and on the deepest overlap with a weight that makes the penalty exact, leads there from afar. Tools press the
-/// whole surface, not only `contact.triangles`; of a contact it uses where it is, its normal and its radius. A tool that
-/// is far in comes from outside, in as many increments as it is half radii deep. Where nothing can move, a tool may
-/// overlap and a point need not be held. What is fixed does not yield to a tool: beside it this is the limit of a step's
-/// forces for an ever larger `SolverOptions::rigid_stiffness`; where all corners are fixed, no tool presses here.
+/// Newton's method on all vertices at once, with exact Hessians and sparse factorisation. Contact points near a tool
+/// are inequalities with exact second derivatives: sequential quadratic programming [Nocedal06] 18. A line search on
+/// the energy plus the largest penetration, weighted as an exact penalty, makes it converge from distant starts. Tools
+/// press the whole surface, not only `contact.triangles`; of a contact it uses position, normal and radius. A tool that
+/// penetrates deeply enters from outside, in one increment for each half radius of depth. Where no vertex can move, a
+/// tool may penetrate and a point attachment may be off its target. A fixed vertex does not yield to a tool: next to
+/// one, the result is the limit of a step's forces for `SolverOptions::rigid_stiffness` to infinity; on a triangle with
+/// three fixed corners, no tool presses here.
 ///
-/// Where a membrane can rest in several ways, the start decides, and increments may.
+/// If there are several equilibria, the start and the increments select one.
 ///
-/// @throws InvalidInput for points that are not one finite for each vertex, a mesh, network and foundation that do not
-/// belong together, an option out of its range, a constraint that is not valid. Offline.
-/// Cost: some 5 to 20 sparse factorisations for each increment.
+/// @throws InvalidInput for positions that are not finite or not one for each vertex, mesh, network and foundation that
+/// do not match, an option out of its range, or a constraint that is not valid. Offline. Cost: about 5 to 20 sparse
+/// factorisations for each increment.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedStaticConstraint... Constraints>
 [[nodiscard]] Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
@@ -74,12 +75,12 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
     }
 }
 
-/// Where the constraints say that a force enters, and what tools touch at the start.
+/// Vertices to which the constraints apply a force, and those that tools touch at the start.
 [[nodiscard]] inline std::vector<Index> seeds_of(const EquilibriumScene& scene, const Triangles& triangles,
                                                  const Points<double>& x) {
     std::vector<Index> seeds = scene.seeds();
     for (const auto& pressing : scene.tools()) {
-        const double far = pressing.tool.radius + pressing.reach;
+        const double far = pressing.tool.radius + pressing.detection_distance;
         for (const auto& corners : triangles.colwise()) {
             if (distance_from_axis(triangle_at(x, corners), pressing.tool) > far) continue;
             seeds.insert(seeds.end(), corners.begin(), corners.end());
@@ -102,7 +103,7 @@ Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, c
     const Points<double> start = x.template cast<double>();
     EquilibriumScene scene(start, fixed);
     std::size_t count = 0;
-    ((scene.turn_to(count++), describe(constraints, scene)), ...);
+    ((scene.select_constraint(count++), describe(constraints, scene)), ...);
 
     PropagationQueue queue(network.vertex_count());
     queue.build(network, detail::seeds_of(scene, mesh.triangles(), start), options.layers);

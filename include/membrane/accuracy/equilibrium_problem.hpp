@@ -14,14 +14,14 @@
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/constraint_term.hpp>
 
-/// What has to balance where a membrane of linear springs is at rest.
+/// The balance of forces on a membrane of linear springs.
 ///
 ///     membrane::EquilibriumProblem problem(network);                                            // offline
 ///     if (problem.take(x, network, foundation, membrane::pull(7, target)) != ProblemStatus::valid) ...
 ///     problem.forces(problem.centre(), force, magnitude);                                // [N]
 namespace membrane {
 
-/// A foundation that pulls in proportion to the distance from an anchor, or not at all.
+/// A foundation with a force proportional to the distance from an anchor, or without forces.
 template <class Volume>
 concept LinearFoundation = std::same_as<Volume, NoFoundation> || std::same_as<Volume, VirtualVolumeSprings<float>> ||
                            std::same_as<Volume, VirtualVolumeSprings<double>> || std::same_as < Volume,
@@ -30,33 +30,33 @@ float >> || std::same_as<Volume, MovedVolume<VirtualVolumeSprings<double>, doubl
 
 enum class ProblemStatus {
     valid,
-    invalid_input,  ///< a number is not finite, an index names no vertex, counts do not agree
-    contact,        ///< a tool touches; everything else has been taken in
-    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that something else holds too
+    invalid_input,  ///< a number is not finite, an index is not a vertex, or counts do not match
+    contact,        ///< a tool touches; all other input is in the problem
+    unsupported,    ///< a constraint without `describe`, or an attached point that shares a corner with another one
 };
 
-/// Springs, foundation, loads and what is held, in double whatever the network's scalar. Damping is left out: at rest it
-/// has no force. Made of what a step is handed, and good until that changes; it keeps no reference.
+/// Springs, foundation, loads and attachments, in double for any scalar of the network. There is no damping: it has no
+/// force in equilibrium. Valid until the inputs of the step change; keeps no reference to them.
 class EquilibriumProblem {
   public:
     /// Cost: O(V + springs) memory.
     template <Real Scalar, class Law>
     explicit EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& network);
 
-    /// Takes in the membrane at `x` (3 x V [m]) and what acts on it. Online. Cost: O(V + springs).
+    /// Takes the membrane at `x` (3 x V [m]) and its constraints. Online. Cost: O(V + springs).
     template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
     [[nodiscard]] ProblemStatus take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                      const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                      const Constraints&... constraints) noexcept;
 
-    /// Fixes every other vertex as well. Online. Cost: O(V).
+    /// Also fixes all vertices that are not in `free`. Online. Cost: O(V).
     [[nodiscard]] ProblemStatus fix_all_but(std::span<const Index> free) noexcept;
 
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed_.size()); }
     [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
-    [[nodiscard]] double foundation(Index v) const noexcept { return backing_[at(v)].stiffness; }
+    [[nodiscard]] double foundation(Index v) const noexcept { return foundation_[at(v)].stiffness; }
 
-    /// The foundation's stiffness less what something else takes away of it, until the next `take` [N/m].
+    /// The stiffness of the foundation minus the softening set since the last `take` [N/m].
     [[nodiscard]] double support(Index v) const noexcept { return foundation(v) - softening_[at(v)]; }
     void soften(Index v, double by) noexcept { softening_[at(v)] = by; }
 
@@ -65,24 +65,24 @@ class EquilibriumProblem {
         return (fixed(spring.first) ? 0 : 1) + (fixed(spring.second) ? 0 : 1);
     }
 
-    /// The x that was handed in, and the same with held vertices in their places [m].
+    /// The x of the last `take`, and x with prescribed vertices at their targets [m].
     [[nodiscard]] const Points<double>& given() const noexcept { return given_; }
     [[nodiscard]] const Points<double>& centre() const noexcept { return centre_; }
 
-    /// Springs, foundation and loads on every vertex at `y` [N], and the sum of the magnitudes that went into it: rounding
-    /// changes the force by no more than `rounding()` times that.
+    /// Force of springs, foundation and loads on every vertex at `y` [N], and the sum of the magnitudes of its terms:
+    /// rounding changes the force by at most `rounding()` times that sum.
     void forces(const Points<double>& y, Points<double>& force, std::vector<double>& magnitude) const noexcept;
     [[nodiscard]] double rounding() const noexcept { return rounding_; }
 
-    /// Takes out of `f` what does not move, or changes, anything that is held: the orthogonal projection onto the ways
-    /// that are left to the membrane.
+    /// Removes from `f` the components on fixed vertices and those that move an attached point: the orthogonal
+    /// projection onto the admissible displacements.
     void project(Points<double>& f) const noexcept;
 
-    /// Held points: their places.
+    /// The attached points and their targets.
     [[nodiscard]] const PointAttachments& places() const noexcept { return places_; }
 
-    /// Adds to `weights` (V) how the reaction of what a constraint holds is made of the forces on the vertices; nothing
-    /// for a load or a tool.
+    /// Adds to `weights` (V) the share of the force on each vertex in the reaction of `term`; nothing for a load or a
+    /// tool.
     static void share(const ConstraintTerm& term, std::vector<double>& weights) noexcept;
 
   private:
@@ -93,7 +93,7 @@ class EquilibriumProblem {
     template <class Springs>
     void take_springs(const Springs& springs) noexcept;
     template <class Scalar, class Volume>
-    bool take_backing(const Volume& volume) noexcept;
+    bool take_foundation(const Volume& volume) noexcept;
     void fix(Index v, unsigned char by) noexcept { fixed_[at(v)] = static_cast<unsigned char>(fixed_[at(v)] | by); }
     template <class C>
     [[nodiscard]] ProblemStatus take_constraint(const C& constraint) noexcept;
@@ -101,9 +101,9 @@ class EquilibriumProblem {
     [[nodiscard]] ProblemStatus check_places() const noexcept;
 
     std::vector<Spring<double>> springs_;
-    std::vector<VolumeSpring<double>> backing_;
+    std::vector<VolumeSpring<double>> foundation_;
     std::vector<double> softening_;
-    std::vector<unsigned char> fixed_;  // by whom
+    std::vector<unsigned char> fixed_;  // bits: by network, constraint, caller
     Points<double> load_, given_, centre_;
     PointAttachments places_;
     double rounding_ = 0;
@@ -113,9 +113,9 @@ class EquilibriumProblem {
 template <Real Scalar, class Law>
 EquilibriumProblem::EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& network)
     : springs_(network.springs().size()),
-      backing_(static_cast<std::size_t>(network.vertex_count())),
-      softening_(backing_.size()),
-      fixed_(backing_.size()),
+      foundation_(static_cast<std::size_t>(network.vertex_count())),
+      softening_(foundation_.size()),
+      fixed_(foundation_.size()),
       load_(Points<double>::Zero(3, network.vertex_count())),
       given_(load_),
       centre_(load_) {
@@ -124,8 +124,9 @@ EquilibriumProblem::EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& net
     take_springs(network.springs());
     std::size_t most = 0;
     for (Index v = 0; v < network.vertex_count(); ++v) most = (std::max)(most, network.springs_of(v).size());
-    // A spring's force is off by 13 units of rounding, half an epsilon each, times k (l + r) at the most; each sum of n
-    // adds n of all magnitudes. Loads and foundation are two more, and the magnitudes are rounded as well.
+    // A spring's force is off by at most 13 units of rounding, half an epsilon each, times k (l + r). A sum of n terms
+    // adds n units times all magnitudes. Loads and foundation are two more terms, and the magnitudes are rounded as
+    // well.
     rounding_ = std::numeric_limits<double>::epsilon() * static_cast<double>(8 + most);
 }
 
@@ -144,7 +145,7 @@ ProblemStatus EquilibriumProblem::take(const std::type_identity_t<ConstPointsRef
     places_.clear();
     std::fill(softening_.begin(), softening_.end(), 0.0);
     touched_ = false;
-    if (!take_backing<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::invalid_input;
+    if (!take_foundation<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::invalid_input;
     ProblemStatus status = ProblemStatus::valid;
     ((status = status == ProblemStatus::valid ? take_constraint(constraints) : status), ...);
     if (status == ProblemStatus::valid) status = check_places();
@@ -160,9 +161,9 @@ void EquilibriumProblem::take_springs(const Springs& springs) noexcept {
 }
 
 template <class Scalar, class Volume>
-bool EquilibriumProblem::take_backing(const Volume& volume) noexcept {
+bool EquilibriumProblem::take_foundation(const Volume& volume) noexcept {
     if constexpr (std::same_as<Volume, NoFoundation>) {
-        std::fill(backing_.begin(), backing_.end(), VolumeSpring<double>());
+        std::fill(foundation_.begin(), foundation_.end(), VolumeSpring<double>());
         return true;
     } else {
         if (volume.anchors().cols() != vertex_count()) return false;
@@ -170,7 +171,7 @@ bool EquilibriumProblem::take_backing(const Volume& volume) noexcept {
             const Vector3<Scalar> anchor = point(volume.anchors(), v);
             const auto spring = volume.spring(v, anchor, std::numeric_limits<Scalar>::infinity());
             if (!is_finite(anchor)) return false;
-            backing_[at(v)] = {anchor.template cast<double>(), static_cast<double>(spring.stiffness)};
+            foundation_[at(v)] = {anchor.template cast<double>(), static_cast<double>(spring.stiffness)};
         }
         return true;
     }
@@ -225,12 +226,12 @@ inline ProblemStatus EquilibriumProblem::check_places() const noexcept {
 inline void EquilibriumProblem::forces(const Points<double>& y, Points<double>& force,
                                        std::vector<double>& magnitude) const noexcept {
     for (Index v = 0; v < vertex_count(); ++v) {
-        const Vector3<double> pull = backing_[at(v)].elastic_pull(point(y, v)).force;
+        const Vector3<double> pull = foundation_[at(v)].elastic_pull(point(y, v)).force;
         force.col(v) = pull + load_.col(v);
         magnitude[at(v)] = norm(pull) + norm(point(load_, v));
     }
     for (const auto& spring : springs_) {
-        const auto pull = pull_of(LinearSpring{}, edge_vector(spring, y), spring.stiffness, spring.rest_length);
+        const auto pull = spring_force(LinearSpring{}, edge_vector(spring, y), spring.stiffness, spring.rest_length);
         force.col(spring.first) += pull.force();
         force.col(spring.second) -= pull.force();
         const double most = spring.stiffness * (pull.length + spring.rest_length);

@@ -10,18 +10,19 @@
 #include <membrane/accuracy/tool_points.hpp>
 #include <membrane/solve/constraint_term.hpp>
 
-/// What acts on a membrane at rest, told by the constraints of a step, and by those of one's own: see `ConstraintTerm`, or
+/// The constraints of a membrane in equilibrium, described by those of a step or by user-defined ones: see
+/// `ConstraintTerm`, or
 ///
 ///     void describe(const Clamp& clamp, membrane::EquilibriumScene& scene) { scene.hold(clamp.vertex, clamp.target); }
 namespace membrane {
 
 struct EquilibriumOptions {
-    Index increments = 1;       ///< targets, loads and tools are brought on in so many parts; more for a start far off
-    Index layers = unlimited;   ///< vertices farther than this from where forces enter stay where they are
+    Index increments = 1;       ///< steps in which targets, loads and tools are applied; more for a distant start
+    Index layers = unlimited;   ///< vertices beyond this number of layers from the applied forces are fixed
     Index max_iterations = 60;  ///< of Newton's method, in each increment
-    double tolerance =
-        1e-12;  ///< of forces, in parts of the largest that one spring, foundation or load exerts, and of
-                ///< lengths, in parts of the mean edge; neither is asked for below rounding
+    /// Of forces, relative to the largest force of a spring, foundation or load, and of lengths, relative to the mean
+    /// edge; never below rounding.
+    double tolerance = 1e-12;
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
@@ -29,42 +30,43 @@ struct EquilibriumOptions {
 
 struct Equilibrium {
     Points<double> x;                        ///< 3 x V [m]
-    std::vector<Vector3<double>> reactions;  ///< for each constraint in turn, the membrane's force on it [N]
-    std::vector<ToolPoint> contacts;         ///< what tools press on; tools are counted from 0, those that touch
+    std::vector<Vector3<double>> reactions;  ///< for each constraint in order, the membrane's force on it [N]
+    std::vector<ToolPoint> contacts;         ///< points with a contact force; numbers only the tools in contact, from 0
     double residual = 0;                     ///< largest unbalanced force on a free vertex [N]
-    double overlap = 0;                      ///< how deep the surface is in a tool [m]
+    double overlap = 0;                      ///< largest penetration of a tool [m]
     Index iterations = 0;                    ///< of Newton's method, in all increments
-    bool converged = false;                  ///< forces balance, what is held is in its place, no tool overlaps
+    bool converged = false;                  ///< forces balance, attachments are at their targets, no tool penetrates
 };
 
-/// A tool that the surface stays outside of.
+/// A tool that the surface must stay outside of.
 struct ScenePress {
     std::size_t constraint;
     Tool<double> tool;
-    Vector3<double> exit_displacement;  ///< moved so far, it just touches the surface from its own side [m]
-    double reach;                       ///< triangles up to this far from it count as touched [m]
+    Vector3<double> exit_displacement;  ///< after it the tool just touches the surface from outside [m]
+    double detection_distance;          ///< triangles within this distance of the tool are in contact [m]
 };
 
-/// Where everything is to be, and what pulls.
+/// Targets, loads and tools of one increment.
 struct LoadStep {
-    Points<double> targets;               ///< of fixed vertices; the others, where they were at the start, 3 x V [m]
+    Points<double> targets;               ///< of fixed vertices; for the others, the start positions, 3 x V [m]
     Points<double> loads;                 ///< on each vertex, 3 x V [N]
-    std::vector<Vector3<double>> places;  ///< targets of the held places [m]
-    std::vector<Tool<double>> tools;      ///< that press
+    std::vector<Vector3<double>> places;  ///< targets of the attached points [m]
+    std::vector<Tool<double>> tools;      ///< that are in contact
 };
 
-/// The constraints of one membrane, in double. All it is told is checked.
-/// @throws InvalidInput for a vertex that is none, weights that are not barycentric, a number that is not finite
+/// The constraints of one membrane, in double. All input is checked.
+/// @throws InvalidInput for an index that is not a vertex, weights that are not barycentric, a number that is not
+/// finite
 class EquilibriumScene {
   public:
-    /// The membrane is at `start` (3 x V [m]); `pinned[v]` where vertex `v` never moves.
+    /// The membrane is at `start` (3 x V [m]); `pinned[v]` is not 0 if vertex `v` never moves.
     EquilibriumScene(Points<double> start, std::vector<unsigned char> pinned)
         : start_(std::move(start)), targets_(start_), pinned_(std::move(pinned)), held_(pinned_.size(), 0) {}
 
     // For `describe`.
 
-    /// A pinned vertex stays where it is, whatever its target; the last one to hold a vertex decides where. A tool that
-    /// does not touch is nothing.
+    /// A pinned vertex stays at its start, regardless of its target. If several terms hold a vertex, the target of the
+    /// last one counts. A tool without contact is ignored.
     void add(const ConstraintTerm& term);
 
     void hold(Index v, const Vector3<double>& target) { add(ConstraintTerm::hold(v, target)); }
@@ -79,23 +81,24 @@ class EquilibriumScene {
 
     // For `equilibrium`.
 
-    /// What is told from now on comes from constraint number `constraint`.
-    void turn_to(std::size_t constraint) noexcept { constraint_ = constraint; }
+    /// The terms added from now on belong to constraint number `constraint`.
+    void select_constraint(std::size_t constraint) noexcept { constraint_ = constraint; }
 
     [[nodiscard]] bool fixed(Index v) const noexcept {
         return pinned_[static_cast<std::size_t>(v)] != 0 || held_[static_cast<std::size_t>(v)] != 0;
     }
 
-    /// Targets and loads, brought on from the start by this part, and tools that have come in from outside so far.
+    /// Targets and loads at `part` (0 to 1) of the change from the start, and tools at this part of their entry from
+    /// outside.
     [[nodiscard]] LoadStep goals(double part) const;
 
-    /// Constraint and vertex.
+    /// Constraint and vertex of each term that fixes a vertex.
     [[nodiscard]] const std::vector<std::pair<std::size_t, Index>>& holds() const noexcept { return holds_; }
-    [[nodiscard]] const std::vector<ConstraintTerm>& point_attachments() const noexcept { return held_places_; }
-    [[nodiscard]] const std::vector<ConstraintTerm>& loaded_places() const noexcept { return loaded_places_; }
+    [[nodiscard]] const std::vector<ConstraintTerm>& point_attachments() const noexcept { return attachments_; }
+    [[nodiscard]] const std::vector<ConstraintTerm>& loaded_places() const noexcept { return loads_; }
     [[nodiscard]] const std::vector<ScenePress>& tools() const noexcept { return tools_; }
 
-    /// Vertices where a force enters.
+    /// Vertices to which a force is applied.
     [[nodiscard]] const std::vector<Index>& seeds() const noexcept { return seeds_; }
 
   private:
@@ -109,13 +112,13 @@ class EquilibriumScene {
     Points<double> start_, targets_;
     std::vector<unsigned char> pinned_, held_;
     std::vector<std::pair<std::size_t, Index>> holds_;
-    std::vector<ConstraintTerm> held_places_, loaded_places_;
+    std::vector<ConstraintTerm> attachments_, loads_;
     std::vector<ScenePress> tools_;
     std::vector<Index> seeds_;
     std::size_t constraint_ = 0;
 };
 
-/// What `describe(constraint, scene)` tells a scene about.
+/// A constraint that `describe(constraint, scene)` adds to a scene.
 template <class C>
 concept StaticConstraint = requires(const C& constraint, EquilibriumScene& scene) {
     describe(constraint, scene);
@@ -127,13 +130,13 @@ template <class C>
 consteval bool check_static_constraint() noexcept {
     static_assert(
         StaticConstraint<C>,
-        "StaticConstraint: there must be describe(const C&, EquilibriumScene&) in the namespace of the constraint");
+        "StaticConstraint: value must be describe(const C&, EquilibriumScene&) in the namespace of the constraint");
     return StaticConstraint<C>;
 }
 
 }  // namespace detail
 
-/// A `StaticConstraint`; where it is none, the error says what is missing.
+/// A `StaticConstraint`; if a type is not one, the compile error names the missing requirement.
 template <class C>
 concept CheckedStaticConstraint = detail::check_static_constraint<C>();
 static_assert(StaticConstraint<VertexAttachment<float>> && StaticConstraint<PointAttachment<double>> &&
@@ -164,7 +167,7 @@ inline void EquilibriumScene::check(Index v) const {
 
 inline void EquilibriumScene::check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const {
     for (const Index v : corners) check(v);
-    // Whoever brings weights of floats, brings their rounding.
+    // Weights that were floats have the rounding of floats.
     const bool is_float = barycentric.cast<float>().cast<double>() == barycentric;
     if (is_float ? detail::is_barycentric<float>(barycentric.cast<float>()) : detail::is_barycentric(barycentric))
         return;
@@ -205,9 +208,9 @@ inline void EquilibriumScene::act_on_point(const ConstraintTerm& term) {
     check(term.corners, term.weights);
     check(term.target, "target", "m");
     check(term.force, "force", "N");
-    auto& places = term.kind == ConstraintTerm::Kind::load ? loaded_places_ : held_places_;
-    places.push_back(term);
-    places.back().constraint = constraint_;
+    auto& terms = term.kind == ConstraintTerm::Kind::load ? loads_ : attachments_;
+    terms.push_back(term);
+    terms.back().constraint = constraint_;
     seeds_.insert(seeds_.end(), term.corners.begin(), term.corners.end());
 }
 
@@ -238,19 +241,19 @@ inline void EquilibriumScene::press(const ConstraintTerm& term) {
 }
 
 inline LoadStep EquilibriumScene::goals(double part) const {
-    const auto interpolated = [&](const auto& from, const auto& to) {  // exact for what stays, and at the end
-        auto there = to;
-        if (part != 1) there = from + part * (to - from);
-        return there;
+    const auto interpolated = [&](const auto& from, const auto& to) {  // exact for unchanged values, and at the end
+        auto value = to;
+        if (part != 1) value = from + part * (to - from);
+        return value;
     };
     LoadStep goals{interpolated(start_, targets_), Points<double>::Zero(3, start_.cols()), {}, {}};
-    for (const auto& place : loaded_places_) {
+    for (const auto& term : loads_) {
         for (std::size_t k = 0; k < 3; ++k) {
-            goals.loads.col(place.corners[k]) += part * place.weight(k) * place.force;
+            goals.loads.col(term.corners[k]) += part * term.weight(k) * term.force;
         }
     }
-    for (const auto& place : held_places_) {
-        goals.places.push_back(interpolated(place.point_to_body(start_), place.target));
+    for (const auto& term : attachments_) {
+        goals.places.push_back(interpolated(term.point_to_body(start_), term.target));
     }
     for (const auto& pressing : tools_) {
         goals.tools.push_back(pressing.tool);

@@ -17,19 +17,19 @@
 
 namespace membrane {
 
-/// Newton's method on one scene, see `equilibrium`: the last of these parts, and the one that puts them together.
+/// Newton's method on one scene, see `equilibrium`. Combines the other components.
 ///
 ///     EquilibriumSolver(x, mesh.triangles(), Elasticity(network, volume), scene, fixed, options).run(constraint_count)
 template <class ElasticModel>
 class EquilibriumSolver {
   public:
-    /// From `x` (3 x V [m]); `fixed[v]` where vertex v does not move but to where the scene holds it. Triangles and scene
-    /// must outlive the search.
+    /// Starts from `x` (3 x V [m]). `fixed[v]` is not 0 if vertex v moves only to its target in the scene. Triangles
+    /// and scene must outlive the solver.
     EquilibriumSolver(const Points<double>& x, const Triangles& triangles, const ElasticModel& elasticity,
                       const EquilibriumScene& scene, std::vector<unsigned char> fixed,
                       const EquilibriumOptions& options);
 
-    /// All increments. May be run once.
+    /// Solves all increments. May be called once.
     [[nodiscard]] Equilibrium run(std::size_t constraint_count);
 
   private:
@@ -39,12 +39,12 @@ class EquilibriumSolver {
         double overlap = 0;
     };
 
-    [[nodiscard]] bool settle();
+    [[nodiscard]] bool solve_increment();
     [[nodiscard]] State state_at(const Points<double>& x);
     [[nodiscard]] Points<double> newton_step();
     void add_rows();
-    [[nodiscard]] bool is_at_rest() const;
-    [[nodiscard]] bool is_in_place() const;
+    [[nodiscard]] bool is_balanced() const;
+    [[nodiscard]] bool targets_reached() const;
     void advance(const Points<double>& step);
     [[nodiscard]] Points<double> applied(const State& state) const;
     [[nodiscard]] Points<double> unbalanced(const State& state) const;
@@ -60,14 +60,14 @@ class EquilibriumSolver {
     const EquilibriumScene& scene_;
     std::vector<unsigned char> fixed_;
     EquilibriumOptions options_;
-    double edge_, spacing_;  // mean edge; what rounding makes of a length [m]
+    double edge_, spacing_;  // mean edge; rounding of a length [m]
     NewtonSystem system_;
 
     LoadStep goals_;  // of this increment
     State here_;
-    std::vector<Vector3<double>> holding_;  // force on each held place [N]
-    double stiffness_ = 0;                  // of the stiffest spring [N/m]
-    double penalty_ = 0;                    // of overlap [N]
+    std::vector<Vector3<double>> attachment_forces_;  // force on each attached point [N]
+    double stiffness_ = 0;                            // of the stiffest spring [N/m]
+    double penalty_ = 0;                              // weight of the penetration [N]
     Index iterations_ = 0;
 };
 
@@ -97,7 +97,7 @@ EquilibriumSolver<ElasticModel>::EquilibriumSolver(const Points<double>& x, cons
       edge_(detail::mean_side(x, triangles)),
       spacing_(64 * std::numeric_limits<double>::epsilon() * x.cwiseAbs().maxCoeff()),
       system_(fixed_),
-      holding_(scene.point_attachments().size(), Vector3<double>::Zero()) {
+      attachment_forces_(scene.point_attachments().size(), Vector3<double>::Zero()) {
     here_.elastic.x = x;
 }
 
@@ -107,29 +107,29 @@ Equilibrium EquilibriumSolver<ElasticModel>::run(std::size_t constraint_count) {
     for (const auto& pressing : scene_.tools()) {
         increments = (std::max)(increments, std::ceil(2 * norm(pressing.exit_displacement) / pressing.tool.radius));
     }
-    Equilibrium rest;
+    Equilibrium result;
     for (double i = 1; i <= increments; ++i) {
         goals_ = scene_.goals(i / increments);
         here_ = state_at(here_.elastic.x);
-        rest.converged = settle();
+        result.converged = solve_increment();
     }
-    rest.x = here_.elastic.x;
-    rest.reactions = reactions(constraint_count);
-    std::copy_if(here_.contacts.begin(), here_.contacts.end(), std::back_inserter(rest.contacts),
+    result.x = here_.elastic.x;
+    result.reactions = reactions(constraint_count);
+    std::copy_if(here_.contacts.begin(), here_.contacts.end(), std::back_inserter(result.contacts),
                  [](const ToolPoint& point) { return point.multiplier > 0; });
-    for (auto& point : rest.contacts) point.force = -point.multiplier * point.normal;
-    rest.residual = residual(here_);
-    rest.overlap = here_.overlap;
-    rest.iterations = iterations_;
-    return rest;
+    for (auto& point : result.contacts) point.force = -point.multiplier * point.normal;
+    result.residual = residual(here_);
+    result.overlap = here_.overlap;
+    result.iterations = iterations_;
+    return result;
 }
 
 template <class ElasticModel>
-bool EquilibriumSolver<ElasticModel>::settle() {
+bool EquilibriumSolver<ElasticModel>::solve_increment() {
     for (Index i = 0; i < options_.max_iterations; ++i) {
         ++iterations_;
         const Points<double> step = newton_step();
-        if (is_at_rest()) return true;
+        if (is_balanced()) return true;
         if (!is_finite(step)) return false;
         advance(step);
     }
@@ -151,7 +151,7 @@ auto EquilibriumSolver<ElasticModel>::state_at(const Points<double>& x) -> State
     return state;
 }
 
-// The step from here, and with it the forces of what holds and presses.
+// The step from the current state, and the forces of attachments and contacts.
 template <class ElasticModel>
 Points<double> EquilibriumSolver<ElasticModel>::newton_step() {
     const auto& x = here_.elastic.x;
@@ -163,7 +163,7 @@ Points<double> EquilibriumSolver<ElasticModel>::newton_step() {
     add_rows();
     const auto solution = system_.solve(stiffness_);
     Eigen::Index row = 0;
-    for (auto& force : holding_) {
+    for (auto& force : attachment_forces_) {
         force = solution.multipliers.segment<3>(row);
         row += 3;
     }
@@ -171,17 +171,17 @@ Points<double> EquilibriumSolver<ElasticModel>::newton_step() {
     return solution.step;
 }
 
-// What is held is expected to come to its place, and what touches to go on touching: stiffer across that way, H is
-// positive definite wherever the equilibrium is stable.
+// Attached points are expected to reach their targets, and active contacts to remain. With added stiffness along these
+// gradients, H is positive definite wherever the equilibrium is stable.
 template <class ElasticModel>
 void EquilibriumSolver<ElasticModel>::add_rows() {
-    for (std::size_t i = 0; i < holding_.size(); ++i) {
-        const auto& place = scene_.point_attachments()[i];
+    for (std::size_t i = 0; i < attachment_forces_.size(); ++i) {
+        const auto& term = scene_.point_attachments()[i];
         const Vector3<double> off = off_target(i);
         for (Eigen::Index c = 0; c < 3; ++c) {
-            ConstraintRow row{place.corners, {}, off[c], true, stiffness_};
+            ConstraintRow row{term.corners, {}, off[c], true, stiffness_};
             for (std::size_t k = 0; k < 3; ++k) {
-                row.gradient[k] = place.weight(k) * Vector3<double>::Unit(c);
+                row.gradient[k] = term.weight(k) * Vector3<double>::Unit(c);
             }
             system_.add(row);
         }
@@ -202,19 +202,19 @@ void EquilibriumSolver<ElasticModel>::add_rows() {
 }
 
 template <class ElasticModel>
-bool EquilibriumSolver<ElasticModel>::is_at_rest() const {
+bool EquilibriumSolver<ElasticModel>::is_balanced() const {
     const double largest = (std::max)(here_.elastic.largest_force, goals_.loads.colwise().norm().maxCoeff());
     if (!(residual(here_) <= (std::max)(options_.tolerance * largest, stiffness_ * spacing_))) return false;
     const auto contacts = [&](const ToolPoint& p) { return p.multiplier == 0 || p.gap <= negligible_length(); };
-    return is_in_place() && here_.overlap <= negligible_length() &&
+    return targets_reached() && here_.overlap <= negligible_length() &&
            std::all_of(here_.contacts.begin(), here_.contacts.end(), contacts);
 }
 
 template <class ElasticModel>
-bool EquilibriumSolver<ElasticModel>::is_in_place() const {
-    for (std::size_t i = 0; i < holding_.size(); ++i) {
-        const auto& place = scene_.point_attachments()[i];
-        if (can_move(place.corners, place.weights) && norm(off_target(i)) > negligible_length()) return false;
+bool EquilibriumSolver<ElasticModel>::targets_reached() const {
+    for (std::size_t i = 0; i < attachment_forces_.size(); ++i) {
+        const auto& term = scene_.point_attachments()[i];
+        if (can_move(term.corners, term.weights) && norm(off_target(i)) > negligible_length()) return false;
     }
     for (Index v = 0; v < here_.elastic.x.cols(); ++v) {
         if (!is_free(v) && point(here_.elastic.x, v) != point(goals_.targets, v)) return false;
@@ -222,8 +222,9 @@ bool EquilibriumSolver<ElasticModel>::is_in_place() const {
     return true;
 }
 
-// As far as a tool keeps its side, and once all that is held is in its place, as far as it helps: by the energy and the
-// overlap from afar; close to rest, where the curved way of the contacts would forbid whole steps, by what is out of balance.
+// Limits the step so that no tool passes through the surface. Once all targets are reached, a line search limits it
+// further. Far from equilibrium its merit is the energy plus the weighted penetration. Close to equilibrium, where the
+// curved paths of the contacts would reject full steps, a reduction of the residual is accepted as well.
 template <class ElasticModel>
 void EquilibriumSolver<ElasticModel>::advance(const Points<double>& step) {
     constexpr int max_halvings = 12;
@@ -237,19 +238,19 @@ void EquilibriumSolver<ElasticModel>::advance(const Points<double>& step) {
     const auto merit = [&](const State& state) { return residual(state) + stiffness_ * state.overlap; };
     double part = collision_free_step(triangles_, here_.elastic.x, step, goals_.tools);
     State there = after(part);
-    if (is_in_place()) {
+    if (targets_reached()) {
         double multipliers = 0;
         for (const auto& point : here_.contacts) multipliers += point.multiplier;
         penalty_ = (std::max)(penalty_, 2 * multipliers);
         const double slope = -applied(here_).cwiseProduct(step).sum() - penalty_ * here_.overlap;
-        const auto helps = [&] {
+        const auto improves = [&] {
             const double work = goals_.loads.cwiseProduct(there.elastic.x - here_.elastic.x).sum();
             const double energy = elasticity_.energy_change(here_.elastic, there.elastic) - work;
             const double noise = 1e-13 * (here_.elastic.energy + there.elastic.energy);
             const double change = energy + penalty_ * (there.overlap - here_.overlap);
             return change <= 1e-4 * part * slope + noise || merit(there) <= merit(here_) / 2;
         };
-        for (int i = 0; i < max_halvings && !helps(); ++i) {
+        for (int i = 0; i < max_halvings && !improves(); ++i) {
             part /= 2;
             there = after(part);
         }
@@ -257,23 +258,23 @@ void EquilibriumSolver<ElasticModel>::advance(const Points<double>& step) {
     here_ = std::move(there);
 }
 
-// Springs, foundation and loads.
+// Forces of springs, foundation and loads.
 template <class ElasticModel>
 Points<double> EquilibriumSolver<ElasticModel>::applied(const State& state) const {
     return state.elastic.springs + state.elastic.foundation + goals_.loads;
 }
 
-// The same and what holds and presses, of fixed vertices as well.
+// The applied forces plus those of attachments and contacts, also on fixed vertices.
 template <class ElasticModel>
 Points<double> EquilibriumSolver<ElasticModel>::unbalanced(const State& state) const {
     Points<double> forces = applied(state);
     for (const auto& point : state.contacts) {
         for (std::size_t k = 0; k < 3; ++k) forces.col(point.corners[k]) += point.multiplier * point.gradient(k);
     }
-    for (std::size_t i = 0; i < holding_.size(); ++i) {
-        const auto& held = scene_.point_attachments()[i];
+    for (std::size_t i = 0; i < attachment_forces_.size(); ++i) {
+        const auto& term = scene_.point_attachments()[i];
         for (std::size_t k = 0; k < 3; ++k) {
-            forces.col(held.corners[k]) += held.weight(k) * holding_[i];
+            forces.col(term.corners[k]) += term.weight(k) * attachment_forces_[i];
         }
     }
     return forces;
@@ -294,8 +295,9 @@ std::vector<Vector3<double>> EquilibriumSolver<ElasticModel>::reactions(std::siz
     std::vector<Vector3<double>> sums(count, Vector3<double>::Zero());
     const Points<double> forces = unbalanced(here_);
     for (const auto& [constraint, v] : scene_.holds()) sums[constraint] += forces.col(v);
-    for (const auto& place : scene_.loaded_places()) sums[place.constraint] -= place.force;
-    for (std::size_t i = 0; i < holding_.size(); ++i) sums[scene_.point_attachments()[i].constraint] -= holding_[i];
+    for (const auto& term : scene_.loaded_places()) sums[term.constraint] -= term.force;
+    for (std::size_t i = 0; i < attachment_forces_.size(); ++i)
+        sums[scene_.point_attachments()[i].constraint] -= attachment_forces_[i];
     for (const auto& point : here_.contacts)
         sums[scene_.tools()[point.tool].constraint] += point.multiplier * point.normal;
     return sums;

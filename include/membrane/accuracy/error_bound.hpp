@@ -15,61 +15,62 @@
 #include <membrane/accuracy/error_report.hpp>
 #include <membrane/accuracy/stiffness_operator.hpp>
 
-/// How far a membrane is from rest, proven.
+/// A proven bound of the distance of a membrane from equilibrium.
 ///
 ///     membrane::ErrorBound bound(network);                                          // offline: allocates all it needs
 ///     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
 ///     const auto error = bound.of(x, network, foundation, membrane::pull(7, target));
 ///     if (error.certified()) {
 ///         error.position                                                            // no vertex is farther off [m]
-///         error.reactions[0].max_distance_to(report.reactions[0])                     // the force is no farther off [N]
+///         error.reactions[0].max_distance_to(report.reactions[0])                   // error bound of a force [N]
 ///     }
 ///
-/// With a tool in contact, from the equilibrium that Newton's method found:
+/// With a tool in contact, from an equilibrium computed by Newton's method:
 ///     const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
 ///     const auto error = bound.of(rest, x, mesh, network, foundation, press(tool, contact));
 namespace membrane {
 
 struct ErrorBoundOptions {
-    Index cg_iterations = 200;  ///< products with the stiffness at the most; soft backings need more
+    Index cg_iterations = 200;  ///< maximum number of products with the stiffness; soft foundations need more
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
 };
 
-/// Proves how far a membrane of linear springs is from rest, whoever brought it where it is, and whether the solver
-/// has moved all of its vertices or some: the equilibrium meant is that of all that is free.
+/// Proves an upper bound of the distance of a membrane of linear springs from equilibrium. The state may come from any
+/// solver, which may have moved all of its vertices or only some: the equilibrium is that of all free vertices.
 ///
-/// Let E be the energy of springs, foundation and loads, x the state (with what is held in its place), and C all states
-/// whose free vertices are within rho of x: a convex set. If the stiffness has no eigenvalue below mu > 0 on C, as
-/// `Convexity` shows, then (grad E(a) - grad E(b)) . (a - b) >= mu |a - b|^2 for a and b in C, which so has one
-/// equilibrium at the most. Take any y, its unbalanced forces r = -grad E(y), and the ball B around it of radius
-/// e = |r| / mu. If B lies in C, then on its surface grad E(z) . (z - y) >= mu e^2 - |r| e = 0. The least point of E in
-/// B is therefore an equilibrium: on the surface its gradient, if there were one, would point straight inwards, and the
-/// product would be negative. So there is exactly one equilibrium x* in C, and |x* - y| <= e. No vertex of it is
-/// farther from x than max |y_v - x_v| + e; if that is no more than rho, B does lie in C and all is shown.
+/// Let E be the energy of springs, foundation and loads, x the state (with fixed vertices and attached points at their
+/// targets), and C all states whose free vertices are within rho of x: a convex set. If the stiffness has no eigenvalue
+/// below mu > 0 on C, as `Convexity` shows, then (grad E(a) - grad E(b)) . (a - b) >= mu |a - b|^2 for a and b in C, so
+/// C has at most one equilibrium. Take any y, its residual forces r = -grad E(y), and the ball B around it of radius e
+/// = |r| / mu. If B lies in C, then on its surface grad E(z) . (z - y) >= mu e^2 - |r| e = 0. The minimum of E in B is
+/// therefore an equilibrium: on the surface its gradient, if not zero, would point straight inwards, and the product
+/// would be negative. So C has exactly one equilibrium x*, and |x* - y| <= e. None of its vertices is farther from x
+/// than max |y_v - x_v| + e; if that is at most rho, B lies in C and the proof is complete.
 ///
-/// y comes from Newton's method, begun at x, by conjugate gradients (inexact, [Dembo82]): near the equilibrium e is
-/// small beside the distance, and the bound hardly more than that. But the proof takes y as it is, and its forces, with
-/// rounding, as they are. What is held at a point of a triangle leaves C a plane part, on which all of this holds for
-/// the projected forces.
+/// y comes from Newton's method, started at x, with conjugate gradients (inexact, [Dembo82]): near the equilibrium e is
+/// small compared with the distance, and the bound hardly larger than the distance. The proof does not depend on that:
+/// it uses y and its forces as computed, with rounding. Point attachments restrict C to a plane, on which the proof
+/// holds for the projected forces.
 ///
-/// A reaction q changes by no more than the sum of k |w_i - w_j| over the springs at each free vertex, w the share of
-/// each vertex in q, no spring being stiffer than k in C: it is q(y) within sqrt(sum of squares of these) e.
+/// A reaction q changes by at most the sum of k |w_i - w_j| over the springs at each free vertex, where w is the share
+/// of each vertex in q and no spring is stiffer than k in C. So q(x*) is within sqrt(sum of squares of these) e of
+/// q(y).
 ///
-/// Where tools press, y and the pressures there are those of an equilibrium found before, r is what is left over with
-/// them, and mu a bound for the stiffness less what pressures may take away. What they do to the energy beyond that is
-/// work across gaps and overlaps, no more than some w (`ContactBounds`): mu |x - y|^2 <= |r| |x - y| + w for an
-/// equilibrium x in C, and two in C are one. The least point of E outside the tools within a ball B in C around y is one:
+/// If tools press, y and the contact forces are those of an equilibrium computed before, r is the residual with them,
+/// and mu a bound of the stiffness minus the reduction by contact forces. Beyond that, contact forces change the energy
+/// by work across gaps and penetrations, at most some w (`ContactBounds`): mu |x - y|^2 <= |r| |x - y| + w for an
+/// equilibrium x in C, and two in C are equal. The minimum of E outside the tools within a ball B in C around y is one:
 /// if it were on the surface, a force would hold it there, which only adds to the left side; so e, the radius, is where
-/// both sides are equal. (What the force adds to the pressures there is outweighed too while e is below the least
-/// distance from the axis times the least cosine, and above what it takes to clear the overlaps.)
+/// both sides are equal. (The increase of contact forces by this force is outweighed too while e is below the smallest
+/// distance from the axis times the smallest cosine, and above the displacement that clears the penetrations.)
 ///
-/// Rounding is that of IEEE double: with -ffast-math this is no proof. The equilibrium is at rest: damping has no
-/// force. A reaction in a step's report may have some that is due to damping; its distance from the equilibrium's is
-/// bounded all the same. A press that touches nothing, or holds nothing, counts as none.
+/// Rounding is that of IEEE double: with -ffast-math this is no proof. The equilibrium has no damping forces. A
+/// reaction in a step's report may include some; its distance from the equilibrium's reaction is bounded all the same.
+/// A press without contact or grasp counts as no constraint.
 ///
-/// Remembers nothing from call to call. One thread at a time for each.
+/// Calls are independent of each other. One thread at a time for each instance.
 template <CheckedConvexityModel Convexity = BlockConvexity>
 class ErrorBound {
   public:
@@ -77,15 +78,15 @@ class ErrorBound {
     template <Real Scalar, class Law>
     explicit ErrorBound(const MassSpringNetwork<Scalar, Law>& network, const ErrorBoundOptions& options = {});
 
-    /// Of the state `x` (3 x V [m]) under the constraints of a step. Online.
-    /// Cost: O(V + springs) for each refinement, and what `Convexity` costs, as a rule twice or three times.
+    /// Bounds the error of the state `x` (3 x V [m]) under the constraints of a step. Online. Cost: O(V + springs) for
+    /// each CG iteration, and the cost of `Convexity`, usually two or three times.
     template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar>... Constraints>
     [[nodiscard]] ErrorReport of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                  const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                  const Constraints&... constraints) noexcept;
 
-    /// The same with tools in contact; `rest` is the equilibrium of just these. No tool may touch what is held, nor a
-    /// vertex that another may touch, and no point of a triangle be held beside.
+    /// Bounds the error with tools in contact; `rest` is the equilibrium under these constraints. No tool may touch a
+    /// fixed or prescribed vertex, nor a vertex that another tool may touch, and there may be no point attachment.
     /// @throws InvalidInput for a constraint that is not valid. Offline.
     template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
     [[nodiscard]] ErrorReport of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
@@ -102,7 +103,7 @@ class ErrorBound {
     void locate() noexcept;
     void enclose() noexcept;
     bool refine() noexcept;
-    void look() noexcept;
+    void evaluate_residuals() noexcept;
     bool convex_within(double radius) noexcept;
     [[nodiscard]] double enclosure() const noexcept;
     template <class C>
@@ -114,9 +115,10 @@ class ErrorBound {
     Convexity convexity_;
     ContactBounds pressed_;
     Points<double> y_, force_, rest_,
-        displacement_;  // y, its forces on all vertices, those that are unbalanced, a step
+        displacement_;  // y, forces on all vertices, residual forces, a step
     std::vector<double> magnitude_, weights_, slopes_;
-    double distance_ = 0, unbalanced_ = 0, radius_ = -1;  // of y: from x [m], norm of the forces [N]; of C [m]
+    double distance_ = 0, unbalanced_ = 0;  // of y: distance from x [m], norm of the residual [N]
+    double radius_ = -1;                    // rho of C [m]
     ErrorReport error_;
     std::array<ForceEnclosure, max_constraints> reactions_{};
 };
@@ -181,7 +183,7 @@ ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_i
     }
     y_ = rest.x;
     pressed_.take(problem_, mesh.triangles(), y_, scene.tools(), rest.contacts);
-    look();
+    evaluate_residuals();
     error_.estimate = distance_;
     enclose();
     return report(constraints...);
@@ -205,18 +207,18 @@ ErrorReport ErrorBound<Convexity>::report(const Constraints&... constraints) noe
     return error_;
 }
 
-// The equilibrium, by Newton's method, until what is left is small beside the way there; then a radius for C that the
-// bound it gives is not above.
+// Approaches the equilibrium by Newton's method until e is small compared with the distance; then finds a radius rho
+// for C that is not below the bound it yields.
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::locate() noexcept {
     y_ = problem_.centre();
-    problem_.places().settle(y_);
-    look();
+    problem_.places().project_positions(y_);
+    evaluate_residuals();
     error_.status = BoundStatus::not_converged;
     for (double before = std::numeric_limits<double>::infinity(); unbalanced_ < before / 2;) {
         before = unbalanced_;
         const bool convex = refine();
-        look();
+        evaluate_residuals();
         if (!is_finite(unbalanced_) || !is_finite(distance_)) return;
         error_.estimate = distance_;
         const bool fits = distance_ <= radius_ && radius_ <= 1.1 * distance_;
@@ -229,7 +231,7 @@ void ErrorBound<Convexity>::locate() noexcept {
     enclose();
 }
 
-// A radius for C that the bound it gives is not above.
+// Finds a radius rho for C that is not below the bound it yields.
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::enclose() noexcept {
     error_.status = BoundStatus::not_converged;
@@ -244,7 +246,7 @@ void ErrorBound<Convexity>::enclose() noexcept {
     error_.position = (1 + 1e-12) * (distance_ + enclosure());
 }
 
-// A step of Newton's method; false where the energy is not convex.
+// One step of Newton's method; false if the energy is not convex.
 template <CheckedConvexityModel Convexity>
 bool ErrorBound<Convexity>::refine() noexcept {
     stiffness_.at(problem_, y_);
@@ -254,13 +256,13 @@ bool ErrorBound<Convexity>::refine() noexcept {
                          {.tolerance = 1e-2, .iterations = options_.cg_iterations - error_.cg_iterations});
     error_.cg_iterations += report.iterations;
     y_ += displacement_;
-    problem_.places().settle(y_);
+    problem_.places().project_positions(y_);
     return report.convex;
 }
 
-// The unbalanced forces at y, and its distance from x, both rounded up.
+// Computes the residual forces at y, and its distance from x, both rounded up.
 template <CheckedConvexityModel Convexity>
-void ErrorBound<Convexity>::look() noexcept {
+void ErrorBound<Convexity>::evaluate_residuals() noexcept {
     problem_.forces(y_, force_, magnitude_);
     rest_ = force_;
     pressed_.push(rest_, magnitude_);
@@ -275,7 +277,7 @@ void ErrorBound<Convexity>::look() noexcept {
     unbalanced_ = (1 + 1e-9) * std::sqrt(inner(rest_, rest_)) + problem_.rounding() * std::sqrt(rounding);
 }
 
-// Takes the states within `radius` for C.
+// Sets C to the states within `radius`; true if the energy is convex on it.
 template <CheckedConvexityModel Convexity>
 bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
     radius_ = radius;
@@ -286,8 +288,8 @@ bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
     return error_.convexity > 0;
 }
 
-// The radius e of the ball around y; or, as a held point may be off its place by rounding, around the nearest state in
-// which none is.
+// The radius e of the ball around y. If an attached point is off its target by rounding, the ball is around the nearest
+// state with all points at their targets.
 template <CheckedConvexityModel Convexity>
 double ErrorBound<Convexity>::enclosure() const noexcept {
     const double slip = problem_.places().slip(y_);
@@ -297,7 +299,7 @@ double ErrorBound<Convexity>::enclosure() const noexcept {
     return (1 + 1e-9) * ((std::max)(radius, pressed_.min_radius()) + slip);
 }
 
-// A spring between vertices of shares a and b adds (a - b) times its change of force.
+// A spring between vertices with shares a and b adds (a - b) times its change of force.
 template <CheckedConvexityModel Convexity>
 template <class C>
 ForceEnclosure ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::size_t& tool) noexcept {

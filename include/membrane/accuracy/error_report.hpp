@@ -6,7 +6,7 @@
 
 #include <membrane/core/types.hpp>
 
-/// What is known of how far a membrane is from rest.
+/// The bound of the distance of a membrane from equilibrium.
 ///
 ///     const membrane::ErrorReport error = bound.of(x, network, foundation, membrane::pull(7, target));
 ///     if (error.certified()) error.position; error.reactions[0].max_distance_to(report.reactions[0]);   // [m], [N]
@@ -14,14 +14,14 @@ namespace membrane {
 
 enum class BoundStatus {
     certified,
-    not_convex,     ///< the energy could not be shown to be convex as far as the equilibrium seems to be
-    not_converged,  ///< the equilibrium was not neared enough to say anything
-    contact,        ///< a tool touches: it takes the equilibrium to say more
-    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that something else holds too
-    invalid_input,  ///< a number is not finite, an index names no vertex, counts do not agree
+    not_convex,     ///< convexity could not be shown up to the estimated equilibrium
+    not_converged,  ///< the iteration ended too far from the equilibrium for a bound
+    contact,        ///< a tool touches: the bound needs the `Equilibrium` as an argument
+    unsupported,    ///< a constraint without `describe`, or an attached point that shares a corner with another one
+    invalid_input,  ///< a number is not finite, an index is not a vertex, or counts do not match
 };
 
-/// A force that is not known exactly: within `radius` of `centre` [N].
+/// An enclosure of a force: within `radius` of `centre` [N].
 struct ForceEnclosure {
     Vector3<double> centre = Vector3<double>::Zero();
     double radius = std::numeric_limits<double>::infinity();
@@ -33,22 +33,23 @@ struct ForceEnclosure {
     }
 };
 
-/// What is known of the equilibrium near a state. The span is the `ErrorBound`'s and valid until its next call.
+/// The bound at a state. The span belongs to the `ErrorBound` and is valid until its next call.
 struct ErrorReport {
     BoundStatus status = BoundStatus::invalid_input;
 
-    /// If certified: exactly one equilibrium has every vertex within `position` of where it is now; else infinite [m].
+    /// If certified: exactly one equilibrium has every vertex within `position` of its current position; else infinite
+    /// [m].
     double position = std::numeric_limits<double>::infinity();
 
-    /// If certified: the reaction of each constraint in turn at that equilibrium.
+    /// If certified: enclosures of the reactions at that equilibrium, for each constraint in order.
     std::span<const ForceEnclosure> reactions;
 
-    /// Where no bound is known, how far the equilibrium seems to be [m]; not proven. The centres of `reactions` are
-    /// then estimates too.
+    /// If there is no bound, an estimate of the distance to the equilibrium [m]; not proven. The centres of `reactions`
+    /// are then estimates too.
     double estimate = std::numeric_limits<double>::infinity();
 
-    double convexity = 0;     ///< lower bound of the smallest eigenvalue of the stiffness around [N/m], where positive
-    Index cg_iterations = 0;  ///< that were done
+    double convexity = 0;     ///< lower bound of the smallest eigenvalue of the stiffness [N/m], if positive
+    Index cg_iterations = 0;  ///< performed
 
     [[nodiscard]] bool certified() const noexcept { return status == BoundStatus::certified; }
 };

@@ -8,14 +8,15 @@
 #include <membrane/accuracy/block_cholesky.hpp>
 #include <membrane/accuracy/convexity.hpp>
 
-/// The sharper of two looks at how convex the energy of a membrane is, for soft backings.
+/// The sharper of two bounds of the convexity of a membrane's energy, for soft foundations.
 ///
 ///     #include <membrane/accuracy/factored_convexity.hpp>
 ///     membrane::ErrorBound<FactoredConvexity> bound(network);
 namespace membrane {
 
-/// Puts the bounds of all springs together in one matrix and factorises it. Springs that pull hold those that push: it
-/// finds convexity where the foundation alone would not do, and takes some five to ten times as long as `BlockConvexity`.
+/// Assembles the bounds of all springs in one matrix and factorises it. Springs in tension stabilise those in
+/// compression: it shows convexity where the foundation alone does not suffice, and takes about five to ten times as
+/// long as `BlockConvexity`.
 class FactoredConvexity {
   public:
     /// Offline. Cost for a mesh: O(V log V) memory.
@@ -29,8 +30,7 @@ class FactoredConvexity {
     bool gather(const EquilibriumProblem& problem, double radius) noexcept;
 
     BlockCholesky factors_;
-    double even_ =
-        0;  // energy of an even shift of all that is free, by square of length: no smallest eigenvalue is above
+    double even_ = 0;  // Rayleigh quotient of a uniform displacement: an upper bound of the smallest eigenvalue
 };
 static_assert(ConvexityModel<FactoredConvexity>);
 
@@ -43,7 +43,7 @@ inline double FactoredConvexity::around(const EquilibriumProblem& problem, doubl
     return none;
 }
 
-// False where a spring may become too short.
+// False if a spring may become too short to bound its stiffness.
 inline bool FactoredConvexity::gather(const EquilibriumProblem& problem, double radius) noexcept {
     factors_.open();
     double sum = 0;
@@ -68,7 +68,7 @@ inline bool FactoredConvexity::gather(const EquilibriumProblem& problem, double 
         if (ends == 1) sum += block.trace();
     }
     even_ = sum / (3 * static_cast<double>((std::max)(free, Index(1))));
-    // What is fixed is a row of its own and must not be the smallest.
+    // A fixed vertex has a row of its own, which must not have the smallest eigenvalue.
     for (Index v = 0; v < problem.vertex_count(); ++v) {
         if (problem.fixed(v)) factors_.add(v, diagonal3(2 * even_));
     }

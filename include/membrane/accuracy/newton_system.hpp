@@ -14,29 +14,30 @@
 
 /// The linear problem of one Newton step under constraints.
 ///
-///     NewtonSystem system(fixed);                                  // fixed[v]: vertex v has no step of its own
+///     NewtonSystem system(fixed);                                  // fixed[v]: vertex v takes a prescribed step
 ///     system.open(prescribed);
 ///     system.add(v, w, block);  system.push(v, force);  system.add({corners, gradients, gap, false});
 ///     const auto& [step, multipliers] = system.solve(stiffness);
 namespace membrane {
 
-/// A quantity that depends on three vertices: after the step, to first order, it is zero, or at least not negative.
+/// A quantity that depends on three vertices. After the step it is, to first order, zero if an equality, else not
+/// negative.
 struct ConstraintRow {
     std::array<Index, 3> vertices;
     std::array<Vector3<double>, 3> gradient;
     double value;
     bool equality;
-    double stiffening = 0;  ///< weight of half its square in the energy: it is expected to be zero after the step
+    double stiffening = 0;  ///< weight of half its square in the energy, if it is expected to become zero
 };
 
-/// A step, and for each row the force that sees to it.
+/// A step, and the multiplier of each row.
 struct NewtonStep {
     Points<double> step;          ///< 3 x V
-    Eigen::VectorXd multipliers;  ///< not negative but for equalities
+    Eigen::VectorXd multipliers;  ///< not negative, except of equalities
 };
 
-/// Least s.Hs / 2 - F.s over the steps s of the free vertices, under the rows [Nocedal06] 16, 18. H is sparse; the
-/// multipliers come from the dual problem, which is as small as there are rows.
+/// Minimises s.Hs / 2 - F.s over the steps s of the free vertices, under the rows [Nocedal06] 16, 18. H is sparse; the
+/// multipliers come from the dual problem, whose size is the number of active rows.
 class NewtonSystem {
   public:
     explicit NewtonSystem(const std::vector<unsigned char>& fixed);
@@ -44,7 +45,7 @@ class NewtonSystem {
     /// Begins a problem in which fixed vertices take the steps `prescribed` (3 x V).
     void open(const Points<double>& prescribed);
 
-    /// Adds to H a block of rows `i` and columns `j`, and its transpose the other way round if they are not the same.
+    /// Adds a block to H at rows `i` and columns `j`; if these differ, also its transpose at rows `j` and columns `i`.
     void add(Index i, Index j, const Eigen::Matrix3d& block);
 
     /// Adds to F.
@@ -52,8 +53,8 @@ class NewtonSystem {
 
     void add(const ConstraintRow& row);
 
-    /// Where H is not positive definite, it is shifted until it is; `scale` is a stiffness as large as others in H. A
-    /// row without free vertices is not heeded. Cost: factors of H, and a solution for each row.
+    /// If H is not positive definite, it is shifted until it is; `scale` is a typical stiffness in H. A row without
+    /// free vertices is ignored. Cost: a factorisation of H, and a solve for each active row.
     [[nodiscard]] NewtonStep solve(double scale);
 
   private:
@@ -66,10 +67,10 @@ class NewtonSystem {
     void factorise(double scale);
     [[nodiscard]] std::vector<std::size_t> expected() const;
     [[nodiscard]] std::vector<std::size_t> violated(const Eigen::VectorXd& step,
-                                                    const std::vector<std::size_t>& work) const;
-    void extend(Eigen::MatrixXd& answers, const std::vector<std::size_t>& rows) const;
-    [[nodiscard]] Eigen::VectorXd multipliers_of(const std::vector<std::size_t>& work, const Eigen::MatrixXd& answers,
-                                                 const Eigen::VectorXd& alone) const;
+                                                    const std::vector<std::size_t>& active) const;
+    void extend(Eigen::MatrixXd& responses, const std::vector<std::size_t>& rows) const;
+    [[nodiscard]] Eigen::VectorXd multipliers_of(const std::vector<std::size_t>& active,
+                                                 const Eigen::MatrixXd& responses, const Eigen::VectorXd& alone) const;
     [[nodiscard]] double change(const ConstraintRow& row, const Eigen::Ref<const Eigen::VectorXd>& step) const;
     [[nodiscard]] bool can_change(const ConstraintRow& row) const noexcept;
 
@@ -83,7 +84,8 @@ class NewtonSystem {
     double shift_ = 0;  // of the last step that needed one
 };
 
-/// The y of least y.Wy / 2 + q.y with y >= 0 but for `equality`, W the `coupling`, positive semidefinite [Lawson74].
+/// Minimises y.Wy / 2 + q.y over y with y >= 0 except for `equality`; W is the `coupling`, positive semidefinite
+/// [Lawson74].
 [[nodiscard]] inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
                                                            const std::vector<unsigned char>& equality);
 
@@ -138,7 +140,7 @@ inline void NewtonSystem::add(const ConstraintRow& row) {
     }
 }
 
-// [Nocedal06] 3.4, algorithm 3.3; what is hardly positive, as of a membrane that is free to turn, is no better than zero.
+// [Nocedal06] 3.4, algorithm 3.3. A barely positive pivot, as of a membrane free to rotate, counts as not positive.
 inline void NewtonSystem::factorise(double scale) {
     Sparse matrix(size_, size_);
     matrix.setFromTriplets(triplets_.begin(), triplets_.end());
@@ -162,18 +164,18 @@ inline NewtonStep NewtonSystem::solve(double scale) {
     factorise(scale);
     const Eigen::VectorXd alone = factors_.solve(force_);
     Eigen::VectorXd step = alone, multipliers;
-    std::vector<std::size_t> work;      // rows
-    Eigen::MatrixXd answers(size_, 0);  // of the step to each of them
+    std::vector<std::size_t> active;      // rows
+    Eigen::MatrixXd responses(size_, 0);  // of the step to each multiplier
     auto next = expected();
-    if (next.empty()) next = violated(step, work);
-    for (; !next.empty(); next = violated(step, work)) {
-        work.insert(work.end(), next.begin(), next.end());
-        extend(answers, next);
-        multipliers = multipliers_of(work, answers, alone);
-        step = alone + answers * multipliers;
+    if (next.empty()) next = violated(step, active);
+    for (; !next.empty(); next = violated(step, active)) {
+        active.insert(active.end(), next.begin(), next.end());
+        extend(responses, next);
+        multipliers = multipliers_of(active, responses, alone);
+        step = alone + responses * multipliers;
     }
-    for (std::size_t k = 0; k < work.size(); ++k) {
-        result.multipliers[static_cast<Eigen::Index>(work[k])] = multipliers[static_cast<Eigen::Index>(k)];
+    for (std::size_t k = 0; k < active.size(); ++k) {
+        result.multipliers[static_cast<Eigen::Index>(active[k])] = multipliers[static_cast<Eigen::Index>(k)];
     }
     for (Index v = 0; v < static_cast<Index>(slots_.size()); ++v) {
         if (is_free(v)) result.step.col(v) = step.segment<3>(at(v));
@@ -190,14 +192,14 @@ inline std::vector<std::size_t> NewtonSystem::expected() const {
     return found;
 }
 
-/// The worst of the rows that are not at work, and those half as bad.
+/// The most violated inactive row, and those at least half as violated.
 inline std::vector<std::size_t> NewtonSystem::violated(const Eigen::VectorXd& step,
-                                                       const std::vector<std::size_t>& work) const {
+                                                       const std::vector<std::size_t>& active) const {
     std::vector<double> after(rows_.size());
     for (std::size_t i = 0; i < rows_.size(); ++i) {
         after[i] = can_change(rows_[i]) ? rows_[i].value + change(rows_[i], step) : 0;
     }
-    for (const std::size_t i : work) after[i] = 0;
+    for (const std::size_t i : active) after[i] = 0;
     double worst = 0;
     for (const double value : after) worst = (std::min)(worst, value);
     std::vector<std::size_t> found;
@@ -208,7 +210,7 @@ inline std::vector<std::size_t> NewtonSystem::violated(const Eigen::VectorXd& st
     return found;
 }
 
-inline void NewtonSystem::extend(Eigen::MatrixXd& answers, const std::vector<std::size_t>& rows) const {
+inline void NewtonSystem::extend(Eigen::MatrixXd& responses, const std::vector<std::size_t>& rows) const {
     Eigen::MatrixXd gradients = Eigen::MatrixXd::Zero(size_, static_cast<Eigen::Index>(rows.size()));
     for (std::size_t i = 0; i < rows.size(); ++i) {
         const auto& row = rows_[rows[i]];
@@ -217,20 +219,20 @@ inline void NewtonSystem::extend(Eigen::MatrixXd& answers, const std::vector<std
             gradients.col(static_cast<Eigen::Index>(i)).segment<3>(at(row.vertices[k])) += row.gradient[k];
         }
     }
-    const Eigen::Index before = answers.cols();
-    answers.conservativeResize(Eigen::NoChange, before + gradients.cols());
-    answers.rightCols(gradients.cols()) = factors_.solve(gradients);
+    const Eigen::Index before = responses.cols();
+    responses.conservativeResize(Eigen::NoChange, before + gradients.cols());
+    responses.rightCols(gradients.cols()) = factors_.solve(gradients);
 }
 
-inline Eigen::VectorXd NewtonSystem::multipliers_of(const std::vector<std::size_t>& work,
-                                                    const Eigen::MatrixXd& answers,
+inline Eigen::VectorXd NewtonSystem::multipliers_of(const std::vector<std::size_t>& active,
+                                                    const Eigen::MatrixXd& responses,
                                                     const Eigen::VectorXd& alone) const {
-    Eigen::MatrixXd coupling(answers.cols(), answers.cols());
-    Eigen::VectorXd q(answers.cols());
+    Eigen::MatrixXd coupling(responses.cols(), responses.cols());
+    Eigen::VectorXd q(responses.cols());
     std::vector<unsigned char> equality;
     for (Eigen::Index i = 0; i < q.size(); ++i) {
-        const auto& row = rows_[work[static_cast<std::size_t>(i)]];
-        for (Eigen::Index j = 0; j < q.size(); ++j) coupling(i, j) = change(row, answers.col(j));
+        const auto& row = rows_[active[static_cast<std::size_t>(i)]];
+        for (Eigen::Index j = 0; j < q.size(); ++j) coupling(i, j) = change(row, responses.col(j));
         q[i] = can_change(row) ? row.value + change(row, alone) : 0;
         equality.push_back(row.equality ? 1 : 0);
     }
@@ -254,11 +256,11 @@ inline bool NewtonSystem::can_change(const ConstraintRow& row) const noexcept {
 
 namespace detail {
 
-/// Least y.Wy / 2 + q.y over the y that are zero where nothing is at `work`.
-[[nodiscard]] inline Eigen::VectorXd min_awake(Eigen::MatrixXd coupling, Eigen::VectorXd q,
-                                               const std::vector<unsigned char>& work) {
+/// Minimises y.Wy / 2 + q.y over the y that are zero where `active` is 0.
+[[nodiscard]] inline Eigen::VectorXd min_over_active(Eigen::MatrixXd coupling, Eigen::VectorXd q,
+                                                     const std::vector<unsigned char>& active) {
     for (Eigen::Index i = 0; i < q.size(); ++i) {
-        if (work[static_cast<std::size_t>(i)] != 0) continue;
+        if (active[static_cast<std::size_t>(i)] != 0) continue;
         coupling.row(i).setZero();
         coupling.col(i).setZero();
         coupling(i, i) = 1;
@@ -273,11 +275,11 @@ inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, co
                                              const std::vector<unsigned char>& equality) {
     const double slack = 1e-15 * q.lpNorm<Eigen::Infinity>();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(q.size());
-    std::vector<unsigned char> work = equality;
+    std::vector<unsigned char> active = equality;
     for (Eigen::Index round = 0; round < 10 * (q.size() + 1); ++round) {
-        const Eigen::VectorXd best = detail::min_awake(coupling, q, work);
+        const Eigen::VectorXd best = detail::min_over_active(coupling, q, active);
         double part = 1;
-        Eigen::Index first = no_index;  // to come to zero on the way there
+        Eigen::Index first = no_index;  // to become zero along the step
         for (Eigen::Index i = 0; i < q.size(); ++i) {
             if (equality[static_cast<std::size_t>(i)] != 0 || best[i] >= 0 || y[i] >= part * (y[i] - best[i])) continue;
             part = y[i] / (y[i] - best[i]);
@@ -286,14 +288,14 @@ inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, co
         y += part * (best - y);
         if (first != no_index) {
             y[first] = 0;
-            work[static_cast<std::size_t>(first)] = 0;
+            active[static_cast<std::size_t>(first)] = 0;
             continue;
         }
         Eigen::VectorXd slope = coupling * y + q;
-        for (Eigen::Index i = 0; i < q.size(); ++i) slope[i] *= work[static_cast<std::size_t>(i)] != 0 ? 0 : 1;
+        for (Eigen::Index i = 0; i < q.size(); ++i) slope[i] *= active[static_cast<std::size_t>(i)] != 0 ? 0 : 1;
         Eigen::Index next = 0;
         if (slope.minCoeff(&next) >= -slack) break;
-        work[static_cast<std::size_t>(next)] = 1;
+        active[static_cast<std::size_t>(next)] = 1;
     }
     return y;
 }

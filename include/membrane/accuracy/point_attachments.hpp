@@ -11,40 +11,40 @@
 
 namespace membrane {
 
-/// Points of triangles that are held: for each, the weighted sum of its three corners is to be the target.
+/// Points of triangles attached to targets: each point is the weighted sum of three corners.
 ///
 ///     membrane::PointAttachments places;
 ///     places.add(membrane::ConstraintTerm::hold(corners, weights, target));
-///     places.settle(y);                        // every point is in its place
-///     places.project(displacement);                     // and stays there if y moves by this
+///     places.project_positions(y);             // every point is at its target
+///     places.project(displacement);            // and stays there if y moves by this
 class PointAttachments {
   public:
-    /// `place` holds a point. False where there are 16 already.
-    bool add(const ConstraintTerm& place) noexcept {
+    /// Adds a point. False if there are 16 already.
+    bool add(const ConstraintTerm& term) noexcept {
         if (count_ == places_.size()) return false;
-        places_[count_++] = place;
+        places_[count_++] = term;
         return true;
     }
     void clear() noexcept { count_ = 0; }
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
 
-    /// Whether no corner that counts is part of two places, or `fixed(v)`. What is below needs that.
+    /// Whether no corner with a weight belongs to two points, or is `fixed(v)`. The functions below require this.
     template <class IsFixed>
     [[nodiscard]] bool independent(IsFixed fixed) const noexcept;
 
-    /// Takes out of `f` what moves a point: the orthogonal projection.
+    /// Removes from `f` the components that move a point: the orthogonal projection.
     void project(Points<double>& f) const noexcept;
 
-    /// Moves the points to their places, by the shortest way.
-    void settle(Points<double>& y) const noexcept;
+    /// Moves the points to their targets, by the shortest displacement of y.
+    void project_positions(Points<double>& y) const noexcept;
 
-    /// No more than this way is left to where all points are in their places, rounding included [m].
+    /// Upper bound of the distance to the nearest state with all points at their targets, rounding included [m].
     [[nodiscard]] double slip(const Points<double>& y) const noexcept;
 
   private:
     [[nodiscard]] std::span<const ConstraintTerm> places() const noexcept { return {places_.data(), count_}; }
-    static void shift(const ConstraintTerm& place, const Vector3<double>& displacement, Points<double>& y) noexcept {
-        for (std::size_t k = 0; k < 3; ++k) y.col(place.corners[k]) += place.share(k) * displacement;
+    static void shift(const ConstraintTerm& term, const Vector3<double>& displacement, Points<double>& y) noexcept {
+        for (std::size_t k = 0; k < 3; ++k) y.col(term.corners[k]) += term.share(k) * displacement;
     }
 
     std::array<ConstraintTerm, 16> places_{};
@@ -55,15 +55,15 @@ template <class IsFixed>
 bool PointAttachments::independent(IsFixed fixed) const noexcept {
     const auto owners = [&](Index v) {
         int count = 0;
-        for (const auto& place : places()) {
+        for (const auto& term : places()) {
             for (std::size_t k = 0; k < 3; ++k) {
-                if (place.corners[k] == v && place.weight(k) != 0) ++count;
+                if (term.corners[k] == v && term.weight(k) != 0) ++count;
             }
         }
         return count;
     };
-    for (const auto& place : places()) {
-        for (const Index v : place.corners) {
+    for (const auto& term : places()) {
+        for (const Index v : term.corners) {
             if (owners(v) + (fixed(v) ? 1 : 0) > 1 && owners(v) > 0) return false;
         }
     }
@@ -71,21 +71,21 @@ bool PointAttachments::independent(IsFixed fixed) const noexcept {
 }
 
 inline void PointAttachments::project(Points<double>& f) const noexcept {
-    for (const auto& place : places()) shift(place, -place.point_to_body(f), f);
+    for (const auto& term : places()) shift(term, -term.point_to_body(f), f);
 }
 
-inline void PointAttachments::settle(Points<double>& y) const noexcept {
-    for (const auto& place : places()) shift(place, place.target - place.point_to_body(y), y);
+inline void PointAttachments::project_positions(Points<double>& y) const noexcept {
+    for (const auto& term : places()) shift(term, term.target - term.point_to_body(y), y);
 }
 
 inline double PointAttachments::slip(const Points<double>& y) const noexcept {
     double squares = 0;
-    for (const auto& place : places()) {
-        double size = norm(place.target);
-        for (std::size_t k = 0; k < 3; ++k) size += std::abs(place.weight(k)) * norm(point(y, place.corners[k]));
+    for (const auto& term : places()) {
+        double size = norm(term.target);
+        for (std::size_t k = 0; k < 3; ++k) size += std::abs(term.weight(k)) * norm(point(y, term.corners[k]));
         const double left =
-            norm<double>(place.target - place.point_to_body(y)) + 8 * std::numeric_limits<double>::epsilon() * size;
-        squares += left * left / squared_norm(place.weights);
+            norm<double>(term.target - term.point_to_body(y)) + 8 * std::numeric_limits<double>::epsilon() * size;
+        squares += left * left / squared_norm(term.weights);
     }
     return (1 + 1e-9) * std::sqrt(squares);
 }

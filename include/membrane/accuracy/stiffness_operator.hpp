@@ -8,53 +8,54 @@
 #include <membrane/accuracy/equilibrium_problem.hpp>
 #include <membrane/core/symmetric3.hpp>
 
-/// How the forces of a membrane change as it moves a little.
+/// The change of a membrane's forces under small displacements.
 ///
 ///     membrane::StiffnessOperator stiffness(problem);                       // offline
 ///     stiffness.at(problem, y);
 ///     stiffness.multiply(problem, displacement, force);                       // force = H displacement
-///     stiffness.solve(problem, force, displacement, {.tolerance = 1e-3});     // displacement = H^-1 force, of what is free
+///     stiffness.solve(problem, force, displacement, {.tolerance = 1e-3});     // displacement = H^-1 force
 namespace membrane {
 
 struct SolveOptions {
-    double tolerance = 1e-3;  ///< of what is left of the force, in parts of it
+    double tolerance = 1e-3;  ///< of the residual, relative to the force
     Index iterations = 100;   ///< at the most, each a product with H
 };
 
 struct SolveReport {
-    bool convex = true;      ///< no direction was seen in which the energy does not grow
+    bool convex = true;      ///< no direction was found in which the energy does not grow
     bool converged = false;  ///< to the tolerance
     Index iterations = 0;
 };
 
-/// Sum of a_v . b_v over all columns, in one order everywhere.
+/// Sum of a_v . b_v over all columns, always in the same order.
 [[nodiscard]] inline double inner(const Points<double>& a, const Points<double>& b) noexcept {
     double sum = 0;
     for (Index v = 0; v < a.cols(); ++v) sum += dot<double>(point(a, v), point(b, v));
     return sum;
 }
 
-/// The stiffness H of a membrane at one state: the second derivative of its energy, a symmetric 3 x 3 block for each
-/// spring and a number for each vertex.
+/// The stiffness H of a membrane at one state: the Hessian of its energy, a symmetric 3 x 3 block for each spring and a
+/// scalar for each vertex.
 class StiffnessOperator {
   public:
     /// Cost: O(V + springs) memory.
     explicit StiffnessOperator(const EquilibriumProblem& problem);
 
-    /// Takes H at `y`. Online. Cost: O(V + springs).
+    /// Assembles H at `y`. Online. Cost: O(V + springs).
     void at(const EquilibriumProblem& problem, const Points<double>& y) noexcept;
 
     /// `force` = H `displacement`, on every vertex. Online. Cost: O(V + springs).
     void multiply(const EquilibriumProblem& problem, const Points<double>& displacement,
                   Points<double>& force) const noexcept;
 
-    /// Brings `displacement`, zero on entry or a guess that moves nothing held, to where H `displacement` is `force` on all that is free,
-    /// by conjugate gradients [Hestenes52], each vertex scaled by its springs. `force` is used up. Ends early, not
-    /// `convex`, where H is found to be indefinite. Online. Cost: a product for each iteration.
+    /// Solves H `displacement` = `force` on the free vertices by conjugate gradients [Hestenes52], each vertex scaled
+    /// by its springs. On entry `displacement` is zero, or a guess that moves no fixed vertex or attached point.
+    /// `force` is overwritten. If H is found to be indefinite, ends early, not `convex`. Online. Cost: a product for
+    /// each iteration.
     SolveReport solve(const EquilibriumProblem& problem, Points<double>& force, Points<double>& displacement,
                       const SolveOptions& options) noexcept;
 
-    /// No eigenvalue is above this while no spring is stiffer in any direction than its own stiffness [N/m].
+    /// Upper bound of all eigenvalues while no spring is stiffer in any direction than its own stiffness [N/m].
     [[nodiscard]] double largest() const noexcept { return 2 * *std::max_element(scale_.begin(), scale_.end()); }
 
   private:
@@ -76,8 +77,8 @@ inline void StiffnessOperator::at(const EquilibriumProblem& problem, const Point
     for (std::size_t v = 0; v < scale_.size(); ++v) scale_[v] = problem.foundation(static_cast<Index>(v));
     for (std::size_t s = 0; s < blocks_.size(); ++s) {
         const auto& spring = problem.springs()[s];
-        blocks_[s] =
-            block_of<double>(pull_of(LinearSpring{}, edge_vector(spring, y), spring.stiffness, spring.rest_length));
+        blocks_[s] = block_of<double>(
+            spring_force(LinearSpring{}, edge_vector(spring, y), spring.stiffness, spring.rest_length));
         scale_[static_cast<std::size_t>(spring.first)] += spring.stiffness;
         scale_[static_cast<std::size_t>(spring.second)] += spring.stiffness;
     }
@@ -120,10 +121,10 @@ inline SolveReport StiffnessOperator::solve(const EquilibriumProblem& problem, P
         direction_ += scaled_;
         multiply(problem, direction_, product_);
         problem.project(product_);
-        const double curvature = inner(direction_, product_);
-        if (!(report.convex = curvature > 0)) break;
-        displacement += (now / curvature) * direction_;
-        force -= (now / curvature) * product_;
+        const double energy_growth = inner(direction_, product_);
+        if (!(report.convex = energy_growth > 0)) break;
+        displacement += (now / energy_growth) * direction_;
+        force -= (now / energy_growth) * product_;
         before = now;
     }
     return report;

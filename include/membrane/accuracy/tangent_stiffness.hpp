@@ -9,7 +9,7 @@
 #include <membrane/accuracy/equilibrium_problem.hpp>
 #include <membrane/accuracy/stiffness_operator.hpp>
 
-/// How stiff a membrane feels to whoever holds it.
+/// The stiffness that a membrane presents to a constraint that holds it.
 ///
 ///     membrane::TangentStiffness tangent(network);                                  // offline: allocates all it needs
 ///     const auto feel = tangent.of(solver.queue().vertices(), x, network, foundation, membrane::pull(7, target));
@@ -17,8 +17,8 @@
 namespace membrane {
 
 struct TangentOptions {
-    double tolerance = 1e-7;  ///< of forces on free vertices, in parts of what a shift begins with
-    Index iterations = 300;   ///< products with the stiffness of all springs, at the most, for each of three directions
+    double tolerance = 1e-7;  ///< of residual forces on free vertices, relative to those at first
+    Index iterations = 300;   ///< maximum number of products with the stiffness, for each of three directions
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
@@ -26,11 +26,11 @@ struct TangentOptions {
 
 enum class TangentStatus {
     found,
-    not_stable,     ///< the energy has a direction in which it does not grow: what is free would snap away
+    not_stable,     ///< the energy does not grow in some direction: free vertices would snap away
     not_converged,  ///< more iterations are needed
-    contact,        ///< a tool touches: not treated
-    unsupported,  ///< a constraint that does not `describe` itself, or held points with a corner that is held otherwise
-    invalid_input,  ///< a number is not finite, an index names no vertex, counts do not agree
+    contact,        ///< a tool touches: not supported
+    unsupported,    ///< a constraint without `describe`, or an attached point that shares a corner with another one
+    invalid_input,  ///< a number is not finite, an index is not a vertex, or counts do not match
 };
 
 struct TangentReport {
@@ -39,27 +39,28 @@ struct TangentReport {
     Index iterations = 0;          ///< in all three directions
 };
 
-/// The derivative of a reaction by a rigid shift d of what its constraint holds (a vertex, a point of a triangle,
-/// pins), the free vertices following to where they balance: T = H_hh - H_hf H_ff^-1 H_fh, H the second derivative of
-/// the energy at the state, f what is free, h what is held (the Schur complement; in statics, condensation [Guyan65]).
-/// At an equilibrium that is the slope of the force over the way; elsewhere it is as good as the state is near one.
+/// The derivative of a reaction by a rigid displacement d of the vertices that its constraint holds (a vertex, a point
+/// of a triangle, pins), while the free vertices follow in equilibrium: T = H_hh - H_hf H_ff^-1 H_fh. H is the Hessian
+/// of the energy at the state, f are the free vertices, h the held ones (the Schur complement; in statics, condensation
+/// [Guyan65]). At an equilibrium T is the derivative of the force by the displacement; elsewhere its error depends on
+/// the distance from an equilibrium.
 ///
-/// Remembers nothing from call to call. One thread at a time for each.
+/// Calls are independent of each other. One thread at a time for each instance.
 class TangentStiffness {
   public:
     /// @throws InvalidInput for an option out of its range. Cost: O(V + springs) memory.
     template <Real Scalar, class Law>
     explicit TangentStiffness(const MassSpringNetwork<Scalar, Law>& network, const TangentOptions& options = {});
 
-    /// For `held`, one of the constraints of a step (pins name each vertex once), the others staying where they are,
-    /// and all vertices free that none of them holds. Damping is left out. Online.
-    /// Cost: O(V + springs) for each iteration.
+    /// The stiffness at `held`, one of the constraints of a step (pins name each vertex once). The other constraints do
+    /// not move; all vertices that no constraint fixes are free. Damping is left out. Online. Cost: O(V + springs) for
+    /// each iteration.
     template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
     [[nodiscard]] TangentReport of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                    const Held& held, const Others&... others) noexcept;
 
-    /// The same with only the vertices in `free` free, as a solver has it whose queue this is.
+    /// The stiffness with only the vertices in `free` free, as in a solver with this queue.
     template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
     [[nodiscard]] TangentReport of(std::span<const Index> free, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
@@ -69,7 +70,7 @@ class TangentStiffness {
     [[nodiscard]] static TangentStatus status_of(ProblemStatus status) noexcept;
     template <class Held>
     [[nodiscard]] TangentReport condense(ProblemStatus status, const Held& held) noexcept;
-    [[nodiscard]] Vector3<double> answer(int direction) noexcept;
+    [[nodiscard]] Vector3<double> stiffness_column(int direction) noexcept;
 
     TangentOptions options_;
     EquilibriumProblem problem_;
@@ -129,13 +130,13 @@ TangentReport TangentStiffness::condense(ProblemStatus status, const Held& held)
     stiffness_.at(problem_, problem_.centre());
     std::fill(shares_.begin(), shares_.end(), 0.0);
     for_each_term(held, [&](const ConstraintTerm& term) { problem_.share(term, shares_); });
-    const Vector3<double> x = answer(0), y = answer(1), z = answer(2);
+    const Vector3<double> x = stiffness_column(0), y = stiffness_column(1), z = stiffness_column(2);
     report_.stiffness = {x[0], y[1], z[2], (x[1] + y[0]) / 2, (x[2] + z[0]) / 2, (y[2] + z[1]) / 2};
     return report_;
 }
 
-// The change of force, the other way round, for a shift by one metre along an axis.
-inline Vector3<double> TangentStiffness::answer(int direction) noexcept {
+// The change of the reaction, with opposite sign, for a displacement by one metre along an axis.
+inline Vector3<double> TangentStiffness::stiffness_column(int direction) noexcept {
     shift_.setZero();
     for (Index v = 0; v < problem_.vertex_count(); ++v) shift_(direction, v) = shares_[static_cast<std::size_t>(v)];
     stiffness_.multiply(problem_, shift_, force_);

@@ -11,20 +11,20 @@
 #include <membrane/contact/contact_point.hpp>
 #include <membrane/surface/box.hpp>
 
-/// The contact points of tools with a whole surface, and how their gaps change as it moves.
+/// The contact points of tools with a whole surface, and the derivatives of their gaps.
 ///
 ///     for (const auto& point : membrane::tool_points(triangles, x, tools, far)) {
 ///         point.gap; point.gradient(k); membrane::gap_hessian(point, x, tools[point.tool]);
 ///     }
 namespace membrane {
 
-/// A contact point of one of several tools. A corner or an edge that triangles have in common is one point, of the first of
-/// them.
+/// A contact point of one of several tools. A corner or edge shared by triangles is one point, of the first of these
+/// triangles.
 struct ToolPoint : ContactPoint<double> {
     std::size_t tool = 0;
     double multiplier = 0;  ///< force along the normal [N]
 
-    /// The part of the tool: 0 one end of the axis, 1 the other, 2 what is between.
+    /// The part of the tool: 0 one end of the axis, 1 the other end, 2 the segment between them.
     [[nodiscard]] int part() const noexcept { return (std::min)(feature, 2); }
 
     [[nodiscard]] double weight(std::size_t k) const noexcept { return weights[static_cast<Eigen::Index>(k)]; }
@@ -36,13 +36,13 @@ struct ToolPoint : ContactPoint<double> {
 /// Orders points by tool, part of the tool, and corners with a weight.
 [[nodiscard]] inline bool is_before(const ToolPoint& a, const ToolPoint& b);
 
-/// The contact points with a gap of at most `far` [m], in order, each once. A point on the axis itself has no normal and is
-/// left out. O(F) for each tool.
+/// The contact points with a gap of at most `far` [m], sorted by `is_before`, without duplicates. A point on the axis
+/// has no normal and is left out. Cost: O(F) for each tool.
 [[nodiscard]] inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Points<double>& x,
                                                         std::span<const Tool<double>> tools, double far);
 
-/// Second derivative of the gap by the positions of the triangle's corners, x y z each [1/m]. The nearest points slide
-/// along edge, face and axis as the corners move: each direction to slide in is eliminated, a Schur complement.
+/// Second derivative of the gap by the positions of the triangle's corners, x y z each [1/m]. As the corners move, the
+/// closest points slide along edge, face and axis: each sliding direction is eliminated by a Schur complement.
 [[nodiscard]] inline Eigen::Matrix<double, 9, 9> gap_hessian(const ToolPoint& point, const Points<double>& x,
                                                              const Tool<double>& tool);
 
@@ -53,18 +53,18 @@ struct ToolPoint : ContactPoint<double> {
     return std::sqrt(closest_to_segment(triangle, tool.position, end).on_triangle.squared_distance);
 }
 
-/// The largest part, up to 1, of a `step` (3 x V [m]) in which no triangle can reach the axis of a tool: none of its
-/// corners goes as far as it is away.
+/// The largest part, up to 1, of a `step` (3 x V [m]) in which no triangle can reach the axis of a tool: no corner
+/// moves as far as the distance of its triangle from the axis.
 [[nodiscard]] inline double collision_free_step(const Triangles& triangles, const Points<double>& x,
                                                 const Points<double>& step, std::span<const Tool<double>> tools);
 
-/// Whether the tool's axis meets a triangle that is not fixed with all its corners: there it has no gap.
+/// Whether the tool's axis intersects a triangle with a free corner: such a triangle has no gap.
 [[nodiscard]] inline bool is_pierced(const Triangles& triangles, const Points<double>& x, const Tool<double>& tool,
                                      const std::vector<unsigned char>& fixed);
 
 namespace detail {
 
-/// Whether no point of the triangle is nearer than `far` to the tool's axis, at a glance.
+/// Whether bounding boxes show that no point of the triangle is closer to the tool's axis than `far`.
 [[nodiscard]] inline bool is_far(const Triangle<double>& t, const Tool<double>& tool, double far) noexcept {
     Box<double> axis{tool.position, tool.position};
     axis.include(tool.position + tool.axis);
@@ -107,11 +107,11 @@ inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Poin
 
 inline Eigen::Matrix<double, 9, 9> gap_hessian(const ToolPoint& point, const Points<double>& x,
                                                const Tool<double>& tool) {
-    constexpr int slides = 9;  // their first place; there are three at most: along two sides and the axis
+    constexpr int slides = 9;  // first index; at most three: along two sides and the axis
     const Vector3<double>& normal = point.normal;
     const double distance = point.gap + tool.radius;
     const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - normal * normal.transpose()) / distance;
-    Eigen::Matrix<double, 3, 12> separation = Eigen::Matrix<double, 3, 12>::Zero();  // derivatives of it
+    Eigen::Matrix<double, 3, 12> separation = Eigen::Matrix<double, 3, 12>::Zero();  // its derivatives
     Eigen::Matrix<double, 12, 12> mixed = Eigen::Matrix<double, 12, 12>::Zero();
     Eigen::Index first = no_index;
     for (Eigen::Index k = 0; k < 3; ++k) {
@@ -122,7 +122,7 @@ inline Eigen::Matrix<double, 9, 9> gap_hessian(const ToolPoint& point, const Poi
             first = k;
             continue;
         }
-        // Weight goes from the first corner to this one.
+        // Sliding moves weight from the first corner to this one.
         const Eigen::Index slide = slides + k - 1;
         const auto corner = [&](Eigen::Index at) {
             return membrane::point(x, point.corners[static_cast<std::size_t>(at)]);
@@ -137,7 +137,7 @@ inline Eigen::Matrix<double, 9, 9> gap_hessian(const ToolPoint& point, const Poi
     for (Eigen::Index slide = slides; slide < 12; ++slide) {
         const double pivot = second(slide, slide);
         const double size = squared_norm<double>(separation.col(slide)) / distance;
-        if (!(pivot > 1e-12 * size)) continue;  // along the normal, or a direction that is eliminated: nothing slides
+        if (!(pivot > 1e-12 * size)) continue;  // along the normal, or eliminated: no sliding
         second -= (second.col(slide) * second.row(slide) / pivot).eval();
     }
     return second.topLeftCorner<9, 9>();

@@ -20,13 +20,13 @@
 #include <membrane/contact/grasper.hpp>
 #include <membrane/solve/quasi_static.hpp>
 
-/// What a setting of the solver costs, and how far off it is, in a scene of one's own.
+/// Cost and error of a solver setting in a recorded scene.
 ///
 ///     #include <membrane/accuracy/trial.hpp>
-///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: a tool for each tick of 1 ms
+///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: one tool for each tick
 ///     const auto references = membrane::equilibria(mesh, network, foundation, stroke);
 ///     const auto outcome = membrane::trial(mesh, network, foundation, stroke, references, {.layers = 6, .sweeps = 2});
-///     outcome.force_error;                                                    // as a part of the force
+///     outcome.force_error;                                                    // relative to the force
 ///     outcome.time;                                                           // of a tick [s]
 namespace membrane {
 
@@ -40,10 +40,10 @@ inline constexpr bool are_constraints<std::tuple<Each...>, Scalar> = ((Constrain
 
 }  // namespace detail
 
-/// What acts on a membrane over the ticks of a scene: called once for each tick in turn, with the positions as they are
-/// (3 x V [m]) and the vertices that have moved since the call before, it gives the constraints of the tick in a
-/// std::tuple. What the compiler cannot see: a copy of one that has not been called begins with tick 0, and what comes
-/// of it depends on nothing but what it is handed.
+/// The constraints on a membrane over the ticks of a scene. A history is called once for each tick in order, with the
+/// present positions (3 x V [m]) and the vertices moved since the last call. It returns the constraints of the tick in
+/// a std::tuple. The compiler cannot check: a copy of a history that has not been called starts at tick 0, and results
+/// depend on the arguments only.
 template <class History, class Scalar>
 concept LoadHistory = Real<Scalar> && std::copyable<History> &&
     requires(History& history, const History& idle, Index tick, const ConstPointsRef<Scalar>& x,
@@ -76,15 +76,15 @@ consteval bool check_load_history() noexcept {
 
 }  // namespace detail
 
-/// A `LoadHistory`; where it is none, the error says what is missing.
+/// A `LoadHistory`; if a type is not one, the compile error names the missing requirement.
 template <class History, class Scalar>
 concept CheckedLoadHistory = detail::check_load_history<History, Scalar>();
 
-/// A tool that presses, slides, grasps and pulls as it was recorded.
+/// A tool that presses, slides, grasps and pulls along a recorded trajectory.
 template <Real Scalar>
 class Stroke {
   public:
-    /// A tool for each tick of `dt` [s], on the mesh as it stands there.
+    /// A tool for each tick of `dt` [s], in the coordinates of the mesh.
     /// @throws InvalidInput for no tools, one that is not valid, or a `dt` that is not finite and positive
     Stroke(const TriangleMesh<Scalar>& mesh, const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
            std::type_identity_t<Scalar> dt);
@@ -92,7 +92,7 @@ class Stroke {
     [[nodiscard]] Index ticks() const noexcept { return static_cast<Index>(tools_.size()); }
     [[nodiscard]] Scalar dt() const noexcept { return dt_; }
 
-    /// The contact of the tick, and what the forceps hold. The contact is valid until the next call.
+    /// The contact of the tick, and the attachment of the forceps. The contact is valid until the next call.
     [[nodiscard]] std::tuple<ToolContact<Scalar>, PointAttachment<Scalar>> operator()(
         Index tick, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
@@ -105,44 +105,44 @@ class Stroke {
 };
 static_assert(LoadHistory<Stroke<float>, float> && LoadHistory<Stroke<double>, double>);
 
-/// Where the membrane rests in a tick, and what it pushes back with.
+/// The equilibrium in one tick, with its reactions.
 struct ReferenceTick {
     Index tick;
     Points<double> x;                        ///< 3 x V [m]
-    std::vector<Vector3<double>> reactions;  ///< for each constraint in turn [N]
-    double force;                            ///< that is felt, root of the sum of squares over the constraints [N]
+    std::vector<Vector3<double>> reactions;  ///< for each constraint in order [N]
+    double force;                            ///< root of the sum of squares over the felt reactions [N]
 };
 
-/// The equilibrium of every tick, or of every `every`-th, each from the tick before; the solver, with many sweeps,
-/// follows the history between them. A tick for which none was found is left out. Equilibria know no damping: a setting
-/// is off by what a damped foundation lags behind.
-/// @throws InvalidInput for what `equilibrium` refuses, a history without ticks, or an `every` below 1. Offline.
-/// Cost: an `equilibrium` for each tick of the result.
+/// The equilibrium of every tick, or of every `tick_stride`-th, each started from the tick before. Between them the
+/// solver follows the history with many sweeps. A tick without a converged equilibrium is left out. Equilibria have no
+/// damping: the error of a setting includes the lag of a damped foundation.
+/// @throws InvalidInput for arguments that `equilibrium` refuses, a history without ticks, or a `tick_stride` below 1.
+/// Offline. Cost: an `equilibrium` for each tick of the result.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History>
 [[nodiscard]] std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network,
-                                                    const Volume& volume, History history, Index every = 1);
+                                                    const Volume& volume, History history, Index tick_stride = 1);
 
-/// What a setting comes to. Forces that count are those that somebody feels: all but what loads and pins answer with.
+/// Cost and error of a setting. A force is felt if its constraint is not made of loads and pins only.
 struct Outcome {
-    double force_error = 0;     ///< root mean square over the ticks, as a part of the root mean square of the force
-    double position_error = 0;  ///< of the vertex that is the farthest off, root mean square over the ticks [m]
-    double time = 0;            ///< of a tick in which a force is felt, contact and step, on average [s]
-    Index layers_reached = 0;   ///< by the queue: fewer than asked for where the mesh ends before
-    Index ticks_compared = 0;   ///< ticks that the errors are of
-    bool advanced = true;       ///< no step was refused; if one was, errors and time are infinite
+    double force_error = 0;     ///< root mean square over the ticks, relative to the root mean square of the force
+    double position_error = 0;  ///< largest error of a vertex, root mean square over the ticks [m]
+    double time = 0;            ///< mean of contact and step, over ticks with a felt force [s]
+    Index layers_reached = 0;   ///< by the queue; below `layers` if the mesh has fewer
+    Index ticks_compared = 0;   ///< ticks with a reference
+    bool advanced = true;       ///< no step was refused; otherwise errors and time are infinite
 };
 
-/// Seconds by the steady clock. Where others keep the processor busy, one of processor time tells more.
+/// Seconds of the steady clock. On a busy machine a clock of processor time is more reproducible.
 struct SteadySeconds {
     [[nodiscard]] double operator()() const noexcept {
         return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
     }
 };
 
-/// Plays `history` with a solver of these options, from the mesh at rest, each tick from where the one before ended, and
-/// sets it against `references`. `clock()` gives the time [s].
-/// @throws InvalidInput for options that the solver refuses, and `references` of another scene. Offline.
+/// Runs `history` with a solver of these options from the undeformed mesh, each tick from the end of the tick before,
+/// and compares it with `references`. `clock()` returns the time [s].
+/// @throws InvalidInput for options that the solver refuses, and for `references` of another scene. Offline.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
@@ -151,7 +151,7 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
 
 namespace detail {
 
-/// Whether somebody feels the force: not of what only loads and pins.
+/// Whether the force of a constraint is felt: false if it has only loads and pins.
 template <class C>
 [[nodiscard]] bool is_felt(const C& constraint) {
     bool felt = !DescribedConstraint<C>;
@@ -161,7 +161,7 @@ template <class C>
     return felt;
 }
 
-/// The sum of `square(i)` over the constraints whose force is felt.
+/// The sum of `square(i)` over the constraints with a felt force.
 template <class Constraints, class Square>
 [[nodiscard]] double sum_of_felt(const Constraints& constraints, Square square) {
     double sum = 0;
@@ -182,32 +182,32 @@ void check_history(std::string_view component, const History& history) {
     }
 }
 
-/// What is summed up over a trial.
+/// Sums over the ticks of a trial.
 struct TrialSums {
     double errors = 0, squares = 0;      // of forces [N^2]
-    double displacements = 0;            // of the farthest vertices [m^2]
+    double position_errors = 0;          // of the vertex with the largest error [m^2]
     double time = 0;                     // of the ticks with a force [s]
     Index ticks_compared = 0, felt = 0;  // ticks
 
     template <class Constraints, class Reactions, class Positions>
-    void judge(const ReferenceTick& rest, const Constraints& constraints, const Reactions& reactions,
-               const Positions& x) {
-        if (rest.x.cols() != x.cols() || rest.reactions.size() != reactions.size()) {
-            refuse("trial", "the rest of tick ", rest.tick, " must have ", x.cols(), " vertices and ", reactions.size(),
-                   " reactions, got ", rest.x.cols(), " and ", rest.reactions.size());
+    void compare(const ReferenceTick& reference, const Constraints& constraints, const Reactions& reactions,
+                 const Positions& x) {
+        if (reference.x.cols() != x.cols() || reference.reactions.size() != reactions.size()) {
+            refuse("trial", "the reference of tick ", reference.tick, " must have ", x.cols(), " vertices and ",
+                   reactions.size(), " reactions, got ", reference.x.cols(), " and ", reference.reactions.size());
         }
         errors += sum_of_felt(constraints, [&](std::size_t i) {
-            return (reactions[i].template cast<double>() - rest.reactions[i]).squaredNorm();
+            return (reactions[i].template cast<double>() - reference.reactions[i]).squaredNorm();
         });
-        squares += rest.force * rest.force;
-        displacements += (x.template cast<double>() - rest.x).colwise().squaredNorm().maxCoeff();
+        squares += reference.force * reference.force;
+        position_errors += (x.template cast<double>() - reference.x).colwise().squaredNorm().maxCoeff();
         ++ticks_compared;
     }
 
     [[nodiscard]] Outcome outcome(Index layers) const {
         const auto part = [](double sum, double of) { return sum == 0 ? 0.0 : sum / of; };
         return {.force_error = std::sqrt(part(errors, squares)),
-                .position_error = std::sqrt(part(displacements, ticks_compared)),
+                .position_error = std::sqrt(part(position_errors, ticks_compared)),
                 .time = part(time, felt),
                 .layers_reached = layers,
                 .ticks_compared = ticks_compared};
@@ -243,9 +243,9 @@ std::tuple<ToolContact<Scalar>, PointAttachment<Scalar>> Stroke<Scalar>::operato
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History>
 std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
-                                      History history, Index every) {
+                                      History history, Index tick_stride) {
     detail::check_history<Scalar>("equilibria", history);
-    if (every < 1) refuse("equilibria", "every must be at least 1, got ", every);
+    if (tick_stride < 1) refuse("equilibria", "tick_stride must be at least 1, got ", tick_stride);
     std::vector<Index> all(static_cast<std::size_t>(mesh.vertex_count()));
     std::iota(all.begin(), all.end(), 0);
     QuasiStaticSolver<Scalar> between(network, {.layers = unlimited, .sweeps = 16});
@@ -254,14 +254,14 @@ std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Ne
     for (Index tick = 0; tick < history.ticks(); ++tick) {
         const auto constraints = history(tick, x, all);
         const auto apply = [&](auto act) { return std::apply(act, constraints); };
-        if ((tick + 1) % every == 0) {
-            auto rest = apply([&](const auto&... each) { return equilibrium(x, mesh, network, volume, {}, each...); });
-            if (rest.converged) {
+        if ((tick + 1) % tick_stride == 0) {
+            auto found = apply([&](const auto&... each) { return equilibrium(x, mesh, network, volume, {}, each...); });
+            if (found.converged) {
                 const double force = std::sqrt(
-                    detail::sum_of_felt(constraints, [&](std::size_t i) { return rest.reactions[i].squaredNorm(); }));
-                x = rest.x.template cast<Scalar>();
+                    detail::sum_of_felt(constraints, [&](std::size_t i) { return found.reactions[i].squaredNorm(); }));
+                x = found.x.template cast<Scalar>();
                 between.wake_all();
-                references.push_back({tick, std::move(rest.x), std::move(rest.reactions), force});
+                references.push_back({tick, std::move(found.x), std::move(found.reactions), force});
                 continue;
             }
         }
@@ -281,7 +281,7 @@ Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Vo
     std::vector<Index> moved;
     detail::TrialSums sums;
     Index layers = 0;
-    auto rest = references.begin();
+    auto reference = references.begin();
     for (Index tick = 0; tick < history.ticks(); ++tick) {
         const double begin = clock();
         const auto constraints = history(tick, x, moved);
@@ -299,11 +299,11 @@ Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Vo
             sums.time += end - begin;
             ++sums.felt;
         }
-        if (rest == references.end() || rest->tick != tick) continue;
-        sums.judge(*rest++, constraints, report.reactions, x);
+        if (reference == references.end() || reference->tick != tick) continue;
+        sums.compare(*reference++, constraints, report.reactions, x);
     }
-    if (sums.ticks_compared == 0 || rest != references.end()) {
-        refuse("trial", "rests must be of ticks of the history, one at least, in their order, got others");
+    if (sums.ticks_compared == 0 || reference != references.end()) {
+        refuse("trial", "references must be of ticks of the history, one at least, in order, got others");
     }
     return sums.outcome(layers);
 }

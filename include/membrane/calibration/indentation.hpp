@@ -15,7 +15,7 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 
-/// A membrane under an indenter: the force at each depth, for constants of one's own; what `fit` takes for a model.
+/// The force on an indenter at each depth, as a function of the membrane's constants: a `ForceModel` for `fit`.
 ///
 ///     const auto build = [&](std::span<const double> c) {
 ///         return std::pair(membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = c[0]}),
@@ -26,38 +26,39 @@
 ///     const auto found = membrane::fit(table, {40.0, 8.0}, model);
 namespace membrane {
 
-/// Makes network and foundation of some constants, a std::pair of them.
+/// Builds network and foundation from constants, as a std::pair.
 template <class Build>
 concept MembraneBuilder = requires(const Build& build, std::span<const double> constants) {
     build(constants).first.springs();
     build(constants).second;
 };
 
-/// A tool that is pressed into a membrane along a line, as deep as a table says, and no faster than it comes to rest.
+/// A tool that is pressed into a membrane along a line: quasi-static, with an equilibrium at each depth.
 template <Real Scalar, MembraneBuilder Build>
 class Indentation {
   public:
-    /// `tool` stands outside and moves along `displacement`, of any length. Depth is how far it is beyond where it first touches
-    /// the surface at rest [m]. `mesh` must outlive this.
-    /// @throws InvalidInput for a tool that is not valid, has no radius, does not stand outside or does not meet the
-    /// surface, and for a way without a direction. Cost: O(F) some ten times.
+    /// `tool` starts outside and moves along `direction`, of any length. Depth is its displacement beyond first contact
+    /// with the undeformed surface [m]. `mesh` must outlive this.
+    /// @throws InvalidInput for a tool that is invalid, has no radius, does not start outside or misses the surface,
+    /// and for a direction that is zero or not finite. Cost: about ten times O(F).
     Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool,
-                const std::type_identity_t<Vector3<Scalar>>& displacement, Build build);
+                const std::type_identity_t<Vector3<Scalar>>& direction, Build build);
 
-    /// Force of the membrane on the tool at each depth, against its way [N]; none (NaN) from the first depth on where it
-    /// was found not to rest. Depths in any order: each is reached from the one above it.
-    /// @throws InvalidInput for a depth that is not finite, for what `equilibrium` refuses; what `build` throws
+    /// Force of the membrane on the tool at each depth, against `direction` [N]; NaN from the first depth on at which
+    /// no equilibrium was found. Depths may be in any order; each solution starts from that of the next smaller depth.
+    /// @throws InvalidInput for a depth that is not finite and for arguments that `equilibrium` refuses; exceptions of
+    /// `build`
     /// Cost: an `equilibrium` for each depth.
     [[nodiscard]] std::vector<double> operator()(std::span<const double> constants,
                                                  std::span<const double> depths) const;
 
-    /// The tool where it first touches.
+    /// The tool at first contact.
     [[nodiscard]] const Tool<Scalar>& touching() const noexcept { return tool_; }
 
   private:
     const TriangleMesh<Scalar>* mesh_;
     Tool<Scalar> tool_;
-    Vector3<Scalar> displacement_;  // a unit vector
+    Vector3<Scalar> direction_;  // a unit vector
     Build build_;
     AabbTree<Scalar> tree_;
     ContactTracker<Scalar> tracker_;
@@ -67,9 +68,9 @@ namespace detail {
 
 inline constexpr std::string_view indentation_name = "Indentation";
 
-/// How far `tool` can move along `displacement`, a unit vector, until it touches: as far as it is away can do no harm, again and
-/// again. Infinite where it passes by.
-[[nodiscard]] inline double distance_to_touch(Tool<double> tool, const Vector3<double>& displacement,
+/// Distance from `tool` to first contact along `direction`, a unit vector; infinite if it misses. Sphere tracing: each
+/// step is the present gap.
+[[nodiscard]] inline double distance_to_touch(Tool<double> tool, const Vector3<double>& direction,
                                               const Triangles& triangles, const Points<double>& x) {
     const double far = norm<double>(tool.position - x.col(0)) + norm(tool.axis) +
                        2 * norm<double>(x.rowwise().maxCoeff() - x.rowwise().minCoeff());
@@ -82,7 +83,7 @@ inline constexpr std::string_view indentation_name = "Indentation";
         }
         if (gap <= negligible) return sum;
         sum += gap;
-        tool.position += gap * displacement;
+        tool.position += gap * direction;
     }
     return std::numeric_limits<double>::infinity();
 }
@@ -91,24 +92,25 @@ inline constexpr std::string_view indentation_name = "Indentation";
 
 template <Real Scalar, MembraneBuilder Build>
 Indentation<Scalar, Build>::Indentation(const TriangleMesh<Scalar>& mesh, const Tool<Scalar>& tool,
-                                        const std::type_identity_t<Vector3<Scalar>>& displacement, Build build)
-    : mesh_(&mesh), tool_(tool), displacement_(displacement), build_(std::move(build)), tree_(mesh), tracker_(mesh) {
+                                        const std::type_identity_t<Vector3<Scalar>>& direction, Build build)
+    : mesh_(&mesh), tool_(tool), direction_(direction), build_(std::move(build)), tree_(mesh), tracker_(mesh) {
     constexpr auto name = detail::indentation_name;
     if (!is_valid(tool) || !(tool.radius > 0)) {
         refuse(name, "the tool must be finite and have a radius [m], got one that is not or has none");
     }
-    if (!is_finite(displacement) || !(norm(displacement) > 0))
-        refuse(name, "the way must be finite and have a direction, got none");
-    displacement_ /= norm(displacement);
+    if (!is_finite(direction) || !(norm(direction) > 0))
+        refuse(name, "the direction must be finite and not zero, got one that is not");
+    direction_ /= norm(direction);
     Tool<double> moving;
     moving.position = tool.position.template cast<double>();
     moving.axis = tool.axis.template cast<double>();
     moving.radius = tool.radius;
-    const double along = detail::distance_to_touch(moving, displacement_.template cast<double>(), mesh.triangles(),
-                                                   mesh.positions().template cast<double>());
-    if (!(along > 0)) refuse(name, "the tool must stand outside the surface, got one that touches it");
-    if (!is_finite(along)) refuse(name, "the tool must meet the surface on its way, got one that passes by");
-    tool_.position += static_cast<Scalar>(along) * displacement_;
+    const double distance = detail::distance_to_touch(moving, direction_.template cast<double>(), mesh.triangles(),
+                                                      mesh.positions().template cast<double>());
+    if (!(distance > 0)) refuse(name, "the tool must stand outside the surface, got one that touches it");
+    if (!is_finite(distance))
+        refuse(name, "the tool must meet the surface along its direction, got one that misses it");
+    tool_.position += static_cast<Scalar>(distance) * direction_;
 }
 
 template <Real Scalar, MembraneBuilder Build>
@@ -128,12 +130,12 @@ std::vector<double> Indentation<Scalar, Build>::operator()(std::span<const doubl
     std::vector<double> forces(depths.size(), std::numeric_limits<double>::quiet_NaN());
     for (const std::size_t i : ascending) {
         auto tool = tool_;
-        tool.position += static_cast<Scalar>(depths[i]) * displacement_;
+        tool.position += static_cast<Scalar>(depths[i]) * direction_;
         tree.refit(x);
         const auto contact = tracker.update(tree, x, tool);
         const auto rest = equilibrium(x, *mesh_, network, foundation, {}, press(tool, contact));
         if (!rest.converged) break;
-        forces[i] = -dot<double>(rest.reactions[0], displacement_.template cast<double>());
+        forces[i] = -dot<double>(rest.reactions[0], direction_.template cast<double>());
         x = rest.x.template cast<Scalar>();
     }
     return forces;

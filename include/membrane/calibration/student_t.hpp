@@ -6,13 +6,13 @@
 
 #include <membrane/core/types.hpp>
 
-/// How many standard deviations an interval has to reach where the deviation itself is estimated from a few numbers.
+/// Half width of a confidence interval in standard deviations, if the deviation is estimated from a few numbers.
 ///
 ///     mean + membrane::student_t(0.95, 9) * deviation_of_mean;                 // upper end, from 10 numbers: 2.262
 namespace membrane {
 
-/// What the size of Student's t stays below with this probability, above 0 and below 1, for so many degrees of freedom, 1
-/// or more. With t = sqrt(degrees) tan(angle) the probability is a finite sum over powers of the cosine,
+/// The bound that |t| of Student's distribution stays below with this probability, above 0 and below 1, for `degrees`
+/// of freedom, 1 or more. With t = sqrt(degrees) tan(angle) the probability is a finite sum over powers of the cosine,
 /// [Abramowitz64] 26.7.3 and 26.7.4. Cost: O(degrees).
 [[nodiscard]] inline double student_t(double probability, Index degrees) noexcept {
     const bool even = degrees % 2 == 0;

@@ -10,27 +10,27 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Finds the triangles near a point, a segment, a sphere, a box or a capsule, on a surface that deforms.
+/// Finds the triangles near a point, a segment, a sphere, a box or a capsule, on a deforming surface.
 ///
 ///     auto tree = membrane::AabbTree(mesh);
 ///     const auto nearest = tree.closest_point(x, tool.position);
 ///     tree.refit(x, report.moved);
 namespace membrane {
 
-/// The point of the surface nearest to another.
+/// The point of the surface nearest to a query point.
 template <Real Scalar>
 struct SurfacePoint {
     Index triangle;               ///< `no_index`: nothing found.
-    Vector3<Scalar> barycentric;  ///< Exactly zero for the corners that have no part in it.
+    Vector3<Scalar> barycentric;  ///< Exactly zero for corners that do not contribute.
     Vector3<Scalar> point;        ///< [m]
     Scalar squared_distance;      ///< [m^2]
     Index nodes_visited;
 };
 
-/// Where a segment first meets the surface.
+/// The first intersection of a segment with the surface.
 template <Real Scalar>
 struct SurfaceHit {
-    Index triangle;  ///< `no_index`: nothing met.
+    Index triangle;  ///< `no_index`: no intersection.
     Scalar along;    ///< 0 at the segment's start, 1 at its end.
     Vector3<Scalar> barycentric;
     Index nodes_visited;
@@ -38,14 +38,14 @@ struct SurfaceHit {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// A tree of boxes over the triangles of a mesh [Bergen97], and what is asked of it.
+/// A tree of boxes over the triangles of a mesh [Bergen97], and its queries.
 ///
-/// The tree owns what it needs of the mesh; positions are handed in. The splits stay as they were at the start, the
-/// boxes follow by `refit`. Queries may run in several threads at once, none beside a refit.
+/// The tree keeps its own copy of the triangles; positions are arguments. The splits never change; `refit` updates the
+/// boxes. Queries may run in several threads at once, but not during a refit.
 ///
-/// A query with a number that is not finite, a negative radius or a box inside out finds nothing, at no box. A triangle
-/// with a corner that is not finite may not be found; the others are as ever (but under `-ffast-math` those in the same
-/// boxes are not). Nor is what is so far away that the square of the distance overflows.
+/// If an argument is not finite, a radius is negative or a box is inverted, a query finds nothing and tests no box. A
+/// triangle with a corner that is not finite may be missed; it does not affect other triangles (under `-ffast-math`
+/// those in the same boxes may be missed too). A triangle is missed if the square of its distance overflows.
 template <Real Scalar>
 class AabbTree {
   public:
@@ -53,30 +53,31 @@ class AabbTree {
     /// @throws InvalidInput if `balance_threshold` is below 1
     explicit AabbTree(const TriangleMesh<Scalar>& mesh, const TreeOptions& options = {}) : boxes_(mesh, options) {}
 
-    /// Fits all boxes to the positions `x`, 3 x V [m]. O(F), no allocation.
+    /// Refits all boxes to the positions `x`, 3 x V [m]. O(F), no allocation.
     /// @pre `x` has as many points as the mesh (asserted)
     void refit(const ConstPointsRef<Scalar>& x) noexcept { boxes_.refit(x); }
 
-    /// Fits the boxes around the vertices `moved`, each once, in any order, repeated or not: to the bit what a refit of
-    /// all gives if only these have moved since the last one. O(moved * depth) and a bit for each node, no
-    /// allocation.
-    /// @pre `x` has as many points as the mesh and `moved` names some of them (asserted)
+    /// Refits the boxes around the vertices `moved`, each box once. `moved` may have any order and repetitions. If no
+    /// other vertex has moved since the last refit, the boxes equal those of a full refit bit for bit.
+    /// O(moved * depth), plus one bit a node; no allocation.
+    /// @pre `x` has as many points as the mesh, and `moved` holds indices of these (asserted)
     void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept { boxes_.refit(x, moved); }
 
-    // All queries take the positions that the tree was last fitted to. They do not allocate, and visit as many boxes as
-    // they report: of the order of log F for what is near the surface and small, all at worst.
+    // All queries take the positions of the last refit. They do not allocate. They report the number of boxes visited:
+    // O(log F) for a small query near the surface, all boxes at worst.
 
-    /// The point of the surface nearest to `q`. Of points equally near, one; always the same.
+    /// The point of the surface nearest to `q`. If several points are equally near, returns one, always the same one.
     [[nodiscard]] SurfacePoint<Scalar> closest_point(const ConstPointsRef<Scalar>& x,
                                                      const Vector3<Scalar>& q) const noexcept;
 
-    /// Where the segment first meets the surface, from either side; the lowest triangle if it meets several at once.
+    /// The first intersection of the segment with the surface, from either side. If it meets several triangles at the
+    /// same point, returns the one of lowest index.
     [[nodiscard]] SurfaceHit<Scalar> first_hit(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& from,
                                                const Vector3<Scalar>& to) const noexcept;
 
-    /// Calls `visit(Index f)` once for each triangle that has a point in common with the sphere, the box between two
-    /// corners, or the capsule around the segment from `p` to `q`; always in the same order. `visit` must not throw.
-    /// Returns the boxes visited.
+    /// Calls `visit(Index f)` once for each triangle that intersects the sphere, the box between two corners, or the
+    /// capsule around the segment from `p` to `q`, in a reproducible order. `visit` must not throw. Returns the number
+    /// of boxes visited.
     template <class Visit>
     Index overlap_sphere(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& centre, Scalar radius,
                          Visit&& visit) const noexcept;
@@ -89,7 +90,7 @@ class AabbTree {
 
     [[nodiscard]] const TreeStatistics& statistics() const noexcept { return boxes_.statistics(); }
 
-    /// Around all triangles below a node of `tree_shape`; of node 0, around the surface.
+    /// The box around all triangles below a node of `tree_shape`; node 0: around the surface.
     /// @pre 0 <= `node` < `statistics().nodes` (asserted)
     [[nodiscard]] Box<Scalar> box(Index node) const noexcept { return boxes_.box(node); }
 
@@ -101,7 +102,8 @@ class AabbTree {
 
 namespace detail {
 
-/// How far along the segment a box may be met; of triangles, 0 where they may be.
+/// Lower bound of the fraction of the segment at which it meets a box; for triangles 0 if it may meet them, else
+/// `probe.never`.
 template <Real Scalar>
 struct SegmentKey {
     const CapsuleQuery<Scalar>& probe;

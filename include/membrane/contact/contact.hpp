@@ -10,10 +10,10 @@
 namespace membrane {
 
 enum class ContactPhase {
-    none,     ///< the tool does not touch
-    began,    ///< it touches, and did not in the tick before
-    ongoing,  ///< it still touches
-    ended,    ///< it touched in the tick before, and does not now
+    none,     ///< no contact
+    began,    ///< contact, but not in the last tick
+    ongoing,  ///< contact, and in the last tick too
+    ended,    ///< no contact, but contact in the last tick
 };
 
 /// A triangle that the tool touches.
@@ -22,7 +22,7 @@ struct ContactTriangle {
     std::array<Index, 3> corners;
 };
 
-/// Where the tool touches the membrane, how deep, and since when.
+/// The contact of the tool with the membrane: position, depth and phase.
 ///
 ///     const auto contact = tracker.update(tree, x, tool);
 ///     if (contact.touching()) std::printf("depth %g m\n", contact.depth);
@@ -31,27 +31,27 @@ struct Contact {
     ContactPhase phase = ContactPhase::none;
     Index triangle = no_index;                                   ///< the active triangle: the one nearest to the tool
     std::array<Index, 3> corners{no_index, no_index, no_index};  ///< its vertices
-    Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the contact point in it
-    Vector3<Scalar> point = Vector3<Scalar>::Zero();             ///< the contact point, on the surface as it is now [m]
+    Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the contact point
+    Vector3<Scalar> point = Vector3<Scalar>::Zero();             ///< the contact point, on the present surface [m]
     Vector3<Scalar> normal = Vector3<Scalar>::Zero();            ///< unit vector from the surface to the tool's side
-    Vector3<Scalar> axis_point = Vector3<Scalar>::Zero();        ///< point of the tool's axis nearest to it [m]
-    Scalar side = 1;   ///< which side the tool is on: 1 where triangles run counter-clockwise seen from it, else -1
-    Scalar gap = 0;    ///< signed distance of the tool to the surface as it is now [m]; negative where it overlaps
-    Scalar depth = 0;  ///< how far the tool is inside the surface as it would be without the tool [m], >= 0
-    Scalar detection_distance = 0;  ///< triangles up to this far from the tool count as touched [m]
-    Scalar radius = 0;              ///< of the tool [m]; a point counts as a small sphere, see `TrackerOptions::margin`
+    Vector3<Scalar> axis_point = Vector3<Scalar>::Zero();        ///< point of the tool's axis nearest to `point` [m]
+    Scalar side = 1;   ///< of the tool: 1 if triangles run counter-clockwise seen from it, else -1
+    Scalar gap = 0;    ///< signed distance of the tool from the present surface [m]; negative in penetration
+    Scalar depth = 0;  ///< indentation of the tool below the surface without the tool [m], >= 0
+    Scalar detection_distance = 0;  ///< triangles this near to the axis count as touched [m]
+    Scalar radius = 0;  ///< of the tool [m]; a point tool counts as a small sphere, see `TrackerOptions::margin`
     Vector3<Scalar> previous_axis_point =
-        Vector3<Scalar>::Zero();  ///< where `axis_point` was a tick ago, off the surface [m]
-    Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();  ///< of the body there, where it moves [m/s]
-    bool tunnelled = false;  ///< the tool's way since the last tick led through the surface at `point`
+        Vector3<Scalar>::Zero();                              ///< `axis_point` in the last tick, off the surface [m]
+    Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();  ///< of a moving body at the contact point [m/s]
+    bool tunnelled = false;  ///< the tool passed through the surface at `point` since the last tick
 
     // Valid until the tracker's next update.
     std::span<const ContactPoint<Scalar>>
-        points;  ///< one for each triangle and feature of the tool within `detection_distance`
-    std::span<const ContactTriangle> triangles;   ///< what the tool touches, and what is around the active triangle
-    std::span<const ContactTriangle> candidates;  ///< these first, then what is around them
-    bool has_all_points = true;  ///< false where there was no room for all: a step with this contact is refused
-    bool closed = false;         ///< whether the surface is: what is behind it is inside
+        points;  ///< one for each pair of triangle and tool feature within `detection_distance`
+    std::span<const ContactTriangle> triangles;   ///< those the tool touches and those around the active one
+    std::span<const ContactTriangle> candidates;  ///< `triangles`, then those around them
+    bool has_all_points = true;  ///< false if `points` exceeded its capacity: a step refuses this contact
+    bool closed = false;         ///< whether the surface is closed: its back is its inside
 
     [[nodiscard]] static Contact none() noexcept { return {}; }
     [[nodiscard]] bool touching() const noexcept {
@@ -59,7 +59,7 @@ struct Contact {
     }
 };
 
-/// Whether the numbers of a contact that touches are finite. Its vertices are for those to check who know the mesh.
+/// Whether the numbers of a touching contact are finite. The caller checks its vertices against the mesh.
 template <Real Scalar>
 [[nodiscard]] bool is_valid(const Contact<Scalar>& contact) noexcept {
     if (!contact.touching()) return true;

@@ -8,17 +8,17 @@
 #include <membrane/contact/local_surface.hpp>
 #include <membrane/contact/tool.hpp>
 
-/// What a contact looks like once it is known in which triangle it is.
+/// Geometry of a contact in a given triangle.
 namespace membrane {
 
-/// The contact of a tool that is near triangle `f`, or overlaps it: everything but phase, depth and what is touched.
-/// `radius` is the tool's [m], `side` the one it is on; round a border it may have gone to the other.
+/// The contact of a tool near triangle `f` or in penetration, without phase, depth, points, triangles and candidates.
+/// `radius` is the tool's [m], `side` its side of the surface; beside a border the contact may be on the other side.
 template <Real Scalar>
 [[nodiscard]] Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface,
                                          const std::type_identity_t<ConstPointsRef<Scalar>>& x, Index f,
                                          const Tool<Scalar>& tool, Scalar radius, Scalar side) noexcept;
 
-/// The contact of a point of the tool that went through triangle `f`, there where it did, from `from` to `to` [m]; the
+/// The contact of a point of the tool that passed through triangle `f` at `barycentric`, from `from` to `to` [m]. The
 /// gap is that of a tool without radius, and negative if `to` is behind the triangle.
 template <Real Scalar>
 [[nodiscard]] Contact<Scalar> contact_where_passed(const LocalSurface<Scalar>& surface,
@@ -36,7 +36,7 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
     contact.axis_point = tool.position + nearest.along * tool.axis;
     Vector3<Scalar> outward = direction<Scalar>(area_vector(triangle), Vector3<Scalar>::Zero());
     if (nearest.on_triangle.squared_distance == 0 && feature_pairs(tool) > 1) {
-        // The shaft goes through: what counts is how far its lower end is behind.
+        // The shaft passes through the triangle: the gap is that of its lower end.
         contact.axis_point = tool.position;
         if (side * dot(outward, tool.axis) < 0) contact.axis_point += tool.axis;
         nearest.on_triangle = closest_point(triangle, contact.axis_point);
@@ -47,14 +47,14 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
     contact.corners = surface.corners(f);
     contact.barycentric = nearest.on_triangle.barycentric;
     contact.point = nearest.on_triangle.point;
-    const Vector3<Scalar> reach = contact.axis_point - contact.point;
-    if (surface.on_border(f, contact.barycentric)) contact.side = dot(reach, outward) < 0 ? Scalar(-1) : Scalar(1);
+    const Vector3<Scalar> separation = contact.axis_point - contact.point;
+    if (surface.on_border(f, contact.barycentric)) contact.side = dot(separation, outward) < 0 ? Scalar(-1) : Scalar(1);
     outward *= contact.side;
-    const Scalar sign = dot(reach, outward) < 0 ? Scalar(-1) : Scalar(1);
-    const Scalar distance = norm(reach);
+    const Scalar sign = dot(separation, outward) < 0 ? Scalar(-1) : Scalar(1);
+    const Scalar distance = norm(separation);
     contact.gap = sign * distance - radius;
-    // At an edge or a corner the normal leads to the tool; the less so the deeper the tool is in, for the way out is up.
-    const Vector3<Scalar> up = sign * reach + (std::max)(radius - distance, Scalar(0)) * outward;
+    // At an edge or a corner the normal points to the tool. With penetration it turns to `outward`, the shortest exit.
+    const Vector3<Scalar> up = sign * separation + (std::max)(radius - distance, Scalar(0)) * outward;
     contact.normal = direction(up, outward);
     return contact;
 }

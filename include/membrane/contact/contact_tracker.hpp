@@ -17,7 +17,7 @@
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/lanes.hpp>
 
-/// Does the tool touch, where, how deep, and since when?
+/// Contact detection: position, depth and phase of the tool's contact with the surface.
 ///
 ///     auto tree    = membrane::AabbTree(mesh);
 ///     auto tracker = membrane::ContactTracker(mesh);
@@ -28,61 +28,61 @@ template <Real Scalar>
 class MovingBody;  // of moving_body.hpp
 
 struct TrackerOptions {
-    double margin = 0.01;  ///< what is this near counts as touched, and a point as a sphere of this radius [mean edges]
-    Index full_query_interval =
-        128;  ///< ticks in contact after which the tree is asked whether something else is touched too
-    Index max_contact_points = 16384;  ///< room for contact points; it decides the memory, not the time
+    double margin = 0.01;              ///< triangles this near count as touched; a point has this radius [mean edges]
+    Index full_query_interval = 128;   ///< ticks in contact between tree queries for further folds in contact
+    Index max_contact_points = 16384;  ///< capacity for contact points; determines memory, not time
 };
 
-/// Finds the contact with the tree while there is none, and follows it over the neighbours of the triangles touched
-/// before, [Liu07] 2.3: in contact the cost depends on what the tool touches and not on the size of the mesh.
+/// Without contact, queries the tree. In contact, tests the triangles touched in the last tick and their neighbours
+/// [Liu07] 2.3: the cost depends on the contact area, not on the size of the mesh.
 ///
-/// Beyond the paper: the neighbours are flooded over every triangle within the tool's reach. A tool whose reference point
-/// (or, for a capsule, its other end) went through the surface since the last tick touches it where it went through,
-/// however far it has come: the tree is asked about its way in every tick. A second fold of the surface that comes near a
-/// tool in contact is found after `full_query_interval` ticks at the latest.
+/// Beyond the paper: the search floods every triangle within the detection distance. If the reference point of the tool
+/// (or the other end of a capsule) passes through the surface within a tick, the contact is at that intersection,
+/// however long the displacement: every tick queries the tree with the displacement. A second fold of the surface that
+/// approaches a tool in contact is found within `full_query_interval` ticks.
 ///
-/// The tool stays on the outer side of a closed surface: behind it is where the winding number is not 0. On an open one it
-/// stays on the side of first contact until it is clear of the surface, or has slid off a border that gave way; of a shaft
-/// that slides off parts are on either side, and until it is clear it has gone through only where an end did. A tool that
-/// is outside the surface as it would be without it touches nothing that it would pull farther out. The depth is measured
-/// against the surface as it would be without the tool: the mesh, or the anchors of a body that moves.
+/// The tool stays outside a closed surface: where the winding number is 0. At an open surface the tool stays on the
+/// side of first contact until it is clear of the surface, or has slid off a border that it displaced. After a shaft
+/// slides off, its parts may be on different sides; until it is clear, only its ends can tunnel. The surface without
+/// the tool is the mesh, or the anchors of a moving body. Depth is measured against it. A tool outside it has no
+/// contact with a part of the membrane that it would pull farther out.
 template <Real Scalar>
 class ContactTracker {
   public:
     /// @throws InvalidInput for options out of range. Cost: O(V + F log F).
     explicit ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options = {});
 
-    /// The contact of `tool` with the surface at `x` (3 x V [m]). A tool that is not valid touches nothing and
-    /// changes nothing. Online. Cost: O(log F), and in contact the triangles within the tool's reach and their neighbours.
+    /// The contact of `tool` with the surface at `x` (3 x V [m]). If the tool is not valid, returns no contact and
+    /// leaves the state unchanged. Online. Cost: O(log F), plus in contact the triangles within detection distance and
+    /// their neighbours.
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool) noexcept {
         return track(tree, x, tool, origins_);
     }
 
-    /// The same on a body that moves: what is remembered of tool and contact goes along with it.
+    /// The contact on a moving body: the stored tool and contact move with the body.
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
 
-    /// How often the tree has been asked for what the tool touches during contact, since the beginning.
-    [[nodiscard]] Index full_query_count() const noexcept { return tree_checks_; }
+    /// Number of tree queries for touched triangles during contact, since construction.
+    [[nodiscard]] Index full_query_count() const noexcept { return full_query_count_; }
 
-    /// Forgets contact and tool: from here on it does what a new one does, to the bit.
+    /// Drops contact and tool: from here on the tracker equals a new one, bit for bit.
     void reset() noexcept;
 
   private:
-    // What is handed in for one update.
+    // The inputs of one update.
     struct Scene {
         const AabbTree<Scalar>& tree;
         const ConstPointsRef<Scalar>& x;
         const Tool<Scalar>& tool;
         const ConstPointsRef<Scalar>& anchors;
-        Scalar radius;  // of the tool, a point's included
-        Scalar travel;  // of the tool since the last tick, at most [m]
-        Scalar reach;   // from the tool's axis to what may touch it in this tick [m]
+        Scalar radius;              // of the tool, at least the margin [m]
+        Scalar travel;              // longest displacement of a point of the axis since the last tick [m]
+        Scalar detection_distance;  // from the tool's axis to triangles that may touch it in this tick [m]
     };
 
-    void go_along(const RigidFrame<Scalar>& pose) noexcept;
+    void move_with_body(const RigidFrame<Scalar>& pose) noexcept;
     [[nodiscard]] Contact<Scalar> track(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                         const Tool<Scalar>& tool, const ConstPointsRef<Scalar>& anchors) noexcept;
     [[nodiscard]] Scene scene_of(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
@@ -90,13 +90,13 @@ class ContactTracker {
     [[nodiscard]] Scalar expected_side() const noexcept {
         return side_ != 0 ? side_ : last_.touching() ? last_.side : Scalar(1);
     }
-    // Of an open surface either side may be the one that the tool comes from.
+    // The tool may approach an open surface from either side.
     [[nodiscard]] bool is_first_seen() const noexcept { return !surface_.closed() && !last_.touching() && side_ == 0; }
     [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool contacts(const Scene& scene, Contact<Scalar>& contact) noexcept;
-    bool crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept;
+    bool sweep_test(const Scene& scene, Contact<Scalar>& contact) const noexcept;
     void describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept;
     void describe_shaft(const Scene& scene, Index f, Scalar side, Contact<Scalar>& contact) const noexcept;
     static void turn(const Scene& scene, Contact<Scalar>& contact) noexcept {
@@ -109,7 +109,7 @@ class ContactTracker {
     void gather_from_tree(const Scene& scene) noexcept;
     void flood(const Scene& scene) noexcept;
     void examine(const Scene& scene, std::span<const Index> some) noexcept;
-    void watch_rings(int rings) noexcept;
+    void collect_candidates(int rings) noexcept;
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void find_points(const Scene& scene, Contact<Scalar>& contact) noexcept;
     template <class List>
@@ -118,35 +118,36 @@ class ContactTracker {
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] bool leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
-    void settle_side(const Scene& scene, const Contact<Scalar>& contact) noexcept;
+    void decide_side(const Scene& scene, const Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
 
-    // What a tool has gone through springs back, and may fold over it: for some ticks it is looked at from farther off.
-    static constexpr int rings_watched = 2, rings_after_crossing = 6, ticks_after_crossing = 16;
-    static constexpr Scalar negligible_part = Scalar(1e-6);  // part of the tool's way in a tick
+    // After tunnelling the membrane springs back and may fold over the tool: for some ticks candidates include more
+    // rings.
+    static constexpr int candidate_rings = 2, candidate_rings_after_tunnelling = 6, ticks_after_tunnelling = 16;
+    static constexpr Scalar negligible_part = Scalar(1e-6);  // fraction of the tool's displacement in a tick
 
     Points<Scalar> origins_;
     LocalSurface<Scalar> surface_;
     Scalar margin_;  // [m]
-    Index check_every_;
+    Index full_query_interval_;
 
-    IndexSet near_, near_before_;  // the local model: triangles within reach of the tool
-    Index nearest_ = no_index;     // of those
+    IndexSet near_, near_before_;  // the local model: triangles within detection distance, now and before
+    Index nearest_ = no_index;     // of `near_`
     Scalar nearest_square_ = 0;
-    IndexSet candidates_;  // for those, in the order in which they are examined
-    IndexSet watched_;     // those near and the ones around them
-    IndexSet expanded_;    // vertices whose triangles are all watched
+    IndexSet queued_;      // for `near_`, in the order of examination
+    IndexSet candidates_;  // `near_` and the rings around it
+    IndexSet expanded_;    // vertices with all their triangles in `candidates_`
     FixedVector<ContactTriangle> listed_;
     FixedVector<ContactPoint<Scalar>> points_;
     Contact<Scalar> last_;
     std::optional<Tool<Scalar>> last_tool_;
-    RigidFrame<Scalar> pose_;  // of the body then
-    Scalar side_ = 0;          // that the tool is known to be on; 0: not yet
-    bool slid_off_ = false;    // a shaft, off a border that gave way: from then on parts of it may be on either side
-    // Where on the surface without the tool its two ends and its contact point are nearest to.
+    RigidFrame<Scalar> pose_;  // of the body at the last update
+    Scalar side_ = 0;          // of the tool, 1 or -1; 0: not yet known
+    bool slid_off_ = false;    // whether a shaft has slid off a displaced border: its parts may be on different sides
+    // The triangles of the surface without the tool nearest to the tool's two ends and its axis point.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
-    Index ticks_ = 0, tree_checks_ = 0;
-    int lively_ticks_ = 0;
+    Index ticks_ = 0, full_query_count_ = 0;
+    int rebound_ticks_ = 0;
 };
 
 template <Real Scalar>
@@ -154,11 +155,11 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
     : origins_(mesh.positions()),
       surface_(mesh),
       margin_(static_cast<Scalar>(options.margin) * surface_.mean_edge()),
-      check_every_(options.full_query_interval),
+      full_query_interval_(options.full_query_interval),
       near_(mesh.triangle_count()),
       near_before_(near_),
+      queued_(near_),
       candidates_(near_),
-      watched_(near_),
       expanded_(mesh.vertex_count()),
       listed_(static_cast<std::size_t>(mesh.triangle_count())),
       points_(static_cast<std::size_t>(std::clamp(options.max_contact_points, Index(0), 5 * mesh.triangle_count()))) {
@@ -181,13 +182,13 @@ void ContactTracker<Scalar>::reset() noexcept {
     slid_off_ = false;
     origin_triangles_.fill(no_index);
     ticks_ = 0;
-    lively_ticks_ = 0;
+    rebound_ticks_ = 0;
 }
 
 template <Real Scalar>
 Contact<Scalar> ContactTracker<Scalar>::update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                                const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept {
-    go_along(body.pose());
+    move_with_body(body.pose());
     auto contact = track(tree, x, tool, body.anchors());
     if (contact.touching()) {
         contact.body_velocity = body.velocity_at(tool.position, contact.corners, contact.barycentric);
@@ -195,9 +196,9 @@ Contact<Scalar> ContactTracker<Scalar>::update(const AabbTree<Scalar>& tree, con
     return contact;
 }
 
-// The body is at `pose` now, and what was seen in the last tick is on it.
+// Moves the stored tool and contact with the body to `pose`.
 template <Real Scalar>
-void ContactTracker<Scalar>::go_along(const RigidFrame<Scalar>& pose) noexcept {
+void ContactTracker<Scalar>::move_with_body(const RigidFrame<Scalar>& pose) noexcept {
     if (pose.same_pose(pose_)) return;
     const auto motion = motion_between(pose_, pose);
     pose_ = pose;
@@ -205,8 +206,8 @@ void ContactTracker<Scalar>::go_along(const RigidFrame<Scalar>& pose) noexcept {
         last_tool_->position = motion.point_to_world(last_tool_->position);
         last_tool_->axis = motion.vector_to_world(last_tool_->axis);
     }
-    for (auto* place : {&last_.point, &last_.axis_point, &last_.previous_axis_point})
-        *place = motion.point_to_world(*place);
+    for (auto* stored : {&last_.point, &last_.axis_point, &last_.previous_axis_point})
+        *stored = motion.point_to_world(*stored);
     last_.normal = motion.vector_to_world(last_.normal);
 }
 
@@ -220,11 +221,11 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
     const bool before = last_.touching();
     Contact<Scalar> contact;
     const bool followed = before && scene.travel <= surface_.mean_edge() && follow(scene, contact);
-    if (before && !followed) ++tree_checks_;
+    if (before && !followed) ++full_query_count_;
     if ((followed || find(scene, contact)) && contacts(scene, contact)) {
         complete(scene, contact);
         contact.phase = before ? ContactPhase::ongoing : ContactPhase::began;
-        settle_side(scene, contact);
+        decide_side(scene, contact);
         slid_off_ = slid_off_ || (feature_pairs(tool) > 1 && leaves_border(scene, contact));
     } else {
         if ((side_ != 0 || slid_off_) && !tool.grasping) {
@@ -250,41 +251,41 @@ auto ContactTracker<Scalar>::scene_of(const AabbTree<Scalar>& tree, const ConstP
     const Tool<Scalar>& last = last_tool_ ? *last_tool_ : tool;
     const Vector3<Scalar> displacement = tool.position - last.position;
     const Scalar travel = (std::max)(norm(displacement), norm<Scalar>(displacement + tool.axis - last.axis));
-    // What the tool has withdrawn from comes after it.
+    // The membrane follows a tool that withdraws.
     const Scalar behind = (std::max)(last_.gap, Scalar(0));
     const Scalar radius = (std::max)(tool.radius, margin_);
     return {
         tree, x, tool, anchors, radius, travel, radius + margin_ + (std::min)(travel + behind, surface_.mean_edge())};
 }
 
-// In contact: the triangles touched before and their neighbours know; false if the tool has left them all.
+// Finds the contact among the triangles of the last tick and their neighbours; false if the tool has left all of them.
 template <Real Scalar>
 bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact) noexcept {
     std::swap(near_, near_before_);
     near_.clear();
-    candidates_.clear();
-    for (const Index f : near_before_.items()) candidates_.insert(f);
-    if (++ticks_ % check_every_ == 0 || lively_ticks_ > 0) {
-        ++tree_checks_;
+    queued_.clear();
+    for (const Index f : near_before_.items()) queued_.insert(f);
+    if (++ticks_ % full_query_interval_ == 0 || rebound_ticks_ > 0) {
+        ++full_query_count_;
         gather_from_tree(scene);
     }
     flood(scene);
     if (near_.empty()) return false;
 
     contact.side = expected_side();
-    if (!crossing(scene, contact)) describe(scene, nearest_, contact);
+    if (!sweep_test(scene, contact)) describe(scene, nearest_, contact);
     return true;
 }
 
-// No contact, or none that could be followed: the tree knows; false if there is nothing to be near to.
+// Finds the contact with the tree if none could be followed; false if the tree finds no nearest triangle.
 template <Real Scalar>
 bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) noexcept {
     contact = {};
     near_.clear();
-    candidates_.clear();
+    queued_.clear();
     gather_from_tree(scene);
     flood(scene);
-    if (!crossing(scene, contact)) {
+    if (!sweep_test(scene, contact)) {
         const Index f = near_.empty() ? scene.tree.closest_point(scene.x, scene.tool.position).triangle : nearest_;
         if (f == no_index) return false;
         contact.side = expected_side();
@@ -293,7 +294,7 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
     return true;
 }
 
-// A tool that overlaps touches; one that touched before goes on until the membrane has come back all the way.
+// A contact begins with penetration and ends when the membrane has fully recovered.
 template <Real Scalar>
 bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& contact) noexcept {
     if (!last_.touching() && contact.gap > 0) return false;
@@ -305,21 +306,21 @@ bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& conta
     return contact.gap <= slack || (contact.depth > 0 && contact.gap <= contact.depth + scene.travel);
 }
 
-// Whether the way of an end of the tool since the last tick leads through the surface.
+// Whether an end of the tool has passed through the surface since the last tick.
 template <Real Scalar>
-bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& contact) const noexcept {
+bool ContactTracker<Scalar>::sweep_test(const Scene& scene, Contact<Scalar>& contact) const noexcept {
     if (!last_tool_) return false;
     const Scalar side = expected_side();
     const auto through = [&](const Vector3<Scalar>& from, const Vector3<Scalar>& now) {
         const auto hit = scene.tree.first_hit(scene.x, from, now);
         if (hit.triangle == no_index) return false;
         auto passed = contact_where_passed(surface_, scene.x, hit.triangle, hit.barycentric, from, now, side);
-        if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it has only come to it
+        if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it ends on the surface
         if (passed.gap > 0) {
-            if (hit.along < negligible_part) return false;  // it leaves what it rests on
+            if (hit.along < negligible_part) return false;  // it leaves the surface it was on
             if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from))
-                return false;                // or comes out
-            passed.normal = -passed.normal;  // of a crease, or an open surface from its other side
+                return false;                // it leaves the inside
+            passed.normal = -passed.normal;  // a crease, or the other side of an open surface
             passed.gap = -passed.gap;
             if (is_first_seen() && was_behind(scene, hit.triangle, side, from)) passed.side = -side;
         }
@@ -332,7 +333,7 @@ bool ContactTracker<Scalar>::crossing(const Scene& scene, Contact<Scalar>& conta
             through(last_tool_->position + last_tool_->axis, scene.tool.position + scene.tool.axis));
 }
 
-// What looks as if the tool were behind is a crease, or the tool has passed the surface.
+// The contact at triangle `f`. If the tool is behind `f`, it has tunnelled or is outside in a crease.
 template <Real Scalar>
 void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept {
     const auto seen_from = [&](Scalar side) {
@@ -341,18 +342,18 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     };
     const Scalar side = contact.side;
     bool behind = seen_from(side);
-    // A shaft beside a border may reach to both sides: the middle tells, where it was before it touched.
+    // A shaft beside a border may extend to both sides: its middle in the last tick determines the side.
     const Tool<Scalar>& before = last_tool_ ? *last_tool_ : scene.tool;
     const Vector3<Scalar> middle = before.position + before.axis / 2;
     if (behind && is_first_seen() && was_behind(scene, f, side, middle)) behind = seen_from(-1);
-    // A tool that is apart from the surface has not come through: a way of its ends that did is known by now.
+    // A tool apart from the surface has not tunnelled: `sweep_test` has excluded it for the ends.
     if (is_first_seen() && contact.gap < -2 * scene.radius) return turn(scene, contact);
     if (side_ != 0 && contact.side != side_) {  // beside a border
         contact.side = side_;
         behind = !leaves_border(scene, contact);
         if (behind) turn(scene, contact);
     }
-    const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1 &&  // stuck through, perhaps
+    const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1 &&  // it may pierce the surface
                                      (surface_.closed() || !last_tool_) &&
                                      !surface_.on_border(contact.triangle, contact.barycentric);
     contact.tunnelled = behind && !slid_off_ &&
@@ -364,15 +365,15 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     contact.previous_axis_point = (contact.tunnelled ? contact.point : contact.axis_point) + margin_ * contact.normal;
 }
 
-// Whether `q` is on the other side of the surface as that would be without the tool.
+// Whether `q` is behind the surface without the tool.
 template <Real Scalar>
 bool ContactTracker<Scalar>::was_behind(const Scene& scene, Index f, Scalar side,
                                         const Vector3<Scalar>& q) const noexcept {
     return side * surface_.height(scene.anchors, surface_.walk_to_closest(scene.anchors, f, q), q) < 0;
 }
 
-// Of a shaft what is nearest may be outside, and another point behind: the middle of what is inside, or an end, if the
-// shaft lies across a border.
+// The nearest point of a shaft may be outside while another point is behind: the middle of the part inside, or an end
+// if the shaft lies across a border.
 template <Real Scalar>
 void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar side,
                                             Contact<Scalar>& contact) const noexcept {
@@ -389,15 +390,15 @@ void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar 
     };
     if (const auto middle = middle_inside(scene, f, side)) take_if_behind(*middle);
     if (side_ == 0 || surface_.closed()) return;
-    // A shaft that has one end behind has gone through the surface, or round its border.
+    // A shaft with one end behind passes through the surface or around its border.
     const Vector3<Scalar> end = scene.tool.position + scene.tool.axis;
     if (scene.tree.first_hit(scene.x, scene.tool.position, end).triangle == no_index) return;
     take_if_behind(scene.tool.position);
     take_if_behind(scene.tool.position + scene.tool.axis);
 }
 
-// Of a shaft that goes through `f` and comes out again farther along: halfway between. Both its ends may be outside, and
-// say nothing of how deep it is.
+// If the shaft passes through `f` and out again farther along, returns the point halfway between. Both ends may be
+// outside and then do not give the penetration.
 template <Real Scalar>
 std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene& scene, Index f,
                                                                      Scalar side) const noexcept {
@@ -410,7 +411,7 @@ std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene
     const auto here = hit_in(triangle);
     if (!here) return std::nullopt;
     const Scalar inward = climb(triangle) < 0 ? Scalar(1) : Scalar(-1);  // along the axis
-    Scalar inside = 2;                                                   // part of it
+    Scalar inside = 2;                                                   // fraction of the axis
     for (const Index g : near_.items()) {
         const auto other = surface_.triangle(scene.x, g);
         if (!(inward * climb(other) > 0)) continue;
@@ -422,8 +423,8 @@ std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene
     return tool.position + (here->along + inward * inside / 2) * tool.axis;
 }
 
-// Whether `q` is behind the surface and not outside, in a crease. An open surface has no inside: there it is behind what
-// lies between it and where it would be outside, had the surface not moved.
+// Whether `q` is behind the surface, not outside in a crease. An open surface has no inside: `q` is behind it if the
+// ray from `q` along the outward normal of the surface without the tool first meets the back of a triangle.
 template <Real Scalar>
 bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar side,
                                         const Vector3<Scalar>& q) const noexcept {
@@ -439,28 +440,27 @@ bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar s
 template <Real Scalar>
 void ContactTracker<Scalar>::gather_from_tree(const Scene& scene) noexcept {
     const auto& tool = scene.tool;
-    scene.tree.overlap_capsule(scene.x, tool.position, tool.position + tool.axis, scene.reach,
-                               [&](Index f) { candidates_.insert(f); });
+    scene.tree.overlap_capsule(scene.x, tool.position, tool.position + tool.axis, scene.detection_distance,
+                               [&](Index f) { queued_.insert(f); });
 }
 
-// Takes the candidates that the tool reaches, and of their neighbours those that it reaches, and so on.
+// Adds the queued triangles within detection distance to the local model, and recursively their neighbours.
 template <Real Scalar>
 void ContactTracker<Scalar>::flood(const Scene& scene) noexcept {
     constexpr auto at_a_time = static_cast<Index>(Lanes<Scalar>::count);
     for (Index examined = 0, spread = 0;;) {
-        while (spread < near_.count() && candidates_.count() - examined < at_a_time) {
+        while (spread < near_.count() && queued_.count() - examined < at_a_time) {
             surface_.across_sides(near_.items()[static_cast<std::size_t>(spread++)],
-                                  [&](Index f) { candidates_.insert(f); });
+                                  [&](Index f) { queued_.insert(f); });
         }
-        const Index count = (std::min)(at_a_time, candidates_.count() - examined);
+        const Index count = (std::min)(at_a_time, queued_.count() - examined);
         if (count == 0) return;
-        examine(scene,
-                candidates_.items().subspan(static_cast<std::size_t>(examined), static_cast<std::size_t>(count)));
+        examine(scene, queued_.items().subspan(static_cast<std::size_t>(examined), static_cast<std::size_t>(count)));
         examined += count;
     }
 }
 
-// Takes those of `some` into the local model that the tool reaches; as many as there are lanes at most.
+// Adds those of `some` within detection distance to the local model. `some` has at most one triangle a lane.
 template <Real Scalar>
 void ContactTracker<Scalar>::examine(const Scene& scene, std::span<const Index> some) noexcept {
     std::array<Index, Lanes<Scalar>::count> triangles;
@@ -468,7 +468,7 @@ void ContactTracker<Scalar>::examine(const Scene& scene, std::span<const Index> 
     const auto squares = surface_.squared_distances(scene.x, triangles, scene.tool);
     for (std::size_t i = 0; i < some.size(); ++i) {
         const Scalar square = squares[i];
-        if (!(square <= scene.reach * scene.reach)) continue;
+        if (!(square <= scene.detection_distance * scene.detection_distance)) continue;
         if (near_.empty() || square < nearest_square_) {
             nearest_ = some[i];
             nearest_square_ = square;
@@ -479,32 +479,32 @@ void ContactTracker<Scalar>::examine(const Scene& scene, std::span<const Index> 
 
 template <Real Scalar>
 void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& contact) noexcept {
-    // What is not yet within reach, but may come to the tool as the membrane moves.
+    // Triangles not yet within detection distance that may approach the tool as the membrane moves.
     near_.insert(contact.triangle);
     surface_.around_corners(contact.triangle, [&](Index f) { near_.insert(f); });
     if (contact.tunnelled) {
         scene.tree.overlap_capsule(scene.x, contact.previous_axis_point, contact.axis_point, Scalar(0),
                                    [&](Index f) { near_.insert(f); });
     }
-    lively_ticks_ = contact.tunnelled ? ticks_after_crossing : (std::max)(lively_ticks_ - 1, 0);
-    watch_rings(lively_ticks_ > 0 ? rings_after_crossing : rings_watched);
+    rebound_ticks_ = contact.tunnelled ? ticks_after_tunnelling : (std::max)(rebound_ticks_ - 1, 0);
+    collect_candidates(rebound_ticks_ > 0 ? candidate_rings_after_tunnelling : candidate_rings);
     listed_.clear();
-    for (const Index f : watched_.items()) listed_.push({f, surface_.corners(f)});
+    for (const Index f : candidates_.items()) listed_.push({f, surface_.corners(f)});
     contact.closed = surface_.closed();
     contact.radius = scene.radius;
-    contact.detection_distance = scene.reach;
+    contact.detection_distance = scene.detection_distance;
     contact.candidates = listed_.items();
     contact.triangles = contact.candidates.first(near_.items().size());
     find_points(scene, contact);
     contact.points = points_.items();
 }
 
-// The points within reach, of what the tool has crossed all: where the surface comes to is not known.
+// The contact points within detection distance; after tunnelling all points, as the next positions are unknown.
 template <Real Scalar>
 void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& contact) noexcept {
     points_.clear();
     const auto list = [&](const ContactPoint<Scalar>& point) {
-        if (!contact.tunnelled && point.gap + scene.radius > scene.reach) return;
+        if (!contact.tunnelled && point.gap + scene.radius > scene.detection_distance) return;
         if (!points_.push(point)) contact.has_all_points = false;
     };
     const int features = feature_pairs(scene.tool);
@@ -518,7 +518,7 @@ void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& co
     }
 }
 
-// The same, several triangles at a time.
+// The contact points of a sphere, several triangles at a time.
 template <Real Scalar>
 template <class List>
 void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> touched,
@@ -545,26 +545,27 @@ void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span
     }
 }
 
-// Watches what is near and so many rings around it. The triangles of a vertex are one fan: where they are not all watched,
-// two of them with a side in common are, and are not. So the first ring is around those beside what is not near.
+// The candidates: the near triangles and `rings` rings around them. The triangles of a vertex form one fan: if not all
+// are near, one that is near shares a side with one that is not. So the first ring expands only near triangles with a
+// side neighbour that is not near.
 template <Real Scalar>
-void ContactTracker<Scalar>::watch_rings(int rings) noexcept {
-    watched_.clear();
+void ContactTracker<Scalar>::collect_candidates(int rings) noexcept {
+    candidates_.clear();
     expanded_.clear();
     const auto expand = [&](Index f) {
         for (const Index v : surface_.corners(f)) {
             if (!expanded_.insert(v)) continue;
-            for (const Index g : surface_.triangles_of(v)) watched_.insert(g);
+            for (const Index g : surface_.triangles_of(v)) candidates_.insert(g);
         }
     };
-    for (const Index f : near_.items()) watched_.insert(f);
+    for (const Index f : near_.items()) candidates_.insert(f);
     for (const Index f : near_.items()) {
         bool inside = true;
         surface_.across_sides(f, [&](Index g) { inside &= near_.contains(g); });
         if (!inside) expand(f);
     }
     for (std::size_t next = near_.items().size(); rings > 1; --rings) {
-        for (const std::size_t end = watched_.items().size(); next < end; ++next) expand(watched_.items()[next]);
+        for (const std::size_t end = candidates_.items().size(); next < end; ++next) expand(candidates_.items()[next]);
     }
 }
 
@@ -584,7 +585,7 @@ void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& 
     }
 }
 
-// Whether nothing is within two edges of the tool.
+// Whether no triangle is within two mean edges of the tool.
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_clear(const Scene& scene) const noexcept {
     bool clear = true;
@@ -595,17 +596,17 @@ bool ContactTracker<Scalar>::is_clear(const Scene& scene) const noexcept {
     return clear;
 }
 
-// Beside a border a tool may be on either side. Once it has been above or below, it stays there until it is clear of the
-// surface, or has slid off a border that gave way: past one that does not, it can only have been forced.
+// Beside a border the tool may be on either side. Once above or below the surface, it stays on that side until it is
+// clear of the surface or has slid off a displaced border. It passes an undisplaced border only by force.
 template <Real Scalar>
-void ContactTracker<Scalar>::settle_side(const Scene& scene, const Contact<Scalar>& contact) noexcept {
+void ContactTracker<Scalar>::decide_side(const Scene& scene, const Contact<Scalar>& contact) noexcept {
     if (side_ != 0) return;
     const auto outward = surface_.outward(scene.x, contact.triangle, contact.barycentric);
     const bool above = contact.side * dot<Scalar>(contact.normal, outward) > Scalar(0.5);
     if (above || !surface_.on_border(contact.triangle, contact.barycentric)) side_ = contact.side;
 }
 
-// Whether the tool is beside a border, and lower.
+// Whether the tool is beside a border and below it.
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
     if (contact.tunnelled || !surface_.on_border(contact.triangle, contact.barycentric)) return false;
@@ -620,8 +621,7 @@ bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Sca
     return norm<Scalar>(contact.point - origin) > margin_;
 }
 
-// A tool that is outside the surface as it would be without it has nothing to press; what lies beyond it, farther out, would
-// be pulled.
+// Whether the contact would pull: the tool is outside the surface without the tool, and the membrane lies farther out.
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
     const auto overlapped = [&](Index f) {

@@ -9,7 +9,7 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Forceps: what they hold, from closing to opening.
+/// Forceps: the held point, from closing to opening.
 ///
 ///     auto grasper = membrane::Grasper(mesh);
 ///     const auto grasp  = grasper.update(contact, x, tool);
@@ -22,42 +22,42 @@ class MovingBody;  // of moving_body.hpp
 /// A point of the membrane that moves with the tool.
 template <Real Scalar>
 struct Grasp {
-    Index triangle = no_index;                                   ///< none: nothing is held
+    Index triangle = no_index;                                   ///< `no_index`: no point is held
     std::array<Index, 3> corners{no_index, no_index, no_index};  ///< its vertices
     Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the held point
     Vector3<Scalar> offset = Vector3<Scalar>::Zero();            ///< from the tool to the held point [m]
-    Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< where the held point would be without the tool [m]
-    Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();     ///< of the body there, where it moves [m/s]
+    Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< position of the held point without the tool [m]
+    Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();     ///< of a moving body at the held point [m/s]
 
     [[nodiscard]] bool holding() const noexcept { return triangle != no_index; }
 
-    /// How far the tool has taken the held point from where it would be without it [m]. @pre holding()
+    /// Displacement of the held point by the tool [m]. @pre holding()
     [[nodiscard]] Vector3<Scalar> displacement(const Tool<Scalar>& tool) const noexcept {
         return tool.position + offset - origin;
     }
 };
 
-/// How forceps take hold.
+/// How forceps grasp.
 struct GraspOptions {
-    bool snap_to_vertex = false;  ///< hold the nearest vertex rather than the very point touched
+    bool snap_to_vertex = false;  ///< hold the nearest vertex instead of the contact point
 };
 
-/// Takes hold of the contact point when the tool closes on the membrane, and lets go when it opens.
+/// Holds the contact point from when the tool closes in contact until it opens.
 template <Real Scalar>
 class Grasper {
   public:
     explicit Grasper(const TriangleMesh<Scalar>& mesh, GraspOptions options = {})
         : origins_(mesh.positions()), options_(options) {}
 
-    /// What the tool holds now. Forceps that were closed before they touched hold nothing.
+    /// The present grasp. Forceps that closed before the contact hold no point.
     [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                        const Tool<Scalar>& tool) noexcept;
 
-    /// The same on a body that moves: the held point goes along with it, and turns with it about the tool.
+    /// The present grasp on a moving body: the held point moves with the body and turns with it about the tool.
     [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                        const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
 
-    /// Lets go and forgets whether it was closed: from here on it does what a new one does, to the bit.
+    /// Drops the held point and the closed state: from here on the grasper equals a new one, bit for bit.
     void reset() noexcept {
         grasp_ = {};
         pose_ = {};

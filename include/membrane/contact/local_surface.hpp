@@ -13,15 +13,15 @@
 #include <membrane/surface/normals.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// A surface as seen from one of its triangles: what is around it, which way is out, where it comes nearest to a point.
+/// Local queries on a surface around a triangle: neighbours, outward direction, nearest point.
 ///
 ///     const membrane::LocalSurface<double> around(mesh);
 ///     const membrane::Index f = around.walk_to_closest(x, start, q);
-///     const double height = around.height(x, f, q);                        // of q over the surface, negative behind it
+///     const double height = around.height(x, f, q);              // of q above the surface, negative behind it
 namespace membrane {
 
-/// The triangles of a mesh and their neighbours, with the geometric questions that only these can answer. Positions are
-/// handed in. Online but for the constructor.
+/// The triangles of a mesh with their neighbours, and the geometric queries that need both. Positions are arguments.
+/// Online except for the constructor.
 template <Real Scalar>
 class LocalSurface {
   public:
@@ -39,10 +39,10 @@ class LocalSurface {
         return triangle_at(x, triangles_.col(f));
     }
 
-    /// Those with the corner `v`, ascending.
+    /// Triangles with the corner `v`, in ascending order.
     [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return adjacency_.triangles_of(v); }
 
-    /// Calls `visit(g)` once for each triangle that has a side in common with `f`; or a corner, as `f` itself has.
+    /// Calls `visit(g)` once for each triangle that shares a side with `f`; or a corner, including `f` itself.
     template <class Visit>
     void across_sides(Index f, Visit&& visit) const noexcept;
     template <class Visit>
@@ -57,21 +57,21 @@ class LocalSurface {
     /// Whether the point `barycentric` of triangle `f` is on the border of the surface.
     [[nodiscard]] bool on_border(Index f, const Vector3<Scalar>& barycentric) const noexcept;
 
-    /// Downhill from `f`, over the triangles around its corners, to one that is nearer to `q` than all around it.
+    /// Walks from `f` over triangles that share a corner, ever nearer to `q`, to a local minimum of the distance.
     [[nodiscard]] Index walk_to_closest(const ConstPointsRef<Scalar>& x, Index f,
                                         const Vector3<Scalar>& q) const noexcept;
 
-    /// Height of `q` over the surface at its nearest point of triangle `f`, negative behind it [m].
+    /// Signed distance of `q` from its nearest point of triangle `f`, negative behind the surface [m].
     [[nodiscard]] Scalar height(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q) const noexcept;
 
-    /// Where triangle `f` and the tool's axis come nearest.
+    /// The nearest points of triangle `f` and the tool's axis.
     [[nodiscard]] SegmentPair<Scalar> nearest(const ConstPointsRef<Scalar>& x, Index f,
                                               const Tool<Scalar>& tool) const noexcept;
 
     using Wide = std::array<Index, Lanes<Scalar>::count>;  ///< triangles
 
-    /// In lane i the squared distance of triangle `some[i]` from `q`, or from the tool's axis [m^2]: what `closest_point`
-    /// and `nearest` give, to the bit.
+    /// In lane i the squared distance of triangle `some[i]` from `q`, or from the tool's axis [m^2]. Equals the results
+    /// of `closest_point` and `nearest` bit for bit.
     [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                   const Vector3<Scalar>& q) const noexcept;
     [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
@@ -86,7 +86,7 @@ class LocalSurface {
 
     Triangles triangles_;
     Adjacency adjacency_;
-    std::vector<unsigned char> border_;  // vertices on it
+    std::vector<unsigned char> border_;  // whether vertex v is on the border
     Scalar mean_edge_ = 0;
 };
 
@@ -166,8 +166,8 @@ Index LocalSurface<Scalar>::walk_to_closest(const ConstPointsRef<Scalar>& x, Ind
 template <Real Scalar>
 Scalar LocalSurface<Scalar>::height(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q) const noexcept {
     const auto nearest = closest_point(triangle(x, f), q);
-    const Vector3<Scalar> reach = q - nearest.point;
-    return dot(reach, outward(x, f, nearest.barycentric)) < 0 ? -norm(reach) : norm(reach);
+    const Vector3<Scalar> separation = q - nearest.point;
+    return dot(separation, outward(x, f, nearest.barycentric)) < 0 ? -norm(separation) : norm(separation);
 }
 
 template <Real Scalar>
@@ -199,7 +199,7 @@ TrianglePoint<Lanes<Scalar>> LocalSurface<Scalar>::closest_points(const ConstPoi
 template <Real Scalar>
 Lanes<Scalar> LocalSurface<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                       const Vector3<Scalar>& q) const noexcept {
-    if constexpr (Lanes<Scalar>::parts > 1) {  // registers of half the lanes, without a blend: slower than one by one
+    if constexpr (Lanes<Scalar>::parts > 1) {  // several registers, no blend instruction: scalar code is faster
         return Lanes<Scalar>::of([&](std::size_t i) { return squared_distance(triangle(x, some[i]), q); });
     }
     return squared_distance(gather(x, some), Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));

@@ -9,19 +9,20 @@
 
 namespace membrane {
 
-/// What the device steers: a point, a sphere, or a capsule (an instrument's shaft).
+/// The tool that the device moves: a point, a sphere, or a capsule (an instrument's shaft).
 ///
 ///     const membrane::Tool<double> tip{.position = {0, 0, 0.011}, .radius = 1e-3};
 ///     const membrane::Tool<double> shaft{.position = {0, 0, 0.011}, .axis = {0, 0, 0.04}, .radius = 5e-4};
 template <Real Scalar>
 struct Tool {
     Vector3<Scalar> position =
-        Vector3<Scalar>::Zero();                     ///< the reference point: centre, or centre of the tip's end [m]
-    Vector3<Scalar> axis = Vector3<Scalar>::Zero();  ///< to the other end of a capsule; zero for a sphere [m]
-    Scalar radius = 0;                               ///< zero for a point [m]
+        Vector3<Scalar>::Zero();  ///< reference point: centre of the sphere, or of the capsule's tip [m]
+    Vector3<Scalar> axis =
+        Vector3<Scalar>::Zero();  ///< from `position` to the other end of a capsule; zero for a sphere [m]
+    Scalar radius = 0;            ///< zero for a point [m]
     Vector3<Scalar> velocity = Vector3<Scalar>::Zero();  ///< of the reference point [m/s]
     Scalar time = 0;                                     ///< [s]
-    bool grasping = false;                               ///< the button that closes the forceps
+    bool grasping = false;                               ///< whether the forceps are closed
 };
 
 /// Whether every number of the tool is finite and the radius not negative.
@@ -31,7 +32,7 @@ template <Real Scalar>
            is_finite(tool.radius) && tool.radius >= 0;
 }
 
-/// The tool as seen from a body that moves.
+/// The tool in the frame of a moving body.
 template <Real Scalar>
 [[nodiscard]] Tool<Scalar> to_body_frame(const Tool<Scalar>& tool, const RigidFrame<Scalar>& body) noexcept {
     Tool<Scalar> seen = tool;
@@ -41,23 +42,24 @@ template <Real Scalar>
     return seen;
 }
 
-/// Where tool and triangle come nearest.
+/// The nearest points of tool and triangle.
 template <Real Scalar>
 struct Proximity {
-    Vector3<Scalar> barycentric;  ///< of the point of the triangle
-    Vector3<Scalar> reach;        ///< from that point to the tool's axis [m]; the gap is its length less the radius
+    Vector3<Scalar> barycentric;  ///< of the triangle's point
+    Vector3<Scalar> separation;   ///< from that point to the tool's axis [m]; the gap is its length minus the radius
 };
 
-/// How many pairs of features can be in touch at once: a sphere touches a triangle in one point, a capsule that lies on
-/// it with both ends and across its edges.
+/// Number of pairs of features that can be in contact at once: 1 for a sphere; 5 for a capsule, its two ends and its
+/// axis across the three edges.
 template <Real Scalar>
 [[nodiscard]] int feature_pairs(const Tool<Scalar>& tool) noexcept {
     return tool.axis.isZero(0) ? 1 : 5;
 }
 
-/// Nearest points of pair `pair`, 0 to `feature_pairs(tool)` - 1: each end of the axis against the triangle, then the
-/// axis against each edge. None where the axis is nearest with an end: the end has a pair of its own. Each pair changes
-/// smoothly as things move. Where all pairs are outside, the tool is, or its axis runs through the triangle's inside.
+/// Nearest points of pair `pair`, 0 to `feature_pairs(tool)` - 1: each end of the axis with the triangle, then the axis
+/// with each edge. If the axis is nearest to the edge with an end, returns no points: that end has its own pair. Each
+/// pair changes smoothly with the positions. If all gaps are positive, the tool is outside the triangle, or its axis
+/// runs through the triangle's interior.
 template <Real Scalar>
 [[nodiscard]] std::optional<Proximity<Scalar>> proximity(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool,
                                                          int pair) noexcept;

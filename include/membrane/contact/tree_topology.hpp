@@ -12,7 +12,7 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// How the triangles of a mesh are shared out in a binary tree.
+/// The topology of a binary tree over the triangles of a mesh.
 ///
 ///     const auto shape = membrane::tree_shape(mesh, 16);
 ///     std::printf("%d leaves, %d levels\n", statistics(shape).leaves, statistics(shape).depth);
@@ -20,17 +20,17 @@ namespace membrane {
 
 /// A binary tree over triangles, without geometry. Node 0 is the root.
 struct TreeTopology {
-    /// No node lies more steps below the root than this, whatever the mesh: see `tree_shape`.
+    /// Upper bound of the steps from the root to a node, for any mesh: see `tree_shape`.
     static constexpr Index max_depth = 63;
 
     struct Node {
         Index parent;  ///< `no_index` for the root.
-        Index first;   ///< Of the two children, `first` and `first + 1`; of a leaf's triangles, in `triangles`.
-        Index count;   ///< Of a leaf's triangles; 0 for a node with children.
+        Index first;   ///< Of the two children, `first` and `first + 1`; for a leaf, its start in `triangles`.
+        Index count;   ///< Number of a leaf's triangles; 0 for a node with children.
         [[nodiscard]] bool is_leaf() const noexcept { return count > 0; }
     };
     std::vector<Node> nodes;       ///< Depth first: children after their parent.
-    std::vector<Index> triangles;  ///< Leaf by leaf, ascending in each.
+    std::vector<Index> triangles;  ///< Leaf by leaf, in ascending order within each.
 };
 
 struct TreeStatistics {
@@ -40,14 +40,14 @@ struct TreeStatistics {
     double mean_leaf;  ///< [triangles]
 };
 
-/// A set of triangles is split at the middle of the longest side of its box, by where their centroids are. If one part
-/// is empty, the set is halved instead. A set of fewer than `balance_threshold` triangles is shared out evenly into two
-/// leaves, whatever the positions [Liu07] 2.3. Halves are taken at the median, so that they too lie side by side.
+/// A set of triangles is split by centroid at the middle of the longest side of its box. If one part is empty, the set
+/// is halved at the median of the centroids instead. A set of fewer than `balance_threshold` triangles is halved into
+/// two leaves, independently of the middle [Liu07] 2.3.
 ///
-/// From 32 steps below the root on, every set is halved; a set of fewer than 2^31 triangles is down to single ones 31
-/// steps later. So the depth is bounded by `max_depth`, and a search needs room for what waits beside one node a level.
+/// From 32 steps below the root on, every set is halved: a set of fewer than 2^31 triangles is split into single ones
+/// within 31 more steps. So `max_depth` bounds the depth, and with it the capacity of the stack of a search.
 ///
-/// The same for the same mesh everywhere. O(F log F) for usual shapes, at most O(F max_depth).
+/// The tree is the same on all platforms. O(F log F) for usual shapes, at most O(F max_depth).
 /// @throws InvalidInput if `balance_threshold` is below 1
 template <Real Scalar>
 [[nodiscard]] TreeTopology tree_shape(const TriangleMesh<Scalar>& mesh, Index balance_threshold);
@@ -55,17 +55,16 @@ template <Real Scalar>
 /// O(F).
 [[nodiscard]] inline TreeStatistics statistics(const TreeTopology& shape);
 
-/// A binary tree of which most nodes are folded into those above: what is left of it, and is no leaf, has up to `width`
-/// children.
+/// A binary tree with most nodes collapsed into their ancestors: each inner node left has up to `width` children.
 template <std::size_t width>
 struct CollapsedTree {
     using Children = std::array<Index, width>;  ///< Nodes of the binary tree, then `no_index`.
 
-    std::vector<Index> nodes;        ///< Of the binary tree; the root first, children after their parent.
-    std::vector<Children> children;  ///< Of each.
+    std::vector<Index> nodes;        ///< Indices in the binary tree; the root first, children after their parent.
+    std::vector<Children> children;  ///< Of each node.
 };
 
-/// Folds in what has most triangles first. A root that is a leaf is the only child of itself. O(nodes).
+/// Collapses the nodes with most triangles first. A root that is a leaf becomes its own only child. O(nodes).
 template <std::size_t width>
 [[nodiscard]] CollapsedTree<width> folded(const TreeTopology& shape);
 
@@ -77,8 +76,8 @@ class TriangleSplit {
   public:
     explicit TriangleSplit(const TriangleMesh<Scalar>& mesh);
 
-    /// Puts the set in the order of its two parts, neither of them empty, and returns the size of the first.
-    /// @pre two triangles at least
+    /// Partitions the set into two parts, neither of them empty, and returns the size of the first.
+    /// @pre at least two triangles
     [[nodiscard]] Index operator()(std::span<Index> set, bool evenly) const;
 
   private:
@@ -100,34 +99,35 @@ Index TriangleSplit<Scalar>::operator()(std::span<Index> set, bool evenly) const
     Box<Scalar> box;
     for (const Index f : set) box.include(boxes_[static_cast<std::size_t>(f)]);
     const int axis = major_axis(box);
-    const auto place = [&](Index f) { return centroids_[static_cast<std::size_t>(f)][axis]; };
+    const auto coordinate = [&](Index f) { return centroids_[static_cast<std::size_t>(f)][axis]; };
     if (!evenly) {
         const Scalar middle = (box.low[axis] + box.high[axis]) / 2;
-        const auto right = std::partition(set.begin(), set.end(), [&](Index f) { return place(f) < middle; });
+        const auto right = std::partition(set.begin(), set.end(), [&](Index f) { return coordinate(f) < middle; });
         if (right != set.begin() && right != set.end()) return static_cast<Index>(right - set.begin());
     }
     const auto median = set.begin() + static_cast<std::ptrdiff_t>(set.size() / 2);
     std::nth_element(set.begin(), median, set.end(), [&](Index f, Index g) {
-        return place(f) != place(g) ? place(f) < place(g) : f < g;  // no ties, or each library would break its own way
+        // A strict order: the result does not depend on the library.
+        return coordinate(f) != coordinate(g) ? coordinate(f) < coordinate(g) : f < g;
     });
     return static_cast<Index>(median - set.begin());
 }
 
-/// Grows the tree below node `i`, a leaf so far.
+/// Builds the tree below node `i`, which is still a leaf.
 template <Real Scalar>
 void grow(TreeTopology& shape, const TriangleSplit<Scalar>& split, Index balance_threshold, Index i, Index depth) {
     constexpr Index halving_depth = TreeTopology::max_depth - 31;
     const auto [parent, first, count] = shape.nodes[static_cast<std::size_t>(i)];
     if (count == 1) return;
-    const bool shared_out = count < balance_threshold;
+    const bool into_leaves = count < balance_threshold;
     const auto set =
         std::span(shape.triangles).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
-    const Index half = split(set, shared_out || depth >= halving_depth);
+    const Index half = split(set, into_leaves || depth >= halving_depth);
     const auto child = static_cast<Index>(shape.nodes.size());
     shape.nodes[static_cast<std::size_t>(i)] = {parent, child, 0};
     shape.nodes.push_back({i, first, half});
     shape.nodes.push_back({i, first + half, count - half});
-    if (shared_out) return;
+    if (into_leaves) return;
     grow(shape, split, balance_threshold, child, depth + 1);
     grow(shape, split, balance_threshold, child + 1, depth + 1);
 }

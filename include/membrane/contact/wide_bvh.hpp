@@ -19,7 +19,7 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Boxes around the triangles of a surface that deforms, and the way through them to those that matter.
+/// A bounding volume hierarchy over the triangles of a deforming surface, with several boxes tested at once.
 ///
 ///     auto boxes = membrane::WideBvh(mesh, {.balance_threshold = 16});
 ///     boxes.refit(x, report.moved);
@@ -27,47 +27,46 @@
 namespace membrane {
 
 struct TreeOptions {
-    /// A set of fewer triangles is shared out evenly into two leaves whatever their positions [Liu07] 2.3. Low: fewer
-    /// triangles are tested; high: fewer boxes, and a refit costs less. At least 1.
+    /// A set of fewer triangles is halved into two leaves [Liu07] 2.3. A low value tests fewer triangles; a high value
+    /// tests fewer boxes and makes a refit cheaper. At least 1.
     Index balance_threshold = 16;
 };
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// The splits are those of `tree_shape`; folded, so that a node has as many children as the processor reckons with side
-/// by side.
+/// The splits are those of `tree_shape`, collapsed so that a node has up to one child for each of the `Lanes`.
 template <Real Scalar>
 class WideBvh {
   public:
     /// O(F log F) for usual shapes. @throws InvalidInput if `balance_threshold` is below 1
     explicit WideBvh(const TriangleMesh<Scalar>& mesh, const TreeOptions& options = {});
 
-    /// Fits all boxes, or those around the vertices `moved`: see `AabbTree`.
+    /// Refits all boxes, or those around the vertices `moved`: see `AabbTree`.
     void refit(const ConstPointsRef<Scalar>& x) noexcept;
     void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
-    /// Calls `examine(Index f, triangle)` for the triangles with a key below `limit` in boxes with such a key, the lowest
-    /// of several boxes first; `examine` may lower the limit. `key(box)` is a number, of several boxes as many; so is
-    /// `key(triangle)`, if there is one: else the key of a triangle is that of its box. Returns the boxes visited.
+    /// Calls `examine(Index f, triangle)` for each triangle with a key below `limit`, of boxes with a key below
+    /// `limit`. Visits sibling boxes by ascending key; `examine` may lower the limit. `key(box)` is one number a box;
+    /// `key(triangle)` is optional: by default a triangle has the key of its box. Returns the number of boxes visited.
     template <class Key, class Examine>
     [[nodiscard]] Index search(const ConstPointsRef<Scalar>& x, Key key, const Scalar& limit,
                                Examine examine) const noexcept;
 
     [[nodiscard]] const TreeStatistics& statistics() const noexcept { return statistics_; }
 
-    /// Around all triangles.
+    /// The box around all triangles.
     [[nodiscard]] const Box<Scalar>& surface() const noexcept { return surface_; }
 
-    /// Around those below a node of `tree_shape`. @pre 0 <= `node` < `statistics().nodes` (asserted)
+    /// The box around the triangles below a node of `tree_shape`. @pre 0 <= `node` < `statistics().nodes` (asserted)
     [[nodiscard]] Box<Scalar> box(Index node) const noexcept;
 
   private:
     static constexpr std::size_t width = Lanes<Scalar>::count;
     static constexpr std::size_t bits_in_word = 64;
-    static constexpr Index filled = 4;  // what the length of most rows of vertices and leaves is a multiple of
+    static constexpr Index filled = 4;  // most rows of vertices and leaves are padded to a multiple of this
 
-    /// Of each child the box, and which part it is. In place of those that are missing the first one's box: a key is
-    /// to be reckoned with valid numbers only.
+    /// The box and the part index of each child. Missing children have the box of the first child: keys must be
+    /// computed from finite numbers only.
     struct alignas(64) Node {
         Box<Lanes<Scalar>> boxes;
         std::array<Index, width> child;
@@ -82,16 +81,16 @@ class WideBvh {
     };
 
     void fold();
-    void share_out_vertices(Index vertex_count);
+    void collect_vertices_and_leaves(Index vertex_count);
     [[nodiscard]] Index node_count() const noexcept { return static_cast<Index>(nodes_.size()); }
     [[nodiscard]] std::span<const Item> items_of(Index leaf) const noexcept {
         const auto [first, count] = leaves_[static_cast<std::size_t>(leaf)];
         return std::span(items_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
     }
-    [[nodiscard]] Box<Scalar> box_in(Index place) const noexcept;
+    [[nodiscard]] Box<Scalar> box_in(Index slot) const noexcept;
     void fit_leaf(const ConstPointsRef<Scalar>& x, Index leaf) noexcept;
     void fit_node(Index n) noexcept;
-    void put(const Box<Scalar>& box, Index place) noexcept;
+    void put(const Box<Scalar>& box, Index slot) noexcept;
     void mark_parent(Index part) noexcept;
     [[nodiscard]] static Triangle<Lanes<Scalar>> triangles_at(const ConstPointsRef<Scalar>& x,
                                                               const Item* some) noexcept;
@@ -102,18 +101,18 @@ class WideBvh {
 
     TreeTopology shape_;
     std::vector<Node> nodes_;
-    Box<Scalar> surface_;      // around everything
+    Box<Scalar> surface_;      // around all triangles
     std::vector<Item> items_;  // leaf by leaf
     std::vector<Leaf> leaves_;
 
-    // Parts are the nodes, and after them the leaves; places number node for node what may be a child.
-    std::vector<Index> place_of_node_;  // of the shape; `no_index` for the root and what is folded in
-    std::vector<Index> place_of_part_;  // `no_index` for the root
-    // Filled up by repetition: a processor predicts rows that are nearly all equally long.
+    // Part indices: the nodes, then the leaves. Slot indices: `width` child slots for each node.
+    std::vector<Index> slot_of_node_;  // of the shape; `no_index` for the root and collapsed nodes
+    std::vector<Index> slot_of_part_;  // `no_index` for the root
+    // Padded by repetition: branch prediction is better if nearly all rows have the same length.
     CompressedRows<Index> vertices_of_;       // of a leaf
     CompressedRows<Index> leaves_of_;         // around a vertex
-    IndexSet stale_leaves_;                   // to be fitted
-    std::vector<std::uint64_t> stale_nodes_;  // 64 in a word
+    IndexSet stale_leaves_;                   // to be refitted
+    std::vector<std::uint64_t> stale_nodes_;  // 64 nodes a word
     TreeStatistics statistics_;
 };
 
@@ -121,7 +120,7 @@ class WideBvh {
 
 namespace detail {
 
-/// Of triangles, the key of their boxes; or the query's own.
+/// The query's key of the triangles if it has one, else the key of their boxes.
 template <class Key, Number N>
 [[nodiscard]] N key_of(const Key& key, const Triangle<N>& triangles) noexcept {
     if constexpr (requires { key(triangles); })
@@ -141,9 +140,9 @@ WideBvh<Scalar>::WideBvh(const TriangleMesh<Scalar>& mesh, const TreeOptions& op
         const auto corners = mesh.triangles().col(f);
         items_.push_back({{corners[0], corners[1], corners[2]}, f});
     }
-    items_.insert(items_.end(), width - 1, items_.back());  // several are read at once, from any on
+    items_.insert(items_.end(), width - 1, items_.back());  // several are read at once, from any item on
     fold();
-    share_out_vertices(mesh.vertex_count());
+    collect_vertices_and_leaves(mesh.vertex_count());
     stale_leaves_ = IndexSet(statistics_.leaves);
     stale_nodes_.assign(nodes_.size() / bits_in_word + 1, 0);
     refit(mesh.positions());
@@ -153,9 +152,9 @@ template <Real Scalar>
 void WideBvh<Scalar>::fold() {
     const auto wide = folded<width>(shape_);
     nodes_.resize(wide.nodes.size());
-    place_of_node_.assign(shape_.nodes.size(), no_index);
-    place_of_part_.assign(nodes_.size() + static_cast<std::size_t>(statistics_.leaves), no_index);
-    std::vector<Index> part_of(shape_.nodes.size(), no_index);  // for the nodes of the shape
+    slot_of_node_.assign(shape_.nodes.size(), no_index);
+    slot_of_part_.assign(nodes_.size() + static_cast<std::size_t>(statistics_.leaves), no_index);
+    std::vector<Index> part_of(shape_.nodes.size(), no_index);  // of the nodes of the shape
     for (std::size_t n = 0; n < nodes_.size(); ++n)
         part_of[static_cast<std::size_t>(wide.nodes[n])] = static_cast<Index>(n);
     for (std::size_t i = 0; i < shape_.nodes.size(); ++i) {
@@ -168,16 +167,16 @@ void WideBvh<Scalar>::fold() {
         node.child.fill(0);
         for (node.children = 0; node.children < width && wide.children[n][node.children] != no_index; ++node.children) {
             const auto i = static_cast<std::size_t>(wide.children[n][node.children]);
-            const auto place = static_cast<Index>(n * width + node.children);
-            place_of_node_[i] = place;
-            place_of_part_[static_cast<std::size_t>(part_of[i])] = place;
+            const auto slot = static_cast<Index>(n * width + node.children);
+            slot_of_node_[i] = slot;
+            slot_of_part_[static_cast<std::size_t>(part_of[i])] = slot;
             node.child[node.children] = part_of[i];
         }
     }
 }
 
 template <Real Scalar>
-void WideBvh<Scalar>::share_out_vertices(Index vertex_count) {
+void WideBvh<Scalar>::collect_vertices_and_leaves(Index vertex_count) {
     vertices_of_ = CompressedRows<Index>(statistics_.leaves, [&](auto put) {
         std::vector<Index> latest(static_cast<std::size_t>(vertex_count), no_index);
         for (Index leaf = 0; leaf < statistics_.leaves; ++leaf) {
@@ -209,9 +208,9 @@ void WideBvh<Scalar>::share_out_vertices(Index vertex_count) {
 }
 
 template <Real Scalar>
-Box<Scalar> WideBvh<Scalar>::box_in(Index place) const noexcept {
-    const auto& boxes = nodes_[static_cast<std::size_t>(place) / width].boxes;
-    const std::size_t i = static_cast<std::size_t>(place) % width;
+Box<Scalar> WideBvh<Scalar>::box_in(Index slot) const noexcept {
+    const auto& boxes = nodes_[static_cast<std::size_t>(slot) / width].boxes;
+    const std::size_t i = static_cast<std::size_t>(slot) % width;
     return {{boxes.low[0][i], boxes.low[1][i], boxes.low[2][i]},
             {boxes.high[0][i], boxes.high[1][i], boxes.high[2][i]}};
 }
@@ -230,29 +229,29 @@ template <Real Scalar>
             high = larger(high, p);
         }
     }
-    put({low.point(), high.point()}, place_of_part_[static_cast<std::size_t>(node_count() + leaf)]);
+    put({low.point(), high.point()}, slot_of_part_[static_cast<std::size_t>(node_count() + leaf)]);
 }
 
 template <Real Scalar>
 void WideBvh<Scalar>::fit_node(Index n) noexcept {
     const std::size_t children = nodes_[static_cast<std::size_t>(n)].children;
     const Index first = n * static_cast<Index>(width);
-    const Box<Scalar> in_place_of_missing = box_in(first);
-    for (std::size_t i = children; i < width; ++i) put(in_place_of_missing, first + static_cast<Index>(i));
+    const Box<Scalar> box_of_first = box_in(first);
+    for (std::size_t i = children; i < width; ++i) put(box_of_first, first + static_cast<Index>(i));
     Box<Scalar> box;
     for (Index i = 0; i < static_cast<Index>(width); ++i) box.include(box_in(first + i));
-    const Index place = place_of_part_[static_cast<std::size_t>(n)];
-    if (place == no_index) {
+    const Index slot = slot_of_part_[static_cast<std::size_t>(n)];
+    if (slot == no_index) {
         surface_ = box;
     } else {
-        put(box, place);
+        put(box, slot);
     }
 }
 
 template <Real Scalar>
-[[gnu::always_inline]] inline void WideBvh<Scalar>::put(const Box<Scalar>& box, Index place) noexcept {
-    auto& boxes = nodes_[static_cast<std::size_t>(place) / width].boxes;
-    const std::size_t i = static_cast<std::size_t>(place) % width;
+[[gnu::always_inline]] inline void WideBvh<Scalar>::put(const Box<Scalar>& box, Index slot) noexcept {
+    auto& boxes = nodes_[static_cast<std::size_t>(slot) / width].boxes;
+    const std::size_t i = static_cast<std::size_t>(slot) % width;
     for (int k = 0; k < 3; ++k) {
         boxes.low[k].set(i, box.low[k]);
         boxes.high[k].set(i, box.high[k]);
@@ -261,7 +260,7 @@ template <Real Scalar>
 
 template <Real Scalar>
 void WideBvh<Scalar>::mark_parent(Index part) noexcept {
-    const std::size_t parent = static_cast<std::size_t>(place_of_part_[static_cast<std::size_t>(part)]) / width;
+    const std::size_t parent = static_cast<std::size_t>(slot_of_part_[static_cast<std::size_t>(part)]) / width;
     stale_nodes_[parent / bits_in_word] |= std::uint64_t{1} << parent % bits_in_word;
 }
 
@@ -292,7 +291,7 @@ void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x) noexcept {
 template <Real Scalar>
 void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
     MEMBRANE_ASSERT(x.cols() == leaves_of_.row_count());
-    if (moved.size() >= static_cast<std::size_t>(x.cols()) / 2) return refit(x);  // costs less from there on
+    if (moved.size() >= static_cast<std::size_t>(x.cols()) / 2) return refit(x);  // cheaper from here on
     stale_leaves_.clear();
     for (const Index v : moved) {
         for (const Index leaf : leaves_of_[v]) stale_leaves_.insert(leaf);
@@ -301,7 +300,7 @@ void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x, std::span<const Ind
         fit_leaf(x, leaf);
         mark_parent(node_count() + leaf);
     }
-    // Parents come before their children: of what is marked the last is fitted first, and all of it once.
+    // Parents come before their children: marked nodes are refitted in descending order, each once.
     for (std::size_t word = stale_nodes_.size(); word-- > 0;) {
         while (const std::uint64_t left = stale_nodes_[word]) {
             const auto last = bits_in_word - 1 - static_cast<std::size_t>(std::countl_zero(left));
@@ -371,8 +370,8 @@ template <Real Scalar>
 Box<Scalar> WideBvh<Scalar>::box(Index node) const noexcept {
     MEMBRANE_ASSERT(node >= 0 && node < statistics_.nodes);
     if (node == 0) return surface_;
-    const Index place = place_of_node_[static_cast<std::size_t>(node)];
-    if (place != no_index) return box_in(place);
+    const Index slot = slot_of_node_[static_cast<std::size_t>(node)];
+    if (slot != no_index) return box_in(slot);
     const Index first = shape_.nodes[static_cast<std::size_t>(node)].first;
     Box<Scalar> both = box(first);
     both.include(box(first + 1));

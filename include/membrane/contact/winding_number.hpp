@@ -8,14 +8,14 @@
 #include <membrane/contact/local_surface.hpp>
 #include <membrane/core/exact_sign.hpp>
 
-/// Whether a point is inside a closed surface, however creased or folded the surface is.
+/// Whether a point is inside a closed surface, also one with creases and folds.
 ///
-///     if (winding_number(surface, tree, x, tool.position) != 0) { /* the tool has passed the surface */ }
+///     if (winding_number(surface, tree, x, tool.position) != 0) { /* the tool has tunnelled */ }
 namespace membrane {
 
-/// How often the closed surface winds round `q`: 0 outside a valid one, 1 inside. As `q` and the surface move, this
-/// changes only where one passes the other. Without meaning for an open surface; exact but on the surface itself.
-/// Online. Cost: the triangles in the boxes that a ray along an axis, the shortest way out of the tree, runs through.
+/// Winding number of a closed surface about `q`: 0 outside a valid surface, 1 inside. It changes only if `q` passes
+/// through the surface. Undefined for an open surface; exact except on the surface itself. Online. Cost: the triangles
+/// in the boxes that the shortest axis-parallel ray from `q` out of the tree meets.
 /// @pre `tree` was last fitted to `x`
 template <Real Scalar>
 [[nodiscard]] int winding_number(const LocalSurface<Scalar>& surface, const AabbTree<Scalar>& tree,
@@ -24,8 +24,8 @@ template <Real Scalar>
 
 namespace detail {
 
-/// How often the triangle, seen from the end of axis `k`, winds round `q`. What lies on a side that two triangles have in
-/// common is in one of them.
+/// Winding number of the triangle about `q`, seen from the end of axis `k`. A point on a side that two triangles share
+/// is in exactly one of them.
 [[nodiscard]] inline int winding_in_plane(const Triangle<double>& triangle, const Vector3<double>& q, int k) noexcept {
     const int up = (k + 2) % 3;
     int sum = 0;
@@ -47,8 +47,8 @@ int winding_number(const LocalSurface<Scalar>& surface, const AabbTree<Scalar>& 
     if (!(squared_distance(all, q) == 0)) return 0;
     const Vector3<Scalar> above = all.high - q, below = q - all.low;
     const bool upward = above.minCoeff() < below.minCoeff();
-    const Vector3<Scalar>& displacement = upward ? above : below;
-    const auto axis = std::min_element(displacement.begin(), displacement.end()) - displacement.begin();
+    const Vector3<Scalar>& lengths = upward ? above : below;  // of the rays
+    const auto axis = std::min_element(lengths.begin(), lengths.end()) - lengths.begin();
     Vector3<Scalar> low = q, high = q;
     (upward ? high : low)[axis] = (upward ? all.high : all.low)[axis];
 

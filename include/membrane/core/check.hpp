@@ -14,36 +14,35 @@
 
 #include <membrane/core/types.hpp>
 
-/// What happens when something is wrong.
+/// Error handling.
 ///
-/// Offline, input from outside is checked in every build and refused with `InvalidInput`. Online, what can be expected
-/// is a value in a report; a broken precondition is a `MEMBRANE_ASSERT`, which only debug builds check.
+/// Offline code checks the caller's input in every build and throws `InvalidInput`. Online code returns expected errors
+/// as values in a report. Its preconditions are `MEMBRANE_ASSERT`s, which only debug builds check.
 ///
 ///     try { membrane::MassSpringNetwork network(mesh, law, options); }
 ///     catch (const membrane::InvalidInput& e) { std::puts(e.what()); }
 ///     // MassSpringNetwork: stiffness of spring 17 must be finite and not negative [N/m], got -3
 namespace membrane {
 
-/// Input that a part cannot work with. The message names component, field, index, what was found and what is expected.
+/// Invalid input. The message names component, field, index, the value expected and the value found.
 class InvalidInput : public std::invalid_argument {
   public:
     using std::invalid_argument::invalid_argument;
 };
 
-/// Called with the message when a check fails and the translation unit is compiled without exceptions. It must not
-/// return: if it does, the program is aborted.
+/// Called with the message if a check fails in a translation unit compiled without exceptions. It must not return: if
+/// it does, the program is aborted.
 using InvalidInputHandler = void (*)(const char* message);
 
-/// Called with the condition and its place when a `MEMBRANE_ASSERT` fails; the program is aborted when it returns.
+/// Called with the condition, file and line if a `MEMBRANE_ASSERT` fails. If it returns, the program is aborted.
 using AssertHandler = void (*)(const char* condition, const char* file, int line) noexcept;
 
-/// Replaces the handler for the whole program and returns the one before; null restores the stock one, which prints
-/// to stderr. Safe from any thread.
+/// Replaces the handler for the whole program and returns the previous one; null restores the default, which prints to
+/// stderr. Thread-safe.
 inline InvalidInputHandler set_invalid_input_handler(InvalidInputHandler handler) noexcept;
 inline AssertHandler set_assert_handler(AssertHandler handler) noexcept;
 
-/// Whether `value` is neither infinite nor NaN, also under `-ffast-math`, which lets the standard's own test say yes
-/// to everything.
+/// Whether `value` is neither infinite nor NaN, also under `-ffast-math`, where `std::isfinite` may always be true.
 template <Real Scalar>
 [[nodiscard]] bool is_finite(Scalar value) noexcept;
 
@@ -53,11 +52,11 @@ template <Real Scalar>
 template <class Derived>
 [[nodiscard]] bool is_finite(const Eigen::DenseBase<Derived>& values) noexcept;
 
-/// Refuses input: throws `InvalidInput` with the parts put together, "component: part part ...". Offline only.
+/// Throws `InvalidInput` with the message "component: part part ...", the parts concatenated. Offline only.
 template <class... Parts>
 [[noreturn]] void refuse(std::string_view component, const Parts&... parts);
 
-/// A precondition of online code: checked where `NDEBUG` is not defined, costs nothing elsewhere.
+/// A precondition of online code: checked unless `NDEBUG` is defined; then it costs nothing.
 #ifdef NDEBUG
 #define MEMBRANE_ASSERT(condition) static_cast<void>(0)
 #else
@@ -150,7 +149,7 @@ void refuse(std::string_view component, const Parts&... parts) {
 
 namespace detail {
 
-/// Refuses an option that is not finite, or negative, or zero where it must not be.
+/// Throws `InvalidInput` if the option is not finite, negative, or zero unless `allow_zero`.
 inline void check_option(std::string_view component, double value, std::string_view field, std::string_view unit,
                          bool allow_zero = true) {
     if (is_finite(value) && (value > 0 || (allow_zero && value == 0))) return;

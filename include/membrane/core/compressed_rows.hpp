@@ -9,7 +9,7 @@
 
 namespace membrane {
 
-/// Rows of different lengths, one after the other in one array.
+/// Rows of different lengths, stored contiguously in one array.
 ///
 ///     const CompressedRows<Index> triangles_of(vertex_count, [&](auto put) {
 ///         for (Index f = 0; f < triangles.cols(); ++f) {
@@ -21,8 +21,8 @@ class CompressedRows {
   public:
     CompressedRows() = default;  ///< No rows.
 
-    /// `for_each_item(put)` calls `put(row, item)` for every item; it is run twice and must do the same both times. A
-    /// row holds its items in the order of the calls. Linear.
+    /// `for_each_item(put)` calls `put(row, item)` for every item. It is called twice and must make the same calls both
+    /// times. A row holds its items in the order of the calls. Linear in rows and items.
     template <class ForEachItem>
     CompressedRows(Index row_count, ForEachItem for_each_item);
 
@@ -39,7 +39,7 @@ class CompressedRows {
     [[nodiscard]] std::span<const Item> items() const noexcept { return items_; }
 
   private:
-    std::vector<std::size_t> begin_{0};  // of each row, and the end of the last
+    std::vector<std::size_t> begin_{0};  // of each row, then the end of the last
     std::vector<Item> items_;
 };
 

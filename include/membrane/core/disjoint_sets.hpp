@@ -8,19 +8,19 @@
 
 namespace membrane {
 
-/// Numbers in sets that grow together.
+/// Disjoint sets of the numbers from 0 to `count` - 1, with union and find.
 ///
 ///     DisjointSets parts(triangle_count);
 ///     parts.unite(f, g);
 ///     parts.find(f) == parts.find(g);
 class DisjointSets {
   public:
-    /// Each number below `count` in a set of its own.
+    /// Each number below `count` starts in a set of its own.
     explicit DisjointSets(std::size_t count) : parent_(count) {
         std::iota(parent_.begin(), parent_.end(), std::size_t{0});
     }
 
-    /// The lowest number of the set that holds `i`. O(log count), in the mean over many calls.
+    /// The lowest number of the set that contains `i`. O(log count), amortised.
     std::size_t find(std::size_t i) noexcept {
         while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
         return i;

@@ -7,19 +7,19 @@
 
 #include <membrane/core/types.hpp>
 
-/// On which side a point lies, without rounding: signs that never contradict each other.
+/// Exact orientation predicates: signs of volumes and areas, consistent with each other.
 ///
-///     if (sign_of_volume(a, b, c, d) == 0) { /* the four lie in one plane, exactly */ }
+///     if (sign_of_volume(a, b, c, d) == 0) { /* the four points are exactly coplanar */ }
 ///
-/// Reckoned in plain numbers first; only where their error could change the sign, exactly [Shewchuk97]. Not exact under
-/// `-ffast-math`, nor where products of three differences overflow or vanish.
+/// Computed in floating point first; if the rounding error could change the sign, in exact arithmetic [Shewchuk97]. Not
+/// exact under `-ffast-math`, or if products of three differences overflow or underflow.
 namespace membrane {
 
-/// -1, 0 or 1: of the volume of a, b, c, d; positive where d sees a, b, c counter-clockwise.
+/// Sign of the volume of a, b, c, d: -1, 0 or 1; positive if a, b, c run counter-clockwise seen from d.
 [[nodiscard]] inline int sign_of_volume(const Vector3<double>& a, const Vector3<double>& b, const Vector3<double>& c,
                                         const Vector3<double>& d) noexcept;
 
-/// -1, 0 or 1: of the area of a, b, c seen from the end of axis `k`; positive where they run counter-clockwise.
+/// Sign of the area of a, b, c seen from the end of axis `k`: -1, 0 or 1; positive if they run counter-clockwise.
 [[nodiscard]] inline int sign_of_area(const Vector3<double>& a, const Vector3<double>& b, const Vector3<double>& c,
                                       int k) noexcept;
 
@@ -33,7 +33,7 @@ namespace detail {
 
 [[nodiscard]] constexpr int sign_of(double value) noexcept { return value > 0 ? 1 : value < 0 ? -1 : 0; }
 
-/// A number and what is missing to the exact result.
+/// A rounded result and its rounding error: the exact result is `value` + `rest`.
 struct Rounded {
     double value, rest;
 };
@@ -48,7 +48,7 @@ struct Rounded {
     return {product, std::fma(a, b, -product)};
 }
 
-/// A sum of up to 192 numbers, kept as numbers that do not overlap, the smallest first.
+/// An exact sum of up to 192 numbers, stored as nonoverlapping terms, smallest first.
 class ExactSum {
   public:
     void add(double number) noexcept {

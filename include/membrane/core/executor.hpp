@@ -7,10 +7,11 @@
 
 #include <membrane/core/types.hpp>
 
-/// Who does what may be done at the same time.
+/// Execution of independent tasks.
 ///
 ///     const auto in_my_pool = [&pool](membrane::Index count, const auto& task) { pool.for_each(count, task); };
-///     auto solver = membrane::QuasiStaticSolver(network, {.order = membrane::UpdateOrder::colour_all}, rule, in_my_pool);
+///     const membrane::SolverOptions options{.order = membrane::UpdateOrder::colour_all};
+///     auto solver = membrane::QuasiStaticSolver(network, options, rule, in_my_pool);
 namespace membrane {
 
 namespace detail {
@@ -21,8 +22,8 @@ struct SomeTask {
 
 }  // namespace detail
 
-/// `executor(count, task)` calls `task(i)` once for each `i` from 0 to `count` - 1, in any order and on any threads, and
-/// returns when all are done, after which there is no task. Neither throws; `count` may be 0.
+/// `executor(count, task)` calls `task(i)` once for each `i` from 0 to `count` - 1, in any order and on any threads. It
+/// returns after the last call and keeps no reference to `task`. Neither may throw. `count` may be 0.
 template <class E>
 concept Executor = std::copy_constructible<E> &&
     requires(const E& executor, Index count, const detail::SomeTask& task) {
@@ -42,11 +43,11 @@ consteval bool check_executor() noexcept {
 
 }  // namespace detail
 
-/// A `Executor`; where it is none, the error says what is missing.
+/// An `Executor`; if `E` is not one, the compile error names the missing property.
 template <class E>
 concept CheckedExecutor = detail::check_executor<E>();
 
-/// The thread that asks.
+/// Runs all tasks on the calling thread, in order.
 struct OneThread {
     template <class Task>
     void operator()(Index count, const Task& task) const noexcept {
@@ -60,19 +61,19 @@ class AnyExecutor;
 
 namespace detail {
 
-// To ask whether an executor of any type is an executor must not ask whether one can be made of it.
+// Excludes `AnyExecutor`, whose own check must not depend on its converting constructor.
 template <class E>
 concept OtherExecutor = !std::same_as<E, AnyExecutor> && CheckedExecutor<E>;
 
 }  // namespace detail
 
-/// An executor of any type: what gives it tasks depends on no type of executor. Copies share the executor it was made of,
-/// which lives as long as they do; what that refers to (a pool of threads) is its owner's to keep.
+/// A type-erased executor. Copies share the wrapped executor, which lives as long as the last copy. Objects that the
+/// wrapped executor refers to, as a thread pool, must outlive it.
 class AnyExecutor {
   public:
-    AnyExecutor() = default;  ///< One thread.
+    AnyExecutor() = default;  ///< Runs tasks on the calling thread.
 
-    /// Allocates, but for `OneThread`.
+    /// Allocates, except for `OneThread`.
     template <detail::OtherExecutor E>
     AnyExecutor([[maybe_unused]] const E& executor) {
         if constexpr (!std::same_as<E, OneThread>) {
@@ -83,7 +84,7 @@ class AnyExecutor {
         }
     }
 
-    /// Whether it is known that one thread does all tasks in order.
+    /// Whether all tasks are known to run on the calling thread, in order.
     [[nodiscard]] bool is_serial() const noexcept { return executor_ == nullptr; }
 
     template <class Task>
@@ -100,11 +101,11 @@ class AnyExecutor {
         void operator()(Index i) const noexcept { call(task, i); }
     };
 
-    std::shared_ptr<const void> executor_;  // none: one thread
+    std::shared_ptr<const void> executor_;  // null: the calling thread
     void (*run_)(const void* executor, Index count, const TaskRef& task) noexcept = nullptr;
 };
 
-/// Calls `act(begin, end)` for parts of 0 to `count` of at most `grain_size`, each part in a task.
+/// Splits the range from 0 to `count` into parts of at most `grain_size`; calls `act(begin, end)` in one task a part.
 template <Executor E, class Act>
 void parallel_for(const E& executor, std::size_t count, std::size_t grain_size, const Act& act) noexcept {
     const std::size_t tasks = count / grain_size + (count % grain_size > 0 ? 1 : 0);

@@ -11,7 +11,7 @@
 
 namespace membrane {
 
-/// One number for all, or one number for each vertex or spring.
+/// One number for all vertices or springs, or one for each.
 ///
 ///     VolumeSpringOptions<double> uniform{.stiffness = 8.0};
 ///     VolumeSpringOptions<double> graded{.stiffness = std::vector<double>{8.0, 9.5, 11.0}};
@@ -23,11 +23,11 @@ class Field {
     Field(std::vector<Scalar> each) : values_(std::move(each)) {}               // NOLINT(google-explicit-constructor)
     Field(std::span<const Scalar> each) : values_(each.begin(), each.end()) {}  // NOLINT(google-explicit-constructor)
 
-    /// Whether anything was given.
+    /// Whether a value was given.
     [[nodiscard]] bool given() const noexcept { return !values_.empty(); }
 
-    /// The numbers for `count` items, each finite and not negative, nor zero unless `allow_zero`.
-    /// @throws InvalidInput naming component, field and item, with the unit as given
+    /// The numbers for `count` items. Each must be finite and positive, or zero if `allow_zero`.
+    /// @throws InvalidInput if a number or their count is invalid; the message names component, field, item and unit
     [[nodiscard]] std::vector<Scalar> expand(Index count, std::string_view component, std::string_view field,
                                              std::string_view item, std::string_view unit,
                                              bool allow_zero = true) const;

@@ -9,18 +9,18 @@
 
 namespace membrane {
 
-/// A list with room for a fixed number of items: it allocates when it is made or copied, and never else. (A copied
-/// `std::vector` has lost what was reserved.)
+/// A vector of fixed capacity: allocates only when constructed or copied. (A copied `std::vector` loses its reserved
+/// capacity.)
 ///
-///     FixedVector<Touch<double>> contacts(4096);
-///     if (!contacts.push(touch)) { /* full */ }
+///     FixedVector<ContactPoint<double>> points(4096);
+///     if (!points.push(point)) { /* full */ }
 template <class Item>
 class FixedVector {
   public:
     FixedVector() = default;
     explicit FixedVector(std::size_t capacity) : slots_(capacity) {}
 
-    /// Adds `item` at the end, or says that there is no room for it.
+    /// Appends `item`; returns false if the capacity is used up.
     bool push(const Item& item) noexcept {
         if (count_ == slots_.size()) return false;
         slots_[count_++] = item;
@@ -28,7 +28,7 @@ class FixedVector {
     }
     void clear() noexcept { count_ = 0; }
 
-    /// Keeps the first `count` items. @pre no more than there are (asserted)
+    /// Keeps the first `count` items. @pre `count` <= size() (asserted)
     void cut(std::size_t count) noexcept {
         MEMBRANE_ASSERT(count <= count_);
         count_ = count;
@@ -38,7 +38,7 @@ class FixedVector {
     [[nodiscard]] std::size_t size() const noexcept { return count_; }
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
 
-    /// Valid until the list is assigned to or destroyed.
+    /// Valid until the vector is assigned to or destroyed.
     [[nodiscard]] std::span<Item> items() noexcept { return {slots_.data(), count_}; }
     [[nodiscard]] std::span<const Item> items() const noexcept { return {slots_.data(), count_}; }
 

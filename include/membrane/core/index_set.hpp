@@ -11,7 +11,7 @@
 
 namespace membrane {
 
-/// A set of vertices or triangles that keeps the order of arrival and is emptied in no time, however large the mesh.
+/// A set of vertex or triangle indices in order of insertion. `clear` is O(1), amortised.
 ///
 ///     IndexSet touched(mesh.triangle_count());
 ///     if (touched.insert(f)) { ... }         // f was not in it
@@ -20,10 +20,10 @@ class IndexSet {
   public:
     IndexSet() = default;
 
-    /// An empty set that can hold 0 to `size` - 1; allocates all it will ever need.
+    /// An empty set for indices from 0 to `size` - 1; allocates all its memory.
     explicit IndexSet(Index size) : mark_(static_cast<std::size_t>(size), 0), items_(mark_.size()) {}
 
-    /// Whether `i` is new to the set; it is in it afterwards. @pre 0 <= `i` < size (asserted)
+    /// Inserts `i`; returns whether it was new. @pre 0 <= `i` < size (asserted)
     bool insert(Index i) noexcept {
         if (contains(i)) return false;
         mark_[static_cast<std::size_t>(i)] = current_;
@@ -36,26 +36,26 @@ class IndexSet {
         return mark_[static_cast<std::size_t>(i)] == current_;
     }
 
-    /// In order of arrival; valid until the next change.
+    /// Indices in order of insertion; valid until the next change.
     [[nodiscard]] std::span<const Index> items() const noexcept { return items_.items(); }
     [[nodiscard]] Index count() const noexcept { return static_cast<Index>(items_.size()); }
     [[nodiscard]] bool empty() const noexcept { return items_.empty(); }
 
-    /// The items from number `begin` on come in this order. @pre the same ones
+    /// Reorders the items from position `begin` on. @pre `order` holds the same items
     void reorder(std::size_t begin, std::span<const Index> order) noexcept {
         std::copy(order.begin(), order.end(), items_.items().begin() + static_cast<std::ptrdiff_t>(begin));
     }
 
     void clear() noexcept {
         items_.clear();
-        if (++current_ == 0) {  // every 2^32 times the old marks would come back to life
+        if (++current_ == 0) {  // after 2^32 calls old marks would count again
             std::fill(mark_.begin(), mark_.end(), 0U);
             current_ = 1;
         }
     }
 
   private:
-    std::vector<std::uint32_t> mark_;  // i is in the set where mark_[i] == current_
+    std::vector<std::uint32_t> mark_;  // i is in the set if mark_[i] == current_
     FixedVector<Index> items_;
     std::uint32_t current_ = 1;
 };

@@ -3,10 +3,10 @@
 
 /// The instruction set that a translation unit is compiled for.
 ///
-/// One program may have units compiled for several, as for SSE2 and for AVX2. What is packed in registers (solver, tree,
-/// packs of lanes) is in an inline namespace named after the set, `membrane::avx2::QuasiStaticSolver`: each unit uses its
-/// own, and what a unit is to get from one compiled otherwise does not link. All else (mesh, network, positions, tool,
-/// contact, report) is the same everywhere and may be handed on.
+/// One program may contain units compiled for different sets, as SSE2 and AVX2. Types packed in registers (solver,
+/// tree, lanes) are in an inline namespace named after the set, `membrane::avx2::QuasiStaticSolver`. Each unit uses its
+/// own types; passing one to a unit compiled for another set does not link. All other types (mesh, network, positions,
+/// tool, contact, report) are the same for all sets and may be passed between units.
 #if defined(__AVX512F__)
 #define MEMBRANE_INSTRUCTION_SET avx512
 #elif defined(__AVX2__)
@@ -21,14 +21,15 @@
 
 namespace membrane {
 
-// With the tag, the name is also in the symbol of a function that only returns something of the namespace.
+// With the tag, the name is also in the symbol of a function that only returns a type of the namespace.
 inline namespace MEMBRANE_INSTRUCTION_SET __attribute__((abi_tag)) {}
 
 namespace detail {
 
-// A part may also come from another unit inside a type that names no instruction set. So a unit that can make such parts
-// defines a symbol, which a unit that uses them refers to: if only units for other sets can, it is undefined. Where one for
-// each set can, nothing tells, but then nothing breaks: parts lie in memory alike for all.
+// An object of such a type may also come from another unit as a member of a type that names no instruction set. So a
+// unit that constructs it defines a symbol, and a unit that uses it refers to that symbol. If only units for other sets
+// construct it, the symbol is undefined. If units for each set construct it, a mix is not detected, but harmless: the
+// memory layout is the same for all sets.
 #if defined(__ELF__)
 template <class Part>
 struct MadeHere {

@@ -8,16 +8,16 @@
 
 #include <membrane/core/lanes.hpp>
 
-/// Points of which several are read at once from wherever they are.
+/// Points of which several are gathered or scattered at once.
 ///
 ///     std::vector<membrane::PaddedPoint<float>> rows;
-///     const auto there = membrane::gather(rows.data(), begins);             // a point in every lane
+///     const auto there = membrane::gather(rows.data(), begins);             // one point a lane
 namespace membrane {
 
-/// A point and one number more, read as a whole.
+/// A point and one extra number, aligned to be read at once.
 template <Real Scalar>
 struct alignas(4 * sizeof(Scalar)) PaddedPoint {
-    std::array<Scalar, 4> number{};  ///< x, y, z, and a number that belongs to the point
+    std::array<Scalar, 4> number{};  ///< x, y, z and the extra number
 
     [[nodiscard]] Vector3<Scalar> point() const noexcept { return {number[0], number[1], number[2]}; }
     [[nodiscard]] Scalar extra() const noexcept { return number[3]; }
@@ -26,7 +26,7 @@ struct alignas(4 * sizeof(Scalar)) PaddedPoint {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// A point in registers, reckoned with as a whole.
+/// A padded point in registers; operators act on its four numbers.
 template <Real Scalar>
 class PaddedVector {
   public:
@@ -35,7 +35,7 @@ class PaddedVector {
         for (auto& part : parts_) part = all - Part{};
     }
 
-    /// The four numbers from `from` on.
+    /// Reads four numbers from `from` on.
     [[nodiscard]] static PaddedVector load(const Scalar* from) noexcept {
         PaddedVector vector;
         std::memcpy(vector.parts_.data(), from, sizeof parts_);
@@ -43,7 +43,7 @@ class PaddedVector {
     }
     void store(Scalar* to) const noexcept { std::memcpy(to, parts_.data(), sizeof parts_); }
 
-    /// The three numbers from `from` on, and a zero: what lies behind them is not read.
+    /// Reads three numbers from `from` on, none beyond them; the fourth becomes zero.
     [[nodiscard]] static PaddedVector load_point(const Scalar* from) noexcept {
         PaddedVector vector;
 #if defined(__AVX__)
@@ -77,7 +77,7 @@ class PaddedVector {
         return each([](auto x, auto y) { return x * y; }, a, b);
     }
 
-    /// `membrane::smaller` and `larger`, of each number.
+    /// `membrane::smaller` and `larger` of each number.
     [[nodiscard]] friend PaddedVector smaller(const PaddedVector& a, const PaddedVector& b) noexcept {
         return each([](auto x, auto y) { return y < x ? y : x; }, a, b);
     }
@@ -85,14 +85,14 @@ class PaddedVector {
         return each([](auto x, auto y) { return x < y ? y : x; }, a, b);
     }
 
-    /// Of all four numbers.
+    /// The sum of all four numbers.
     [[nodiscard]] Scalar sum() const noexcept {
         std::array<Scalar, 4> number;
         store(number.data());
         return (number[0] + number[1]) + (number[2] + number[3]);
     }
 
-    /// y, z, x.
+    /// The point (y, z, x).
     [[nodiscard]] PaddedVector turned() const noexcept {
         PaddedVector result;
         if constexpr (parts == 1) {
@@ -111,7 +111,7 @@ class PaddedVector {
         return result;
     }
 
-    // As many numbers as a register holds.
+    // As many of the numbers as fit a register.
     using Part = typename Register<Scalar, (std::min)(4 * sizeof(Scalar), register_bytes)>::Type;
     static constexpr std::size_t parts = 4 * sizeof(Scalar) / sizeof(Part), width = 4 / parts;
     std::array<Part, parts> parts_{};
@@ -119,25 +119,25 @@ class PaddedVector {
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
-/// How many numbers a point takes: row r begins at number 4 r.
+/// Numbers in a padded point: row r begins at number 4 r.
 inline constexpr Index numbers_in_point = 4;
 
 /// In lane i the point of `rows` that begins at number `begins[i]`.
 template <Real Scalar>
 [[nodiscard]] Vector3<Lanes<Scalar>> gather(const PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
 
-/// Lane i to the point of `rows` that begins at number `begins[i]`; the number beside it becomes zero.
+/// Writes lane i to the point of `rows` that begins at number `begins[i]`; its extra number becomes zero.
 template <Real Scalar>
 void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
 
-/// Several padded points, each in its lane.
+/// Padded points, one a lane.
 template <Real Scalar>
 struct PaddedLanes {
     Vector3<Lanes<Scalar>> point;
     Lanes<Scalar> extra;
 };
 
-/// The same with the number beside the point.
+/// `gather` and `scatter` with the extra number.
 template <Real Scalar>
 [[nodiscard]] PaddedLanes<Scalar> gather_padded(const PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
 template <Real Scalar>
@@ -178,8 +178,8 @@ template <class Part>
 }
 #endif
 
-/// The four columns of a matrix whose rows begin at these numbers of `rows`; as many as a register holds numbers. What is
-/// not used of them costs nothing.
+/// The four columns of a matrix whose row i begins at number `begins[i]` of `rows`; it has as many rows as a register
+/// holds numbers. Unused columns cost nothing.
 template <class Part, Real Scalar>
 [[gnu::always_inline, nodiscard]] inline std::array<Part, 4> columns(const PaddedPoint<Scalar>* rows,
                                                                      const Index* begins) noexcept {
@@ -192,7 +192,7 @@ template <class Part, Real Scalar>
         return {__builtin_shufflevector(a, b, 0, 2), __builtin_shufflevector(a, b, 1, 3),
                 __builtin_shufflevector(c, d, 0, 2), __builtin_shufflevector(c, d, 1, 3)};
     } else if constexpr (width == 4) {
-        // By halves of rows, so that nothing crosses the halves of a register afterwards.
+        // Reads half rows, so that no later shuffle crosses the halves of a register.
         using Half = typename Register<Scalar, 2 * sizeof(Scalar)>::Type;
         const auto halves = [&](std::size_t i, std::size_t k) {
             return __builtin_shufflevector(load_part<Half>(row(i) + 2 * k), load_part<Half>(row(i + 2) + 2 * k), 0, 1,
@@ -213,7 +213,7 @@ template <class Part, Real Scalar>
     return result;
 }
 
-/// The other way round.
+/// Writes the four columns to the rows: the inverse of `columns`.
 template <class Part, Real Scalar>
 [[gnu::always_inline]] inline void put_columns(const std::array<Part, 4>& column, PaddedPoint<Scalar>* rows,
                                                const Index* begins) noexcept {

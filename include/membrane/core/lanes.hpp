@@ -19,10 +19,10 @@
 #include <emmintrin.h>
 #endif
 
-/// Several numbers side by side, for what is reckoned alike with all of them.
+/// A pack of numbers in SIMD registers, with the same operation on each.
 ///
 ///     const membrane::Lanes<float> length = sqrt(x * x + y * y);
-///     const auto part = x / select(length > 0, length, membrane::Lanes<float>(1));      // every lane for itself
+///     const auto part = x / select(length > 0, length, membrane::Lanes<float>(1));      // each lane by itself
 namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
@@ -38,14 +38,14 @@ struct Register {
     using Type __attribute__((vector_size(bytes))) = Scalar;
 };
 
-/// 8 floats or 4 doubles, on every processor. Each lane comes to the bits that its number would come to by itself.
+/// 8 floats or 4 doubles, on every processor. Each lane gives the same bits as scalar arithmetic.
 template <Real Scalar>
 class Lanes {
   public:
     using Each = Scalar;
     static constexpr std::size_t count = 32 / sizeof(Scalar);
 
-    /// What the processor reckons with at a time; so many make up all lanes.
+    /// One register; `parts` of them hold all lanes.
     using Part = typename Register<Scalar>::Type;
     static constexpr std::size_t parts = 32 / register_bytes;
 
@@ -102,7 +102,7 @@ class Lanes {
     Lanes& operator*=(const Lanes& b) noexcept { return *this = *this * b; }
     Lanes& operator/=(const Lanes& b) noexcept { return *this = *this / b; }
 
-    /// A yes or no for each lane.
+    /// A boolean for each lane.
     class Mask {
       public:
         using PartMask = decltype(Part{} < Part{});
@@ -202,7 +202,7 @@ class Lanes {
         for (std::size_t i = 0; i < parts; ++i) mask.parts_[i] = relation(a.parts_[i], b.parts_[i]);
         return mask;
     }
-    // Compilers take the root of a vector only where nobody asks for errno.
+    // Compilers vectorise a square root only under `-fno-math-errno`.
     static Part root(const Part& a) noexcept {
 #if defined(__AVX__)
         if constexpr (sizeof(Scalar) == 4)
@@ -228,8 +228,8 @@ class Lanes {
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
 /// choice ? yes : no, in every lane.
-template <Number N, class ChosenSettings>
-[[nodiscard]] N select(const ChosenSettings& choice, const N& yes, const N& no) noexcept {
+template <Number N, class Choice>
+[[nodiscard]] N select(const Choice& choice, const N& yes, const N& no) noexcept {
     if constexpr (Real<N>)
         return choice ? yes : no;
     else
@@ -245,7 +245,7 @@ template <Number N>
     return sqrt(a);
 }
 
-/// `f` of one number, or of two; of those in every lane.
+/// `f` of the numbers, or of those in each lane.
 template <Number N, class F, class... Rest>
 [[nodiscard]] N lane_by_lane(const F& f, const N& a, const Rest&... rest) noexcept {
     if constexpr (Real<N>)
@@ -254,7 +254,7 @@ template <Number N, class F, class... Rest>
         return N::of([&](std::size_t i) { return f(a[i], rest[i]...); });
 }
 
-/// std::max and std::min, of every lane.
+/// `std::max` and `std::min` of every lane.
 template <Number N>
 [[nodiscard]] N larger(const N& a, const N& b) noexcept {
     return select(a < b, b, a);

@@ -3,14 +3,14 @@
 
 #include <concepts>
 
-/// What lengths, forces and times are made of.
+/// Number types.
 namespace membrane {
 
 /// `float` or `double`: the type of every length, force and time of one scene.
 template <class T>
 concept Real = std::same_as<T, float> || std::same_as<T, double>;
 
-/// A `Real`, or several of them side by side: `Lanes`.
+/// A `Real`, or several of them in `Lanes`.
 template <class N>
 concept Number = Real<N> || requires {
     requires Real<typename N::Each>;
@@ -29,7 +29,7 @@ struct EachOf<N> {
 
 }  // namespace detail
 
-/// The `Real` that a number is made of.
+/// The `Real` type of a number, or of each of its lanes.
 template <Number N>
 using Each = typename detail::EachOf<N>::Type;
 

@@ -5,8 +5,8 @@
 
 namespace membrane {
 
-/// A body that moves rigidly, as an eye in its orbit. The membrane stays in the body's own frame, where its anchors
-/// rest, at no cost per vertex: carry the tool in and the force out.
+/// Pose and velocity of a rigid body, as an eye in its orbit. The membrane is simulated in the body's frame, where its
+/// anchors are fixed, at no cost per vertex: only the tool and the force are transformed.
 ///
 ///     const auto tool = membrane::to_body_frame(device.read(), eye);
 ///     // contact, solve, force: in the eye's frame
@@ -25,7 +25,7 @@ struct RigidFrame {
         return origin + vector_to_world(body);
     }
 
-    /// A force, an axis, a normal: turned, not moved.
+    /// A force, an axis or a normal: rotated, not translated.
     [[nodiscard]] Vector3<Scalar> vector_to_body(const Vector3<Scalar>& world) const noexcept {
         return {dot(point(rotation, 0), world), dot(point(rotation, 1), world), dot(point(rotation, 2), world)};
     }
@@ -33,29 +33,29 @@ struct RigidFrame {
         return point(rotation, 0) * body.x() + point(rotation, 1) * body.y() + point(rotation, 2) * body.z();
     }
 
-    /// Velocity in the world of what moves with the body and is at `place` [m/s], [m].
-    [[nodiscard]] Vector3<Scalar> velocity_at(const Vector3<Scalar>& place) const noexcept {
-        return velocity + cross<Scalar>(angular_velocity, place - origin);
+    /// World velocity [m/s] of a point that moves with the body, at `position` in the world [m].
+    [[nodiscard]] Vector3<Scalar> velocity_at(const Vector3<Scalar>& position) const noexcept {
+        return velocity + cross<Scalar>(angular_velocity, position - origin);
     }
 
-    /// Velocity as seen from the body of what moves with `velocity_of` at `place`, both in the world [m/s], [m].
+    /// Velocity in the body frame [m/s] of a point with world velocity `velocity_of` at `position` in the world [m].
     [[nodiscard]] Vector3<Scalar> velocity_in(const Vector3<Scalar>& velocity_of,
-                                              const Vector3<Scalar>& place) const noexcept {
-        return vector_to_body(velocity_of - velocity - cross<Scalar>(angular_velocity, place - origin));
+                                              const Vector3<Scalar>& position) const noexcept {
+        return vector_to_body(velocity_of - velocity - cross<Scalar>(angular_velocity, position - origin));
     }
 
-    /// The same place and attitude, to the bit.
+    /// Whether rotation and origin are equal, bit for bit.
     [[nodiscard]] bool same_pose(const RigidFrame& other) const noexcept {
         return rotation == other.rotation && origin == other.origin;
     }
 };
 
-/// The motion that takes a body from pose `from` to pose `to`: `point_to_world` of where something on the body was is where it
-/// is, in the world. Without velocities.
+/// The motion of a body from pose `from` to pose `to`: `point_to_world` maps the old world position of a point on the
+/// body to the new one. Velocities are zero.
 template <Real Scalar>
 [[nodiscard]] RigidFrame<Scalar> motion_between(const RigidFrame<Scalar>& from, const RigidFrame<Scalar>& to) noexcept {
     RigidFrame<Scalar> motion;
-    for (Eigen::Index k = 0; k < 3; ++k) {  // the rotation takes each of the world's axes into the body and out again
+    for (Eigen::Index k = 0; k < 3; ++k) {  // each world axis: into the old body frame, then out of the new
         motion.rotation.col(k) = to.vector_to_world(from.rotation.row(k).transpose());
     }
     motion.origin = to.origin - motion.vector_to_world(from.origin);

@@ -8,11 +8,11 @@
 
 namespace membrane {
 
-/// A symmetric 3 x 3 matrix by its six numbers.
+/// A symmetric 3 x 3 matrix, stored as six numbers.
 ///
 ///     membrane::Symmetric3<double> stiffness = membrane::diagonal3(8.0);            // [N/m]
 ///     stiffness += membrane::outer(40.0, u);                                        // 40 u u^T
-///     const auto displacement = inverse(stiffness) * force;                                  // [m]
+///     const auto displacement = inverse(stiffness) * force;                          // [m]
 template <Number Scalar>
 struct Symmetric3 {
     Scalar xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
@@ -44,13 +44,13 @@ template <Number Scalar>
     return {x * u[0], y * u[1], z * u[2], x * u[1], x * u[2], y * u[2]};
 }
 
-/// All nine numbers.
+/// The full 3 x 3 matrix.
 template <Real Scalar>
 [[nodiscard]] Eigen::Matrix<Scalar, 3, 3> dense(const Symmetric3<Scalar>& a) noexcept {
     return Eigen::Matrix<Scalar, 3, 3>{{a.xx, a.xy, a.xz}, {a.xy, a.yy, a.yz}, {a.xz, a.yz, a.zz}};
 }
 
-/// `a` as it is once everything is turned by `rotation`: R a R^T.
+/// `a` rotated by R = `rotation`: R a R^T.
 template <Real Scalar>
 [[nodiscard]] Symmetric3<Scalar> rotated(const Symmetric3<Scalar>& a,
                                          const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept {
@@ -60,8 +60,8 @@ template <Real Scalar>
     return {dot(x, ax), dot(y, ay), dot(z, az), dot(x, ay), dot(x, az), dot(y, az)};
 }
 
-/// `s` times the inverse. @pre positive definite. Cost: one division; half the digits are left where the largest eigenvalue
-/// is a cube root of epsilon's inverse times the smallest.
+/// `s` times the inverse. @pre positive definite. Cost: one division. Half the digits remain if the largest eigenvalue
+/// is epsilon^(-1/3) times the smallest.
 template <Number Scalar>
 [[nodiscard]] Symmetric3<Scalar> inverse(const Symmetric3<Scalar>& a, Scalar s = 1) noexcept {
     const Scalar xx = a.yy * a.zz - a.yz * a.yz, xy = a.xz * a.yz - a.xy * a.zz, xz = a.xy * a.yz - a.xz * a.yy;
@@ -70,14 +70,14 @@ template <Number Scalar>
                                       xz, a.xy * a.xz - a.xx * a.yz};
 }
 
-/// No eigenvalue is larger: root of the sum of their squares.
+/// Upper bound of the eigenvalues: the root of the sum of their squares.
 template <Number Scalar>
 [[nodiscard]] Scalar eigenvalue_bound(const Symmetric3<Scalar>& a) noexcept {
     using std::sqrt;
     return sqrt((a.xx * a.xx + a.yy * a.yy + a.zz * a.zz) + 2 * (a.xy * a.xy + a.xz * a.xz + a.yz * a.yz));
 }
 
-/// In closed form [Smith61].
+/// The largest eigenvalue, in closed form [Smith61].
 template <Real Scalar>
 [[nodiscard]] Scalar largest_eigenvalue(const Symmetric3<Scalar>& a) noexcept {
     const Scalar mean = a.trace() / 3;

@@ -11,20 +11,20 @@
 #include <membrane/core/check.hpp>
 #include <membrane/core/executor.hpp>
 
-/// Threads that do what the library lets be done at the same time. No other part starts any.
+/// Threads for the independent tasks of the library. No other header starts threads.
 ///
 ///     const membrane::ThreadPool pool(4);
 ///     auto solver = membrane::QuasiStaticSolver(network, options, membrane::BlockStep{}, pool.executor());
 namespace membrane {
 
-/// A number of threads that wait for work; the one that brings it takes part. They wait for a while without sleeping:
-/// tasks that follow on one another find them awake. Waking those that sleep is a call of the system's.
+/// Threads that wait for tasks; the calling thread runs tasks too. Threads wait some ten microseconds without sleeping,
+/// so that closely spaced calls find them awake. Waking sleeping threads is a system call.
 ///
-/// One thread at a time may bring work, and it must not be a task.
+/// Only one thread at a time may call the pool, and never from within a task.
 class ThreadPool {
   public:
-    /// `threads`, the one that brings work included.
-    /// @throws InvalidInput if there is to be none; std::system_error if the system has none left
+    /// `threads` includes the calling thread.
+    /// @throws InvalidInput if `threads` is below 1; std::system_error if the system cannot start a thread
     explicit ThreadPool(int threads = (std::max)(1, static_cast<int>(std::thread::hardware_concurrency())));
     ~ThreadPool();
     ThreadPool(const ThreadPool&) = delete;
@@ -32,11 +32,11 @@ class ThreadPool {
 
     [[nodiscard]] int threads() const noexcept { return static_cast<int>(workers_.size()) + 1; }
 
-    /// Calls `task(i)` once for each `i` from 0 to `count` - 1. Online, but for the waking of threads that sleep.
+    /// Calls `task(i)` once for each `i` from 0 to `count` - 1. Online, except for waking sleeping threads.
     template <class Task>
     void operator()(Index count, const Task& task) const noexcept;
 
-    /// Hands its tasks on to this pool, which must live as long.
+    /// An executor that runs its tasks on this pool. The pool must outlive it.
     [[nodiscard]] auto executor() const noexcept {
         return [this](Index count, const auto& task) noexcept { (*this)(count, task); };
     }
@@ -57,14 +57,14 @@ class ThreadPool {
     static void wait_for_change(const std::atomic<T>& value, T old) noexcept;
 
     mutable Job job_;
-    mutable std::atomic<std::int64_t> next_{0};        // task of the job
-    mutable std::atomic<std::uint32_t> job_count_{0};  // so far
-    mutable std::atomic<int> busy_{0};                 // threads, with this job
+    mutable std::atomic<std::int64_t> next_{0};        // next task of the job
+    mutable std::atomic<std::uint32_t> job_count_{0};  // jobs started
+    mutable std::atomic<int> busy_{0};                 // workers that have not finished the job
     mutable std::atomic<bool> over_{false};
     std::vector<std::thread> workers_;
 };
 
-// Made before its threads are, so that it joins those there are if the system has no more.
+// Delegates, so that the destructor joins the threads already started if starting one fails.
 inline ThreadPool::ThreadPool(int threads) : ThreadPool(NoWorkers{}) {
     if (threads < 1) refuse("ThreadPool", "there must be at least 1 thread, got ", threads);
     workers_.reserve(static_cast<std::size_t>(threads) - 1);
@@ -101,13 +101,13 @@ inline void ThreadPool::serve() const noexcept {
     for (std::uint32_t seen = 0;;) {
         wait_for_change(job_count_, seen);
         if (over_) return;
-        ++seen;  // the next job begins when all have done this one
+        ++seen;  // the next job begins after all workers have finished this one
         work();
         if (busy_.fetch_sub(1, std::memory_order_acq_rel) == 1) busy_.notify_one();
     }
 }
 
-// Some ten microseconds without sleeping, for the sake of tasks that follow on one another.
+// Spins for some ten microseconds before it sleeps: closely spaced jobs find the thread awake.
 template <class T>
 void ThreadPool::wait_for_change(const std::atomic<T>& value, T old) noexcept {
     for (int i = 0; i < 10'000; ++i) {

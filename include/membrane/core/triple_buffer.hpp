@@ -6,48 +6,48 @@
 
 namespace membrane {
 
-/// Three slots through which one thread hands what it writes to another that reads, and neither ever waits: each owns a
-/// slot, and one exchange of an atomic number swaps it for the slot in the middle.
+/// Passes values from one writer thread to one reader thread; neither ever waits. Each thread owns one of three slots,
+/// and one atomic exchange swaps it with the middle slot.
 ///
 ///     TripleBuffer<Pose> poses;
 ///     poses.back() = pose;  poses.publish();          // one thread
 ///     if (poses.take()) draw(poses.front());          // another thread
 ///
-/// Neither copied nor moved: two threads hold on to it.
+/// Neither copyable nor movable: two threads refer to it.
 template <class Slot>
 class TripleBuffer {
   public:
     explicit TripleBuffer(const Slot& each = Slot()) : slots_{{{each}, {each}, {each}}} {}
 
-    /// The writer's own slot: another one after each `publish`, with what was in it.
+    /// The writer's slot: after each `publish` a different one, with its old contents.
     [[nodiscard]] Slot& back() noexcept { return slots_[back_].slot; }
 
-    /// Makes the writer's slot the newest one, in place of one that the reader has not taken. Returns whether there was
-    /// none such: then the writer now has the slot that the reader has given back, and otherwise the one it published
-    /// before this one.
+    /// Publishes the writer's slot; it replaces a published slot that the reader has not taken. If there was no such
+    /// slot, returns true, and the writer gets the slot that the reader gave back. Otherwise returns false, and the
+    /// writer gets back the replaced slot.
     bool publish() noexcept {
         const unsigned old = middle_.exchange(back_ | fresh, std::memory_order_acq_rel);
         back_ = old & ~fresh;
         return (old & fresh) == 0;
     }
 
-    /// Makes the newest slot the reader's, if it is newer than the one it has; returns whether it was. Never misses what
-    /// was published before.
+    /// If a slot was published since the last `take`, makes the newest one the reader's and returns true. Never misses
+    /// a slot published before the call.
     bool take() noexcept {
-        // A slot that is fresh stays so until it is taken here: what is exchanged below can only be newer.
+        // A fresh slot stays fresh until it is taken here: the exchange below can only get a newer one.
         if ((middle_.load(std::memory_order_relaxed) & fresh) == 0) return false;
         front_ = middle_.exchange(front_, std::memory_order_acq_rel) & ~fresh;
         return true;
     }
 
-    /// The reader's own slot: what it took last, or as it was made.
+    /// The reader's slot: the last one taken, or the initial one.
     [[nodiscard]] const Slot& front() const noexcept { return slots_[front_].slot; }
 
   private:
-    static constexpr unsigned fresh = 4;  // beside the number of a slot: published and not taken
+    static constexpr unsigned fresh = 4;  // flag beside the slot's number: published, not yet taken
     static_assert(std::atomic<unsigned>::is_always_lock_free, "TripleBuffer needs an atomic number that takes no lock");
 
-    struct alignas(64) OwnLine {  // so that writer and reader do not share a line of the cache
+    struct alignas(64) OwnLine {  // writer and reader must not share a cache line
         Slot slot;
     };
 

@@ -11,14 +11,14 @@
 
 /// Three numbers: a point, a direction, a force.
 ///
-///     const membrane::Vector3<double> a(1, 2, 3), b = x.col(v);       // from three numbers, from any column of Eigen's
+///     const membrane::Vector3<double> a(1, 2, 3), b = x.col(v);       // from three numbers, from an Eigen column
 ///     const auto middle = (a + b) / 2;                                // a value, not an expression
-///     x.col(v) += dot(a, b) * a;                                      // a column takes it
-///     const Eigen::Vector3d e = rotation * a;                         // so does a vector of Eigen's
+///     x.col(v) += dot(a, b) * a;                                      // assigned to an Eigen column
+///     const Eigen::Vector3d e = rotation * a;                         // or to an Eigen vector
 ///
-/// Eigen's own dot() and norm() add in an order that depends on the instruction set. These do not, so that every compiler
-/// and processor comes to the same bits as long as it does not contract a * b + c. Nothing is left for a compiler to unfold,
-/// so that a program compiles sooner, and runs faster without optimisation.
+/// Eigen's dot() and norm() add in an order that depends on the instruction set. Here the order is fixed: all compilers
+/// and processors give the same bits unless they contract a * b + c. There are no expression templates: programs
+/// compile faster, and run faster without optimisation.
 namespace membrane {
 
 template <Number N>
@@ -26,16 +26,16 @@ class Vector3;
 
 namespace detail {
 
-/// An expression of Eigen's with three rows and one column.
+/// An Eigen expression with three rows and one column.
 template <class Derived, class N>
 concept Column =
     std::same_as<typename Derived::Scalar, N> && Derived::RowsAtCompileTime == 3 && Derived::ColsAtCompileTime == 1;
 
-/// An expression of Eigen's that a vector can be multiplied by.
+/// An Eigen expression that can multiply a vector.
 template <class Derived, class N>
 concept ThreeColumns = std::same_as<typename Derived::Scalar, N> && Derived::ColsAtCompileTime == 3;
 
-/// What lets Eigen's matrices take a vector by `=`, `+=` and `-=`.
+/// Base class that makes a vector assignable to Eigen matrices by `=`, `+=` and `-=`.
 template <class N>
 struct ThreeByOne : Eigen::EigenBase<Vector3<N>> {
     using Scalar = N;
@@ -59,7 +59,7 @@ struct ThreeByOne : Eigen::EigenBase<Vector3<N>> {
 
 }  // namespace detail
 
-/// Three numbers, or three packs of `Lanes`: several vectors. Members with capitals are named as Eigen's are.
+/// Three numbers; with `Lanes` several vectors. Members with capitals have the names of Eigen's.
 template <Number N>
 class Vector3 : public detail::ThreeByOne<N> {
   public:
@@ -123,7 +123,7 @@ class Vector3 : public detail::ThreeByOne<N> {
                                                           const Eigen::Matrix<N, 1, 3>& row) noexcept {
         return a.eigen() * row;
     }
-    /// In a list, `x << columns, a, b`.
+    /// For comma initialisers: `x << columns, a, b`.
     template <class Matrix>
     friend Eigen::CommaInitializer<Matrix>& operator,(Eigen::CommaInitializer<Matrix>& list, const Vector3& a) {
         return list, a.eigen();
@@ -164,9 +164,10 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] constexpr N maxCoeff() const noexcept {
         return (std::max)((std::max)(number_[0], number_[1]), number_[2]);
     }
-    /// Whether no number is larger than `most`, whatever its sign.
-    [[nodiscard]] bool isZero(const N& most) const noexcept {
-        return std::abs(number_[0]) <= most && std::abs(number_[1]) <= most && std::abs(number_[2]) <= most;
+    /// Whether no number exceeds `tolerance` in magnitude.
+    [[nodiscard]] bool isZero(const N& tolerance) const noexcept {
+        return std::abs(number_[0]) <= tolerance && std::abs(number_[1]) <= tolerance &&
+               std::abs(number_[2]) <= tolerance;
     }
     [[nodiscard]] Vector3 cwiseAbs() const noexcept {
         return {std::abs(number_[0]), std::abs(number_[1]), std::abs(number_[2])};
@@ -190,7 +191,7 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] constexpr Vector3<To> cast() const noexcept {
         return {static_cast<To>(number_[0]), static_cast<To>(number_[1]), static_cast<To>(number_[2])};
     }
-    /// A row of Eigen's: for `a * b.transpose()`, and to be printed.
+    /// An Eigen row: for `a * b.transpose()` and for printing.
     [[nodiscard]] Eigen::Matrix<N, 1, 3> transpose() const noexcept { return {number_[0], number_[1], number_[2]}; }
     // NOLINTEND(readability-identifier-naming)
 
@@ -224,7 +225,7 @@ template <Real Scalar>
     return a.x() <= b.x() && a.y() <= b.y() && a.z() <= b.z();
 }
 
-/// `a` at unit length, or `otherwise` where `a` has no direction.
+/// `a` at unit length, or `otherwise` if `a` is zero.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> direction(const Vector3<Scalar>& a, const Vector3<Scalar>& otherwise) noexcept {
     const Scalar length = norm(a);

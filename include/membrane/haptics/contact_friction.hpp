@@ -8,7 +8,7 @@
 #include <membrane/core/check.hpp>
 #include <membrane/haptics/force_policy.hpp>
 
-/// Friction on whatever a policy presses with.
+/// Coulomb friction on the normal force of another policy.
 ///
 ///     auto feel = membrane::ContactFriction(membrane::SpringDamperForce{.stiffness = 100},
 ///                                           {.coefficient = 0.1, .stiffness = 100});
@@ -16,23 +16,23 @@
 namespace membrane {
 
 struct FrictionOptions {
-    double coefficient;  ///< of Coulomb: force along the surface over force along the normal, at the most
-    double stiffness;    ///< of what sticks, as felt by the hand [N/m]
+    double coefficient;  ///< of Coulomb friction: largest ratio of tangential to normal force
+    double stiffness;    ///< tangential stiffness while the tool sticks, at the device [N/m]
 
-    /// @throws InvalidInput for a number out of its range
+    /// @throws InvalidInput if a number is out of its range
     void check() const;
 };
 
-/// The force of another policy and Coulomb friction against it. A tool that touches sticks to where it did first, as by
-/// a spring along the surface; when that would pull with more than `coefficient` times the force along the normal, it
-/// slips, and drags the place where it sticks along. From sticking to slipping the force changes continuously. It takes
-/// energy and never gives any but what the spring has stored; the largest stiffness that passivity has to reckon with is
-/// the larger of the policy's and `stiffness`.
+/// The force of another policy plus Coulomb friction. At first contact the tool sticks: a spring along the surface
+/// pulls it to that point. If the spring force would exceed `coefficient` times the normal force, the tool slips and
+/// drags the sticking point along. The force is continuous between sticking and slipping. Friction dissipates energy
+/// and returns only what its spring has stored. For `passivity` the stiffness is the larger of the policy's and
+/// `stiffness`.
 template <class Policy, Real Scalar = double>
     requires CheckedForcePolicy<Policy, Scalar>
 class ContactFriction {
   public:
-    /// @throws InvalidInput for an option out of its range
+    /// @throws InvalidInput if an option is out of its range
     ContactFriction(Policy policy, const FrictionOptions& options)
         : policy_((options.check(), std::move(policy))),
           coefficient_(static_cast<Scalar>(options.coefficient)),

@@ -11,14 +11,15 @@
 
 #include <membrane/contact/tool.hpp>
 
-/// Where the tool comes from and the force goes to.
+/// Source of the tool's state and sink of the force.
 ///
-///     membrane::ScriptedDevice<double> device({{.time = 0, .position = {0, 0, 0.012}}, {.time = 1, .position = {0, 0, 0.009}}},
-///                                         {.tick = 1e-3, .radius = 1e-3});
+///     membrane::ScriptedDevice<double> device({{.time = 0, .position = {0, 0, 0.012}},
+///                                              {.time = 1, .position = {0, 0, 0.009}}},
+///                                             {.tick = 1e-3, .radius = 1e-3});
 ///     while (device.running()) { const auto tool = device.read(); ...; device.write(force); }
 namespace membrane {
 
-/// A haptic device, or what stands in for one. Each tick reads once and writes once.
+/// A haptic device or a substitute. Each tick calls `read` once and `write` once.
 template <class D, class Scalar>
 concept Device = Real<Scalar> && requires(D& device, const D& idle, const Vector3<Scalar>& force) {
     { idle.running() }
@@ -56,28 +57,29 @@ consteval bool check_device() noexcept {
 
 }  // namespace detail
 
-/// A `Device`; where it is none, the error says what is missing.
+/// A `Device`. If a requirement is missing, the compile error names it.
 template <class D, class Scalar>
 concept CheckedDevice = detail::check_device<D, Scalar>();
 
-/// Where the tool of a script is at a time.
+/// Position of a scripted tool at a time.
 template <Real Scalar>
 struct Waypoint {
     Scalar time = 0;                                     ///< [s]
     Vector3<Scalar> position = Vector3<Scalar>::Zero();  ///< [m]
-    bool grasping = false;                               ///< from here to the next waypoint
+    bool grasping = false;                               ///< from this waypoint to the next
 };
-// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+// Without these, g++ 12 rejects this type's initialiser inside another type's.
 static_assert(std::is_default_constructible_v<Waypoint<float>>);
 static_assert(std::is_default_constructible_v<Waypoint<double>>);
 
 struct NullDeviceOptions {
-    double tick = 1e-3;  ///< from one `read` to the next [s]
+    double tick = 1e-3;  ///< time from one `read` to the next [s]
     double radius = 0;   ///< of the tool [m]
 };
 
-/// What holds the tool of a `ScriptedDevice`: `place` puts it somewhere, at rest; `aim` says where it should be now and at
-/// which velocity that moves; `move` lets a time go by under a force. Then it is at `position`, with `velocity`.
+/// Model of the hand that holds the tool of a `ScriptedDevice`. `place` sets a position with zero velocity. `aim` sets
+/// the present target and its velocity. `move` advances time under a force; then `position` and `velocity` hold the new
+/// state.
 template <class H, class Scalar>
 concept Hand = Real<Scalar> && std::copyable<H> &&
     requires(H& hand, const H& idle, const Vector3<Scalar>& vector, Scalar dt) {
@@ -133,11 +135,11 @@ consteval bool check_hand() noexcept {
 
 }  // namespace detail
 
-/// A `Hand`; where it is none, the error says what is missing.
+/// A `Hand`. If a requirement is missing, the compile error names it.
 template <class H, class Scalar>
 concept CheckedHand = detail::check_hand<H, Scalar>();
 
-/// Is where it should be, whatever the force. One that gives way: `SimulatedHand`.
+/// Follows its target exactly, whatever the force. A compliant hand is a `SimulatedHand`.
 template <Real Scalar>
 class IdealHand {
   public:
@@ -157,31 +159,32 @@ class IdealHand {
 
 static_assert(Hand<IdealHand<float>, float> && Hand<IdealHand<double>, double>);
 
-/// A device without a device: its tool follows a script in straight lines from waypoint to waypoint, at the velocity
-/// that takes, whatever force is written. Held by another hand, it follows as far as that hand lets it: from rest at the
-/// first waypoint, under the force that was written last before each tick.
+/// A simulated device. Its tool follows a script in straight lines from waypoint to waypoint, at constant velocity on
+/// each line, and ignores the force. With a compliant hand the tool follows as that hand allows: it starts at rest at
+/// the first waypoint and moves in each tick under the last written force.
 template <Real Scalar, CheckedHand<Scalar> Holder = IdealHand<Scalar>>
 class ScriptedDevice {
   public:
-    /// @throws InvalidInput for a script that is empty or not finite or does not go forward in time, or bad options
+    /// @throws InvalidInput if the script is empty, not finite or not ascending in time, or if an option is out of its
+    /// range
     explicit ScriptedDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options = {},
                             const Holder& hand = Holder());
 
-    /// Whether the script is not yet over.
+    /// Whether the script has not ended.
     [[nodiscard]] bool running() const noexcept { return time() < script_.back().time + tick_ / 2; }
 
-    /// The tool now; time goes on by a tick. Beyond the script's end, its last position.
+    /// The tool now; advances time by one tick. After the script's end, returns the last position.
     [[nodiscard]] Tool<Scalar> read() noexcept;
 
     void write(const Vector3<Scalar>& force) noexcept { force_ = force; }
 
-    /// What was written last [N].
+    /// The last written force [N].
     [[nodiscard]] const Vector3<Scalar>& force() const noexcept { return force_; }
 
-    /// Of the next `read` [s].
+    /// Time of the next `read` [s].
     [[nodiscard]] Scalar time() const noexcept { return script_.front().time + static_cast<Scalar>(ticks_) * tick_; }
 
-    /// Back to the beginning.
+    /// Returns to the start of the script.
     void reset() noexcept {
         ticks_ = 0;
         next_ = 0;
@@ -195,7 +198,7 @@ class ScriptedDevice {
     std::vector<Waypoint<Scalar>> script_;
     Scalar tick_, radius_;
     std::size_t ticks_ = 0;
-    std::size_t next_ = 0;  // the first waypoint that is not over
+    std::size_t next_ = 0;  // the first waypoint later than the last `read`
     Vector3<Scalar> force_ = Vector3<Scalar>::Zero();
     Holder hand_;
 };

@@ -5,33 +5,34 @@
 
 #include <membrane/core/check.hpp>
 
-/// What haptic devices bear, and what they feel like by themselves.
+/// Limits of haptic devices, and their own damping and friction.
 ///
 ///     auto limit = membrane::ForceLimiter(membrane::devices::touch);
 ///     auto mine  = membrane::devices::touch;
-///     mine.peak_force = 2;                                             // [N]: gentler than the maker allows
+///     mine.peak_force = 2;                                             // [N]: below the manufacturer's limit
 namespace membrane {
 
-/// A device by its numbers. Zero is on the safe side for damping and friction: what is not known is not counted on.
+/// Data of a device. If damping or friction is not known, zero is conservative.
 struct DeviceProfile {
     std::string_view name;
-    double peak_force;         ///< the largest it may be asked for, for a short time [N]
-    double continuous_force;   ///< what its motors bear for ever [N]; the peak: heating is left to the device
-    double stiffness;          ///< the largest it can show [N/m]
-    double damping = 0;        ///< of its own, viscous, at the least [N s/m]
-    double friction = 0;       ///< of its own, Coulomb: the force it takes to drive it back [N]
-    double resolution = 0;     ///< of its position [m]; 0: not counted
-    double thermal_time = 10;  ///< in which its motors warm up [s]; makers do not say, small windings take 5 to 15
+    double peak_force;         ///< largest force for a short time [N]
+    double continuous_force;   ///< largest force for unlimited time [N]; the peak: the device limits heating itself
+    double stiffness;          ///< largest stiffness it can render [N/m]
+    double damping = 0;        ///< lower bound of its own viscous damping [N s/m]
+    double friction = 0;       ///< its own Coulomb friction: the force to back-drive it [N]
+    double resolution = 0;     ///< of its position [m]; 0: neglected
+    double thermal_time = 10;  ///< time constant of its motors [s]; not published, 5 to 15 for small windings
 
-    /// @throws InvalidInput for a number that is not finite or out of its range
+    /// @throws InvalidInput if a number is not finite or out of its range
     void check() const;
 };
 
-/// Forces, stiffness, back-drive friction and resolution from the makers' data sheets, where a sheet gives several
-/// directions the least stiffness. Damping is published for the PHANToM 1.0 only [Diolaiti06], the Premium's forerunner.
+/// Forces, stiffness, back-drive friction and resolution are from the manufacturers' data sheets. If a sheet gives
+/// several directions, the stiffness is the lowest. Damping is published only for the PHANToM 1.0 [Diolaiti06], the
+/// predecessor of the Premium.
 namespace devices {
 
-/// 3D Systems Touch, before that Geomagic Touch and SensAble PHANTOM Omni.
+/// 3D Systems Touch, formerly Geomagic Touch and SensAble PHANTOM Omni.
 inline constexpr DeviceProfile touch{.name = "Touch",
                                      .peak_force = 3.3,
                                      .continuous_force = 0.88,
@@ -62,8 +63,8 @@ inline constexpr DeviceProfile premium_3_0{.name = "PHANTOM Premium 3.0",
                                            .friction = 0.2,
                                            .resolution = 20e-6};
 
-/// Force Dimension. One force is published, for as long as one likes, and no friction: without it to stand against it, a
-/// resolution would rule out every stiffness, so that none is given either.
+/// Force Dimension publishes one force, without a time limit, and no friction. Without friction a resolution would rule
+/// out every stiffness, so the resolution is neglected.
 inline constexpr DeviceProfile omega{.name = "omega", .peak_force = 12, .continuous_force = 12, .stiffness = 5000};
 inline constexpr DeviceProfile delta{.name = "delta", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
 inline constexpr DeviceProfile sigma{.name = "sigma", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};

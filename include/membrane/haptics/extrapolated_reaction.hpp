@@ -6,7 +6,7 @@
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/haptics/force_policy.hpp>
 
-/// A force for each tick from a solve for every tenth.
+/// A force for each tick if only every tenth tick has a solve.
 ///
 ///     auto feel = membrane::ExtrapolatedReaction<double>({.scale = 40});
 ///     feel.solved(report.reactions[0], tangent.stiffness, tool.position);    // when a solve has ended
@@ -14,21 +14,21 @@
 namespace membrane {
 
 struct ExtrapolationOptions {
-    double scale = 1;  ///< from the tissue to the hand
+    double scale = 1;  ///< force at the hand over force at the tissue
 };
 
-/// The reaction of the last solve, and how it changes with the tool's way since then: scale (R - T d), T the tangent
-/// stiffness (see `accuracy/tangent_stiffness.hpp`), d the way. A touch still pushes and never pulls. Right to second
-/// order in d, where the reaction alone is to first.
-/// What passivity has to reckon with is `scale` times the largest eigenvalue of T, with no delay for a good T, but with
-/// the age of the solve for what T leaves out.
+/// The reaction of the last solve, extrapolated by the tool's displacement d since then: scale (R - T d), with T the
+/// tangent stiffness (see `accuracy/tangent_stiffness.hpp`). In contact the force pushes and never pulls. Its error is
+/// of order d^2; that of the reaction alone is of order d.
+/// For `passivity` the stiffness is `scale` times the largest eigenvalue of T. An exact T adds no delay; the stiffness
+/// that T omits has the age of the solve as its delay.
 template <Real Scalar>
 class ExtrapolatedReaction {
   public:
     explicit ExtrapolatedReaction(const ExtrapolationOptions& options = {}) noexcept
         : scale_(static_cast<Scalar>(options.scale)) {}
 
-    /// `reaction` of the membrane on the tool at `position`, `stiffness` how it resists there [N], [N/m], [m].
+    /// Of one solve: `reaction` of the membrane on the tool [N], tangent `stiffness` [N/m], `position` of the tool [m].
     void solved(const Vector3<Scalar>& reaction, const Symmetric3<Scalar>& stiffness,
                 const Vector3<Scalar>& position) noexcept {
         reaction_ = reaction;

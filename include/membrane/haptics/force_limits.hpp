@@ -9,51 +9,51 @@
 
 #include <membrane/haptics/device_profile.hpp>
 
-/// The last thing before the device: whatever a policy asks for, the hand gets what it and the device bear.
+/// Last stage before the device: limits a policy's force to what hand and device can bear.
 ///
 ///     auto limit = membrane::ForceLimiter(membrane::devices::touch);
-///     device.write(limit(feel({tool, contact, report}), tool.time, solves));   // [N], [s], how many solves there were
+///     device.write(limit(feel({tool, contact, report}), tool.time, solves));   // [N], [s], number of solves
 namespace membrane {
 
-/// All limits are on; each can be taken off.
+/// All limits are on by default; each can be switched off.
 struct LimitOptions {
-    double rise_time = 0.02;  ///< for a change of the force by the peak force, at the quickest [s]; 0: no slew limit
-    double soft_start = 0.1;  ///< from nothing to the whole force, at first and after a fault [s]; 0: at once
-    double max_state_age = 0.04;  ///< a state of the solver may be this old [s]; infinity: no watchdog
-    double fade_time = 0.05;      ///< and then the force fades to zero in this time [s]
-    double max_tick = 2e-3;       ///< a force grows as if no tick had been longer [s]
-    bool heating = true;          ///< whether motors that grow hot get no more than the continuous force
+    double rise_time = 0.02;      ///< shortest time for a change by the peak force [s]; 0: no slew limit
+    double soft_start = 0.1;      ///< from zero to the full force, at start and after a fault [s]; 0: at once
+    double max_state_age = 0.04;  ///< largest age of the solver's state [s]; infinity: no watchdog
+    double fade_time = 0.05;      ///< time in which the force of an older state fades to zero [s]
+    double max_tick = 2e-3;       ///< upper limit of the tick length that lets a force grow [s]
+    bool heating = true;          ///< whether hot motors are limited to the continuous force
 
-    /// @throws InvalidInput for an option out of its range
+    /// @throws InvalidInput if an option is out of its range
     void check() const;
 };
 
-/// Which limits have made the force of this tick smaller.
+/// Limits that reduced the force of this tick.
 struct ActiveLimits {
-    bool fault = false;  ///< force or clock was not finite: no force
-    bool faded = false;  ///< the state is old, or the force still comes in after that, a fault or the start
-    bool peak = false;   ///< of the device
-    bool heat = false;   ///< of its motors
-    bool slew = false;   ///< the force may not change that fast
+    bool fault = false;  ///< force or time was not finite: the force is zero
+    bool faded = false;  ///< old state, or soft start after an old state, a fault or the start
+    bool peak = false;   ///< peak force of the device
+    bool heat = false;   ///< thermal limit of its motors
+    bool slew = false;   ///< rate of change of the force
 
     [[nodiscard]] bool any() const noexcept { return fault || faded || peak || heat || slew; }
 };
 
-/// How much of the force an old state of the solver is good for: 1 while it is fresh, then down to 0.
+/// Factor on the force by the age of the solver's state: 1 up to `max_state_age`, then down to 0 in `fade_time`.
 class Watchdog {
   public:
-    Watchdog(double max_state_age, double fade_time) noexcept : fresh_for_(max_state_age), fade_time_(fade_time) {}
+    Watchdog(double max_state_age, double fade_time) noexcept : max_state_age_(max_state_age), fade_time_(fade_time) {}
 
-    /// `state`: a number that the solver changes with each solve; `dt` since the last call [s].
+    /// `state`: a number that changes with each solve; `dt` since the last call [s].
     double update(std::uint64_t state, double dt) noexcept;
 
   private:
-    double fresh_for_, fade_time_;
+    double max_state_age_, fade_time_;
     double age_ = 0;
     std::uint64_t state_ = 0;
 };
 
-/// What share of the force comes through: falls at once to what is allowed, and rises to it slowly.
+/// Factor on the force: falls to the allowed value at once and rises to it slowly.
 class SoftStart {
   public:
     explicit SoftStart(double time) noexcept : time_(time) {}
@@ -66,70 +66,71 @@ class SoftStart {
     double share_ = 0;
 };
 
-/// Warmth of a motor: what it takes up goes with the square of the force, what it gives off with its warmth. In parts of
-/// what the continuous force comes to in the end. From three quarters on less than the peak is allowed, from 1 on the
-/// continuous force. So 1 is not passed where ticks are short beside `thermal_time` (for the stock devices, up to 40 ms).
-/// In a longer gap the device goes on with a force that was chosen for a short tick: then it can be more, up to the
-/// square of peak over continuous force.
+/// Thermal load of a motor, relative to its final value under the continuous force. Heating is proportional to the
+/// square of the force, cooling to the load. From 0.75 on the allowed force falls below the peak, from 1 on it is the
+/// continuous force. So the load does not exceed 1 if ticks are short compared with `thermal_time` (for the stock
+/// devices, up to 40 ms). In a longer gap the device holds a force that was chosen for a short tick: then the load can
+/// rise up to the square of peak over continuous force.
 class MotorThermalModel {
   public:
     explicit MotorThermalModel(const DeviceProfile& device) noexcept
         : peak_(device.peak_force), continuous_(device.continuous_force), time_(device.thermal_time) {}
 
-    /// `force` was held for `dt` [N], [s].
+    /// Adds a `force` [N] held for `dt` [s].
     void add(double force, double dt) noexcept;
-    [[nodiscard]] double thermal_load() const noexcept { return warmth_; }
+    [[nodiscard]] double thermal_load() const noexcept { return thermal_load_; }
     [[nodiscard]] double max_force() const noexcept;
 
   private:
     double peak_, continuous_, time_;
-    double warmth_ = 0;
+    double thermal_load_ = 0;
 };
 
-/// Makes a force fit for a device. The order is fixed:
-/// 1. not a number, no force: everything after reckons with it;
-/// 2. watchdog and soft start: a share of what is asked for, since they doubt the force itself;
-/// 3. peak and heat: of that share, what the device bears;
-/// 4. slew last: against what the device really got a tick ago. From there the force falls straight towards zero, at
-///    once, as far as less of it is asked for; any other change is bounded, of its direction too: one that turns about
-///    goes through zero.
-/// None makes the force larger, so none undoes the one before. The first three do not turn it; the slew limit lets it come
-/// after one that turns too fast, but never against it: with f for what is asked for and g for what comes out,
-/// g . f >= |g|^2. A force that all of them let pass comes out with the same bits.
+/// Limits a force for a device, in a fixed order:
+/// 1. fault: a force that is not finite becomes zero, since the later limits compute with it;
+/// 2. watchdog and soft start: a factor on the requested force, since they doubt the force itself;
+/// 3. peak and heat: the limits of the device, on the scaled force;
+/// 4. slew, against the force that the device got in the last tick. The part of that force which is no longer requested
+///    falls straight towards zero at once. Any other change is bounded, also of direction: a reversal passes
+///    through zero.
 ///
-/// What `passivity` says of a force holds while no limit acts. The slew limit keeps back what comes in too fast, so that a
-/// hand that jabs gets more back than it brought: above a speed of peak force / rise time / stiffness, 1.65 m/s for a
-/// Touch that shows 100 N/m.
+/// No limit increases the force, so no limit undoes an earlier one. The first three keep its direction. The slew limit
+/// lags behind a force that turns too fast, but never opposes it: with input f and output g, g . f >= |g|^2. If no
+/// limit acts, the force is returned bit for bit.
 ///
-/// With the options as they are a force is at zero 90 ms and at most a tick after the solver has stopped, and whole again
-/// 0.1 s after a fault is over (as far as motors are not hot).
+/// The result of `passivity` holds while no limit acts. The slew limit delays a fast rise, so a fast jab gets back more
+/// energy than it put in: above a speed of peak force / rise time / stiffness, 1.65 m/s for `devices::touch` at 100
+/// N/m.
 ///
-/// The time is the tool's: a recording has it, so that a replay gets the same forces to the bit, and a script that runs
-/// faster than a clock has the limits of its own time. A steady clock does as well where no replay is wanted. In `float`
-/// a time is good to a tenth of a millisecond for a quarter of an hour; count from the start of the run.
+/// With default options the force is zero 90 ms and at most one tick after the solver has stopped. It is full again 0.1
+/// s after a fault has ended (if the motors are not hot).
 ///
-/// A time that stands still or goes back counts as a tick of the longest length for watchdog and motors, and lets no
-/// force change but towards zero: a device that gives no time gets no force. One that leaps ahead counts as a gap in which
-/// the last force was held: after a wild reading motors are taken for as hot as that, until they have cooled down.
+/// Use the tool's time: a recording contains it, so a replay gives the same forces bit for bit, and a script that runs
+/// faster than real time is limited in its own time. If no replay is needed, a steady clock is suitable too. A time in
+/// `float` is accurate to 0.1 ms for 15 minutes; count from the start of the run.
+///
+/// If the time stands still or goes back, watchdog and motors count a tick of `max_tick`, and the force may only fall
+/// towards zero: a device without times gets no force. A jump ahead counts as a gap in which the last force was held:
+/// after a wrong time the motors count as heated by it until they have cooled down.
 class ForceLimiter {
   public:
-    /// @throws InvalidInput for a profile or an option out of its range
+    /// @throws InvalidInput if a number of the profile or an option is out of its range
     explicit ForceLimiter(const DeviceProfile& device, const LimitOptions& options = {});
 
-    /// The force to write [N]. `now`: the tool's time [s]; `state`: a number that the solver changes with each solve,
-    /// such as how many there were. Call it in each tick: the time in between counts for watchdog and motors.
+    /// The force to write [N]. `now`: the tool's time [s]; `state`: a number that changes with each solve, such as the
+    /// number of solves. Call once per tick: watchdog and motors count the time between calls.
     template <Real Scalar>
     [[nodiscard]] Vector3<Scalar> operator()(const Vector3<Scalar>& force, double now, std::uint64_t state) noexcept;
 
-    /// What limited the last force.
+    /// Limits that reduced the last force.
     [[nodiscard]] const ActiveLimits& acted() const noexcept { return acted_; }
-    /// Of the motors: 0 cold, 1 what the continuous force comes to; see `MotorThermalModel`.
+    /// Thermal load of the motors: 0 cold, 1 the final value under the continuous force; see `MotorThermalModel`.
     [[nodiscard]] double thermal_load() const noexcept { return heat_.thermal_load(); }
-    /// Of the force that came through watchdog and soft start, 0 to 1.
+    /// Factor of watchdog and soft start on the force, 0 to 1.
     [[nodiscard]] double share() const noexcept { return soft_start_.share(); }
     [[nodiscard]] const DeviceProfile& device() const noexcept { return device_; }
 
-    /// As new, but for the heat. For a replay take a new one.
+    /// As new, except for the thermal load. For a replay construct a new limiter.
     void reset() noexcept;
 
   private:
@@ -144,28 +145,28 @@ class ForceLimiter {
     ActiveLimits acted_;
     bool began_ = false;
     double time_ = 0;
-    Vector3<double> force_ = Vector3<double>::Zero();  // the last one [N]
+    Vector3<double> force_ = Vector3<double>::Zero();  // last force [N]
 };
 
 namespace detail {
 
-/// `force`, no longer than `most`; with the same bits if it is not.
+/// `force`, shortened to the length `most`. If it is not longer, returns it bit for bit.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> shortened(const Vector3<Scalar>& force, double most) noexcept {
     Vector3<double> exact = force.template cast<double>();
     const double largest = exact.cwiseAbs().maxCoeff();
-    if (largest > most) exact *= most / largest;  // the squares of what is left do not overflow
+    if (largest > most) exact *= most / largest;  // so that squares do not overflow
     const double length = norm(exact);
     if (largest <= most && length <= most) return force;
-    // Rounding must not lead beyond it.
+    // Rounding must not exceed the limit.
     constexpr double a_little = 4 * static_cast<double>(std::numeric_limits<Scalar>::epsilon());
     if (!(length > 0)) return Vector3<Scalar>::Zero();
     return (exact * (most * (1 - a_little) / length)).template cast<Scalar>();
 }
 
-/// The force after `last` for a hand that is to get `wanted`: `last`, fallen straight towards zero as far as `wanted` has
-/// less of it, and from there towards `wanted` by what is then left of a change of `most`. So it is either `last`
-/// shortened, or no farther from it than `most`. No larger than `wanted`, and never against it.
+/// The next force after `last` towards `wanted`, with a change of at most `most`. First `last` falls straight towards
+/// zero, as far as its projection on `wanted` requires. The remaining change then goes towards `wanted`. So the result
+/// is either `last` shortened, or at most `most` from it. It is not larger than `wanted` and never opposes it.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> slewed(const Vector3<Scalar>& wanted, const Vector3<double>& last, double most) noexcept {
     const Vector3<double> goal = wanted.template cast<double>();
@@ -174,13 +175,14 @@ template <Real Scalar>
     const Vector3<double> fallen = kept * last, fall = last - fallen, change = goal - fallen;
     const double length = norm(change);
     if (!(length > 0)) return wanted;
-    // Rounding must not lead beyond it, nor turn a fall into a change of direction.
+    // Rounding must not exceed the limit, nor turn a fall into a change of direction.
     const double rounding =
         4 * static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * (most + std::sqrt(square));
-    const double reach = (std::max)(most - 2 * rounding, 0.0);
-    // How far along `change` a sphere of this radius about `last` reaches; nowhere if the fall has left it.
-    const double back = kept > 0 ? 0 : dot(fall, change) / length;  // elsewhere at right angles, or no fall
-    const double left = (std::max)(reach * reach - squared_norm(fall), 0.0);
+    const double max_change = (std::max)(most - 2 * rounding, 0.0);
+    // Length along `change` within a sphere of this radius around `last`; 0 if the fall has left the sphere.
+    const double back =
+        kept > 0 ? 0 : dot(fall, change) / length;  // otherwise the fall is 0 or orthogonal to the change
+    const double left = (std::max)(max_change * max_change - squared_norm(fall), 0.0);
     const double step = (std::max)(back + std::sqrt(left + back * back), 0.0);
     if (length <= step + rounding) return wanted;
     return shortened<Scalar>((fallen + step / length * change).template cast<Scalar>(), norm(goal));
@@ -202,8 +204,8 @@ inline void LimitOptions::check() const {
 inline double Watchdog::update(std::uint64_t state, double dt) noexcept {
     age_ = state == state_ ? age_ + dt : 0;
     state_ = state;
-    if (age_ <= fresh_for_) return 1;
-    return age_ < fresh_for_ + fade_time_ ? 1 - (age_ - fresh_for_) / fade_time_ : 0;
+    if (age_ <= max_state_age_) return 1;
+    return age_ < max_state_age_ + fade_time_ ? 1 - (age_ - max_state_age_) / fade_time_ : 0;
 }
 
 inline double SoftStart::update(double allowed, double dt) noexcept {
@@ -213,16 +215,17 @@ inline double SoftStart::update(double allowed, double dt) noexcept {
 }
 
 inline void MotorThermalModel::add(double force, double dt) noexcept {
-    constexpr double long_enough = 1e3;  // to forget what was before
+    constexpr double long_enough = 1e3;  // ratio beyond which the past has no effect
     const double time = dt / long_enough < time_ ? dt / time_ : long_enough;
-    const double left = 1 / (1 + time * (1 + time * (0.5 + time / 6)));  // of exp(-time), the same on all machines
+    const double left =
+        1 / (1 + time * (1 + time * (0.5 + time / 6)));  // close to exp(-time), with the same bits on all machines
     const double relative = force / continuous_;
-    warmth_ = left * warmth_ + (1 - left) * (relative * relative);  // between the two, however long the time
+    thermal_load_ = left * thermal_load_ + (1 - left) * (relative * relative);  // a weighted mean for any time
 }
 
 inline double MotorThermalModel::max_force() const noexcept {
     constexpr double warm = 0.75;
-    const double reserve = std::clamp((1 - warmth_) / (1 - warm), 0.0, 1.0);
+    const double reserve = std::clamp((1 - thermal_load_) / (1 - warm), 0.0, 1.0);
     return continuous_ + reserve * (peak_ - continuous_);
 }
 
@@ -246,7 +249,7 @@ Vector3<Scalar> ForceLimiter::operator()(const Vector3<Scalar>& force, double no
     acted_ = {};
     acted_.fault = !is_finite(force) || !is_finite(now);
     const double dt = is_finite(now) ? time_since_last(now) : 0;
-    // A clock that stands still or jumps back stops no watchdog, and lets no force grow.
+    // If the time stands still or goes back, the watchdog still counts and no force grows.
     const double passed = dt > 0 && is_finite(dt) ? dt : options_.max_tick;
     const double growing = std::clamp(dt, 0.0, options_.max_tick);
     heat_.add(norm(force_), passed);

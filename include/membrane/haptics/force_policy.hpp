@@ -9,13 +9,13 @@
 #include <membrane/contact/tool.hpp>
 #include <membrane/solve/step.hpp>
 
-/// What the hand should feel.
+/// Force laws: the force on the hand from the state of the loop.
 ///
 ///     const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};     // [N/m], [N s/m]
 ///     device.write(feel({tool, contact, report}));                                         // [N]
 namespace membrane {
 
-/// All that is known at the end of a tick.
+/// State of the loop at the end of a tick.
 template <Real Scalar>
 struct HapticState {
     Tool<Scalar> tool;
@@ -24,10 +24,10 @@ struct HapticState {
     Grasp<Scalar> grasp = {};
 };
 
-/// The force on the hand [N]. What the compiler cannot see: finite for every finite state, and no energy given that the hand did
-/// not bring. The stock policies give zero for what is not finite. A policy may remember (friction does): then it is called
-/// once in each tick, and belongs to one tool.
-/// A policy that is to be called with a list in braces, as above, names the scalar of its argument.
+/// The force on the hand [N]. Requirements that the compiler cannot check: it is finite for every finite state, and it
+/// gives the hand no more energy than the hand put in. The stock policies return zero instead of a force that is not
+/// finite. A policy may have a state (friction has): then call it once per tick, for one tool only.
+/// A policy that is called with a braced list, as above, must name the scalar of its argument.
 template <class Policy, class Scalar>
 concept ForcePolicy = Real<Scalar> && requires(Policy& policy, const HapticState<Scalar>& state) {
     { policy(state) }
@@ -45,13 +45,13 @@ consteval bool check_force_policy() noexcept {
 
 }  // namespace detail
 
-/// A `ForcePolicy`; where it is none, the error says what is missing.
+/// A `ForcePolicy`. If a requirement is missing, the compile error names it.
 template <class Policy, class Scalar>
 concept CheckedForcePolicy = detail::check_force_policy<Policy, Scalar>();
 
 namespace detail {
 
-/// A device never gets what is not a number.
+/// Zero if the force is not finite: a device never gets a NaN.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> finite_or_zero(const Vector3<Scalar>& force) noexcept {
     return is_finite(force) ? force : Vector3<Scalar>(Vector3<Scalar>::Zero());
@@ -59,19 +59,19 @@ template <Real Scalar>
 
 }  // namespace detail
 
-/// The force of the paper, F = -k x - mu v, [Liu07] 2.4. Touching: x is the depth and v the velocity along the contact
-/// normal, and so is the force; it never pulls the tool in. Pulling: x is how far the held point is from where it would be
-/// without the tool, v its velocity along that, and the force runs against it. The held point moves with the tool. On a
-/// body that moves velocities are relative to it.
+/// The force of the paper, F = -k x - mu v, [Liu07] 2.4. In contact x is the depth, v the velocity along the contact
+/// normal. The force is along the normal and never pulls the tool in. In a grasp x is the distance of the held point
+/// from its position without the tool, v its velocity along that displacement; the force opposes the displacement. The
+/// held point moves with the tool. On a moving body velocities are relative to the body.
 ///
-/// Touching, it has no potential as it stands: the depth is of the surface at rest, the normal of the deformed one. A hand
-/// that goes round slowly is given some microjoules on each turn, which only friction takes (see `SampledLoop`). With the
-/// contact of a `RestContact` it is that of a spring.
+/// In contact the force has no potential: the depth is that of the surface at rest, the normal that of the deformed
+/// surface. A hand on a slow closed path gains some microjoules per turn, which only friction dissipates (see
+/// `SampledLoop`). With the contact of a `RestContact` the force is that of a spring.
 struct SpringDamperForce {
     double stiffness;    ///< k [N/m]
     double damping = 0;  ///< mu [N s/m]
 
-    // For a state of doubles in braces or of floats; templates, so that an include costs no more for them.
+    // For braced states of double or float. Templates, so that they cost no compile time unless called.
     template <int = 0>
     [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept {
         return force(state);
@@ -86,10 +86,10 @@ struct SpringDamperForce {
     [[nodiscard]] Vector3<Scalar> force(const HapticState<Scalar>& state) const noexcept;
 };
 
-/// The membrane's own reaction, what the solver found: the sum over all constraints of the step, scaled from the tissue
-/// to what a hand can feel. As far as steps converge its potential is the energy of the membrane, so that a hand that goes
-/// round slowly is given nothing. Where a step has loads, pins or a second hand's tool, a policy of one's own takes the
-/// `report.reactions` that are this hand's.
+/// The reaction of the membrane as the solver computes it: the sum over all constraints of the step, scaled from the
+/// tissue to the hand. For converged steps its potential is the energy of the membrane, so a hand on a slow closed path
+/// gains no energy. If a step has loads, pins or the tool of a second hand, write a policy that sums the
+/// `report.reactions` of one hand.
 struct ReactionForce {
     double scale = 1;
 

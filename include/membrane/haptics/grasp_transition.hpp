@@ -6,33 +6,34 @@
 #include <membrane/core/check.hpp>
 #include <membrane/haptics/force_policy.hpp>
 
-/// From touching to grasping and back, without a jump.
+/// Continuous change of the force between contact and grasp.
 ///
 ///     auto feel = membrane::GraspTransition(membrane::SpringDamperForce{.stiffness = 100}, {.duration = 0.1});
-///     device.write(feel({tool, contact, report, grasp}));                    // the tool with its time
+///     device.write(feel({tool, contact, report, grasp}));                    // tool.time must be set
 namespace membrane {
 
 struct TransitionOptions {
-    double duration = 0.1;  ///< in which the force goes from the one law to the other [s]
+    double duration = 0.1;  ///< of the change from one force law to the other [s]
 
-    /// @throws InvalidInput for a duration that is not finite and positive
+    /// @throws InvalidInput if the duration is not finite and positive
     void check() const { detail::check_option("GraspTransition", duration, "duration", "s", false); }
 };
 
-/// The force of another policy; when the tool takes hold or lets go, the force first stays what it was, and what the new
-/// law differs by comes in evenly over `duration`. At all other times it is the policy's, bit for bit. Meanwhile it is
-/// no force of a potential: it may give the hand up to that difference times the way in `duration`.
+/// The force of another policy, continuous at grasp and release: the force first keeps its value, and the difference to
+/// the new law is added linearly over `duration`. At all other times it is the policy's force, bit for bit. During the
+/// transition the force has no potential: it may give the hand an energy of up to that difference times the
+/// displacement in `duration`.
 template <class Policy, Real Scalar = double>
     requires CheckedForcePolicy<Policy, Scalar>
 class GraspTransition {
   public:
-    /// @throws InvalidInput for an option out of its range
+    /// @throws InvalidInput if an option is out of its range
     explicit GraspTransition(Policy policy, const TransitionOptions& options = {})
         : policy_((options.check(), std::move(policy))), duration_(static_cast<Scalar>(options.duration)) {}
 
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& state) noexcept;
 
-    /// Whether the force is still on its way from one law to the other.
+    /// Whether the force is between the two laws.
     [[nodiscard]] bool in_transition() const noexcept { return in_transition_; }
 
   private:
@@ -40,8 +41,8 @@ class GraspTransition {
     Scalar duration_;
     bool held_ = false, in_transition_ = false;
     Scalar begin_ = 0;                                      // [s]
-    Vector3<Scalar> difference_ = Vector3<Scalar>::Zero();  // of the old law to the new, at the beginning [N]
-    Vector3<Scalar> last_ = Vector3<Scalar>::Zero();        // force [N]
+    Vector3<Scalar> difference_ = Vector3<Scalar>::Zero();  // old law minus new law, at the beginning [N]
+    Vector3<Scalar> last_ = Vector3<Scalar>::Zero();        // last force [N]
 };
 
 template <class Policy, Real Scalar>
@@ -56,7 +57,7 @@ requires CheckedForcePolicy<Policy, Scalar> Vector3<Scalar> GraspTransition<Poli
         in_transition_ = true;
     }
     const Scalar past = (state.tool.time - begin_) / duration_;
-    // A time that jumps back or is none ends it.
+    // A time that goes back or is not finite ends the transition.
     in_transition_ = in_transition_ && past >= 0 && past < 1 && is_finite(past) && is_finite(difference_);
     last_ = in_transition_ ? Vector3<Scalar>(force + (1 - past) * difference_) : force;
     return last_;

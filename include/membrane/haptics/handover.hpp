@@ -9,8 +9,8 @@
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/triple_buffer.hpp>
 
-/// How a haptic loop and a drawing loop share one membrane: each has its own positions and its own thread, and neither
-/// ever waits for the other.
+/// Two loops that share one membrane, a haptic loop and a drawing loop: each has its own positions and its own thread,
+/// and neither waits for the other.
 ///
 ///     membrane::MovedPoints<double> moved(mesh.vertex_count());
 ///     membrane::Latest<membrane::Tool<double>> pose;
@@ -23,10 +23,10 @@
 ///     normals.update(shown, news.moved);
 ///     pose.publish(tool, now());
 ///
-/// Times are of any clock that both loops read [s].
+/// Times may come from any clock that both loops read [s].
 namespace membrane {
 
-/// Which one it is of all that were published, and when that was.
+/// Number and time of a publish.
 struct Stamp {
     std::uint64_t number = 0;  ///< from 1 on; 0 before the first
     double time = 0;           ///< [s]
@@ -34,16 +34,16 @@ struct Stamp {
     [[nodiscard]] double age(double now) const noexcept { return now - time; }
 };
 
-/// What was published, whole.
+/// A published value with its stamp.
 template <class T>
 struct Snapshot : Stamp {
     T value{};
 };
 
-/// The latest of what one thread publishes, for one other thread: a pose, a force. What is in between is left out.
+/// The latest value that one thread publishes for one other thread: a pose, a force. The reader skips older values.
 ///
-/// What is read is never older than the last publish that was complete before the read, and the numbers never go back.
-/// Wait-free: a publish copies T and exchanges one atomic number; a read does the latter at most.
+/// The value read is never older than the last publish completed before the read, and numbers never decrease.
+/// Wait-free: a publish copies T and exchanges one atomic number; a read exchanges at most one atomic number.
 template <class T>
 class Latest {
     static_assert(
@@ -51,16 +51,16 @@ class Latest {
         "Latest: T must own no memory, so that to copy it allocates nothing; MovedPoints hands over positions");
 
   public:
-    /// Before the first publish, what is read is `first`, with number 0.
+    /// Before the first publish `read` returns `first` with number 0.
     explicit Latest(const T& first = T()) : slots_(Snapshot<T>{{}, first}) {}
 
-    /// By the writer.
+    /// Called by the writer.
     void publish(const T& value, double time) noexcept {
         slots_.back() = {{++published_, time}, value};
         slots_.publish();
     }
 
-    /// By the reader; valid until its next `read`.
+    /// Called by the reader; valid until its next `read`.
     [[nodiscard]] const Snapshot<T>& read() noexcept {
         slots_.take();
         return slots_.front();
@@ -68,43 +68,44 @@ class Latest {
 
   private:
     TripleBuffer<Snapshot<T>> slots_;
-    std::uint64_t published_ = 0;  // the writer's
+    std::uint64_t published_ = 0;  // used by the writer only
 };
 
-/// What has moved, and where it is now.
+/// The moved vertices and their positions.
 template <Real Scalar>
 struct MovedSnapshot : Stamp {
-    /// Each vertex that has moved since the reader's last snapshot, and perhaps some that moved between that and the
-    /// one before. None where nothing was published since.
+    /// All vertices moved since the reader's last snapshot, and possibly some moved between that and the previous one.
+    /// Empty if there was no publish since.
     std::span<const Index> moved;
-    const Points<Scalar>& x;  ///< 3 x V [m]; of the vertices that moved, and no others
+    const Points<Scalar>& x;  ///< 3 x V [m]; valid at the moved vertices only
 };
 
-/// The vertices that one thread moves, for one other thread that looks less often: all that has moved since it looked
-/// last, not the whole mesh. A reader that starts with the writer's first positions, and takes over what is in each
-/// snapshot, has the writer's positions of that snapshot, bit for bit.
+/// Vertices that one thread moves, for one other thread that reads less often: all vertices moved since its last read,
+/// not the whole mesh. A reader that starts with the writer's first positions and copies the vertices of each snapshot
+/// has the writer's positions of that snapshot, bit for bit.
 ///
-/// Wait-free and allocates nothing: a publish copies each moved vertex twice, and at most once more those of the publish
-/// before; a read exchanges one atomic number. Takes three times 3 numbers and 8 bytes a vertex, and 8 bytes more.
+/// Wait-free, no allocation: a publish copies each moved vertex twice, and those of the previous publish at most once
+/// more; a read exchanges one atomic number. Memory per vertex: three slots of 3 numbers and 8 bytes, plus 8 bytes.
 ///
-/// Why nothing is lost: before publish k, the writer's slot has all that moved in the publishes s + 1 to k - 1, where
-/// they were then, for a snapshot s that the reader has taken (0: it starts with that). Publish k adds what moves in it,
-/// and swaps slots. If the reader had not taken k - 1, the slot that comes back is that of k - 1: it lacks only what
-/// moved in k, which is added. If it had, the slot is empty but for what moved in k: now s = k - 1. The snapshots that
-/// the reader has only grow, so that s is one of them whenever a slot is taken.
-/// Why it does not pile up: when the reader has taken k - 1, the slot of k may still hold what moved long before.
-/// If that comes back from publish k + 1, it is emptied as well, but for what moved in k and k + 1.
+/// Why no vertex is lost: before publish k, the writer's slot holds all vertices moved in the publishes s + 1 to k - 1,
+/// with their positions then, for a snapshot s that the reader has taken (0: its start). Publish k adds the vertices
+/// moved in it and swaps slots. If the reader had not taken k - 1, the slot that comes back is that of k - 1: it lacks
+/// only the vertices moved in k, which are added. If the reader had taken k - 1, the slot is cleared and gets the
+/// vertices moved in k: now s = k - 1. The reader never returns to an older snapshot, so it has s whenever it takes a
+/// slot.
+/// Why slots do not fill up: if the reader has taken k - 1, the slot of k may still hold vertices moved long before. If
+/// it comes back from publish k + 1, it is cleared too and gets the vertices moved in k and k + 1.
 template <Real Scalar>
 class MovedPoints {
   public:
-    /// @throws InvalidInput if there is no vertex
+    /// @throws InvalidInput if `vertex_count` is below 1
     explicit MovedPoints(Index vertex_count) : slots_(Slot(vertex_count)), before_(checked(vertex_count)) {}
 
-    /// By the writer: `moved` are all that have moved since the last publish. @pre `x` is 3 x V [m], `moved` in 0 .. V - 1
-    /// (asserted)
+    /// Called by the writer: `moved` are all vertices moved since the last publish. @pre `x` is 3 x V [m], `moved` in 0
+    /// .. V - 1 (asserted)
     void publish(std::span<const Index> moved, const ConstPointsRef<Scalar>& x, double time) noexcept;
 
-    /// By the reader; valid until its next `read`.
+    /// Called by the reader; valid until its next `read`.
     [[nodiscard]] MovedSnapshot<Scalar> read() noexcept {
         const bool newer = slots_.take();
         const Slot& slot = slots_.front();
@@ -114,7 +115,8 @@ class MovedPoints {
   private:
     struct Slot {
         explicit Slot(Index vertex_count)
-            : moved(checked(vertex_count)), x(Points<Scalar>::Zero(3, vertex_count)) {}  // written to: memory is there
+            : moved(checked(vertex_count)),
+              x(Points<Scalar>::Zero(3, vertex_count)) {}  // written, so that its pages exist
 
         void add(std::span<const Index> vertices, const ConstPointsRef<Scalar>& from) noexcept {
             for (const Index v : vertices) {
@@ -134,9 +136,9 @@ class MovedPoints {
     }
 
     TripleBuffer<Slot> slots_;
-    // The writer's:
-    IndexSet before_;     // what moved in the publish before
-    bool taken_ = false;  // whether the reader had then taken all that was published until then
+    // Used by the writer only:
+    IndexSet before_;     // moved in the previous publish
+    bool taken_ = false;  // whether the previous publish found the slot before it taken by the reader
     std::uint64_t published_ = 0;
 };
 

@@ -8,111 +8,118 @@
 
 #include <membrane/haptics/device_profile.hpp>
 
-/// Whether a loop can buzz: before it runs, and while it does.
+/// Passivity of a haptic loop: a condition before it runs, an observer while it runs.
 ///
-///     const membrane::SampledLoop loop{.stiffness = 40 * 12.0, .damping = 0.5, .tick = 1e-3,    // after the scale
+///     const membrane::SampledLoop loop{.stiffness = 40 * 12.0, .damping = 0.5, .tick = 1e-3,  // scaled to the device
 ///                                      .negative_stiffness = 100, .off_potential = 0.06};
 ///     const auto device = membrane::devices::touch;
-///     membrane::require_passive(loop, device, {.hand_damping = 2});     // throws, and says what would do
+///     membrane::require_passive(loop, device, {.hand_damping = 2});     // throws; the message names a limit
 ///     const auto most = membrane::passivity(loop, device, {.hand_damping = 2}).max_stiffness;  // [N/m]
 namespace membrane {
 
-/// What is shown to the hand: a force that has a potential, but for its damping and for what `off_potential` says. Its
-/// stiffness is that of the potential, the eigenvalues of its Hessian: in every direction, not along a normal alone.
+/// The force shown to the hand. It has a potential, except for its damping and the part bounded by `off_potential`. Its
+/// stiffness is that of the potential, the eigenvalues of its Hessian: in every direction, not only along a normal.
 ///
 /// | force | negative_stiffness | off_potential |
 /// |---|---|---|
-/// | `ReactionForce` | reaction / distance to the centre of curvature of a convex membrane; more where it buckles | scale * residual |
-/// | `SpringDamperForce` on a `RestContact` | stiffness * depth / distance, see there | 0 |
-/// | the same on a contact itself, or a `SmoothContact` | the same | stiffness * depth * sine of the angle between its normal and that of the `RestContact` |
+/// | `ReactionForce` | reaction / distance to the centre of convex curvature; more if buckling | scale * residual |
+/// | `SpringDamperForce` on a `RestContact` | stiffness * depth / distance, see `RestContact` | 0 |
+/// | `SpringDamperForce` on another contact | stiffness * depth / distance | stiffness * depth * sin(a) |
+///
+/// Other contacts are a tracked contact or a `SmoothContact`; a is the angle between its normal and that of a
+/// `RestContact`.
 struct SampledLoop {
     double stiffness;    ///< K, the largest tangent stiffness at the device, tissue-to-device scale included [N/m]
-    double damping = 0;  ///< B, the largest damping of the policy, by differences of the position [N s/m]
-    double tick = 1e-3;  ///< T, from one force to the next [s]
-    double delay = 0;    ///< from a position to the tick in which it is answered, a multiple of the tick [s]
-    /// N, how far the tangent stiffness goes below zero, at most [N/m]: 0 where it never does, infinity for a wall that
-    /// ends, or if it is not known. It matters with a delay, or on a device with a resolution.
+    double damping = 0;  ///< B, largest damping of the policy, from differences of the position [N s/m]
+    double tick = 1e-3;  ///< T, time from one force to the next [s]
+    double delay = 0;    ///< from a position to the tick that responds to it, a multiple of the tick [s]
+    /// N, largest magnitude of a negative tangent stiffness [N/m]: 0 if it is never negative, infinity for a wall that
+    /// ends or if N is not known. N matters only with a delay or with a resolution of the device.
     double negative_stiffness = std::numeric_limits<double>::infinity();
-    /// How far the force without its damping is from that of any potential, at most [N]: 0 where it has one, infinity if
-    /// it is not known. What it gives in a slow loop no damping takes, friction must. A jump of the force counts in full.
+    /// Largest part of the force, without its damping, that has no potential [N]: 0 if the force has a potential,
+    /// infinity if this part is not known. In a slow loop no damping dissipates its energy; friction must. A jump of
+    /// the force counts in full.
     double off_potential = std::numeric_limits<double>::infinity();
 
-    /// @throws InvalidInput for a number that is not finite or out of its range
+    /// @throws InvalidInput if a number is not finite or out of its range
     void check() const;
 };
 
-/// What else takes energy out of the loop, beside the device's own damping and friction.
+/// Dissipation of the loop, in addition to the device's own damping and friction.
 struct Dissipation {
-    double hand_damping;  ///< the least a hand that holds the device ever has [N s/m]; 0: it may let go
-    /// In contact the tool is never faster [m/s]. Friction takes as much as a damper of friction / speed up to there, and
-    /// is counted so. Infinity: it is not counted, but against a coarse resolution.
+    double hand_damping;  ///< lower bound of the damping of the hand on the device [N s/m]; 0: it may let go
+    /// Upper bound of the tool's speed in contact [m/s]. Friction counts as a damper of friction / `max_speed`.
+    /// Infinity: friction counts only against a resolution and `off_potential`.
     double max_speed = std::numeric_limits<double>::infinity();
 
-    /// @throws InvalidInput for a number out of its range
+    /// @throws InvalidInput if a number is out of its range
     void check() const;
 };
 
-/// What a check comes to.
+/// Result of `passivity`.
 struct PassivityReport {
     bool passive = false;
-    double max_stiffness = 0;      ///< of the loop, the rest as it is; 0: none [N/m]
-    double damping_needed = 0;     ///< by the loop as it is [N s/m]
+    double max_stiffness = 0;  ///< largest passive stiffness, other numbers unchanged [N/m]; 0: no stiffness is passive
+    double damping_needed = 0;     ///< by the loop as given [N s/m]
     double damping_available = 0;  ///< of device and hand, and of friction as far as it is counted [N s/m]
-    double friction_needed = 0;    ///< of the device, for a coarse resolution and what has no potential [N]
+    double friction_needed = 0;    ///< of the device, for its resolution and the force without a potential [N]
 };
 
-/// Whether a held, sampled force gives the hand no energy that the hand has not brought.
+/// Whether a held, sampled force gives the hand no more energy than the hand put in.
 ///
-/// The force of a tick is held until the next, so a spring that is let go pushes as it did where it was pressed deeper:
-/// that makes at most K / 2 d^2 for a tick in which the tool goes by d. A delay of n ticks answers a position that is off
-/// by the last n d: where no slope is steeper than L = max(K, N), up or down, that makes n L d^2 more in the mean. A
-/// damper by differences makes B d^2 / T. A damper b takes b d^2 / T. So the loop is passive if
+/// The force of a tick is held until the next, so a released spring pushes with the force of the deeper position: this
+/// generates at most K / 2 d^2 in a tick in which the tool moves by d. With a delay of n ticks the force responds to a
+/// position that is off by the last n d: if no slope is steeper than L = max(K, N), up or down, this generates n L d^2
+/// more on average. Damping by differences generates B d^2 / T. A damper b dissipates b d^2 / T. So the loop is passive
+/// if
 ///
 ///     b >= K T / 2 + max(K, N) delay + B,                                                        [Colgate97]
 ///
-/// for any force with a potential: springs that harden, and, where there is no delay, walls that end, of which N is
-/// infinite. A position coarse by r makes the force wrong by (L / 2 + B / T) r, against which friction has to stand
-/// [Abbott05], as it has against the part of the force that has no potential: that gives in a slow loop what no damper takes.
-/// What is left of friction, c, takes c d, no less than c / v d^2 / T at speeds up to v [Diolaiti06]. Sufficient; for
-/// N <= K necessary where the hand may be anything passive.
+/// for any force with a potential: springs that harden and, without a delay, walls that end, whose N is infinite. A
+/// position with a resolution of r makes the force wrong by (L / 2 + B / T) r. Friction must exceed this error
+/// [Abbott05] plus the part of the force that has no potential, whose energy no damper dissipates in a slow loop. The
+/// remaining friction c dissipates c d, at least c / v d^2 / T at speeds up to v [Diolaiti06]. The condition is
+/// sufficient. For N <= K it is necessary if the hand may be any passive system.
 ///
-/// @throws InvalidInput for a number out of its range
+/// @throws InvalidInput if a number is out of its range
 [[nodiscard]] inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device,
                                                const Dissipation& dissipation);
 
-/// @throws InvalidInput for a loop that is not passive, naming the stiffness that would be, and the damping
+/// @throws InvalidInput if the loop is not passive; the message names the largest passive stiffness and the damping
+/// needed
 inline void require_passive(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation);
 
-/// The energy a hand has put into the loop, tick by tick [Hannaford02]. Where it sinks below zero, the loop has given more
-/// than it got.
+/// The energy that a hand has put into the loop, updated each tick [Hannaford02]. If it falls below zero, the loop has
+/// given more energy than it received.
 ///
-///     membrane::PassivityObserver observer(2.0);             // least damping of device and hand [N s/m]
+///     membrane::PassivityObserver observer(2.0);             // lower bound of device and hand damping [N s/m]
 ///     observer.update(tool.position, force, dt);          // the force that is written in this tick
 ///     if (observer.energy() < 0) ...                      // active
 class PassivityObserver {
   public:
-    /// With damping and friction of device and hand, what they take counts too: without, each sampled spring gives some.
+    /// `damping` and `friction` of device and hand: their dissipation counts too. Without it each sampled spring
+    /// generates some energy.
     explicit PassivityObserver(double damping = 0, double friction = 0) noexcept
         : damping_(damping), friction_(friction) {}
 
-    /// `position` of the tool now [m], `force` on the hand from now on [N], `dt` since the last call [s]. What is not
-    /// finite, or no time, is passed over.
+    /// `position` of the tool now [m], `force` on the hand from now on [N], `dt` since the last call [s]. Input that is
+    /// not finite is ignored; if `dt` is not positive, no energy is added.
     template <Real Scalar>
     void update(const Vector3<Scalar>& position, const Vector3<Scalar>& force, double dt) noexcept;
 
-    /// What the hand has put in, less what it got back [J].
+    /// Energy that the hand put in, minus the energy it got back [J].
     [[nodiscard]] double energy() const noexcept { return energy_; }
-    /// What went in, not counting what came back [J].
-    [[nodiscard]] double energy_in() const noexcept { return brought_; }
-    /// The least there ever was [J].
-    [[nodiscard]] double least() const noexcept { return least_; }
+    /// Energy that the hand put in, without subtracting the energy it got back [J].
+    [[nodiscard]] double energy_in() const noexcept { return energy_in_; }
+    /// Smallest `energy` so far [J].
+    [[nodiscard]] double least() const noexcept { return min_energy_; }
     void reset() noexcept { *this = PassivityObserver(damping_, friction_); }
 
   private:
     double damping_, friction_;
     bool began_ = false;
     Vector3<double> position_ = Vector3<double>::Zero(), force_ = Vector3<double>::Zero();
-    double energy_ = 0, brought_ = 0, least_ = 0;
+    double energy_ = 0, energy_in_ = 0, min_energy_ = 0;
 };
 
 inline void SampledLoop::check() const {
@@ -129,7 +136,7 @@ inline void SampledLoop::check() const {
 
 inline void Dissipation::check() const {
     detail::check_option("Dissipation", hand_damping, "hand_damping", "N s/m");
-    if (!(max_speed > 0)) refuse("Dissipation", "fastest must be positive [m/s], got ", max_speed);
+    if (!(max_speed > 0)) refuse("Dissipation", "max_speed must be positive [m/s], got ", max_speed);
 }
 
 inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation) {
@@ -139,7 +146,7 @@ inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& d
     const double lag = loop.tick / 2, coarse = device.resolution, negative = loop.negative_stiffness;
     const double per_speed = 1 / dissipation.max_speed;
     const double viscous = device.damping + dissipation.hand_damping;
-    // For slopes: without a lag even an infinite one does nothing.
+    // Without a lag even an infinite slope has no effect.
     const double friction = device.friction - loop.off_potential - loop.damping / loop.tick * coarse;
     const auto over = [](double slope, double displacement) { return displacement > 0 ? slope * displacement : 0.0; };
 
@@ -150,7 +157,8 @@ inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& d
     report.damping_needed = loop.stiffness * lag + over(steepest, loop.delay) + loop.damping;
     report.damping_available = viscous + (std::max)(left, 0.0) * per_speed;
 
-    // The most where the stiffness is the steepest slope; if that is less than the negative one, where that is.
+    // The largest stiffness if the stiffness is the steepest slope; if that is below `negative`, with `negative` as the
+    // steepest slope.
     const double late = loop.delay + coarse / 2 * per_speed;
     const double spare = viscous + friction * per_speed - loop.damping;
     double most = spare / (lag + late);
@@ -159,7 +167,7 @@ inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& d
     const bool borne = friction >= 0 && (coarse == 0 || negative <= max_slope);
     report.max_stiffness = borne ? (std::max)((std::min)({most, max_slope, device.stiffness}), 0.0) : 0;
 
-    // A wall of no stiffness and no damping is no wall.
+    // Without stiffness and damping there is no force.
     const bool shows_nothing = loop.stiffness == 0 && loop.damping == 0;
     const bool enough = left >= 0 && report.damping_available >= report.damping_needed;
     report.passive = shows_nothing || (enough && loop.stiffness <= device.stiffness);
@@ -196,8 +204,8 @@ void PassivityObserver::update(const Vector3<Scalar>& position, const Vector3<Sc
         const double more =
             damping_ / dt * squared_norm(displacement) + friction_ * norm(displacement) - dot(force_, displacement);
         energy_ += more;
-        brought_ += (std::max)(more, 0.0);
-        least_ = (std::min)(least_, energy_);
+        energy_in_ += (std::max)(more, 0.0);
+        min_energy_ = (std::min)(min_energy_, energy_);
     }
     began_ = true;
     position_ = now;

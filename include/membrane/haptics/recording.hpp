@@ -12,49 +12,49 @@
 
 #include <membrane/haptics/device.hpp>
 
-/// A run, kept tick by tick, and played again. Files of it: `haptics/recording_file.hpp`.
+/// Recording of a run, tick by tick, and its replay. Files: `haptics/recording_file.hpp`.
 ///
 ///     membrane::Recorder<double> recorder(60'000, mesh.vertex_count());            // a minute at 1 kHz
 ///     while (device.running()) { ...; device.write(force); recorder.add(tool, force); }
 ///     membrane::ReplayDevice<double> again(recorder.recording());                  // in place of the device
 ///     while (again.running()) { ...; again.write(force); }                         // then again.differing() == 0
 ///
-/// A replay gives the same forces to the bit if it is the same binary, and begins as the recorded run began: same mesh,
-/// network and options, same positions, parts and force policies that are new or `reset()`, the tree refitted, a limiter that
-/// is new (a restarted one is as warm as it was). Nothing is recorded but what the device said, so all that needs a time takes
-/// the tool's: a `ForceLimiter` with `tool.time` limits a replay as it did the run, and the loop is the same in both. One
-/// on a clock of its own, or steps that end at a deadline of a real clock, do not repeat themselves.
+/// A replay gives the same forces bit for bit if it is the same binary and starts in the state of the recorded run: the
+/// same mesh, network, options and positions, parts and force policies new or `reset()`, the tree refitted, and a new
+/// limiter (`reset` keeps its thermal load). Only the device's data is recorded, so every part that needs a time must
+/// use the tool's: a `ForceLimiter` with `tool.time` limits a replay as it limited the run. A limiter on another clock,
+/// or steps that end at a deadline of a real clock, are not reproducible.
 namespace membrane {
 
-/// One turn of the loop: what the device said, and what it was told.
+/// One tick: the tool that the device returned, and the force written to it.
 template <Real Scalar>
 struct RecordedTick {
     Tool<Scalar> tool;
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
 };
 
-/// Whether two ticks have the same bits: unlike ==, zeros of either sign differ, and NaN is NaN.
+/// Whether two ticks have the same bits. Unlike ==, +0 and -0 differ, and a NaN equals itself.
 template <Real Scalar>
 [[nodiscard]] bool identical(const RecordedTick<Scalar>& a, const RecordedTick<Scalar>& b) noexcept;
 
 template <Real Scalar>
 struct Recording {
-    Index vertex_count = 0;  ///< of the membrane, so that it is not played to another
+    Index vertex_count = 0;  ///< of the membrane; guards against a replay with another mesh
     std::vector<RecordedTick<Scalar>> ticks = {};
 };
 
-/// Takes down a run, in memory that it has from the beginning. What is not finite is kept as it is.
+/// Records a run into memory allocated at construction. Values that are not finite are recorded unchanged.
 template <Real Scalar>
 class Recorder {
   public:
-    /// Room for `max_ticks`, 120 bytes each in `double`, of which every page has been touched.
-    /// @throws InvalidInput for no room, or a negative number of vertices
+    /// Capacity for `max_ticks`, 120 bytes each in `double`; every page is touched at construction.
+    /// @throws InvalidInput if `max_ticks` is 0 or `vertex_count` is negative
     explicit Recorder(std::size_t max_ticks, Index vertex_count) : ticks_(max_ticks), vertex_count_(vertex_count) {
         if (max_ticks == 0) refuse("Recorder", "max_ticks must be positive, got 0");
         if (vertex_count < 0) refuse("Recorder", "vertex_count must not be negative, got ", vertex_count);
     }
 
-    /// One tick more; when there is no room left it is only counted, for a replay needs the beginning. Online.
+    /// Adds one tick. If the capacity is exhausted, only counts the tick: a replay needs the beginning. Online.
     void add(const Tool<Scalar>& tool, const Vector3<Scalar>& force) noexcept {
         if (size_ < ticks_.size()) {
             ticks_[size_++] = {tool, force};
@@ -65,15 +65,15 @@ class Recorder {
 
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
 
-    /// How many ticks there was no room for.
+    /// Number of ticks that exceeded the capacity.
     [[nodiscard]] std::size_t missed() const noexcept { return missed_; }
 
-    /// A copy of what there is so far; not while another thread adds to it.
+    /// A copy of the ticks so far; not while another thread adds ticks.
     [[nodiscard]] Recording<Scalar> recording() const {
         return {vertex_count_, {ticks_.begin(), ticks_.begin() + static_cast<std::ptrdiff_t>(size_)}};
     }
 
-    /// Forgets all ticks and keeps the room.
+    /// Removes all ticks and keeps the capacity.
     void clear() noexcept { size_ = missed_ = 0; }
 
   private:
@@ -82,25 +82,25 @@ class Recorder {
     std::size_t size_ = 0, missed_ = 0;
 };
 
-/// A device that hands out a recording's tools one after the other, and compares the forces with the recorded ones.
+/// A device that returns the tools of a recording in order, and compares the forces with the recorded ones.
 template <Real Scalar>
 class ReplayDevice {
   public:
-    /// @throws InvalidInput for a recording without a tick
+    /// @throws InvalidInput if the recording has no tick
     explicit ReplayDevice(Recording<Scalar> recording) : ticks_(std::move(recording.ticks)) {
         if (ticks_.empty()) refuse("ReplayDevice", "the recording must have a tick, got none");
     }
 
-    /// Whether there is a tick left.
+    /// Whether a tick is left.
     [[nodiscard]] bool running() const noexcept { return next_ < ticks_.size(); }
 
-    /// The tool of the next tick; beyond the end, the last.
+    /// The tool of the next tick; after the end, that of the last tick.
     [[nodiscard]] Tool<Scalar> read() noexcept {
         if (running()) ++next_;
         return ticks_[(std::max)(next_, std::size_t{1}) - 1].tool;
     }
 
-    /// The force of the tick that was read last.
+    /// Compares the force with that of the tick that was read last.
     void write(const Vector3<Scalar>& force) noexcept {
         if (next_ == 0) return;
         const auto& tick = ticks_[next_ - 1];
@@ -108,11 +108,11 @@ class ReplayDevice {
         if (differing_++ == 0) first_difference_ = next_ - 1;
     }
 
-    /// How many forces so far were not the recorded ones to the bit, and the tick of the first of them.
+    /// Number of forces so far that differed from the recorded ones in any bit, and the tick of the first difference.
     [[nodiscard]] std::size_t differing() const noexcept { return differing_; }
     [[nodiscard]] std::size_t first_difference() const noexcept { return first_difference_; }
 
-    /// Back to the beginning.
+    /// Returns to the first tick.
     void reset() noexcept { next_ = differing_ = first_difference_ = 0; }
 
   private:

@@ -16,31 +16,31 @@
 
 #include <membrane/haptics/recording.hpp>
 
-/// Recordings to and from files. Offline.
+/// Reading and writing of recordings. Offline.
 ///
 ///     std::ofstream file("run.rec", std::ios::binary);
 ///     membrane::write_recording(file, recorder.recording());
 ///     const auto recording = membrane::read_recording<double>(stream, mesh.vertex_count());
 ///
-/// The file, whatever the machine, least byte first: 8 bytes of magic; version, bytes of a number (4 or 8), vertices (4
-/// bytes each); ticks (8 bytes); checksum. Then each tick: 14 numbers (position, axis, radius, velocity, time, force;
-/// IEEE 754), a byte that is 1 while grasping, checksum. A checksum is the CRC-32 of everything before it, checksums
-/// left out, so that it also tells of ticks that are lost or out of order.
+/// The file is little-endian on every machine: 8 bytes of magic; version, bytes of a number (4 or 8), vertices (4 bytes
+/// each); ticks (8 bytes); checksum. Then for each tick: 14 numbers (position, axis, radius, velocity, time, force;
+/// IEEE 754), a byte that is 1 while grasping, checksum. A checksum is the CRC-32 of everything before it except
+/// checksums, so it also detects lost or reordered ticks.
 namespace membrane {
 
 inline constexpr std::uint32_t recording_version = 1;
 
-/// Whether all could be written is the stream's to say.
+/// Write errors are in the state of the stream.
 template <Real Scalar>
 void write_recording(std::ostream& file, const Recording<Scalar>& recording);
 
-/// To the bit what was written.
-/// @throws InvalidInput for a file that is not a whole recording in this scalar, or (given one) with another number of
-/// vertices; the message says where, what was found and what must be there
+/// The recording as written, bit for bit.
+/// @throws InvalidInput if the file is not a complete recording in this scalar, or if `vertex_count` is given and
+/// differs; the message names the position, the value found and the value required
 template <Real Scalar>
 [[nodiscard]] Recording<Scalar> read_recording(std::istream& file, Index vertex_count = no_index);
 
-/// A line of names and units, then one for each tick, with digits enough to tell all numbers apart.
+/// A line of names and units, then one line per tick, with enough digits to distinguish all numbers.
 template <Real Scalar>
 void write_csv(std::ostream& text, const Recording<Scalar>& recording);
 
@@ -48,7 +48,7 @@ namespace detail {
 
 inline constexpr std::string_view reader_name = "read_recording";
 
-// No text begins like this, and a file that passed as text from one system to another does not survive it.
+// No text begins with these bytes, and a conversion of line ends changes them.
 inline constexpr std::array<unsigned char, 8> recording_magic{0x89, 'M', 'R', 'E', 'C', '\r', '\n', 0x1a};
 
 /// CRC-32 as in zip and png: reflected polynomial 0xEDB88320.
@@ -99,7 +99,7 @@ class RecordingReader {
   public:
     explicit RecordingReader(std::istream& file) : file_(&file) {}
 
-    /// What is being read, for messages: "the header", or "tick i of n".
+    /// The part being read, for messages: "the header", or "tick i of n".
     void enter(std::string part) { part_ = std::move(part); }
 
     template <class Unsigned>
@@ -209,7 +209,7 @@ Recording<Scalar> read_recording(std::istream& file, Index vertex_count) {
     const auto header = detail::read_header(reader, sizeof(Scalar), vertex_count);
     Recording<Scalar> recording{.vertex_count = static_cast<Index>(header.vertex_count)};
     const std::string total = " of " + std::to_string(header.ticks);
-    for (std::uint64_t i = 0; i < header.ticks; ++i) {  // no more memory than there is file, whatever the header says
+    for (std::uint64_t i = 0; i < header.ticks; ++i) {  // memory is bounded by the file, not by the header
         reader.enter("tick " + std::to_string(i) + total);
         recording.ticks.push_back(detail::read_tick<Scalar>(reader));
     }
@@ -222,7 +222,7 @@ void write_csv(std::ostream& text, const Recording<Scalar>& recording) {
     text << "x_m,y_m,z_m,axis_x_m,axis_y_m,axis_z_m,radius_m,velocity_x_m_s,velocity_y_m_s,velocity_z_m_s,time_s,"
             "force_x_N,force_y_N,force_z_N,grasping\n";
     for (const auto& tick : recording.ticks) {
-        std::ostringstream line;  // the text's own locale and precision stay as they are, and do not matter
+        std::ostringstream line;  // independent of locale and precision of `text`
         line.imbue(std::locale::classic());
         line.precision(std::numeric_limits<Scalar>::max_digits10);
         for (const Scalar number : detail::numbers_of(tick)) line << number << ',';

@@ -10,42 +10,42 @@
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// A depth and a normal that belong together, so that a force made of them has a potential.
+/// A consistent depth and normal: a spring force of them has a potential.
 ///
 ///     const auto rest = membrane::RestContact(mesh);
-///     device.write(feel({tool, rest(contact, tool), report}));      // for the force; the solver takes the contact itself
+///     device.write(feel({tool, rest(contact, tool), report}));    // for the force; the solver takes `contact`
 namespace membrane {
 
-/// The contact with the surface at rest instead of the deformed one. The depth is measured from the distance to it, the
-/// normal is the gradient of that distance, and both depend on where the tool is now and on nothing else. So
-/// `SpringDamperForce` is a spring, with the energy stiffness / 2 depth^2, and its damper takes energy: whatever closed
-/// path a tool goes along slowly, the hand gets none. The depth of a `ContactTracker`, which is the same, under the normal
-/// of the deformed surface gives some on each turn.
+/// The contact with the surface at rest instead of the deformed surface. The depth is measured by the distance to it,
+/// the normal is the gradient of that distance, and both depend only on the present position of the tool. So
+/// `SpringDamperForce` is a spring with the energy stiffness / 2 depth^2, and its damper dissipates energy: on a slow
+/// closed path the hand gains no energy. A `ContactTracker` has the same depth, but with the normal of the deformed
+/// surface a force gives some energy on each turn.
 ///
-/// The force is continuous where the tool's centre is outside a convex surface. Where it is deeper, or over a concave
-/// edge, the normal jumps between those of the triangles as the tool slides (`ReactionForce` does not jump).
+/// The force is continuous if the tool's centre is outside a convex surface. If it is deeper, or over a concave edge,
+/// the normal jumps between triangles as the tool slides (`ReactionForce` does not jump).
 ///
-/// For `SampledLoop`: the largest slope is the stiffness. The negative one is across the normal: stiffness * depth /
-/// distance, from the tool's centre to where the normals around it meet; that is radius - depth at a convex edge or corner,
-/// and the radius of curvature more on a smooth surface. A jump, stiffness * depth * 2 sin(half the angle between the
-/// normals), is `off_potential`, and has to be less than the device's friction.
+/// For `SampledLoop`: the largest slope is the stiffness. The negative slope is across the normal: stiffness * depth /
+/// distance, from the tool's centre to the point where the normals around it meet. That distance is radius - depth at a
+/// convex edge or corner, and larger by the radius of curvature on a smooth surface. A jump, stiffness * depth * 2
+/// sin(half the angle between the normals), counts as `off_potential` and must be less than the device's friction.
 ///
-/// On an open surface the tool must touch (the deformed surface) to be felt, from the side of the contact; where its
-/// centre is below the surface, there is no potential nearer to the border than it is deep. A shaft is felt at points
-/// along its axis; what it does to a hand that turns it is not felt, and not counted. One for any number of tools and
-/// threads.
+/// On an open surface the force exists only while the tool is in contact with the deformed surface, from the side of
+/// that contact. If the tool's centre is below the surface and nearer to the border than it is deep, there is no
+/// potential. A shaft is sampled at points along its axis; its torque on the hand is not rendered and not counted. One
+/// instance serves any number of tools and threads.
 template <Real Scalar>
 class RestContact {
   public:
     /// Cost: O(F log F).
     explicit RestContact(const TriangleMesh<Scalar>& mesh) : at_rest_(mesh.positions()), surface_(mesh), tree_(mesh) {}
 
-    /// Not for the solver. Online. Cost: O(log F) for a sphere, 17 times that for a shaft.
+    /// For the force, not for the solver. Online. Cost: O(log F) for a sphere, 17 times that for a shaft.
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact, const Tool<Scalar>& tool) const noexcept {
         return contact_with(at_rest_, tree_, contact, tool);
     }
 
-    /// The same on a body that moves; `tree` is fitted to its anchors.
+    /// The contact on a moving body; `tree` must be fitted to its anchors.
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact, const Tool<Scalar>& tool,
                                              const AabbTree<Scalar>& tree,
                                              const MovingBody<Scalar>& body) const noexcept {
@@ -93,7 +93,7 @@ Contact<Scalar> RestContact<Scalar>::contact_with(const ConstPointsRef<Scalar>& 
     return lowest;
 }
 
-/// Of a point of the axis.
+/// The contact of a point `q` of the axis.
 template <Real Scalar>
 Contact<Scalar> RestContact<Scalar>::contact_of(const Vector3<Scalar>& q, Scalar side, const AabbTree<Scalar>& tree,
                                                 const ConstPointsRef<Scalar>& anchors) const noexcept {
@@ -106,14 +106,14 @@ Contact<Scalar> RestContact<Scalar>::contact_of(const Vector3<Scalar>& q, Scalar
     contact.point = nearest.point;
     contact.axis_point = contact.previous_axis_point = q;
     contact.side = side;
-    const Vector3<Scalar> reach = q - nearest.point;
+    const Vector3<Scalar> separation = q - nearest.point;
     const Vector3<Scalar> outward = side * surface_.outward(anchors, nearest.triangle, nearest.barycentric);
-    // Round a border there is no other side.
-    const bool inside = dot(reach, outward) < 0 && !surface_.on_border(nearest.triangle, nearest.barycentric);
+    // Beyond a border there is no inside.
+    const bool inside = dot(separation, outward) < 0 && !surface_.on_border(nearest.triangle, nearest.barycentric);
     const Scalar sign = inside ? Scalar(-1) : Scalar(1);
-    contact.gap = sign * norm(reach);
+    contact.gap = sign * norm(separation);
     const bool on_face = nearest.barycentric.minCoeff() > 0;
-    contact.normal = on_face ? outward : direction<Scalar>(sign * reach, outward);
+    contact.normal = on_face ? outward : direction<Scalar>(sign * separation, outward);
     return contact;
 }
 

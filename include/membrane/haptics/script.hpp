@@ -11,15 +11,15 @@
 
 #include <membrane/haptics/device.hpp>
 
-/// Scripts of the null device from text. Offline, included by its own name.
+/// Scripts of a `ScriptedDevice` from text. Offline; include it separately.
 ///
 ///     std::ifstream file("press.csv");
 ///     membrane::ScriptedDevice<double> device(membrane::read_script<double>(file), {.radius = 1e-3});
 namespace membrane {
 
-/// Waypoints from lines `time,x,y,z,grasping` in s, m and 0 or 1; the last column may be left out. Passed over are
-/// empty lines, lines that begin with #, and column names above the first waypoint.
-/// @throws InvalidInput naming the line, and what is wrong with it
+/// Waypoints from lines `time,x,y,z,grasping` in s, m and 0 or 1; the last column is optional. Skips empty lines, lines
+/// that begin with #, and column names above the first waypoint.
+/// @throws InvalidInput naming the line and its error
 template <Real Scalar>
 [[nodiscard]] std::vector<Waypoint<Scalar>> read_script(std::istream& text);
 
@@ -29,12 +29,12 @@ inline constexpr std::string_view script_name = "read_script";
 
 [[nodiscard]] inline std::vector<std::string> split_at_commas(const std::string& line) {
     std::vector<std::string> fields;
-    std::istringstream rest(line + ',');  // what follows the last comma is a field, too
+    std::istringstream rest(line + ',');  // the text after the last comma is a field, too
     for (std::string field; std::getline(rest, field, ',');) fields.push_back(field);
     return fields;
 }
 
-// The whole field is one number, written as C does everywhere.
+// The number that fills the whole field, in the classic locale.
 template <Real Scalar>
 [[nodiscard]] Scalar number_in(const std::string& field, std::size_t line) {
     std::istringstream text(field);

@@ -5,7 +5,7 @@
 
 #include <membrane/core/check.hpp>
 
-/// A hand at a desk: it gives way to the force, as one that holds a device would.
+/// A simulated hand that holds a device and yields to its force.
 ///
 ///     using Hand = membrane::SimulatedHand<double>;
 ///     membrane::ScriptedDevice<double, Hand> device({{0.0, above}, {1.0, below}}, {.radius = 1e-3},
@@ -13,48 +13,47 @@
 ///     while (device.running()) { const auto tool = device.read(); ...; device.write(force); }     // a closed loop
 namespace membrane {
 
-/// Hand and device together. There are no usual values: they are of the person, the grip and the device, and a loop that
-/// is stable for one hand need not be for another.
+/// Hand and device together. There are no default values: they depend on person, grip and device. A loop that is stable
+/// with one hand need not be stable with another.
 struct HandOptions {
     double mass = 0;       ///< m [kg]
     double damping = 0;    ///< b, of the velocity relative to the target's [N s/m]
     double stiffness = 0;  ///< k, to the target [N/m]
 };
 
-/// A mass that a spring and a damper draw to a target, m a = F - k (p - target) - b (v - target velocity). The target is
-/// where the hand means to be; it goes on at its velocity until it is told anew. The force is held from one call to the
-/// next, as a device holds it.
+/// A mass on a spring and a damper to a target, m a = F - k (p - target) - b (v - target velocity). The target is the
+/// intended position of the hand; it moves at its velocity until the next `aim`. The force is held from one call to the
+/// next, as by a device.
 ///
-/// Each move is the exact solution: any time step is stable, many small ones come to where one large one does, and a
-/// loop that gains energy does so by itself. It takes `exp` and `sin`, which differ from one mathematics library to the
-/// next in the last digits.
+/// `move` is the exact solution: any time step is stable, many small steps give the result of one large step, and only
+/// the loop can generate energy. It uses `exp` and `sin`, whose last digits differ between mathematics libraries.
 template <Real Scalar>
 class SimulatedHand {
   public:
-    /// @throws InvalidInput unless mass and stiffness are finite and positive, and damping finite and not negative
+    /// @throws InvalidInput if mass or stiffness is not finite and positive, or damping not finite or negative
     explicit SimulatedHand(const HandOptions& options);
 
-    /// At rest, there and nowhere else.
+    /// Sets position and target, with zero velocity.
     void place(const Vector3<Scalar>& position) noexcept {
         position_ = target_ = position;
         velocity_ = target_velocity_ = Vector3<Scalar>::Zero();
     }
 
-    /// Where it means to be now [m], and at which velocity that moves [m/s].
+    /// Sets the target [m] and its velocity [m/s].
     void aim(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
         target_ = target;
         target_velocity_ = velocity;
     }
 
-    /// Lets `dt` [s] go by under a force [N]. Returns false, and leaves all as it was, where a number is not finite or
-    /// `dt` negative.
+    /// Advances by `dt` [s] under a force [N]. If a number is not finite or `dt` is negative, returns false and changes
+    /// nothing.
     bool move(const Vector3<Scalar>& force, Scalar dt) noexcept;
 
     [[nodiscard]] const Vector3<Scalar>& position() const noexcept { return position_; }  ///< [m]
     [[nodiscard]] const Vector3<Scalar>& velocity() const noexcept { return velocity_; }  ///< [m/s]
 
   private:
-    /// After a time, what has become of a displacement of 1 and of a velocity of 1, with nothing else.
+    /// Free response after a time: to an initial displacement of 1 and to an initial velocity of 1.
     struct Response {
         Scalar position_by_position, position_by_velocity, velocity_by_position, velocity_by_velocity;
     };
@@ -86,13 +85,13 @@ template <Real Scalar>
 bool SimulatedHand<Scalar>::move(const Vector3<Scalar>& force, Scalar dt) noexcept {
     if (!(dt >= 0)) return false;
     const Response by = response(static_cast<double>(dt));
-    // Seen from where the force would hold it, which moves as the target does, it swings freely.
-    const Vector3<Scalar> held = target_ + force / stiffness_, away = position_ - held;
+    // Relative to its equilibrium under the force, which moves with the target, the mass oscillates freely.
+    const Vector3<Scalar> equilibrium = target_ + force / stiffness_, offset = position_ - equilibrium;
     const Vector3<Scalar> speed = velocity_ - target_velocity_, displacement = dt * target_velocity_;
     const Vector3<Scalar> position =
-        held + displacement + (by.position_by_position * away + by.position_by_velocity * speed);
+        equilibrium + displacement + (by.position_by_position * offset + by.position_by_velocity * speed);
     const Vector3<Scalar> velocity =
-        target_velocity_ + (by.velocity_by_position * away + by.velocity_by_velocity * speed);
+        target_velocity_ + (by.velocity_by_position * offset + by.velocity_by_velocity * speed);
     if (!is_finite(position) || !is_finite(velocity)) return false;
     position_ = position;
     velocity_ = velocity;
@@ -103,13 +102,13 @@ bool SimulatedHand<Scalar>::move(const Vector3<Scalar>& force, Scalar dt) noexce
 template <Real Scalar>
 auto SimulatedHand<Scalar>::response(double time) const noexcept -> Response {
     const double discriminant = rate_ * rate_ - square_;
-    // Of the position by velocity, `sine` after the time; of the rest, the part `other` that has none of it.
+    // The position by velocity is `sine`; the other responses combine `sine` and `other`.
     double sine, other, forward = rate_, back = rate_;
     if (discriminant < 0) {
         const double turn = std::sqrt(-discriminant), decay = std::exp(-rate_ * time);
         sine = decay * std::sin(turn * time) / turn;
         other = decay * std::cos(turn * time);
-    } else {  // two decays; the slow one from their product, the difference would cancel
+    } else {  // two decays; the slow rate from their product, since a difference would cancel
         const double half = std::sqrt(discriminant);
         forward = rate_ + half;
         back = square_ / forward;

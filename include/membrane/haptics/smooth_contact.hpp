@@ -11,24 +11,24 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// A normal that does not jump as the tool slides over edges and vertices.
+/// A contact normal that is continuous as the tool slides over edges and vertices.
 ///
 ///     const auto smooth = membrane::SmoothContact(mesh);
-///     device.write(feel({tool, smooth(contact), report}));          // for the force; the solver takes the contact itself
+///     device.write(feel({tool, smooth(contact), report}));    // for the force; the solver takes `contact`
 namespace membrane {
 
 template <Real Scalar>
 class MovingBody;  // of moving_body.hpp
 
-/// The contact with the normal of a smooth surface: that without the tool, as the depth has it, under normals that are
-/// interpolated between its vertices. A proxy on it has the tool straight above itself or below, along its normal. It
-/// moves as continuously as the tool, over concave edges too, and nothing is remembered: no delay is added. The depth,
-/// continuous already, stays as it is. Its gradient is another normal, that of a `RestContact`: a force of this one has no
-/// potential, and gives a hand a little on each slow turn (see `SampledLoop`).
+/// The contact with the normal of a smooth surface: the surface without the tool, as for the depth, with normals
+/// interpolated between its vertices. The proxy is the point of it whose normal passes through the tool. The proxy
+/// moves as continuously as the tool, also over concave edges, and has no memory: it adds no delay. The depth is
+/// already continuous and stays unchanged. Its gradient is another normal, that of a `RestContact`: a force along the
+/// smooth normal has no potential, and gives a hand some energy on each slow turn (see `SampledLoop`).
 ///
-/// Where the tool's radius is larger than that of a fold which it lies in there is more than one proxy, and going from
-/// one to the other is a jump; so is going from one end of a shaft to the other, which the contact does. Beyond a border
-/// the proxy stays on it. One for any number of tools and threads.
+/// If the tool's radius is larger than that of a fold around it, there are several proxies, and a change between them
+/// is a jump. A change from one end of a shaft to the other, which the contact makes, is a jump too. Beyond a border
+/// the proxy stays on the border. One instance serves any number of tools and threads.
 template <Real Scalar>
 class SmoothContact {
   public:
@@ -45,7 +45,7 @@ class SmoothContact {
         return over(contact, at_rest_, normals_);
     }
 
-    /// The same on a body that moves.
+    /// The contact on a moving body.
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact,
                                              const MovingBody<Scalar>& body) const noexcept {
         return over(contact, body.anchors(), body.normals());
@@ -58,7 +58,7 @@ class SmoothContact {
                                             const ConstPointsRef<Scalar>& normals) const noexcept;
     [[nodiscard]] Index across(Index f, const Vector3<Scalar>& weights) const noexcept;
 
-    static constexpr int max_triangles = 64;  // on the way from the contact to the proxy
+    static constexpr int max_triangles = 64;  // visited from the contact to the proxy
 
     Triangles triangles_;
     Adjacency adjacency_;
@@ -67,23 +67,23 @@ class SmoothContact {
 
 namespace detail {
 
-/// The weights of the corners for which `q` is on the line through the point they give, along the normal that they give:
-/// those of `q` in the triangle that lies higher by so much, each corner along its normal, that it contains it.
+/// The weights of the point whose interpolated normal passes through `q`. These are the weights of `q` in the triangle
+/// that contains `q` after all corners have moved along their normals by one common height.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> weights_below(const Triangle<Scalar>& triangle, const Triangle<Scalar>& normals,
                                             const Vector3<Scalar>& q) noexcept {
     const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
     const Vector3<Scalar> turn_b = normals.b - normals.a, turn_c = normals.c - normals.a;
     Scalar height = dot(aq, direction<Scalar>(cross(ab, ac), normals.a));
-    for (int i = 0; i < 8; ++i) {  // Newton's method on the volume that they span
+    for (int i = 0; i < 8; ++i) {  // Newton's method for the height at which triangle and `q` span no volume
         const Vector3<Scalar> b = ab + height * turn_b, c = ac + height * turn_c, to_q = aq - height * normals.a;
         const Vector3<Scalar> area = cross(b, c);
         const Scalar volume = dot(to_q, area);
         const Scalar slope = dot<Scalar>(to_q, cross(turn_b, c) + cross(b, turn_c)) - dot(normals.a, area);
-        const Scalar displacement = volume / slope;
-        if (!is_finite(displacement)) break;
-        height -= displacement;
-        if (std::abs(displacement) <= std::numeric_limits<Scalar>::epsilon() * norm(aq)) break;
+        const Scalar newton_step = volume / slope;
+        if (!is_finite(newton_step)) break;
+        height -= newton_step;
+        if (std::abs(newton_step) <= std::numeric_limits<Scalar>::epsilon() * norm(aq)) break;
     }
     const Vector3<Scalar> b = ab + height * turn_b, c = ac + height * turn_c, to_q = aq - height * normals.a;
     const Vector3<Scalar> area = cross(b, c);
@@ -107,7 +107,7 @@ Contact<Scalar> SmoothContact<Scalar>::over(const Contact<Scalar>& contact, cons
     return smooth;
 }
 
-// From triangle `f` on always across the side that the proxy is farthest beyond.
+// Walks from triangle `f` on, across the side that the proxy is farthest beyond.
 template <Real Scalar>
 Vector3<Scalar> SmoothContact<Scalar>::normal_at(Index f, const Vector3<Scalar>& q,
                                                  const ConstPointsRef<Scalar>& anchors,
@@ -124,11 +124,11 @@ Vector3<Scalar> SmoothContact<Scalar>::normal_at(Index f, const Vector3<Scalar>&
     }
 }
 
-// The triangle in which a point with these weights rather is; none if it is in `f`, or beyond a border.
+// The next triangle towards a point with these weights; `no_index` if the point is in `f` or beyond a border.
 template <Real Scalar>
 Index SmoothContact<Scalar>::across(Index f, const Vector3<Scalar>& weights) const noexcept {
     Index next = no_index;
-    Scalar least = -std::numeric_limits<Scalar>::epsilon();  // on the side itself either will do
+    Scalar least = -std::numeric_limits<Scalar>::epsilon();  // a point on the side belongs to both triangles
     for (std::size_t k = 0; k < 3; ++k) {
         const Index other = adjacency_.triangle_neighbours(f)[(k + 1) % 3];  // across from corner k
         const Scalar weight = weights[static_cast<Eigen::Index>(k)];

@@ -8,15 +8,16 @@
 #include <membrane/core/check.hpp>
 #include <membrane/core/rigid_frame.hpp>
 
-/// Between a device that counts in millimetres and a scene in metres; between a tissue of millinewtons and a hand.
+/// Conversion between a device in millimetres and a scene in metres; force scale between a tissue and a hand.
 ///
-///     const membrane::DeviceScale scale{.force = 40, .motion = 0.1};     // the tool goes a tenth of what the hand does
-///     membrane::Tool<double> tool = scale.to_scene(membrane::Millimetres(position), membrane::MillimetresPerSecond(velocity));
-///     const auto felt = scale.to_device(membrane::Newtons(reaction));           // felt.device_force, felt.scene_force, felt.scale
-///     write(felt.device_force.value());                                       // [N]
+///     const membrane::DeviceScale scale{.force = 40, .motion = 0.1};  // the tool moves a tenth of the hand's motion
+///     membrane::Tool<double> tool = scale.to_scene(membrane::Millimetres(position),
+///                                                  membrane::MillimetresPerSecond(velocity));
+///     const auto felt = scale.to_device(membrane::Newtons(reaction));  // device_force, scene_force, scale
+///     write(felt.device_force.value());                         // [N]
 namespace membrane {
 
-/// A number or vector together with its unit: units do not mix, nothing turns into a bare number unasked.
+/// A number or vector with its unit: units do not mix, and no conversion to a plain number is implicit.
 template <class Unit, class Value>
 class In {
   public:
@@ -51,7 +52,7 @@ using Newtons = In<unit::Newton, Vector3<double>>;
 using NewtonsPerMetre = In<unit::NewtonPerMetre, double>;
 using NewtonsPerMillimetre = In<unit::NewtonPerMillimetre, double>;
 
-// Each is right to the last bit: 1000 is a number of the machine, 0.001 is none.
+// Correctly rounded: 1000 is exact in floating point, 0.001 is not.
 [[nodiscard]] inline Metres in_metres(const Millimetres& a) noexcept { return Metres(a.value() / 1000); }
 [[nodiscard]] inline Millimetres in_millimetres(const Metres& a) noexcept { return Millimetres(a.value() * 1000); }
 [[nodiscard]] inline MetresPerSecond in_metres(const MillimetresPerSecond& a) noexcept {
@@ -67,21 +68,21 @@ using NewtonsPerMillimetre = In<unit::NewtonPerMillimetre, double>;
     return NewtonsPerMillimetre(a.value() / 1000);
 }
 
-/// A force with the scale it was magnified by, so that nobody takes the one for the other.
+/// A force at the device and in the scene, and the scale between them, so that neither is taken for the other.
 struct FeltForce {
-    Newtons device_force;  ///< what to write, in the device's frame
-    Newtons scene_force;   ///< what the tissue does to the tool, in the scene
-    double scale;          ///< the first is so many times the second
+    Newtons device_force;  ///< the force to write, in the device's frame
+    Newtons scene_force;   ///< the force of the tissue on the tool, in the scene
+    double scale;          ///< device force over scene force
 };
 
-/// How hand and tool correspond. A lens capsule tears at 15 to 35 mN, of which a hand feels nothing: `force` is 30 to 100
-/// there.
+/// Scales between hand and tool. A lens capsule tears at 15 to 35 mN, which a hand does not feel: there `force` is 30
+/// to 100.
 struct DeviceScale {
-    double force = 1;                ///< newtons of the hand for one of the tissue
-    double motion = 1;               ///< metres of the tool for one of the hand
-    RigidFrame<double> device = {};  ///< the device's frame in the scene, at rest there; origin in metres of the scene
+    double force = 1;                ///< force at the hand over force at the tissue
+    double motion = 1;               ///< motion of the tool over motion of the hand
+    RigidFrame<double> device = {};  ///< the fixed frame of the device in the scene; origin in metres of the scene
 
-    /// @throws InvalidInput for a scale that is not finite and positive
+    /// @throws InvalidInput if a scale is not finite and positive
     void check() const;
 
     [[nodiscard]] Metres to_scene(const Millimetres& position) const noexcept {
@@ -90,7 +91,7 @@ struct DeviceScale {
     [[nodiscard]] MetresPerSecond to_scene(const MillimetresPerSecond& velocity) const noexcept {
         return MetresPerSecond(device.vector_to_world(motion * in_metres(velocity).value()));
     }
-    /// The tool of the scene; radius, axis, time and grasping are the caller's.
+    /// The tool of the scene; the caller sets radius, axis, time and grasping.
     [[nodiscard]] Tool<double> to_scene(const Millimetres& position,
                                         const MillimetresPerSecond& velocity) const noexcept {
         Tool<double> tool;
@@ -102,7 +103,7 @@ struct DeviceScale {
         return {Newtons(device.vector_to_body(force * scene_force.value())), scene_force, force};
     }
 
-    /// What the stiffness of a tissue becomes at the device, for `passivity`.
+    /// The stiffness of a tissue at the device, for `passivity`.
     [[nodiscard]] NewtonsPerMetre at_device(NewtonsPerMetre tissue) const noexcept {
         return NewtonsPerMetre(force * motion * tissue.value());
     }

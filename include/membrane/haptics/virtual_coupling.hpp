@@ -7,11 +7,11 @@
 #include <membrane/core/check.hpp>
 #include <membrane/haptics/force_policy.hpp>
 
-/// A spring between the hand and the tool that meets the membrane: what the hand feels is no stiffer than that, however
+/// A spring between the hand and the tool in contact: the stiffness at the hand is at most that of the spring, however
 /// stiff the tissue is.
 ///
 ///     auto coupling = membrane::VirtualCoupling<double>({.stiffness = 300, .scale = 40});
-///     const auto tool    = coupling.follow(device.read(), reaction, dt);     // what the membrane meets
+///     const auto tool    = coupling.follow(device.read(), reaction, dt);     // the tool in contact
 ///     const auto contact = tracker.update(tree, x, tool);
 ///     const auto report  = solver.step(x, dt, network, foundation, press(tool, contact));
 ///     reaction = report.total_reaction();                                    // for the next tick
@@ -19,38 +19,38 @@
 namespace membrane {
 
 struct CouplingOptions {
-    double stiffness;    ///< between hand and tool [N/m]
-    double damping = 0;  ///< that holds the tool back where it is, see `min_damping` [N s/m]
-    double scale = 1;    ///< from the tissue to the hand
+    double stiffness;    ///< of the spring between hand and tool [N/m]
+    double damping = 0;  ///< of the motion of the tool, see `min_damping` [N s/m]
+    double scale = 1;    ///< force at the hand over force at the tissue
 
-    /// @throws InvalidInput for a number out of its range
+    /// @throws InvalidInput if a number is out of its range
     void check() const;
 };
 
-/// The `damping` that a tissue asks for whose stiffness, after the scale, is `tissue` [N/m]: none if the coupling is
-/// stiffer. It is felt as a drag in free air, too.
+/// The `damping` needed for a tissue whose stiffness, after the scale, is `tissue` [N/m]: 0 if the coupling is stiffer.
+/// The hand feels it as drag in free air, too.
 [[nodiscard]] inline double min_damping(double tissue, double coupling, double tick) noexcept {
     return (std::max)(tissue - coupling, 0.0) * tick / 2;
 }
 
-/// A tool without mass between the coupling's spring and the membrane's reaction [Colgate95]. With `min_damping` it
-/// makes no energy of its own: passivity has to reckon with the coupling's stiffness only.
+/// A massless tool between the coupling's spring and the membrane's reaction [Colgate95]. With `min_damping` it
+/// generates no energy: for `passivity` only the stiffness of the coupling counts.
 template <Real Scalar>
 class VirtualCoupling {
   public:
-    /// @throws InvalidInput for an option out of its range
+    /// @throws InvalidInput if an option is out of its range
     explicit VirtualCoupling(const CouplingOptions& options)
         : stiffness_((options.check(), static_cast<Scalar>(options.stiffness))),
           damping_(static_cast<Scalar>(options.damping)),
           scale_(static_cast<Scalar>(options.scale)) {}
 
-    /// The tool where spring, damping and the membrane's `reaction` on it, as of the last tick [N], balance. The hand's
-    /// tool where something is not finite.
+    /// The tool at the equilibrium of spring, damping and the membrane's `reaction` on it, as of the last tick [N]. If
+    /// a number is not finite, returns the hand's tool.
     Tool<Scalar> follow(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction, Scalar dt) noexcept;
 
-    /// On the hand [N].
+    /// Force on the hand [N].
     [[nodiscard]] const Vector3<Scalar>& force() const noexcept { return force_; }
-    /// The same as a force policy, for what takes one.
+    /// `force()` as a force policy.
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& /*state*/) const noexcept { return force_; }
 
     /// As new.

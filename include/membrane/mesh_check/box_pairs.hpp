@@ -11,27 +11,27 @@
 
 #include <membrane/surface/box.hpp>
 
-/// Which of many boxes overlap.
+/// Pairs of overlapping boxes.
 ///
 ///     std::int64_t effort = 1000000;
 ///     const bool all = for_each_overlap(boxes, effort, [&](membrane::Index i, membrane::Index j) { ... });
 namespace membrane {
 
-/// Calls `visit(i, j)` once for each two boxes that overlap. Each two parts looked at take 1 from `effort`, and `visit`
-/// may take more; the search ends when none is left, and says whether it has seen everything. O(n log n) where boxes
-/// overlap few others.
+/// Calls `visit(i, j)`, i < j, once for each pair of overlapping boxes. Each pair of tree nodes tested and each pair of
+/// boxes found subtracts 1 from `effort`; `visit` may subtract more. If `effort` falls below 0, the search stops and
+/// returns false; if it completes, returns true. O(n log n) if boxes overlap few others.
 template <class Visit>
 [[nodiscard]] bool for_each_overlap(std::span<const Box<double>> boxes, std::int64_t& effort, Visit visit);
 
 namespace detail {
 
-/// A tree of boxes, halves of equal numbers split along the longest axis.
+/// A tree of boxes, split into halves of equal count along the longest axis.
 class HalvedBoxes {
   public:
     struct Node {
         Box<double> box;
-        std::size_t first, count;  // of the order
-        std::size_t right;         // child; the left one comes next; 0 for a leaf
+        std::size_t first, count;  // range in the order
+        std::size_t right;         // child, 0 for a leaf; the left child is the next node
         [[nodiscard]] bool is_leaf() const noexcept { return right == 0; }
     };
 
@@ -45,7 +45,7 @@ class HalvedBoxes {
     }
 
   private:
-    void split(std::size_t first, std::size_t count) {  // as deep as the logarithm of the count
+    void split(std::size_t first, std::size_t count) {  // recursion depth: log2 of the count
         const std::size_t n = nodes_.size();
         nodes_.push_back({{}, first, count, 0});
         Box<double> middles;

@@ -12,30 +12,30 @@
 #include <membrane/mesh_check/surface_facts.hpp>
 #include <membrane/surface/mesh_defect.hpp>
 
-/// What has been found out about a mesh.
+/// Facts and defects of a mesh.
 ///
 ///     const membrane::MeshReport report = membrane::validate(x, triangles);
 ///     std::cout << to_string(report);
 namespace membrane {
 
-/// One defect, and where.
+/// One defect and its location.
 struct MeshFinding {
     MeshDefect defect;
-    std::vector<Index> vertices, triangles;  ///< Those concerned; none where it is the whole mesh.
-    std::string text;                        ///< With what was found and what is expected.
+    std::vector<Index> vertices, triangles;  ///< Those concerned; empty if it is the whole mesh.
+    std::string text;                        ///< Says what was found and what is expected.
 };
 
 struct MeshReport {
     SurfaceFacts facts;
-    std::vector<MeshFinding> findings;  ///< In the order of the search; of each kind no more than asked for.
+    std::vector<MeshFinding> findings;                    ///< In the order of the search; limited for each kind.
     std::array<std::size_t, mesh_defect_count> counts{};  ///< Of each kind, listed or not.
-    bool complete = true;                                 ///< False: a search was given up, there may be more.
+    bool complete = true;                                 ///< False: a search stopped early, there may be more.
 
     [[nodiscard]] std::size_t count(MeshDefect defect) const noexcept {
         return counts[static_cast<std::size_t>(defect)];
     }
 
-    /// Whether nothing has been found.
+    /// Whether no defect has been found.
     [[nodiscard]] bool empty() const noexcept {
         return std::all_of(counts.begin(), counts.end(), [](std::size_t count) { return count == 0; });
     }
@@ -49,7 +49,7 @@ struct MeshReport {
     }
 };
 
-/// A line for each finding.
+/// One line for each finding.
 [[nodiscard]] inline std::string to_string(const MeshReport& report) {
     std::string text;
     for (const MeshFinding& finding : report.findings) {
@@ -64,22 +64,23 @@ struct MeshReport {
         const std::size_t more = report.counts[i] - static_cast<std::size_t>(listed);
         if (more > 0) ((text += std::to_string(more) + " more: ") += name(defect)) += "\n";
     }
-    if (!report.complete) text += "not everything was looked at\n";
+    if (!report.complete) text += "the search is not complete\n";
     return text;
 }
 
 namespace detail {
 
-/// Puts down what checks find.
+/// Records the findings of the checks.
 class Recorder {
   public:
-    Recorder(MeshReport& report, Index max_findings_per_kind) : report_(&report), most_(max_findings_per_kind) {}
+    Recorder(MeshReport& report, Index max_findings_per_kind)
+        : report_(&report), max_findings_per_kind_(max_findings_per_kind) {}
 
     template <class... Parts>
     void operator()(MeshDefect defect, std::vector<Index> vertices, std::vector<Index> triangles,
                     const Parts&... parts) const {
         const std::size_t count = ++report_->counts[static_cast<std::size_t>(defect)];
-        if (count > static_cast<std::size_t>(most_)) return;
+        if (count > static_cast<std::size_t>(max_findings_per_kind_)) return;
         std::string text;
         (append(text, parts), ...);
         report_->findings.push_back({defect, std::move(vertices), std::move(triangles), std::move(text)});
@@ -87,7 +88,7 @@ class Recorder {
 
   private:
     MeshReport* report_;
-    Index most_;
+    Index max_findings_per_kind_;
 };
 
 }  // namespace detail

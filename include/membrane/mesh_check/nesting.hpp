@@ -15,16 +15,18 @@
 
 /// Closed components inside others.
 ///
-///     const bool all = for_each_nested(x, triangles, parts, effort, [&](membrane::Index outer, membrane::Index inner) { ... });
+///     const bool all = for_each_nested(x, triangles, parts, effort,
+///                                      [&](membrane::Index outer, membrane::Index inner) { ... });
 namespace membrane {
 
-/// How often the triangles `some` go around the point `q`: 1 inside a closed surface, -1 if that faces inward, 0 outside
-/// [Oosterom83].
+/// Winding number of the triangles `some` about the point `q`: 1 inside a closed surface, -1 if it faces inward, 0
+/// outside [Oosterom83].
 [[nodiscard]] inline double winding_number(const Points<double>& x, const Triangles& triangles,
                                            std::span<const Index> some, const Vector3<double>& q) noexcept;
 
-/// Calls `visit(outer, inner)` for each two closed parts of which one lies inside the other, for parts that do not cross.
-/// Each two parts looked at, and each triangle, take 1 from `effort`; says whether it has seen everything.
+/// Calls `visit(outer, inner)` for each pair of closed components of which one is inside the other; they must not
+/// intersect. Each pair and each triangle tested subtracts 1 from `effort`. If `effort` falls below 0, the search stops
+/// and returns false; if it completes, returns true.
 template <class Visit>
 [[nodiscard]] bool for_each_nested(const Points<double>& x, const Triangles& triangles, const SurfaceParts& parts,
                                    std::int64_t& effort, Visit visit);
@@ -68,7 +70,7 @@ bool for_each_nested(const Points<double>& x, const Triangles& triangles, const 
             if (!contains(outer.extent, inner.extent)) continue;
             effort -= outer.triangle_count;
             const auto q = point(x, triangles(0, inner.first_triangle));
-            // A half where they touch.
+            // The winding number is 1/2 if the components touch at q.
             if (std::abs(winding_number(x, triangles, triangles_of[closed[i]], q)) > 0.75) visit(closed[i], closed[j]);
         }
     }

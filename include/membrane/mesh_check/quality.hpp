@@ -9,7 +9,7 @@
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// How even the triangles of a mesh are.
+/// Quality of the triangles of a mesh.
 ///
 ///     const auto quality = membrane::quality_of(mesh);
 ///     if (quality.smallest_angle < 30) ...                     // degrees
@@ -17,10 +17,10 @@ namespace membrane {
 
 /// Angles [degrees] and edges of a mesh.
 struct MeshQuality {
-    double smallest_angle = 0;       ///< Of all triangles.
-    double mean_smallest_angle = 0;  ///< Each triangle's smallest, on average: 60 if all are equilateral.
+    double smallest_angle = 0;       ///< Smallest angle of all triangles.
+    double mean_smallest_angle = 0;  ///< Mean of each triangle's smallest angle: 60 if all are equilateral.
     double mean_edge = 0;            ///< [m]
-    double even_edges = 0;           ///< The part of the edges that is within 25 % of the mean.
+    double even_edges = 0;           ///< Fraction of the edges with a length within 25 % of the mean.
 };
 
 /// Computed in double. O(F log F).

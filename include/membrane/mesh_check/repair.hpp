@@ -21,47 +21,49 @@
 #include <membrane/mesh_check/surface_facts.hpp>
 #include <membrane/surface/mesh_checks.hpp>
 
-/// Mends what can be mended without a guess, if asked to.
+/// Repairs that need no guess, each only on request.
 ///
 ///     const auto repaired = membrane::repair(x, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true});
 ///     std::cout << to_string(repaired.done);                        // welded 12 vertices, turned 3 triangles
 ///     const membrane::TriangleMesh mesh(repaired.positions, repaired.triangles);
 namespace membrane {
 
-/// What to do, in this order; nothing by itself.
+/// The repairs, in the order of their application; all are off by default.
 struct RepairOptions {
-    /// Vertices this near become one, the lowest of them, which stays where it is [m]; 0: those at the very same place.
-    /// Of several in a row the ends may be farther apart.
+    /// Vertices at most this far apart become one, the lowest of them, which keeps its position [m]; 0: only vertices
+    /// at exactly the same position. The ends of a chain of welded vertices may be farther apart.
     std::optional<double> weld{};
 
-    bool drop_repeated = false;    ///< Triangles that name a vertex twice.
-    bool drop_zero_area = false;   ///< Triangles with corners on one line; may leave a T-junction.
-    bool drop_duplicates = false;  ///< Of triangles with the same vertices, however turned, all but the first.
-    /// Turns triangles of a component to agree, not if it is one-sided: a closed component so that it faces outward, any other
-    /// as few triangles as possible. One whose triangles agree as given stays as it is, see `flip_inward`. Each component by
-    /// itself: one inside another comes to face outward too, though it may be meant as the wall of a cavity.
+    bool drop_repeated = false;    ///< Drops triangles that name a vertex twice.
+    bool drop_zero_area = false;   ///< Drops triangles with collinear corners; may leave a T-junction.
+    bool drop_duplicates = false;  ///< Of triangles with the same vertices, in any order, keeps only the first.
+    /// Turns triangles so that those of a component agree, unless it is one-sided. A closed component then faces
+    /// outward; of any other component, as few triangles as possible are turned. A component with agreeing triangles is
+    /// left unchanged, see `flip_inward`. Each component is treated separately: one inside another faces outward too,
+    /// even if it is meant as the wall of a cavity.
     bool orient = false;
-    bool split_vertices = false;  ///< Gives each fan of triangles at a vertex, but for the first, a vertex of its own.
+    bool split_vertices = false;  ///< Gives each fan of triangles at a vertex, except the first, its own vertex.
     bool flip_inward = false;     ///< Turns closed components that face inward.
-    bool drop_isolated = false;   ///< Vertices that no triangle names.
+    bool drop_isolated = false;   ///< Drops vertices that no triangle references.
 };
 
-/// What was done: how many vertices or triangles each option has changed.
+/// Number of vertices or triangles that each option has changed.
 struct RepairReport {
     Index welded = 0, repeated = 0, zero_area = 0, duplicates = 0, turned = 0, split = 0, flipped = 0, isolated = 0;
-    bool complete = true;  ///< False: the search for vertices to weld was given up, so many are within the distance.
+    bool complete = true;  ///< False: too many vertices were within the weld distance, and the search stopped early.
 };
 
 template <Real Scalar>
 struct RepairedMesh {
     Points<Scalar> positions;
     Triangles triangles;
-    std::vector<Index> vertices, source_triangles;  ///< For each the one it was.
+    std::vector<Index> vertices, source_triangles;  ///< For each its index in the input.
     RepairReport done;
 };
 
-/// The mesh with what `options` ask for, and nothing else: what is kept keeps its order, its bits and, unless it is
-/// turned, its first corner. What comes out may still have defects: `validate` tells. O(F log F).
+/// The mesh after the repairs of `options`, without other changes. Kept vertices and triangles keep their order and
+/// their bits; a triangle keeps its first corner unless it is turned. The result may still have defects, which
+/// `validate` reports. O(F log F).
 /// @throws InvalidInput for shapes as `validate` does, for triangles that name a vertex that does not exist, and if
 /// `weld` is negative or not finite
 template <class P, class T>
@@ -69,7 +71,7 @@ template <class P, class T>
                                                       const Eigen::MatrixBase<T>& triangles,
                                                       const RepairOptions& options);
 
-/// The same from x y z x y z ... [m] and three vertices for each triangle.
+/// Repairs a mesh given as x y z x y z ... [m] and three vertices for each triangle.
 template <class S, std::size_t m, std::integral I, std::size_t n>
 [[nodiscard]] auto repair(std::span<S, m> xyz, std::span<I, n> corners, const RepairOptions& options) {
     return repair(detail::by_threes("repair", xyz, "positions"), detail::by_threes("repair", corners, "triangles"),
@@ -96,7 +98,7 @@ template <class S, std::size_t m, std::integral I, std::size_t n>
 
 namespace detail {
 
-/// A mesh at work.
+/// A mesh under repair.
 class Repair {
   public:
     Repair(Points<double> x, Triangles triangles)
@@ -127,7 +129,7 @@ class Repair {
     }
     void turn(Index f) { std::swap(triangles_(1, f), triangles_(2, f)); }
 
-    /// The sides of those kept that name three vertices.
+    /// The half-edges of the kept triangles with three different vertices.
     [[nodiscard]] std::vector<HalfEdge> sides() const {
         std::vector<Index> some;
         for (const Index f : kept_) {
@@ -139,14 +141,14 @@ class Repair {
         const auto [a, b, c] = corners(f);
         return a == b || b == c || c == a;
     }
-    /// As triangles are turned now; a part with a point that cannot be computed with is not closed.
+    /// The components with the present orientation of the triangles; one with an unusable point is not closed.
     [[nodiscard]] inline SurfaceParts parts(const std::vector<bool>& usable) const;
 
     Points<double> x_;
     Triangles triangles_;
     std::vector<bool> kept_vertices_;
     std::vector<Index> kept_;    // triangles
-    std::vector<Index> origin_;  // of each vertex: itself, or the one it was split off
+    std::vector<Index> origin_;  // of each vertex: itself, or the vertex it was split from
     RepairReport done_;
 };
 
@@ -186,7 +188,7 @@ inline void Repair::drop_duplicates() {
     std::vector<bool> is_duplicate(static_cast<std::size_t>(triangles_.cols()), false);
     const std::vector<HalfEdge> all = sides();
     for_each_edge(all, [&](std::span<const HalfEdge> edge) {
-        for (std::size_t i = 1; i < edge.size(); ++i) {  // those of one apex by ascending triangle
+        for (std::size_t i = 1; i < edge.size(); ++i) {  // those with one apex in ascending order of triangles
             if (edge[i].apex == edge[i - 1].apex) is_duplicate[static_cast<std::size_t>(edge[i].triangle)] = true;
         }
     });
@@ -198,7 +200,7 @@ inline void Repair::orient(const std::vector<bool>& usable) {
     const auto count = static_cast<std::size_t>(triangles_.cols());
     const std::vector<HalfEdge> all = sides();
     DisjointSets sets = turns(all, count);
-    // Of each component, by its lowest triangle: how many are to be turned to agree with that, and how many not.
+    // For each component, at its lowest triangle: how many triangles agree with that one, and how many are opposite.
     std::vector<std::array<Index, 2>> votes(count, {0, 0});
     const auto side_of = [&](Index f) {
         const std::size_t as_is = sets.find(static_cast<std::size_t>(f));
@@ -217,10 +219,10 @@ inline void Repair::orient(const std::vector<bool>& usable) {
     for (const Index f : kept_) {
         const auto [lowest, side] = side_of(f);
         const std::size_t fewer = votes[lowest][1] <= votes[lowest][0] ? 1 : 0;
-        if (side == fewer) turn_over(f);  // on a one-sided surface none is
+        if (side == fewer) turn_over(f);  // never on a one-sided surface
     }
     const SurfaceParts now = parts(usable);
-    std::vector<bool> agreed(now.parts.size(), true);  // as given
+    std::vector<bool> agreed(now.parts.size(), true);  // whether the input triangles of a component agree
     for (const Index f : kept_) {
         const Index p = now.part_of[static_cast<std::size_t>(f)];
         if (p != no_index && turned[static_cast<std::size_t>(f)]) agreed[static_cast<std::size_t>(p)] = false;
@@ -265,14 +267,14 @@ inline void Repair::split_vertices() {
 }
 
 inline SurfaceParts Repair::parts(const std::vector<bool>& usable) const {
-    std::vector<bool> measured(static_cast<std::size_t>(triangles_.cols()), true);
+    std::vector<bool> finite(static_cast<std::size_t>(triangles_.cols()), true);
     for (const Index f : kept_) {
         for (const Index v : corners(f)) {
             const auto given = static_cast<std::size_t>(origin_[static_cast<std::size_t>(v)]);
-            if (!usable[given]) measured[static_cast<std::size_t>(f)] = false;
+            if (!usable[given]) finite[static_cast<std::size_t>(f)] = false;
         }
     }
-    return surface_parts(x_, triangles_, sides(), measured);
+    return surface_parts(x_, triangles_, sides(), finite);
 }
 
 inline void Repair::flip_inward(const std::vector<bool>& usable) {
@@ -288,12 +290,12 @@ inline void Repair::flip_inward(const std::vector<bool>& usable) {
 }
 
 inline void Repair::drop_isolated() {
-    std::vector<bool> named(kept_vertices_.size(), false);
+    std::vector<bool> referenced(kept_vertices_.size(), false);
     for (const Index f : kept_) {
-        for (const Index v : corners(f)) named[static_cast<std::size_t>(v)] = true;
+        for (const Index v : corners(f)) referenced[static_cast<std::size_t>(v)] = true;
     }
-    for (std::size_t v = 0; v < named.size(); ++v) {
-        if (!kept_vertices_[v] || named[v]) continue;
+    for (std::size_t v = 0; v < referenced.size(); ++v) {
+        if (!kept_vertices_[v] || referenced[v]) continue;
         kept_vertices_[v] = false;
         ++done_.isolated;
     }

@@ -15,15 +15,16 @@
 #include <membrane/mesh_check/box_pairs.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// Where a surface runs into itself.
+/// Self-intersections of a surface.
 ///
-///     const bool all = for_each_self_intersection(x, triangles, some, representative, effort, [&](Index f, Index g) { ... });
+///     const bool all = for_each_self_intersection(x, triangles, some, representative, effort,
+///                                                 [&](membrane::Index f, membrane::Index g) { ... });
 namespace membrane {
 
-/// Calls `found(f, g)` for each two of the triangles `some` that meet elsewhere than at what they share: touching counts,
-/// and folded onto each other, too. Vertices that `representative` gives one number are shared. Exact, but for triangles
-/// clearly apart. Takes from `effort` as `for_each_overlap` does, and more for pairs that need a closer look; says
-/// whether it has seen everything.
+/// Calls `found(f, g)`, f < g, for each pair of the triangles `some` that meet outside their shared vertices and edges.
+/// Touching counts, and so does folding onto each other. Vertices with the same `representative` count as shared. Exact
+/// predicates decide unless the triangles are clearly apart. Subtracts from `effort` as `for_each_overlap` does, and
+/// more for pairs that need exact predicates. Returns whether the search is complete.
 /// @pre points are finite, and no triangle of `some` has its corners on one line
 template <class Found>
 [[nodiscard]] bool for_each_self_intersection(const Points<double>& x, const Triangles& triangles,
@@ -35,12 +36,12 @@ namespace detail {
 /// Whether the segment from p to q, which lies in the plane of `t`, meets it.
 [[nodiscard]] inline bool meets_in_plane(const Triangle<double>& t, const Vector3<double>& p,
                                          const Vector3<double>& q) noexcept {
-    int k = 0;  // an axis along which the triangle is seen with an area
+    int k = 0;  // an axis along which the projected area is not 0
     while (sign_of_area(t.a, t.b, t.c, k) == 0) {
         if (++k == 3) return false;
     }
     const int turn = sign_of_area(t.a, t.b, t.c, k);
-    // Apart if all of one lies on the far side of a line along the other's side.
+    // They are apart if the line of a side of one has all of the other beyond it.
     for (int i = 0; i < 3; ++i) {
         const Vector3<double>&from = corner(t, i), &to = corner(t, (i + 1) % 3);
         if (turn * sign_of_area(from, to, p, k) < 0 && turn * sign_of_area(from, to, q, k) < 0) return false;
@@ -60,7 +61,8 @@ namespace detail {
     return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0);
 }
 
-/// Whether a line in one triangle's plane, or one between their middles, has the triangles on different sides for sure.
+/// Whether one of these axes certainly separates the triangles: from centroid to centroid, a normal, or the in-plane
+/// normal of a side.
 [[nodiscard]] inline bool clearly_apart(const Triangle<double>& s, const Triangle<double>& t,
                                         double rounding) noexcept {
     const auto apart = [&](const Vector3<double>& axis) {
@@ -84,7 +86,7 @@ namespace detail {
     return false;
 }
 
-/// Two triangles turned so that what they share comes first.
+/// Two triangles with their shared corners first.
 struct MeetingTriangles {
     Triangle<double> s, t;
     int shared;
@@ -104,7 +106,7 @@ struct MeetingTriangles {
         return false;
     }
 
-    /// Whether a plane through their common vertex has the rest of them on different sides for sure.
+    /// Whether a plane through the shared vertex `v` certainly separates the other corners.
     [[nodiscard]] bool apart_around(const Vector3<double>& v) const noexcept {
         const std::array<Vector3<double>, 4> from_v{s.b - v, s.c - v, t.b - v, t.c - v};
         const Vector3<double> axis = direction<double>(from_v[2] + from_v[3], Vector3<double>::Zero()) -
@@ -117,7 +119,7 @@ struct MeetingTriangles {
         return side(0) == -1 && side(1) == -1 && side(2) == 1 && side(3) == 1;
     }
 
-    /// Whether two triangles with the edge a-b in common lie on each other.
+    /// Whether two triangles that share the edge a-b overlap in one plane.
     [[nodiscard]] bool folded(std::int64_t& effort) const noexcept {
         const Vector3<double> edge = s.b - s.a, to_s = s.c - s.a, to_t = t.c - s.a;
         const Vector3<double> normal_s = cross(edge, to_s), normal_t = cross(edge, to_t);
@@ -134,16 +136,16 @@ struct MeetingTriangles {
     }
 };
 
-/// The corners of f and g, turned.
+/// The triangles f and g, their shared corners first.
 [[nodiscard]] inline MeetingTriangles meeting(const Points<double>& x, const Triangles& triangles,
                                               const std::vector<Index>& representative, Index f, Index g) noexcept {
     std::array<Index, 3> a{triangles(0, f), triangles(1, f), triangles(2, f)};
     std::array<Index, 3> b{triangles(0, g), triangles(1, g), triangles(2, g)};
-    const auto place = [&](Index v) { return representative[static_cast<std::size_t>(v)]; };
+    const auto merged = [&](Index v) { return representative[static_cast<std::size_t>(v)]; };
     std::size_t shared = 0;
     for (std::size_t i = 0; i < 3; ++i) {
         for (std::size_t j = shared; j < 3; ++j) {
-            if (place(a[i]) != place(b[j])) continue;
+            if (merged(a[i]) != merged(b[j])) continue;
             std::swap(a[i], a[shared]);
             std::swap(b[j], b[shared]);
             ++shared;

@@ -15,25 +15,26 @@
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// What a surface is: how large, of how many parts, with how many holes and handles.
+/// Size and topology of a surface: components, borders, handles.
 ///
 ///     const auto facts = membrane::validate(mesh).facts;
 ///     if (facts.likely_unit == membrane::LengthUnit::millimetre) positions /= 1000;
 namespace membrane {
 
-/// Which way the closed components face.
+/// Orientation of the closed components.
 enum class Facing : std::uint8_t { unknown, outward, inward, both };
 
 enum class LengthUnit : std::uint8_t { unknown, metre, millimetre, micrometre };
 
-/// Of all triangles that name three vertices with coordinates one can compute with.
+/// Facts of the triangles with three different vertices. Lengths, angles, area and volume count usable coordinates
+/// only.
 struct SurfaceFacts {
-    Index vertices = 0;               ///< Those that a triangle names.
-    Index edges = 0;                  ///< Pairs of vertices that a side joins.
-    Index triangles = 0;              ///< Those that name three different vertices.
-    Index components = 0;             ///< Of triangles joined by edges.
-    Index borders = 0;                ///< Lines of edges that have one triangle.
-    Index border_edges = 0;           ///< Edges that have one triangle; none if the surface is closed.
+    Index vertices = 0;               ///< Vertices referenced by a triangle.
+    Index edges = 0;                  ///< Pairs of vertices joined by a side.
+    Index triangles = 0;              ///< Triangles with three different vertices.
+    Index components = 0;             ///< Connected components: triangles joined by edges.
+    Index borders = 0;                ///< Connected lines of border edges.
+    Index border_edges = 0;           ///< Edges with one triangle; 0 if the surface is closed.
     Index genus = no_index;           ///< Handles, of all components together; `no_index` if the mesh has errors.
     Facing facing = Facing::unknown;  ///< Of the closed components; `unknown` if there is none.
     double shortest_edge = 0, mean_edge = 0, max_edge = 0;  ///< [m]
@@ -41,13 +42,13 @@ struct SurfaceFacts {
     double area = 0;                                        ///< [m^2]
     double volume = 0;                                      ///< Of the closed components, negative if inward [m^3].
     Vector3<double> size = Vector3<double>::Zero();         ///< Along the axes [m].
-    /// In which the coordinates would make it 1 mm to 2 m large: a guess.
+    /// The unit in which the surface is 1 mm to 2 m large: an estimate.
     LengthUnit likely_unit = LengthUnit::unknown;
 
     [[nodiscard]] bool closed() const noexcept { return triangles > 0 && border_edges == 0; }
 };
 
-/// Triangles joined by edges.
+/// A connected component: triangles joined by edges.
 struct SurfaceComponent {
     Index first_triangle = no_index;
     Index triangle_count = 0;
@@ -57,22 +58,22 @@ struct SurfaceComponent {
     Box<double> extent;
 };
 
-/// The parts, by their first triangles.
+/// The connected components, in order of their first triangles.
 struct SurfaceParts {
     std::vector<SurfaceComponent> parts;
-    std::vector<Index> part_of;  ///< For each triangle; `no_index` for those without sides.
+    std::vector<Index> part_of;  ///< Component of each triangle; `no_index` for triangles without half-edges.
 };
 
-/// @pre `sides` are those of all triangles but such as are left out; `measured` says of which triangles the points are
-/// finite. O(F).
+/// The connected components of the triangles with half-edges in `sides`. `finite` says which triangles have only usable
+/// points. O(F).
 [[nodiscard]] inline SurfaceParts surface_parts(const Points<double>& x, const Triangles& triangles,
-                                                std::span<const HalfEdge> sides, const std::vector<bool>& measured);
+                                                std::span<const HalfEdge> sides, const std::vector<bool>& finite);
 
-/// The edges that have one triangle, each line of them by itself; lines that meet at a vertex are one.
+/// The border edges, grouped by connected line; lines that meet at a vertex are one line.
 [[nodiscard]] inline std::vector<std::vector<HalfEdge>> border_lines(std::span<const HalfEdge> sides,
                                                                      Index vertex_count);
 
-/// The unit of coordinates of a tissue with the given largest extent.
+/// The likely unit of the coordinates of a tissue with the given largest extent.
 [[nodiscard]] constexpr LengthUnit likely_unit(double extent) noexcept {
     if (extent >= 1e-3 && extent <= 2) return LengthUnit::metre;
     if (extent > 2 && extent <= 2e3) return LengthUnit::millimetre;
@@ -80,13 +81,13 @@ struct SurfaceParts {
     return LengthUnit::unknown;
 }
 
-/// Counts and measures; of what `surface_parts` was asked about. `valid`: the mesh has no errors. O(F).
+/// The facts of the triangles of `surface_parts`. `valid`: the mesh has no errors. O(F).
 [[nodiscard]] inline SurfaceFacts surface_facts(const Points<double>& x, std::span<const HalfEdge> sides,
-                                                const std::vector<bool>& measured, const SurfaceParts& parts,
+                                                const std::vector<bool>& finite, const SurfaceParts& parts,
                                                 Index borders, bool valid);
 
 inline SurfaceParts surface_parts(const Points<double>& x, const Triangles& triangles, std::span<const HalfEdge> sides,
-                                  const std::vector<bool>& measured) {
+                                  const std::vector<bool>& finite) {
     DisjointSets sets(static_cast<std::size_t>(triangles.cols()));
     std::vector<bool> closed(static_cast<std::size_t>(triangles.cols()), true);
     SurfaceParts result;
@@ -102,7 +103,7 @@ inline SurfaceParts surface_parts(const Points<double>& x, const Triangles& tria
     });
     for (std::size_t f = 0; f < closed.size(); ++f) {
         if (result.part_of[f] == no_index) continue;
-        const std::size_t root = sets.find(f);  // the lowest, seen before all others
+        const std::size_t root = sets.find(f);  // the lowest triangle of the component, so it comes first
         if (root == f) {
             result.part_of[f] = static_cast<Index>(result.parts.size());
             result.parts.emplace_back().first_triangle = static_cast<Index>(f);
@@ -110,8 +111,8 @@ inline SurfaceParts surface_parts(const Points<double>& x, const Triangles& tria
         result.part_of[f] = result.part_of[root];
         SurfaceComponent& part = result.parts[static_cast<std::size_t>(result.part_of[f])];
         ++part.triangle_count;
-        part.closed = part.closed && closed[f] && measured[f];
-        if (!measured[f]) continue;
+        part.closed = part.closed && closed[f] && finite[f];
+        if (!finite[f]) continue;
         const auto t = triangle_at(x, triangles.col(static_cast<Eigen::Index>(f)));
         const auto origin = point(x, triangles(0, part.first_triangle));
         part.area += norm(area_vector(t));
@@ -144,21 +145,21 @@ inline std::vector<std::vector<HalfEdge>> border_lines(std::span<const HalfEdge>
 
 namespace detail {
 
-/// Lengths, angles, size.
+/// Computes lengths, angles and size.
 inline void measure(SurfaceFacts& facts, const Points<double>& x, std::span<const HalfEdge> sides,
-                    const std::vector<bool>& measured) {
+                    const std::vector<bool>& finite) {
     facts.shortest_edge = facts.smallest_angle = std::numeric_limits<double>::infinity();
     double sum = 0, count = 0;
     Box<double> extent;
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
-        if (!measured[static_cast<std::size_t>(edge[0].triangle)]) return;
+        if (!finite[static_cast<std::size_t>(edge[0].triangle)]) return;
         const auto length = norm<double>(point(x, edge[0].second) - point(x, edge[0].first));
         facts.shortest_edge = (std::min)(facts.shortest_edge, length);
         facts.max_edge = (std::max)(facts.max_edge, length);
         sum += length;
         ++count;
         for (const HalfEdge& side : edge) {
-            if (!measured[static_cast<std::size_t>(side.triangle)]) continue;
+            if (!finite[static_cast<std::size_t>(side.triangle)]) continue;
             const Vector3<double> tip = point(x, side.apex);
             const Vector3<double> first = point(x, side.first) - tip, second = point(x, side.second) - tip;
             const double angle = std::atan2(norm(cross(first, second)), dot(first, second));
@@ -179,17 +180,17 @@ inline void measure(SurfaceFacts& facts, const Points<double>& x, std::span<cons
 }  // namespace detail
 
 inline SurfaceFacts surface_facts(const Points<double>& x, std::span<const HalfEdge> sides,
-                                  const std::vector<bool>& measured, const SurfaceParts& parts, Index borders,
+                                  const std::vector<bool>& finite, const SurfaceParts& parts, Index borders,
                                   bool valid) {
     SurfaceFacts facts;
-    detail::measure(facts, x, sides, measured);
-    std::vector<bool> named(static_cast<std::size_t>(x.cols()), false);
+    detail::measure(facts, x, sides, finite);
+    std::vector<bool> referenced(static_cast<std::size_t>(x.cols()), false);
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
         ++facts.edges;
         facts.border_edges += edge.size() == 1 ? 1 : 0;
-        for (const Index v : {edge[0].first, edge[0].second}) named[static_cast<std::size_t>(v)] = true;
+        for (const Index v : {edge[0].first, edge[0].second}) referenced[static_cast<std::size_t>(v)] = true;
     });
-    facts.vertices = static_cast<Index>(std::count(named.begin(), named.end(), true));
+    facts.vertices = static_cast<Index>(std::count(referenced.begin(), referenced.end(), true));
     facts.triangles = static_cast<Index>(sides.size() / 3);
     facts.components = static_cast<Index>(parts.parts.size());
     facts.borders = borders;
@@ -205,7 +206,7 @@ inline SurfaceFacts surface_facts(const Points<double>& x, std::span<const HalfE
                    : outward         ? Facing::outward
                    : inward          ? Facing::inward
                                      : Facing::unknown;
-    // Each component: V - E + F = 2 - 2 genus - borders.
+    // For each component: V - E + F = 2 - 2 genus - borders.
     if (valid) facts.genus = facts.components - (facts.vertices - facts.edges + facts.triangles + borders) / 2;
     return facts;
 }

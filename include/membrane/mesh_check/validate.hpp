@@ -27,7 +27,7 @@
 #include <membrane/surface/mesh_checks.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Is a mesh valid, and what is it?
+/// Finds the defects and the facts of a mesh.
 ///
 ///     const auto report = membrane::validate(x, triangles);  // any numbers, 3 x V [m] and 3 x F
 ///     if (!report.valid()) std::cerr << to_string(report);
@@ -35,29 +35,31 @@
 namespace membrane {
 
 struct ValidateOptions {
-    /// Vertices this near to each other, and to an edge of the border, should be joined [m]; if not given, a millionth
-    /// of the mean edge, or four times the spacing of numbers at the largest coordinate if that is more.
+    /// Vertices at most this far from each other or from a border edge count as unjoined [m]. Default: the larger of a
+    /// millionth of the mean edge and four times the spacing of floating-point numbers at the largest coordinate.
     std::optional<double> tolerance{};
 
-    /// Findings listed of each kind; all are counted, but for self-intersections, whose search ends there. At least 1.
+    /// Maximum number of findings listed for each kind. All are counted, except self-intersections: their search stops
+    /// at this number. At least 1.
     Index max_findings_per_kind = 100;
 
-    /// How many pairs each search may look at, for each triangle, beside a million. Not negative.
+    /// Each search tests at most a million pairs plus this number for each triangle. Not negative.
     Index effort = 100;
 };
 
-/// All defects, with what they concern and what to do, and facts. `valid()` exactly if `TriangleMesh` takes the mesh.
+/// All defects, with their vertices and triangles and a remedy, and the facts. `valid()` exactly if `TriangleMesh`
+/// accepts the mesh.
 ///
-/// Whatever the numbers are, the time is bounded, O(F log F) for usual shapes: a search that takes too long is given up,
-/// and `complete` says so. Further checks leave out triangles that do not name three vertices, those of positions where
-/// these are not finite or too large, and those of distances where the mesh has no size.
-/// @throws InvalidInput if a matrix has not three rows, or more columns than can be numbered, and for options out of
-/// their range
+/// The time is bounded for any input, O(F log F) for usual shapes: a search that exceeds its limit stops, and
+/// `complete` is false. Further checks skip triangles without three different valid vertices. Checks of positions skip
+/// triangles with a corner that is not finite or too large. Checks of distances are skipped if the mesh has no size.
+/// @throws InvalidInput if a matrix does not have three rows or has too many columns for `Index`, and for options out
+/// of range
 template <class P, class T>
 [[nodiscard]] MeshReport validate(const Eigen::MatrixBase<P>& positions, const Eigen::MatrixBase<T>& triangles,
                                   const ValidateOptions& options = {});
 
-/// The same from x y z x y z ... [m] and three vertices for each triangle.
+/// Validates a mesh given as x y z x y z ... [m] and three vertices for each triangle.
 template <class S, std::size_t m, std::integral I, std::size_t n>
 [[nodiscard]] MeshReport validate(std::span<S, m> xyz, std::span<I, n> corners, const ValidateOptions& options = {}) {
     return validate(detail::by_threes("validate", xyz, "positions"),
@@ -80,14 +82,14 @@ inline void check_options(const ValidateOptions& options) {
     if (options.effort < 0) refuse(component, "effort must not be negative, got ", options.effort);
 }
 
-/// What can be told from the indices alone, besides errors.
+/// Finds the defects, other than errors, that follow from the indices alone.
 template <class Found>
 void check_extras(const CheckedMesh& mesh, const SurfaceParts& parts, std::span<const std::vector<HalfEdge>> borders,
                   Index max_findings_per_kind, Found found) {
-    std::vector<bool> is_named(static_cast<std::size_t>(mesh.x.cols()), mesh.named.empty());
-    for (const HalfEdge& side : mesh.sides) is_named[static_cast<std::size_t>(side.apex)] = true;
+    std::vector<bool> is_referenced(static_cast<std::size_t>(mesh.x.cols()), mesh.referenced.empty());
+    for (const HalfEdge& side : mesh.sides) is_referenced[static_cast<std::size_t>(side.apex)] = true;
     for (Index v = 0; v < mesh.x.cols(); ++v) {
-        if (!is_named[static_cast<std::size_t>(v)]) {
+        if (!is_referenced[static_cast<std::size_t>(v)]) {
             found(MeshDefect::isolated_vertex, {v}, {}, "no triangle names vertex ", v);
         }
     }
@@ -103,7 +105,7 @@ void check_extras(const CheckedMesh& mesh, const SurfaceParts& parts, std::span<
               "the triangle of vertices ", corners[0], ", ", corners[1], " and ", corners[2], " is missing");
     }
     if (parts.parts.size() < 2) return;
-    std::vector<Index> first;  // two at least, for the text
+    std::vector<Index> first;  // at least two, for the text
     for (const SurfaceComponent& part : parts.parts) {
         if (first.size() < 2 || first.size() < static_cast<std::size_t>(max_findings_per_kind)) {
             first.push_back(part.first_triangle);
@@ -113,13 +115,13 @@ void check_extras(const CheckedMesh& mesh, const SurfaceParts& parts, std::span<
           " components, one with triangle ", first[0], ", one with triangle ", first[1]);
 }
 
-/// Triangles of a bad shape; returns those with an area.
+/// Finds triangles of bad shape; returns those with an area.
 template <class Found>
 std::vector<Index> check_triangles(const CheckedMesh& mesh, Found found) {
-    constexpr double flattest = 179.999 * std::numbers::pi / 180;
+    constexpr double max_angle = 179.999 * std::numbers::pi / 180;
     std::vector<Index> with_area;
-    for (const Index f : mesh.named) {
-        if (!mesh.measured[static_cast<std::size_t>(f)]) continue;
+    for (const Index f : mesh.referenced) {
+        if (!mesh.finite[static_cast<std::size_t>(f)]) continue;
         const auto t = triangle_at(mesh.x, mesh.triangles.col(f));
         const std::vector<Index> corners{mesh.triangles(0, f), mesh.triangles(1, f), mesh.triangles(2, f)};
         if (on_one_line(t.a, t.b, t.c)) {
@@ -127,27 +129,28 @@ std::vector<Index> check_triangles(const CheckedMesh& mesh, Found found) {
             continue;
         }
         with_area.push_back(f);
-        double shortest = std::numeric_limits<double>::infinity(), longest = 0, widest = 0;
+        double shortest = std::numeric_limits<double>::infinity(), longest = 0, largest_angle = 0;
         for (int k = 0; k < 3; ++k) {
             const Vector3<double>& tip = corner(t, k);
             const Vector3<double> to_next = corner(t, (k + 1) % 3) - tip, to_last = corner(t, (k + 2) % 3) - tip;
             shortest = (std::min)(shortest, norm(to_next));
             longest = (std::max)(longest, norm(to_next));
-            widest = (std::max)(widest, std::atan2(norm(cross(to_next, to_last)), dot(to_next, to_last)));
+            largest_angle = (std::max)(largest_angle, std::atan2(norm(cross(to_next, to_last)), dot(to_next, to_last)));
         }
         if (shortest <= 1e-6 * longest) {
             found(MeshDefect::needle, corners, {f}, "the sides of triangle ", f, " are ", shortest, " to ", longest,
                   " [m] long");
         }
-        if (widest >= flattest) {
-            found(MeshDefect::cap, corners, {f}, "triangle ", f, " has an angle of pi - ", std::numbers::pi - widest,
-                  " [rad]");
+        if (largest_angle >= max_angle) {
+            found(MeshDefect::cap, corners, {f}, "triangle ", f, " has an angle of pi - ",
+                  std::numbers::pi - largest_angle, " [rad]");
         }
     }
     return with_area;
 }
 
-/// Vertices of the border that lie within an edge of it, though not at its ends; each is told once.
+/// Finds border vertices that lie on a border edge, but not at its ends; reports each vertex once. Returns whether the
+/// search is complete.
 template <class Found>
 bool check_t_junctions(const CheckedMesh& mesh, std::span<const std::vector<HalfEdge>> borders, double tolerance,
                        std::int64_t effort, Found found) {
@@ -155,7 +158,7 @@ bool check_t_junctions(const CheckedMesh& mesh, std::span<const std::vector<Half
     std::vector<Box<double>> boxes;
     for (const auto& line : borders) {
         for (const HalfEdge& side : line) {
-            if (!mesh.measured[static_cast<std::size_t>(side.triangle)]) continue;
+            if (!mesh.finite[static_cast<std::size_t>(side.triangle)]) continue;
             edges.push_back(side);
             Box<double> box;
             for (const Index v : {side.first, side.second}) {
@@ -165,31 +168,32 @@ bool check_t_junctions(const CheckedMesh& mesh, std::span<const std::vector<Half
             boxes.push_back(box);
         }
     }
-    std::vector<bool> told(static_cast<std::size_t>(mesh.x.cols()), false);
-    const auto look = [&](const HalfEdge& edge, Index v) {
-        if (told[static_cast<std::size_t>(v)] || v == edge.first || v == edge.second || v == edge.apex) return;
+    std::vector<bool> reported(static_cast<std::size_t>(mesh.x.cols()), false);
+    const auto test_vertex = [&](const HalfEdge& edge, Index v) {
+        if (reported[static_cast<std::size_t>(v)] || v == edge.first || v == edge.second || v == edge.apex) return;
         const Vector3<double> along = point(mesh.x, edge.second) - point(mesh.x, edge.first);
         const Vector3<double> to_v = point(mesh.x, v) - point(mesh.x, edge.first);
         if (norm(to_v) <= tolerance || norm<double>(to_v - along) <= tolerance) return;
         const double part = fraction(dot(to_v, along), squared_norm(along));
         if (!(part > 0 && part < 1) || norm<double>(to_v - part * along) > tolerance) return;
-        told[static_cast<std::size_t>(v)] = true;
+        reported[static_cast<std::size_t>(v)] = true;
         found(MeshDefect::t_junction, {v, edge.first, edge.second}, {edge.triangle}, "vertex ", v, " is on edge ",
               edge.first, "-", edge.second, " of triangle ", edge.triangle, ", expected at an end of it");
     };
     return for_each_overlap(boxes, effort, [&](Index i, Index j) {
         const HalfEdge &a = edges[static_cast<std::size_t>(i)], &b = edges[static_cast<std::size_t>(j)];
-        for (const Index v : {b.first, b.second}) look(a, v);
-        for (const Index v : {a.first, a.second}) look(b, v);
+        for (const Index v : {b.first, b.second}) test_vertex(a, v);
+        for (const Index v : {a.first, a.second}) test_vertex(b, v);
     });
 }
 
-/// Closed components that have no inside, face it, or are in that of another.
+/// Finds closed components that have no volume, face inward, or are inside another. Returns whether the search is
+/// complete.
 template <class Found>
 bool check_volumes(const CheckedMesh& mesh, const SurfaceParts& parts, std::int64_t effort, Found found) {
     for (const SurfaceComponent& part : parts.parts) {
         if (!part.closed) continue;
-        if (std::abs(part.volume) <= mesh.spacing * part.area) {  // what rounded coordinates come to
+        if (std::abs(part.volume) <= mesh.spacing * part.area) {  // within the rounding error of the coordinates
             found(MeshDefect::no_volume, {}, {part.first_triangle}, "the closed component of triangle ",
                   part.first_triangle, " is flat");
         } else if (part.volume < 0) {
@@ -205,7 +209,7 @@ bool check_volumes(const CheckedMesh& mesh, const SurfaceParts& parts, std::int6
     });
 }
 
-/// What needs distances; returns whether all was looked at.
+/// The checks that need distances; returns whether all searches are complete.
 template <class Found>
 bool check_geometry(const CheckedMesh& mesh, const SurfaceParts& parts, std::span<const std::vector<HalfEdge>> borders,
                     double mean_edge, const ValidateOptions& options, Found found) {
@@ -251,13 +255,13 @@ MeshReport validate(const Eigen::MatrixBase<P>& positions, const Eigen::MatrixBa
     const detail::CheckedMesh mesh = detail::workable(positions.derived(), triangles.derived(), found);
     const auto vertices = static_cast<Index>(mesh.x.cols());
     detail::check_edges(mesh.sides, found);
-    detail::check_turns(mesh.sides, mesh.measured.size(), found);
+    detail::check_turns(mesh.sides, mesh.finite.size(), found);
     detail::check_fans(mesh.triangles, mesh.sides, vertices, found);
 
-    const SurfaceParts parts = surface_parts(mesh.x, mesh.triangles, mesh.sides, mesh.measured);
+    const SurfaceParts parts = surface_parts(mesh.x, mesh.triangles, mesh.sides, mesh.finite);
     const auto borders = border_lines(mesh.sides, vertices);
     report.facts =
-        surface_facts(mesh.x, mesh.sides, mesh.measured, parts, static_cast<Index>(borders.size()), report.valid());
+        surface_facts(mesh.x, mesh.sides, mesh.finite, parts, static_cast<Index>(borders.size()), report.valid());
     detail::check_extras(mesh, parts, borders, options.max_findings_per_kind, found);
     if (mesh.has_size) {
         report.complete = detail::check_geometry(mesh, parts, borders, report.facts.mean_edge, options, found);

@@ -13,49 +13,50 @@
 #include <membrane/meshing/signed_distance.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Surfaces from formulas: the paper's way to its membranes.
+/// Surfaces from signed distances: the mesh generation of the paper.
 ///
 ///     #include <membrane/meshing/distmesh.hpp>
 ///     const auto sphere = membrane::distmesh(membrane::Ball{.radius = 1}, {.edge_length = 0.1});
 ///     const auto bowl   = membrane::distmesh(membrane::trimmed(membrane::Ball{.radius = 1}, membrane::HalfSpace{}),
-///                                            {.edge_length = 0.1});                       // the half below, with a border
+///                                            {.edge_length = 0.1});                  // the lower half, with a border
 ///     const auto own    = membrane::distmesh([](const membrane::Vector3<double>& p) { return ...; },
-///                                            {.edge_length = 0.1, .bounds = membrane::Bounds{{-1, -1, -1}, {1, 1, 1}}});
+///                                            {.edge_length = 0.1,
+///                                             .bounds = membrane::Bounds{{-1, -1, -1}, {1, 1, 1}}});
 namespace membrane {
 
 struct DistMeshOptions {
-    EdgeLength edge_length = {};         ///< Wanted: [m], or a function of the place. Must be given.
-    std::optional<Bounds> bounds = {};   ///< That the surface is in [m]: needed where the body does not know its own.
-    Index iterations = 200;              ///< At most; the paper's number.
-    std::optional<double> spacing = {};  ///< Of the grid that the surface is first found in [m], see below.
+    EdgeLength edge_length = {};         ///< Target length [m], or a function of the position. Required.
+    std::optional<Bounds> bounds = {};   ///< Box around the surface [m]; required if the body has no bounds of its own.
+    Index iterations = 200;              ///< Upper limit; the default is the paper's.
+    std::optional<double> spacing = {};  ///< Cell size of the initial grid [m], see `distmesh`.
     std::function<void(const RemeshProgress&)> progress = {};  ///< Called after each iteration.
 };
 
-/// The surface of a body, closed and facing outward, or what of it a `trimmed` one keeps, with a border; of the bits that
-/// the same call gave before. [Liu07] 2.1 after [Persson04], with these differences: points start from an `isosurface`
-/// in place of a random choice from a grid; the triangulation is repaired by flips on the surface, where Delaunay
-/// tetrahedra would have to be sorted into inside and outside; and edges are split and collapsed, so that the mean edge
-/// is close to `edge_length`, whatever the start was.
+/// The surface of a body, closed and facing outward; of a `trimmed` body the part within, with a border. Equal input
+/// gives equal bits. [Liu07] 2.1 after [Persson04], with these differences. Points start from an `isosurface` instead
+/// of a random choice from a grid. The triangulation is repaired by flips on the surface; Delaunay tetrahedra would
+/// have to be sorted into inside and outside. Edges are split and collapsed, so that the mean edge is close to
+/// `edge_length` for any start.
 ///
-/// Each vertex is within 1e-10 of the size of the bounds of the surface, those of a border of both. Where the surface is
-/// smooth and edges are at most 0.6 of its radii of curvature, all angles are above 30 degrees, and 53 is the mean of the
-/// triangles' smallest; 95 % of the edges are within 25 % of their mean, and that within 20 % of `edge_length` (measured
-/// on hundreds of random bodies, if the length is the same everywhere). Edges and corners of the body are not followed:
-/// triangles cut them off, and near edges sharper than a right angle they can be bad. Where edges are longer than the body
-/// is thin, triangles may cross each other.
+/// Each vertex is within 1e-10 of the size of the bounds from the surface, a border vertex from both surfaces. If the
+/// surface is smooth and edges are at most 0.6 of its radii of curvature, all angles are above 30 degrees, and the mean
+/// of the triangles' smallest angles is 53 degrees. 95 % of the edges are within 25 % of their mean, and the mean is
+/// within 20 % of `edge_length` (measured on hundreds of random bodies, with a constant length). Edges and corners of
+/// the body are not followed: triangles cut them off, and near edges sharper than a right angle triangles can be bad.
+/// If edges are longer than the body is thin, triangles may intersect.
 ///
-/// The grid's `spacing` is 0.8 of the smallest edge length found at 17^3 places, but at most a twelfth of the shortest
-/// side of the bounds; features smaller than that can be lost.
+/// The default `spacing` is 0.8 of the smallest edge length at 17^3 points, but at most a twelfth of the shortest side
+/// of the bounds. Features smaller than the spacing can be lost.
 ///
-/// @throws InvalidInput if bounds are missing, not finite, empty, or farther from 0 than 1e7 times their size, for
-/// iterations below 0, a spacing or edge length that is not finite and positive, and for what `isosurface` refuses
-/// Cost: O(grid) + O(vertices) for each iteration: 0.3 s for 1,500 vertices and 200 iterations. A body much thinner than
-/// the edges are long is found in many more vertices than are left, some 20 us each: give a wider `spacing`.
+/// @throws InvalidInput if bounds are missing, not finite, empty, or farther from 0 than 1e7 times their size; if
+/// `iterations` is below 0; if a spacing or edge length is not finite and positive; for errors of `isosurface`
+/// Cost: O(grid) + O(vertices) for each iteration: 0.3 s for 1,500 vertices and 200 iterations. A body much thinner
+/// than the edges are long starts with many more vertices than remain, at 20 us each: then use a wider `spacing`.
 template <Real Scalar = double, class Body>
     requires(!detail::is_trimmed<Body> && CheckedSignedDistance<Body>)
 [[nodiscard]] TriangleMesh<Scalar> distmesh(Body body, const DistMeshOptions& options);
 
-/// The same with a border.
+/// The surface of a trimmed body, with a border.
 template <Real Scalar = double, CheckedSignedDistance Body, SignedDistance Within>
 [[nodiscard]] TriangleMesh<Scalar> distmesh(const Trimmed<Body, Within>& surface, const DistMeshOptions& options);
 

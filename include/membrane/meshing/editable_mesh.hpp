@@ -16,58 +16,60 @@
 ///     const auto finer = editable.mesh();
 namespace membrane {
 
-/// A surface like a `TriangleMesh`, and as valid after each change as before.
+/// A surface like a `TriangleMesh`; each change keeps it valid.
 ///
-/// It is seen by its sides: side 3 f + k runs from corner k of triangle f to the next corner, counter-clockwise, and the
-/// twin of a side is the side of the other triangle at the same edge. Numbers of what was collapsed are not used again.
+/// Its elements are sides (half-edges): side 3 f + k runs from corner k of triangle f to the next corner,
+/// counter-clockwise. The twin of a side is the side of the other triangle at the same edge. Indices of collapsed
+/// elements are not reused.
 class EditableMesh {
   public:
     /// O(F log F).
     inline explicit EditableMesh(const TriangleMesh<double>& mesh);
 
-    /// Of all that ever were, those collapsed too.
+    /// Counts include collapsed elements.
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(side_from_.size()); }
     [[nodiscard]] Index side_count() const noexcept { return static_cast<Index>(from_.size()); }
 
-    /// Whether the vertex is in a triangle; whether the side's triangle is there still.
+    /// Whether the vertex is in a triangle; whether the side's triangle still exists.
     [[nodiscard]] bool is_vertex(Index v) const noexcept { return side_from_[at(v)] != no_index; }
     [[nodiscard]] bool exists(Index side) const noexcept { return from_[at(side)] != no_index; }
 
-    /// Around the side's triangle: the next side, the one before, and the vertices of these three: the side's first, its
-    /// second, and the third.
+    /// In the side's triangle: the next side, the previous side, and the three vertices: first, second, apex.
     [[nodiscard]] static Index next(Index side) noexcept { return side % 3 == 2 ? side - 2 : side + 1; }
     [[nodiscard]] static Index last(Index side) noexcept { return side % 3 == 0 ? side + 2 : side - 1; }
     [[nodiscard]] Index from(Index side) const noexcept { return from_[at(side)]; }
     [[nodiscard]] Index to(Index side) const noexcept { return from_[at(next(side))]; }
     [[nodiscard]] Index apex(Index side) const noexcept { return from_[at(last(side))]; }
 
-    /// `no_index` at a border.
+    /// The other side of the edge; `no_index` at a border.
     [[nodiscard]] Index twin(Index side) const noexcept { return twin_[at(side)]; }
     [[nodiscard]] bool is_border(Index v) const noexcept { return twin(side_from_[at(v)]) == no_index; }
 
-    /// Calls `visit(side)` for the side out of `v` of each triangle around, counter-clockwise, from border to border.
+    /// Calls `visit(side)` for the outgoing side of `v` in each of its triangles, counter-clockwise, from border to
+    /// border.
     template <class Visit>
     void around(Index v, Visit visit) const;
 
-    /// Whether an edge joins the two. Linear in the triangles around `v`.
+    /// Whether an edge joins the two vertices. Linear in the triangles around `v`.
     [[nodiscard]] inline bool joined(Index v, Index w) const;
 
     [[nodiscard]] const Vector3<double>& position(Index v) const noexcept { return positions_[at(v)]; }
     void move(Index v, const Vector3<double>& to) noexcept { positions_[at(v)] = to; }
 
-    /// Exchanges the edge for the other diagonal of its two triangles, if it has two and the other is no edge yet. Says
-    /// whether it did; `side` is then the new edge.
+    /// Replaces the edge by the other diagonal of its two triangles; `side` is then the new edge. If the edge is at a
+    /// border or that diagonal is an edge already, returns false and changes nothing.
     inline bool flip(Index side);
 
-    /// Puts a vertex on the edge at `place`, which splits its triangles in two, and returns it. `side` then ends there.
-    inline Index split(Index side, const Vector3<double>& place);
+    /// Inserts a vertex at `p` on the edge, which splits its triangles in two, and returns the vertex. `side` then ends
+    /// there.
+    inline Index split(Index side, const Vector3<double>& p);
 
-    /// Moves the first vertex of `side` into the second, with the triangles at the edge gone, if the surface stays one of
-    /// the same topology: no vertex but the apexes is next to both [Dey99], a vertex of the border goes only along the
-    /// border, and of a part that is one triangle or a tetrahedron all stays. Says whether it did.
+    /// Moves the first vertex of `side` into the second and removes the triangles at the edge, if the surface keeps its
+    /// topology: only the apexes are neighbours of both vertices [Dey99], a border vertex moves only along the border,
+    /// and a component of one triangle or one tetrahedron stays. Returns whether it collapsed.
     inline bool collapse(Index side);
 
-    /// What is there now, vertices and triangles in the order of their numbers.
+    /// The present mesh, vertices and triangles in the order of their indices.
     [[nodiscard]] inline TriangleMesh<double> mesh() const;
 
   private:
@@ -80,8 +82,8 @@ class EditableMesh {
     inline void begin_at_border(Index v, Index side) noexcept;
 
     std::vector<Vector3<double>> positions_;
-    std::vector<Index> side_from_;  // each vertex: one that begins there; at a border the one that has no twin
-    std::vector<Index> from_;       // each side: its first vertex, no_index if its triangle is gone
+    std::vector<Index> side_from_;  // per vertex: an outgoing side; at a border the one without a twin
+    std::vector<Index> from_;       // per side: its first vertex, no_index if its triangle was removed
     std::vector<Index> twin_;
 };
 
@@ -129,7 +131,7 @@ inline void EditableMesh::remove_triangle(Index side) noexcept {
     for (const Index gone : {side, next(side), last(side)}) from_[at(gone)] = no_index;
 }
 
-/// The vertex's triangles, of which `side` is one's side out of it, are visited from the border on.
+/// Sets the first outgoing side of `v`, found from its outgoing `side`: at a border the one without a twin.
 inline void EditableMesh::begin_at_border(Index v, Index side) noexcept {
     const Index first = side;
     while (twin(side) != no_index) {
@@ -163,11 +165,11 @@ inline bool EditableMesh::flip(Index side) {
     return true;
 }
 
-inline Index EditableMesh::split(Index side, const Vector3<double>& place) {
+inline Index EditableMesh::split(Index side, const Vector3<double>& p) {
     const Index middle = vertex_count(), other = twin(side), ends[] = {from(side), to(side)};
-    positions_.push_back(place);
+    positions_.push_back(p);
     side_from_.push_back(no_index);
-    // Of a triangle a b c, with `near` its side a b, `near` keeps a m c; the new one is m b c.
+    // In a triangle a b c with the side `near` = a b, `near` keeps a m c; the new triangle is m b c.
     const auto halve = [&](Index near) {
         const Index b = to(near), c = apex(near), bc = twin(next(near));
         const Index far = add_triangle(middle, b, c);
@@ -215,9 +217,9 @@ inline bool EditableMesh::collapse(Index side) {
     around(a, [&](Index out) { out_of_a.push_back(out); });
     for (const Index out : out_of_a) from_[at(out)] = b;
     side_from_[at(a)] = no_index;
-    // The two other sides of a triangle that goes close up, and what was across them lies side by side.
+    // The two other sides of a removed triangle merge: their twins become twins of each other.
     struct Seam {
-        Index end, inward, outward;  // an apex, what is across from it to b, what is across from b to it
+        Index end, inward, outward;  // the apex, the twin from it to b, the twin from b to it
     };
     std::vector<Seam> seams;
     for (const Index gone : {side, other}) {

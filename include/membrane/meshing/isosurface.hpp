@@ -15,21 +15,22 @@
 #include <membrane/meshing/level_surface.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Where a surface is: triangles of the right topology, on it, of any shape. What `distmesh` begins with.
+/// Initial triangles of `distmesh`: correct topology, vertices on the surface, any triangle shape.
 ///
 ///     const auto ball = membrane::LevelSurface(membrane::Ball{}, membrane::Ball{}.bounds());
 ///     const auto raw  = membrane::isosurface(ball, membrane::Ball{}.bounds(), 0.1);       // cells of 0.1 m
 namespace membrane {
 
-/// The zero level of `surface` in a grid of cells `spacing` [m] wide over `bounds`, each cut into six tetrahedra, with
-/// one vertex wherever an edge of these crosses the surface [Doi91]. A surface with a border is then cut off where its
-/// edges cross the border. Every vertex is within the surface's tolerance of it, those of the border of both distances.
+/// The zero level of `surface` in a grid of cells `spacing` [m] wide over `bounds`. Each cell is cut into six
+/// tetrahedra, with one vertex on each of their edges that crosses the surface [Doi91]. A surface with a border is then
+/// cut where its edges cross the border. Every vertex is within the surface's tolerance of it, a border vertex of both
+/// distances.
 ///
 /// Features smaller than a cell can be lost.
-/// @throws InvalidInput if there is no surface, if it reaches out of the bounds, if one without a border has its inside out
-/// there, if a distance is not finite, if the grid has more than 1.3e8 points or 2e6 in a plane, and if the border cannot
-/// be found because two distances touch
-/// O(points of the grid) time, O(one layer of the grid + surface) memory.
+/// @throws InvalidInput if there is no surface; if it extends beyond the bounds; if a surface without a border has its
+/// inside beyond the bounds; if a distance is not finite; if the grid has more than 1.3e8 points or 2e6 in a plane; if
+/// the border is not found because the two surfaces are tangent
+/// Cost: O(points of the grid) time, O(one layer of the grid + surface) memory.
 template <class Surface>
 [[nodiscard]] TriangleMesh<double> isosurface(const Surface& surface, const Bounds& bounds, double spacing);
 
@@ -37,7 +38,7 @@ namespace detail {
 
 inline constexpr std::string_view isosurface_name = "isosurface";
 
-/// Triangles that grow in number.
+/// A growing set of triangles.
 struct Soup {
     std::vector<Vector3<double>> x;
     std::vector<std::array<Index, 3>> triangles;
@@ -48,7 +49,7 @@ struct Soup {
     }
     [[nodiscard]] const Vector3<double>& at(Index v) const { return x[static_cast<std::size_t>(v)]; }
 
-    /// With the vertices that triangles name, in their order.
+    /// The mesh of the referenced vertices, in the order of their first reference.
     [[nodiscard]] TriangleMesh<double> mesh() const {
         std::vector<Index> number(x.size(), no_index);
         Points<double> points(3, static_cast<Eigen::Index>(x.size()));
@@ -68,7 +69,7 @@ struct Soup {
     }
 };
 
-/// One vertex for each edge that has one, whoever asks first.
+/// One vertex per crossing edge, made at the first request.
 class EdgeVertices {
   public:
     template <class Make>
@@ -84,7 +85,7 @@ class EdgeVertices {
     std::unordered_map<std::uint64_t, Index> vertices_;
 };
 
-/// The place between `inside` and `outside` where `is_inside` changes, to the last bit or so.
+/// The fraction, 0 to 1, at which `is_inside` turns from true to false, to within 2^-51.
 template <class IsInside>
 [[nodiscard]] double crossing(IsInside is_inside) {
     double low = 0, high = 1;
@@ -95,7 +96,7 @@ template <class IsInside>
     return (low + high) / 2;
 }
 
-/// Marching tetrahedra, one layer of cubes after the other.
+/// Marching tetrahedra, one layer of cubes after another.
 template <class Surface>
 class MarchingTetrahedra {
   public:
@@ -111,7 +112,7 @@ class MarchingTetrahedra {
                        "points, or 2e6 in a plane; use longer edges, a wider spacing or narrower bounds");
             }
             points_[static_cast<std::size_t>(k)] = static_cast<std::int64_t>(cells) + 1;
-            // Off the middle, so that the planes of symmetric bodies do not lie on those of the grid.
+            // Off centre, so that symmetry planes of bodies do not lie on planes of the grid.
             origin_[k] = (bounds.low[k] + bounds.high[k]) / 2 - (cells / 2 - 0.0271828 * (k + 1)) * spacing;
         }
     }
@@ -129,17 +130,17 @@ class MarchingTetrahedra {
         return std::move(soup_);
     }
 
-    /// Whether a corner of the grid is in the body.
+    /// Whether a corner of the grid is inside the body.
     [[nodiscard]] bool starts_inside() const noexcept { return starts_inside_; }
 
   private:
     using Cell = std::array<std::int64_t, 3>;
     struct Corner {
-        int bits;  // x, y, z: on which side of the cube
+        int bits;  // one per axis x, y, z: 0 on the lower side of the cube, 1 on the upper
         double distance;
     };
 
-    [[nodiscard]] Vector3<double> place(const Cell& cell, int bits) const {
+    [[nodiscard]] Vector3<double> grid_point(const Cell& cell, int bits) const {
         Vector3<double> p;
         for (int k = 0; k < 3; ++k) {
             p[k] = origin_[k] + static_cast<double>(cell[static_cast<std::size_t>(k)] + (bits >> k & 1)) * spacing_;
@@ -152,7 +153,7 @@ class MarchingTetrahedra {
         distances.reserve(static_cast<std::size_t>(points_[0] * points_[1]));
         for (std::int64_t y = 0; y < points_[1]; ++y) {
             for (std::int64_t x = 0; x < points_[0]; ++x) {
-                const Vector3<double> p = place({x, y, z}, 0);
+                const Vector3<double> p = grid_point({x, y, z}, 0);
                 distances.push_back(surface_.distance(p));
                 if (is_finite(distances.back())) continue;
                 refuse(isosurface_name, "the distance at (", p.x(), ", ", p.y(), ", ", p.z(),
@@ -172,32 +173,31 @@ class MarchingTetrahedra {
             inside += d[bits] < 0 ? 1 : 0;
         }
         if (inside == 0 || inside == 8) return;
-        // From corner 0 to corner 7 along the axes, in each of their orders.
-        static constexpr std::array<std::array<int, 2>, 6> displacements{
-            {{1, 3}, {2, 6}, {4, 5}, {2, 3}, {1, 5}, {4, 6}}};
+        // The six paths from corner 0 to corner 7 along the three axes.
+        static constexpr std::array<std::array<int, 2>, 6> paths{{{1, 3}, {2, 6}, {4, 5}, {2, 3}, {1, 5}, {4, 6}}};
         for (std::size_t n = 0; n < 6; ++n) {
-            const auto [p, q] = displacements[n];
+            const auto [p, q] = paths[n];
             std::array<Corner, 4> corner{{{0, 0}, {p, 0}, {q, 0}, {7, 0}}};
             for (Corner& c : corner) c.distance = d[static_cast<std::size_t>(c.bits)];
             tetrahedron(cell, corner, n < 3);
         }
     }
 
-    /// Corners inside come first, each exchange turns the orientation.
-    void tetrahedron(const Cell& cell, std::array<Corner, 4> c, bool right_handed) {
+    /// Sorts corners inside to the front; each swap reverses the orientation.
+    void tetrahedron(const Cell& cell, std::array<Corner, 4> c, bool positive) {
         std::size_t inside = 0;
         for (std::size_t i = 0; i < 4; ++i) {
             if (!(c[i].distance < 0)) continue;
             if (i != inside) {
                 std::swap(c[i], c[inside]);
-                right_handed = !right_handed;
+                positive = !positive;
             }
             ++inside;
         }
         if (inside == 0 || inside == 4) return;
-        const auto vertex = [&](std::size_t in, std::size_t out) { return tunnelled(cell, c[in].bits, c[out].bits); };
+        const auto vertex = [&](std::size_t in, std::size_t out) { return edge_vertex(cell, c[in].bits, c[out].bits); };
         const auto add = [&](Index p, Index q, Index r) {
-            if (!right_handed) std::swap(q, r);
+            if (!positive) std::swap(q, r);
             soup_.triangles.push_back({p, q, r});
         };
         if (inside == 1) add(vertex(0, 1), vertex(0, 2), vertex(0, 3));
@@ -209,17 +209,16 @@ class MarchingTetrahedra {
         }
     }
 
-    [[nodiscard]] Index tunnelled(const Cell& cell, int in, int out) {
-        const int low = in & out,
-                  displacement = in ^ out;  // the ends differ in the bits of `displacement`, in one direction
+    [[nodiscard]] Index edge_vertex(const Cell& cell, int in, int out) {
+        const int low = in & out, diagonal = in ^ out;  // the edge runs from `low` along the axes of `diagonal`
         std::uint64_t number = 0;
         for (int k = 2; k >= 0; --k) {
             const auto axis = static_cast<std::size_t>(k);
             number = number * static_cast<std::uint64_t>(points_[axis]) +
                      static_cast<std::uint64_t>(cell[axis] + (low >> k & 1));
         }
-        return vertices_.at(8 * number + static_cast<std::uint64_t>(displacement), [&] {
-            const Vector3<double> p = place(cell, in), q = place(cell, out);
+        return vertices_.at(8 * number + static_cast<std::uint64_t>(diagonal), [&] {
+            const Vector3<double> p = grid_point(cell, in), q = grid_point(cell, out);
             const double along = crossing([&](double t) { return surface_.distance(p + t * (q - p)) < 0; });
             return soup_.add(p + along * (q - p));
         });
@@ -234,7 +233,7 @@ class MarchingTetrahedra {
     EdgeVertices vertices_;
 };
 
-/// What lies within the border.
+/// The part of the surface within the border.
 template <class Surface>
 [[nodiscard]] Soup cut_at_border(const Surface& surface, Soup soup) {
     std::vector<char> within;
@@ -245,20 +244,21 @@ template <class Surface>
     const auto cut = [&](Index in, Index out) {
         const auto edge = (static_cast<std::uint64_t>(in) << 32U) + static_cast<std::uint64_t>(out);
         return vertices.at(edge, [&] {
-            const Vector3<double> p = soup.at(in), displacement = soup.at(out) - p;
+            const Vector3<double> p = soup.at(in), edge_vector = soup.at(out) - p;
             const double along = crossing([&](double t) {
-                const auto on_surface = surface.project(p + t * displacement);
+                const auto on_surface = surface.project(p + t * edge_vector);
                 return on_surface && surface.beyond_border(on_surface->point) < 0;
             });
-            const auto place = surface.project_to_border(p + along * displacement);
-            if (place && norm<double>(place->point - p) < 2 * norm(displacement)) return soup.add(place->point);
+            const auto on_border = surface.project_to_border(p + along * edge_vector);
+            if (on_border && norm<double>(on_border->point - p) < 2 * norm(edge_vector))
+                return soup.add(on_border->point);
             refuse(isosurface_name, "the border near (", p.x(), ", ", p.y(), ", ", p.z(),
                    ") must be where two distances cross at an angle, got none");
         });
     };
     std::vector<std::array<Index, 3>> triangles;
     for (const auto& corners : std::exchange(soup.triangles, {})) {
-        std::size_t k = 0;  // turned so that the corner that differs from the others comes first
+        std::size_t k = 0;  // rotated so that the corner that differs from the others comes first
         while (k < 2 &&
                (stays(corners[k]) == stays(corners[(k + 1) % 3]) || stays(corners[k]) == stays(corners[(k + 2) % 3]))) {
             ++k;
@@ -284,7 +284,7 @@ template <class Surface>
 TriangleMesh<double> isosurface(const Surface& surface, const Bounds& bounds, double spacing) {
     detail::MarchingTetrahedra<Surface> grid(surface, bounds, spacing);
     detail::Soup soup = grid.march();
-    const auto tunnelled = static_cast<Index>(soup.x.size());
+    const auto crossing_count = static_cast<Index>(soup.x.size());
     if constexpr (Surface::has_border) soup = detail::cut_at_border(surface, std::move(soup));
     if (soup.triangles.empty()) {
         refuse(detail::isosurface_name, "the distance must change its sign within the bounds, got none of cells of ",
@@ -296,7 +296,7 @@ TriangleMesh<double> isosurface(const Surface& surface, const Bounds& bounds, do
             Eigen::Map<const Eigen::Matrix<Index, 3, 1>>(soup.triangles[f].data());
     }
     for_each_edge(half_edges(corners), [&](std::span<const HalfEdge> sides) {
-        if (sides.size() != 1 || (sides[0].first >= tunnelled && sides[0].second >= tunnelled)) return;
+        if (sides.size() != 1 || (sides[0].first >= crossing_count && sides[0].second >= crossing_count)) return;
         const Vector3<double>& p = soup.at(sides[0].first);
         refuse(detail::isosurface_name, "the surface must be within the bounds, got a point out of them near (", p.x(),
                ", ", p.y(), ", ", p.z(), ")");

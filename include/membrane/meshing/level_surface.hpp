@@ -8,12 +8,12 @@
 
 #include <membrane/meshing/signed_distance.hpp>
 
-/// The surface where a signed distance is zero, all of it or the part within another body, and the way onto it.
+/// The zero level of a signed distance, whole or within another body, and the projection onto it.
 ///
 ///     const auto eye    = membrane::Ball{.radius = 12e-3};                                           // [m]
 ///     const auto front  = membrane::HalfSpace{.point = {0, 0, 8e-3}, .normal = {0, 0, -1}};
 ///     const auto mesh   = membrane::distmesh(membrane::trimmed(eye, front), {.edge_length = 1e-3});  // has a border
-///     const auto place  = membrane::LevelSurface(eye, eye.bounds()).project(p);                      // the step below that
+///     const auto foot   = membrane::LevelSurface(eye, eye.bounds()).project(p);                      // one point only
 namespace membrane {
 
 /// The part of a body's surface that lies within another body; its border is where the two surfaces meet.
@@ -33,13 +33,13 @@ inline constexpr bool is_trimmed<Trimmed<Body, Within>> = true;
 
 }  // namespace detail
 
-/// The surface of `body` as far as it is in `within`. They should meet at an angle that is not small.
+/// The part of the surface of `body` within `within`. The two surfaces should not meet at a small angle.
 template <SignedDistance Body, SignedDistance Within>
 [[nodiscard]] Trimmed<Body, Within> trimmed(Body body, Within within) {
     return {std::move(body), std::move(within)};
 }
 
-/// In place of a body to be within: everything.
+/// All of space: `Within` of a surface without a border.
 struct Everywhere {
     [[nodiscard]] double operator()(const Vector3<double>&) const noexcept { return -1; }
 };
@@ -50,29 +50,30 @@ struct OnSurface {
     Vector3<double> normal;  ///< Out of the body, unit length.
 };
 
-/// The surface of `Body` as far as it is in `Within`.
+/// The part of the surface of `Body` within `Within`.
 template <SignedDistance Body, SignedDistance Within = Everywhere>
 class LevelSurface {
   public:
     static constexpr bool has_border = !std::same_as<Within, Everywhere>;
 
-    /// `bounds` [m] only say how long a step of a gradient and how small an error is.
+    /// `bounds` [m] only set the difference step of gradients and the tolerance.
     LevelSurface(const Body& body, const Bounds& bounds) : LevelSurface(trimmed(body, Within{}), bounds) {}
     LevelSurface(const Trimmed<Body, Within>& surface, const Bounds& bounds)
         : surface_(surface), size_(norm<double>(bounds.high - bounds.low)) {}
 
-    /// Signed distances [m]: to the body; to the body that the surface ends at.
+    /// Signed distance to the body [m]; to the body that trims it [m].
     [[nodiscard]] double distance(const Vector3<double>& p) const { return surface_.body(p); }
     [[nodiscard]] double beyond_border(const Vector3<double>& p) const { return surface_.within(p); }
 
-    /// How far a projected point may be from the surface [m]: 1e-10 of the size of the bounds. Most come much nearer.
+    /// Largest distance of a projected point from the surface [m]: 1e-10 of the size of the bounds. Most points are
+    /// much closer.
     [[nodiscard]] double tolerance() const noexcept { return 1e-10 * size_; }
 
-    /// The point of the surface that Newton's method along the gradient leads to from `p`, which is near the nearest
-    /// one where `p` is near the surface; none where the method gets lost. The border is not looked at.
+    /// The result of Newton's method along the gradient from `p`: near the closest point of the surface if `p` is near
+    /// the surface, empty if the method does not converge. The border is ignored.
     [[nodiscard]] std::optional<OnSurface> project(const Vector3<double>& p) const;
 
-    /// The same onto the border: both distances are zero.
+    /// The projection onto the border: both distances are zero.
     [[nodiscard]] std::optional<OnSurface> project_to_border(const Vector3<double>& p) const;
 
   private:
@@ -114,7 +115,7 @@ std::optional<OnSurface> LevelSurface<Body, Within>::project_to_border(const Vec
         const Vector3<double> a = gradient(surface_.body, x), b = gradient(surface_.within, x);
         const double aa = squared_norm(a), ab = dot(a, b), bb = squared_norm(b), whole = aa * bb - ab * ab;
         if (!is_finite(off) || !is_finite(beyond) || !is_finite(whole)) return std::nullopt;
-        if (!(whole > 1e-6 * aa * bb)) return std::nullopt;  // the surfaces touch: no border to be found
+        if (!(whole > 1e-6 * aa * bb)) return std::nullopt;  // the surfaces are tangent: no border
         const double steepness = std::sqrt(aa);
         if (std::abs(off) <= tolerance() * steepness && std::abs(beyond) <= tolerance() * std::sqrt(bb)) {
             return OnSurface{x, a / steepness};

@@ -9,20 +9,20 @@
 
 #include <membrane/core/check.hpp>
 
-/// Bodies, each as the signed distance of a point to its surface: what `distmesh` makes triangles of.
+/// Bodies as signed distances, the input of `distmesh`.
 ///
-///     const auto lens = membrane::Ellipsoid{.radii = {5e-3, 5e-3, 2e-3}};                          // [m]
+///     const auto lens = membrane::Ellipsoid{.radii = {5e-3, 5e-3, 2e-3}};                        // [m]
 ///     const auto bowl = membrane::difference(membrane::Ball{.radius = 1}, membrane::Ball{.radius = 0.9});
-///     const auto ring = [](const membrane::Vector3<double>& p) {                                   // one's own: a torus
+///     const auto ring = [](const membrane::Vector3<double>& p) {                                 // user-defined torus
 ///         return std::hypot(std::hypot(p.x(), p.y()) - 1, p.z()) - 0.3;
 ///     };
 namespace membrane {
 
 /// The signed distance of a point to the surface of a body [m]: negative inside, positive outside.
 ///
-/// What the compiler cannot check: it is finite and continuous, the same at each call, and grows by about one metre a
-/// metre across the surface (a level set that does not is mended by Newton's method, as long as its gradient does not
-/// vanish there).
+/// Requirements that the compiler cannot check: it is finite, continuous and equal at each call, and its slope across
+/// the surface is about 1. For a level set of another slope Newton's method compensates, if the gradient does not
+/// vanish there.
 template <class D>
 concept SignedDistance = requires(const D& distance, const Vector3<double>& p) {
     { distance(p) } -> std::convertible_to<double>;
@@ -38,17 +38,17 @@ consteval bool check_signed_distance() noexcept {
 
 }  // namespace detail
 
-/// A `SignedDistance`; where it is none, the error says what is missing.
+/// A `SignedDistance`. If a requirement is missing, the compile error names it.
 template <class D>
 concept CheckedSignedDistance = detail::check_signed_distance<D>();
 
-/// A signed distance that knows its own gradient: a vector out of the body, of length one for a true distance.
+/// A signed distance with its own gradient: a vector out of the body, of length 1 for a true distance.
 template <class D>
 concept GivesGradient = SignedDistance<D> && requires(const D& distance, const Vector3<double>& p) {
     { distance.gradient(p) } -> std::convertible_to<Vector3<double>>;
 };
 
-/// A box with edges along the axes that a body fits in [m]. Infinite where the body is.
+/// An axis-aligned box that contains a body [m]. Infinite where the body is.
 struct Bounds {
     Vector3<double> low = Vector3<double>::Constant(-std::numeric_limits<double>::infinity());
     Vector3<double> high = Vector3<double>::Constant(std::numeric_limits<double>::infinity());
@@ -64,25 +64,25 @@ struct Bounds {
     }
 };
 
-/// A body that says which box it fits in: `distmesh` need not be told.
+/// A body with its own bounding box: `distmesh` then needs no `bounds`.
 template <class D>
 concept GivesBounds = requires(const D& body) {
     { body.bounds() } -> std::convertible_to<Bounds>;
 };
 
-/// The body's own bounds; without limit if it has none.
+/// The body's own bounds; infinite if it has none.
 template <class D>
 [[nodiscard]] Bounds bounds_of(const D& body) {
     if constexpr (GivesBounds<D>) return body.bounds();
     return {};
 }
 
-/// The body's own gradient at `p`, or differences of its distances `step` [m] to both sides of `p`.
+/// The body's own gradient at `p`, or central differences with the step `step` [m].
 template <SignedDistance D>
 [[nodiscard]] Vector3<double> gradient_at(const D& distance, const Vector3<double>& p, double step);
 
-// All that follow are true distances, but `united` inside, `intersection` and `difference` outside, near where two
-// surfaces meet.
+// The bodies below are true distances, except near the intersection of two surfaces: there `united` is not inside,
+// `intersection` and `difference` are not outside.
 
 struct Ball {
     Vector3<double> centre = Vector3<double>::Zero();  ///< [m]
@@ -105,7 +105,7 @@ struct Ellipsoid {
     [[nodiscard]] Bounds bounds() const { return {centre - radii, centre + radii}; }
 
     /// The point of the surface nearest to `p` [m]. Newton's method on the multiplier of the ellipsoid's equation, from
-    /// the side on which it never steps too far [Eberly13].
+    /// the side on which it never overshoots [Eberly13].
     [[nodiscard]] inline Vector3<double> nearest(const Vector3<double>& p) const;
 };
 
@@ -136,7 +136,7 @@ struct Capsule {
     [[nodiscard]] Bounds bounds() const { return Bounds{start, start}.around({end, end}).grown(radius); }
 };
 
-/// All that lies behind a plane: what `intersection` and `trimmed` cut with.
+/// The half-space behind a plane, for `intersection` and `trimmed`.
 struct HalfSpace {
     Vector3<double> point = Vector3<double>::Zero();    ///< Of the plane [m].
     Vector3<double> normal = Vector3<double>::UnitZ();  ///< Out of the body, of any length.
@@ -179,13 +179,13 @@ struct Offset {
     [[nodiscard]] Bounds bounds() const { return bounds_of(body).grown(by); }
 };
 
-/// What is in one of the two or in both.
+/// The points in `a`, in `b` or in both.
 template <SignedDistance A, SignedDistance B>
 [[nodiscard]] Union<A, B> united(A a, B b) {
     return {std::move(a), std::move(b)};
 }
 
-/// What is in both.
+/// The points in both `a` and `b`.
 template <SignedDistance A, SignedDistance B>
 [[nodiscard]] Intersection<A, B> intersection(A a, B b) {
     return {std::move(a), std::move(b)};
@@ -197,7 +197,7 @@ template <SignedDistance A, SignedDistance B>
     return {std::move(a), std::move(b)};
 }
 
-/// The body with a skin of thickness `by` [m], or without one if that is negative: of a `Cuboid`, one with round edges.
+/// The body grown by a skin of thickness `by` [m], or shrunk if `by` is negative. A grown `Cuboid` has round edges.
 template <SignedDistance A>
 [[nodiscard]] Offset<A> offset(A body, double by) {
     return {std::move(body), by};
@@ -218,8 +218,8 @@ Vector3<double> gradient_at(const D& distance, const Vector3<double>& p, double 
 }
 
 inline Vector3<double> Ellipsoid::nearest(const Vector3<double>& p) const {
-    // By symmetry in one octant: x_k = r_k^2 y_k / (r_k^2 + t), where t is such that x is on the surface. Counted from the
-    // shortest axis, s = r^2 + t, so that no digits are lost close to its middle plane.
+    // By symmetry in one octant: x_k = r_k^2 y_k / (r_k^2 + t), with t such that x is on the surface. The unknown is s
+    // = r^2 + t of the shortest axis, so that no digits are lost close to its middle plane.
     const Vector3<double> y = (p - centre).cwiseAbs();
     const auto shortest = std::min_element(radii.begin(), radii.end()) - radii.begin();
     const double least = radii[shortest] * radii[shortest];
@@ -234,7 +234,7 @@ inline Vector3<double> Ellipsoid::nearest(const Vector3<double>& p) const {
             if (y[k] > 0) slope -= 2 * share(k) * share(k) / (s + excess(k));
         }
         const double next = s - value / slope;
-        if (!(value > 0) || !(next > s)) break;  // it only grows, until roundings stop it
+        if (!(value > 0) || !(next > s)) break;  // s only grows, until rounding stops it
         s = next;
     }
     Vector3<double> x;
@@ -243,7 +243,7 @@ inline Vector3<double> Ellipsoid::nearest(const Vector3<double>& p) const {
         x[k] = std::copysign(radii[k] * share(k), p[k] - centre[k]);
         rest -= share(k) * share(k);
     }
-    if (!(s > 0) && rest > 0) {  // on the middle plane, and so far in that the surface is nearest across it
+    if (!(s > 0) && rest > 0) {  // on the middle plane, so deep that the nearest point is off this plane
         x[shortest] = radii[shortest] * std::sqrt(rest);
     }
     return centre + x;

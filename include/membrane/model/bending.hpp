@@ -14,13 +14,14 @@
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Resistance to being bent.
+/// Bending stiffness.
 ///
-///     const auto tissue = membrane::Tissue(springs, membrane::bending_springs(mesh, membrane::flexural_rigidity(material)));
+///     const double rigidity = membrane::flexural_rigidity(material);
+///     const auto tissue = membrane::Tissue(springs, membrane::bending_springs(mesh, rigidity));
 ///
-/// A flat sheet that is not stretched has no stiffness normal to itself but this and its foundation. It matters where both are
-/// soft: against a foundation of c [Pa/m] over ways of (D / c)^(1/4), 0.1 mm for a cornea's 3 uN m on 30 GPa/m, and against a
-/// tension T over ways of sqrt(D / T); triangles larger than that do not feel it.
+/// A flat, unstretched sheet has normal stiffness only from bending and its foundation. With a flexural rigidity D
+/// bending acts over a length of (D / c)^(1/4) on a foundation of c [Pa/m], 0.1 mm for a cornea's 3 uN m on 30 GPa/m,
+/// and of sqrt(D / T) under a tension T [N/m]. Larger triangles do not resolve it.
 namespace membrane {
 
 /// E t^3 / (12 (1 - nu^2)) [N m]. @throws InvalidInput for a material out of its range
@@ -30,10 +31,9 @@ namespace membrane {
     return material.young_modulus * std::pow(material.thickness, 3) / (12 * (1 - nu * nu));
 }
 
-/// Two triangles at an edge, from corner 0 to corner 1, with the apexes 2 and 3, 2 on the left seen from outside. Folded
-/// by the angle a, positive where apexes go inward, instead of the angle at rest, it stores stiffness (a - rest)^2 / 2
-/// [Grinspun03]. Of the second derivative the part is left out that vanishes at rest, and with it all that could be
-/// negative.
+/// Two triangles at the edge from corner 0 to corner 1, with the apexes 2 and 3; 2 is on the left seen from outside. At
+/// the fold angle a, positive if the apexes turn inward, it stores stiffness (a - rest)^2 / 2 [Grinspun03]. The Hessian
+/// leaves out the term that vanishes at rest, the only one that may be negative.
 template <Number Scalar>
 struct Hinge {
     static constexpr std::size_t corner_count = 4;
@@ -52,17 +52,17 @@ struct Hinge {
                                                 std::size_t j) const noexcept;
 };
 
-/// A hinge at each edge between two triangles of `mesh`, which is at rest as it is, for a flexural rigidity D [N m]: of
-/// stiffness D l^2 / (A + B), l the edge's length, A and B the areas. On equilateral triangles it stores what a plate does
-/// that is bent like a cylinder; where it is bent two ways, its Poisson ratio is -1/3: that part depends on the slopes at
-/// the border alone [Seung88].
+/// A hinge at each edge between two triangles of `mesh`, whose shape is the rest shape, for a flexural rigidity D [N
+/// m]. Its stiffness is D l^2 / (A + B), l the edge's length, A and B the areas. On equilateral triangles the energy is
+/// that of a plate bent to a cylinder. Under bending in two directions the Poisson ratio is -1/3: that term depends
+/// only on the slopes at the border [Seung88].
 /// @throws InvalidInput for a rigidity that is not finite, or negative. O(F log F).
 template <Real Scalar>
 [[nodiscard]] Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh, double rigidity);
 
 namespace detail {
 
-/// The angle of a hinge, and its derivative by each corner; zero where a triangle has no area.
+/// The angle of a hinge, and its derivative by each corner; both are zero if a triangle has no area.
 template <Number N>
 class Fold {
   public:
@@ -76,33 +76,33 @@ class Fold {
 
     [[nodiscard]] N angle() const noexcept {
         const N sine = dot<N>(cross(left, right), edge) / unless_zero(norm(edge)), cosine = dot(left, right);
-        return if_sound(lane_by_lane<N>([](auto y, auto x) { return std::atan2(y, x); }, sine, cosine));
+        return if_valid(lane_by_lane<N>([](auto y, auto x) { return std::atan2(y, x); }, sine, cosine));
     }
 
     [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
-        const Vector3<N> slope = slope_of_sound(x, i);
-        return {if_sound(slope[0]), if_sound(slope[1]), if_sound(slope[2])};
+        const Vector3<N> slope = slope_of_valid(x, i);
+        return {if_valid(slope[0]), if_valid(slope[1]), if_valid(slope[2])};
     }
 
     Vector3<N> edge, left, right;
 
   private:
-    [[nodiscard]] Vector3<N> slope_of_sound(const Corners<N, 4>& x, std::size_t i) const noexcept {
+    [[nodiscard]] Vector3<N> slope_of_valid(const Corners<N, 4>& x, std::size_t i) const noexcept {
         const N length = norm(edge), square = unless_zero(length * length);
         const Vector3<N> by_left = (-length / unless_zero(squared_norm(left))) * left;
         const Vector3<N> by_right = (-length / unless_zero(squared_norm(right))) * right;
         if (i == 2) return by_left;
         if (i == 3) return by_right;
-        // Neither does shifting the hinge change the angle, nor turning it about its edge.
+        // The angle does not change if the hinge is translated, or rotated about its edge.
         const N on_left = dot<N>(edge, x[2] - x[0]) / square, on_right = dot<N>(edge, x[3] - x[0]) / square;
         return i == 0 ? Vector3<N>((on_left - 1) * by_left + (on_right - 1) * by_right)
                       : Vector3<N>(-on_left * by_left - on_right * by_right);
     }
-    [[nodiscard]] N if_sound(const N& number) const noexcept { return select<N>(is_valid(), number, 0); }
+    [[nodiscard]] N if_valid(const N& number) const noexcept { return select<N>(is_valid(), number, 0); }
     [[nodiscard]] static N unless_zero(const N& divisor) noexcept { return select<N>(divisor > 0, divisor, 1); }
 };
 
-/// `angle` but for whole turns, between -pi and pi.
+/// `angle` less whole turns, between -pi and pi [rad].
 template <Number N>
 [[nodiscard]] N within_half_turn(N angle) noexcept {
     constexpr Each<N> turn = 2 * std::numbers::pi_v<Each<N>>;
@@ -137,7 +137,7 @@ EnergyChange<N> Hinge<Scalar>::energy_change(const Corners<N, 4>& x, std::size_t
     auto there = x;
     there[i] += displacement;
     const N k = static_cast<N>(stiffness), before = energy(x), after = energy(there);
-    // The angle itself is known to some epsilons.
+    // The angle is accurate to a few epsilons.
     const N noise =
         k * (1 + abs(static_cast<N>(rest))) * root_of<N>(2 * (before + after) / larger<N>(k, Each<N>(1e-30)));
     return {after - before, before + after + noise};

@@ -7,7 +7,7 @@
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/core/types.hpp>
 
-/// What a solver asks of whatever pulls on the vertices of a membrane.
+/// The elastic forces on the vertices of a membrane and their energy, as a solver needs them.
 ///
 ///     template <membrane::ElasticNetwork<double> Network>
 ///     membrane::Vector3<double> force_on(const Network& network, membrane::Index v, const Eigen::Matrix3Xd& x) {
@@ -15,28 +15,29 @@
 ///     }
 namespace membrane {
 
-/// What pulls on a vertex: the sum over its springs.
+/// Force on a vertex and its stiffness: sums over its springs.
 template <Number Scalar>
 struct VertexForce {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
-    Scalar stiffness = 0;                             ///< at least the curvature of the energy in every direction [N/m]
+    Scalar stiffness = 0;                             ///< stiffness bound: no eigenvalue of the Hessian is larger [N/m]
 };
 
-/// What pulls on a vertex, and what is known of the energy around it: for a move d of a length up to rho it is at most
-/// E - force . d + d . (stiffness I - relief / (1 + rho / size)) d / 2, see `MassSpringNetwork::majoriser`.
+/// Force on a vertex and a quadratic upper bound of the energy: for a displacement d of length up to rho the energy is
+/// at most E - force . d + d . (stiffness I - stiffness_reduction / (1 + rho / size)) d / 2, see
+/// `MassSpringNetwork::majoriser`.
 template <Number Scalar>
 struct EnergyMajoriser {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();              ///< [N]
     Scalar stiffness = 0;                                         ///< [N/m]
-    Symmetric3<Scalar> stiffness_reduction;                       ///< no eigenvalue below zero [N/m]
+    Symmetric3<Scalar> stiffness_reduction;                       ///< positive semidefinite [N/m]
     Scalar size = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m]
 };
 
-/// By how much the energy changes when a vertex moves.
+/// Change of the energy by the displacement of one vertex.
 template <Number Scalar>
 struct EnergyChange {
     Scalar change = 0;  ///< [J]
-    Scalar size = 0;    ///< of what was added up and taken off again: times epsilon, the rounding [J]
+    Scalar size = 0;    ///< of the summed terms: times epsilon, the rounding error [J]
 
     EnergyChange& operator+=(const EnergyChange& other) noexcept {
         change += other.change, size += other.size;
@@ -44,9 +45,9 @@ struct EnergyChange {
     }
 };
 
-/// What joins the vertices of a membrane: springs, or springs and more. What the compiler cannot see: all of it is the
-/// derivative of one energy, `neighbours(v)` are all vertices whose place changes the pull on `v`, by their `other`, and
-/// where a network says that it `never_stiffens`, what `EnergyMajoriser` promises holds for every move, else for small ones.
+/// The elastic elements of a membrane: springs, or springs and others. Beyond the signatures: all forces derive from
+/// one energy; `neighbours(v)` lists, by their `other`, all vertices whose position changes the force on `v`; the bound
+/// of `EnergyMajoriser` holds for every displacement if the network `never_stiffens`, else for small ones.
 template <class Network, class Scalar>
 concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, Scalar> &&
     requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& displacement) {
@@ -66,7 +67,7 @@ concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, 
     noexcept->std::same_as<VertexForce<Scalar>>;
     { network.majoriser(v, x) }
     noexcept->std::same_as<EnergyMajoriser<Scalar>>;
-    { network.curvature(v, x) }
+    { network.hessian(v, x) }
     noexcept->std::same_as<Symmetric3<Scalar>>;
     { network.energy_change(v, displacement, x) }
     noexcept->std::same_as<EnergyChange<Scalar>>;
@@ -132,7 +133,8 @@ consteval bool check_elastic_network() noexcept {  // NOLINT(readability-functio
             { network.force_on(v, x) }
             noexcept->std::same_as<VertexForce<Scalar>>;
         },
-        "ElasticNetwork: force_on(Index, const ConstPointsRef<Scalar>&) const noexcept must return Pull<Scalar>");
+        "ElasticNetwork: force_on(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
+        "VertexForce<Scalar>");
     static_assert(
         requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
                  const Vector3<Scalar>& displacement) {
@@ -144,10 +146,10 @@ consteval bool check_elastic_network() noexcept {  // NOLINT(readability-functio
     static_assert(
         requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
                  const Vector3<Scalar>& displacement) {
-            { network.curvature(v, x) }
+            { network.hessian(v, x) }
             noexcept->std::same_as<Symmetric3<Scalar>>;
         },
-        "ElasticNetwork: curvature(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
+        "ElasticNetwork: hessian(Index, const ConstPointsRef<Scalar>&) const noexcept must return "
         "Symmetric3<Scalar>");
     static_assert(
         requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x,
@@ -169,7 +171,7 @@ consteval bool check_elastic_network() noexcept {  // NOLINT(readability-functio
 
 }  // namespace detail
 
-/// A `ElasticNetwork`; where it is none, the error says what is missing.
+/// An `ElasticNetwork`: if a type does not satisfy it, the error names the missing requirement.
 template <class Network, class Scalar>
 concept CheckedElasticNetwork = detail::check_elastic_network<Network, Scalar>();
 

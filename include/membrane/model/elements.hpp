@@ -16,27 +16,27 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// What joins more than two vertices, or pulls at one alone: triangles that resist stretch, hinges, pressure, loads.
+/// Elements of any number of vertices: triangles that resist stretch, hinges, pressure, loads.
 ///
 ///     const auto triangles = membrane::triangular_springs(mesh, material);
 ///     const auto tissue = membrane::Tissue(springs, triangles, membrane::pressure(mesh, 2000.0));
 namespace membrane {
 
-/// What an element does to one of its corners.
+/// Force of an element on one of its corners, and the Hessian of its energy by that corner.
 template <Number Scalar>
 struct CornerForce {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
-    Symmetric3<Scalar> curvature = {};  ///< of the energy as the corner moves, no eigenvalue below zero [N/m]
+    Symmetric3<Scalar> hessian = {};                  ///< of the energy by the corner, positive semidefinite [N/m]
 };
 
-/// Where the corners of an element are [m].
+/// Positions of an element's corners [m].
 template <Number Scalar, std::size_t count>
 using Corners = std::array<Vector3<Scalar>, count>;
 
-/// One element with its constants, which floats and doubles can be asked. What the compiler cannot see: force, curvature
-/// and change of energy are of the same energy; `hessian_block(x, i, j)` is that by corners i and j [N/m], or so much
-/// of it that Newton's method still finds to rest. The stock ones take `Lanes` as well, as constants and as positions:
-/// several elements of a kind at once, each to the bits that it comes to alone.
+/// One element with its constants, evaluated in float and in double. Beyond the signatures: force, Hessian and change
+/// of energy belong to one energy; `hessian_block(x, i, j)` is its second derivative by corners i and j [N/m], or an
+/// approximation with which Newton's method still converges. The elements of this library also take `Lanes`, as
+/// constants and as positions: several elements of one kind at once, each with the same bits as alone.
 template <class E>
 concept Element = std::copyable<E> && requires(const E& element, const Corners<double, E::corner_count>& x,
                                                const Corners<float, E::corner_count>& y, std::size_t i) {
@@ -53,18 +53,18 @@ concept Element = std::copyable<E> && requires(const E& element, const Corners<d
     { element.hessian_block(x, i, i) } -> std::same_as<Eigen::Matrix3d>;
 };
 
-/// An element at its vertices.
+/// An element and its vertices.
 template <class E>
 struct PlacedElement {
     std::array<Index, E::corner_count> corners;
     E element;
 
-    /// Where its corners are.
+    /// Positions of its corners.
     template <class Positions>
     [[nodiscard]] Corners<typename Positions::Scalar, E::corner_count> where(const Positions& x) const noexcept {
-        Corners<typename Positions::Scalar, E::corner_count> places;
-        for (std::size_t i = 0; i < places.size(); ++i) places[i] = point(x, corners[i]);
-        return places;
+        Corners<typename Positions::Scalar, E::corner_count> positions;
+        for (std::size_t i = 0; i < positions.size(); ++i) positions[i] = point(x, corners[i]);
+        return positions;
     }
 };
 
@@ -124,11 +124,11 @@ consteval bool check_element() noexcept {  // NOLINT(readability-function-size):
 
 }  // namespace detail
 
-/// A `Element`; where it is none, the error says what is missing.
+/// An `Element`: if a type does not satisfy it, the error names the missing requirement.
 template <class E>
 concept CheckedElement = detail::check_element<E>();
 
-/// Elements of one kind, each at its vertices. Constant once built, no positions in it.
+/// Elements of one kind, each with its vertices. Immutable; holds no positions.
 template <Real Scalar_, CheckedElement Each>
 class Elements {
   public:
@@ -136,20 +136,21 @@ class Elements {
     static constexpr std::size_t corner_count = Each::corner_count;
     using Placed = PlacedElement<Each>;
 
-    /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, and for one that is pulled at
-    /// rest by what is not finite: a triangle too thin, or a constant too large, for the scalar. Linear.
+    /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, or whose force or stiffness
+    /// at rest is not finite: a triangle is too thin, or a constant too large, for the scalar. Cost: linear.
     Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all);
 
     [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
     [[nodiscard]] std::span<const Placed> all() const noexcept { return all_; }
 
-    /// Calls `act(placed)` for each.
+    /// Calls `act(placed)` for each element.
     template <class Act>
     void for_each_element(Act act) const {
         for (const auto& placed : all_) act(placed);
     }
 
-    /// Calls `act(placed, x, corner)` for the elements of vertex `v`: where their corners are, and which of them is `v`.
+    /// Calls `act(placed, x, corner)` for each element of vertex `v`: `x` are the positions of its corners, number
+    /// `corner` is `v`.
     template <class Act>
     void for_each(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
         for (const auto& at : corners_of_[v]) {
@@ -158,7 +159,7 @@ class Elements {
         }
     }
 
-    /// Where the corners of an element are.
+    /// Positions of the corners of an element.
     template <class Positions>
     [[nodiscard]] static auto where(const Placed& placed, const Positions& x) noexcept {
         return placed.where(x);
@@ -207,12 +208,12 @@ Scalar Elements<Scalar, Each>::negligible_force_of(const Placed& placed, const P
     const auto corners = placed.where(x);
     Scalar largest = 0, stiffness = 0, size = 0;
     for (std::size_t i = 0; i < corner_count; ++i) {
-        const auto pull = placed.element.force_on(corners, i);
-        if (!is_finite(pull.force) || !is_finite(pull.curvature.trace()))
+        const auto corner = placed.element.force_on(corners, i);
+        if (!is_finite(corner.force) || !is_finite(corner.hessian.trace()))
             return std::numeric_limits<Scalar>::infinity();
-        stiffness = (std::max)(stiffness, pull.curvature.trace());
+        stiffness = (std::max)(stiffness, corner.hessian.trace());
         size = (std::max)(size, norm<Scalar>(corners[i] - corners[0]));
-        largest = (std::max)(largest, norm(pull.force));
+        largest = (std::max)(largest, norm(corner.force));
     }
     const Scalar epsilon = std::numeric_limits<Scalar>::epsilon(), far = x.cwiseAbs().maxCoeff();
     return (std::max)(stiffness * (std::max)(size / Scalar(1e9), 64 * epsilon * far), 64 * epsilon * largest);

@@ -12,32 +12,33 @@
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/surface/normals.hpp>
 
-/// A body under the membrane that resists being pressed more than being sheared.
+/// A foundation with one stiffness along the normal and another along the surface.
 ///
-///     const auto foundation = membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, layer),
-///                                                             .tangential = membrane::tangential_stiffnesses(mesh, layer),
-///                                                             .recovery_time = 0.2});
+///     const auto foundation =
+///         membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, layer),
+///                                            .tangential = membrane::tangential_stiffnesses(mesh, layer),
+///                                            .recovery_time = 0.2});
 ///     solver.step(x, dt, network, foundation, press(tool, contact));
 namespace membrane {
 
-/// Constants of the foundation, the same for all vertices or one for each.
+/// Constants of the foundation: one value for all vertices, or one for each vertex.
 template <Real Scalar>
 struct FoundationOptions {
     Field<Scalar> normal = {};         ///< stiffness along the normal at rest [N/m], required
     Field<Scalar> tangential = {};     ///< stiffness along the surface at rest [N/m], required
-    Field<Scalar> recovery_time = {};  ///< [s], zero if not given: of what the foundation alone brings back, a part of
-                                       ///< 1 / e is left after it; what the membrane helps to bring back is faster
+    Field<Scalar> recovery_time = {};  ///< T [s], zero if not given: in T the foundation alone reduces an indentation
+                                       ///< to 1 / e; the membrane accelerates the recovery
 };
-// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+// For g++ 12, which otherwise fails on this type's initialiser inside another's.
 static_assert(std::is_default_constructible_v<FoundationOptions<float>>);
 static_assert(std::is_default_constructible_v<FoundationOptions<double>>);
 
-/// For each vertex a spring to its place at rest, with one stiffness along the normal there and one across:
-/// K = k_t I + (k_n - k_t) n n^T. Over a tick of dt it pulls with -K (u + T (u - u_0) / dt), u the way from rest, u_0 at the
-/// start of the tick, T the recovery time: damping is T K (Kelvin and Voigt).
+/// For each vertex a spring to its rest position, with one stiffness along the normal n there and one across it:
+/// K = k_t I + (k_n - k_t) n n^T. In a tick of dt its force is -K (u + T (u - u_0) / dt), u the displacement from rest,
+/// u_0 that at the start of the tick, T the recovery time. The damping is T K (Kelvin and Voigt).
 ///
-/// A tick leaves 1 / (1 + dt / T) of what the foundation brings back, so that in ticks of T / 10 the recovery takes 5 % more
-/// than T.
+/// A tick reduces an indentation by the factor 1 / (1 + dt / T): in ticks of T / 10 the recovery takes 5 % longer than
+/// T.
 template <Real Scalar>
 class FoundationSprings {
   public:
@@ -56,12 +57,12 @@ class FoundationSprings {
         const auto& k = constants(v);
         const Scalar rate = k.time / dt;
         const Vector3<Scalar> displacement = (position - point(anchors_, v)) + rate * (position - start);
-        return {-answer(v, displacement), (std::max)(k.normal, k.tangential) * (1 + rate)};
+        return {-stiffness_times(v, displacement), (std::max)(k.normal, k.tangential) * (1 + rate)};
     }
 
-    /// K, the second derivative of the energy, from constants and normals as they are.
+    /// K, the Hessian of the energy, computed in `Number` from constants and normals [N/m].
     template <Real Number = Scalar>
-    [[nodiscard]] Symmetric3<Number> curvature(Index v) const noexcept {
+    [[nodiscard]] Symmetric3<Number> hessian(Index v) const noexcept {
         const auto normal = static_cast<Number>(constants(v).normal),
                    tangential = static_cast<Number>(constants(v).tangential);
         auto sum = diagonal3(tangential);
@@ -72,7 +73,7 @@ class FoundationSprings {
     /// Energy stored in the spring of vertex `v` at `position` [J].
     [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept {
         const Vector3<Scalar> displacement = position - point(anchors_, v);
-        return dot<Scalar>(displacement, answer(v, displacement)) / 2;
+        return dot<Scalar>(displacement, stiffness_times(v, displacement)) / 2;
     }
 
   private:
@@ -81,8 +82,8 @@ class FoundationSprings {
     };
     [[nodiscard]] const Constants& constants(Index v) const noexcept { return constants_[static_cast<std::size_t>(v)]; }
 
-    /// K `displacement`.
-    [[nodiscard]] Vector3<Scalar> answer(Index v, const Vector3<Scalar>& displacement) const noexcept {
+    /// K `displacement` [N].
+    [[nodiscard]] Vector3<Scalar> stiffness_times(Index v, const Vector3<Scalar>& displacement) const noexcept {
         const auto& k = constants(v);
         const Vector3<Scalar> normal = point(normals_, v);
         return k.tangential * displacement + ((k.normal - k.tangential) * dot(normal, displacement)) * normal;

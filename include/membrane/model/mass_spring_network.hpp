@@ -25,16 +25,16 @@
 ///     const auto force = network.force_on(v, x).force;                                          // [N]
 namespace membrane {
 
-/// Constants of a network. What is given for each spring stands in the order of `Adjacency::edges()`.
+/// Constants of a network. Values for each spring are in the order of `Adjacency::edges()`.
 template <Real Scalar>
 struct NetworkOptions {
     Field<Scalar> stiffness = {};    ///< k_ij [N/m], required; a spring of stiffness zero is left out
     Field<Scalar> mass = {};         ///< m_i [kg]; only (4) as published and explicit Euler need it
-    Field<Scalar> viscosity = {};    ///< d_i [N s/m], zero if not given; only explicit Euler feels it
+    Field<Scalar> viscosity = {};    ///< d_i [N s/m], zero if not given; only explicit Euler uses it
     Field<Scalar> rest_length = {};  ///< r_ij [m]; if not given, the lengths in the mesh
     std::vector<Index> pinned = {};  ///< vertices that never move: a clamped rim is `border(mesh)`
 };
-// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+// For g++ 12, which otherwise fails on this type's initialiser inside another's.
 static_assert(std::is_default_constructible_v<NetworkOptions<float>>);
 static_assert(std::is_default_constructible_v<NetworkOptions<double>>);
 
@@ -46,7 +46,7 @@ struct Spring {
     Scalar rest_length;  ///< [m]
 };
 
-/// One spring as the vertex at one end sees it.
+/// One spring, from the vertex at one end.
 template <Real Scalar>
 struct SpringEnd {
     Index other;
@@ -54,80 +54,81 @@ struct SpringEnd {
     Scalar rest_length;  ///< [m]
 };
 
-/// From the first end of a spring to the second [m].
+/// The vector from the first end of a spring to the second [m].
 template <Real Scalar, class Positions>
 [[nodiscard]] Vector3<typename Positions::Scalar> edge_vector(const Spring<Scalar>& spring,
                                                               const Positions& x) noexcept {
     return point(x, spring.second) - point(x, spring.first);
 }
 
-/// The second derivative of a spring's energy by its reach, or a bound of it: along u u^T + across (I - u u^T), u the
+/// The Hessian of a spring's energy by its edge vector, or a bound of it: along u u^T + across (I - u u^T), u the
 /// direction [N/m].
 template <Number Scalar>
 struct SpringStiffness {
     Scalar along, across;
-    Vector3<Scalar> direction;  ///< to the other end, zero without a length
+    Vector3<Scalar> direction;  ///< to the other end; zero if the length is zero
 };
 
-/// What one spring does to the vertex at one end. One of length zero has no direction and no force: it curves the energy
-/// alike in all directions.
+/// Force and stiffness of one spring on the vertex at one end. A spring of length zero has no direction and no force,
+/// and the same stiffness in all directions.
 template <Number Scalar>
 struct SpringForce : SpringStiffness<Scalar> {
-    Vector3<Scalar> reach;  ///< to the other end [m]
-    Scalar length;          ///< [m]
-    Scalar tension;         ///< [N]
+    Vector3<Scalar> edge;  ///< to the other end [m]
+    Scalar length;         ///< [m]
+    Scalar tension;        ///< [N]
 
-    [[nodiscard]] Vector3<Scalar> force() const noexcept { return this->across * reach; }  ///< [N]
+    [[nodiscard]] Vector3<Scalar> force() const noexcept { return this->across * edge; }  ///< [N]
 };
 
-/// From the vertex at one end of a spring to the other, and how far that is. Of several springs, first all of these and
-/// then the rest: a root and a division take long, and one need not wait for the other's.
+/// The edge vector of a spring from the vertex at one end, and its length. For several springs compute all of these
+/// first: roots and divisions have a long latency, and those of different springs overlap.
 template <Number Scalar>
-struct SpringReach {
-    Vector3<Scalar> reach;  ///< to the other end [m]
-    Scalar length;          ///< [m]
-    Scalar divisor;         ///< the same, 1 instead of 0 [m]
-    Scalar per_length;      ///< [1/m]
+struct SpringEdge {
+    Vector3<Scalar> edge;  ///< to the other end [m]
+    Scalar length;         ///< [m]
+    Scalar divisor;        ///< the length, or 1 if it is 0 [m]
+    Scalar per_length;     ///< 1 / divisor [1/m]
 
-    SpringReach() = default;
-    [[gnu::always_inline]] explicit SpringReach(const Vector3<Scalar>& to) noexcept
-        : reach(to), length(norm(to)), divisor(select(length != 0, length, Scalar(1))), per_length(1 / divisor) {}
+    SpringEdge() = default;
+    [[gnu::always_inline]] explicit SpringEdge(const Vector3<Scalar>& to) noexcept
+        : edge(to), length(norm(to)), divisor(select(length != 0, length, Scalar(1))), per_length(1 / divisor) {}
 };
 
-/// What a spring of this stiffness [N/m] and rest length [m] does to the vertex from which it reaches.
+/// Force of a spring of this stiffness [N/m] and rest length [m] on the vertex where its edge vector starts.
 template <Number Scalar, class Law>
-[[gnu::always_inline, nodiscard]] inline SpringForce<Scalar> pull_of(const Law& law, const SpringReach<Scalar>& to,
-                                                                     const Scalar& stiffness,
-                                                                     const Scalar& rest_length) noexcept {
+[[gnu::always_inline, nodiscard]] inline SpringForce<Scalar> spring_force(const Law& law, const SpringEdge<Scalar>& to,
+                                                                          const Scalar& stiffness,
+                                                                          const Scalar& rest_length) noexcept {
     const auto has_length = to.length != 0;
-    const auto answer = law(SpringState<Scalar>{stiffness, rest_length, to.divisor});
-    return {{select(has_length, answer.stiffness, stiffness),
-             select<Scalar>(has_length, answer.tension * to.per_length, stiffness), to.per_length * to.reach},
-            to.reach,
+    const auto response = law(SpringState<Scalar>{stiffness, rest_length, to.divisor});
+    return {{select(has_length, response.stiffness, stiffness),
+             select<Scalar>(has_length, response.tension * to.per_length, stiffness), to.per_length * to.edge},
+            to.edge,
             to.length,
-            select(has_length, answer.tension, Scalar(0))};
+            select(has_length, response.tension, Scalar(0))};
 }
 template <Number Scalar, class Law>
-[[gnu::always_inline, nodiscard]] inline SpringForce<Scalar> pull_of(const Law& law, const Vector3<Scalar>& reach,
-                                                                     const Scalar& stiffness,
-                                                                     const Scalar& rest_length) noexcept {
-    return pull_of(law, SpringReach<Scalar>(reach), stiffness, rest_length);
+[[gnu::always_inline, nodiscard]] inline SpringForce<Scalar> spring_force(const Law& law, const Vector3<Scalar>& edge,
+                                                                          const Scalar& stiffness,
+                                                                          const Scalar& rest_length) noexcept {
+    return spring_force(law, SpringEdge<Scalar>(edge), stiffness, rest_length);
 }
 
-/// Adds a spring to what pulls on a vertex.
+/// Adds the force and the stiffness of a spring to those on a vertex.
 template <Number Scalar>
 [[gnu::always_inline]] inline void add(VertexForce<Scalar>& sum, const SpringForce<Scalar>& spring) noexcept {
     sum.force += spring.force();
     sum.stiffness += larger(spring.along, spring.across);
 }
 
-/// The same for `EnergyMajoriser`, in fewer operations: the relief as a sum of dyads, the size as a quotient.
+/// The sum for an `EnergyMajoriser` in fewer operations: the stiffness reduction as a sum of dyads, the size as a
+/// quotient.
 template <Number Scalar>
 struct CurvedSum {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
     Scalar stiffness = 0;                             ///< [N/m]
-    Symmetric3<Scalar> dyads;                         ///< of what the relief of each spring leaves out, along it [N/m]
-    Scalar size_force = 1, size_stiffness = 0;        ///< the quotient is the smallest size [N], [N/m]
+    Symmetric3<Scalar> dyads;                   ///< sum of r u u^T, r the stiffness reduction across a spring [N/m]
+    Scalar size_force = 1, size_stiffness = 0;  ///< the quotient is the smallest size [N], [N/m]
 
     [[gnu::always_inline, nodiscard]] EnergyMajoriser<Scalar> total() const noexcept {
         EnergyMajoriser<Scalar> sum{force, stiffness, diagonal3(dyads.trace())};
@@ -150,7 +151,7 @@ template <Number Scalar>
     sum.size_stiffness = select(is_smaller, stiffness, sum.size_stiffness);
 }
 
-/// Adds a spring's stiffness to a block.
+/// Adds a spring's stiffness to a Hessian block.
 template <Number Scalar>
 inline void add(Symmetric3<Scalar>& sum, const SpringStiffness<Scalar>& spring) noexcept {
     sum += diagonal3(spring.across);
@@ -163,30 +164,30 @@ template <Number Scalar>
     return block;
 }
 
-/// Bound of the stiffness, from below, of a linear spring at all reaches that are at most `displacement` from `reach`; with none of
-/// them, then, is it stiffer in any direction than its own stiffness. None where it may get too short for that.
+/// Lower bound of the stiffness of a linear spring at all edge vectors within `displacement` [m] of `edge`; there it is
+/// in no direction stiffer than its constant k. If the spring may become too short for the bound, returns nullopt.
 ///
-/// At a reach d of length l and direction u the second derivative of k (|d| - r)^2 / 2 is k I - k r/l (I - u u^T). Let
-/// d' be at most s l away from d. In the plane of d and d', at an angle a from u, it is no shorter than
-/// l' = l (cos a - sqrt(s^2 - sin^2 a)), and with q = r / (l - s l)
+/// At an edge vector d of length l and direction u the Hessian of k (|d| - r)^2 / 2 is k I - k r/l (I - u u^T). Let d'
+/// be at most s l away from d. In the plane of d and d', at an angle a from u, d' is no shorter than l' = l (cos a -
+/// sqrt(s^2 - sin^2 a)), and with q = r / (l - s l)
 ///
 ///     r/l' (I - u' u'^T)  <=  q (I - u u^T) + 2 s q u u^T,                                                     (*)
 ///
-/// so that the stiffness is at least k (1 - q) across u and k (1 - 2 s q) along u. (*) is plain at right angles to the
-/// plane, where l' >= l - s l. Within it the left side is r/l' n n^T, n at right angles to u', and so (*) says that
-/// r/l' (sin^2 a / (2 s q) + cos^2 a / q) <= 1, or with z = sin^2 a that
-/// sqrt(1 - z) - sqrt(s^2 - z) >= (1 - s) (1 - z + z / (2 s)). At z = 0 both sides are 1 - s; up to z = s^2 the left
-/// one is convex, the right one is a line, and at z = 0 the left one is the steeper by 1 - s.
+/// so that the stiffness is at least k (1 - q) across u and k (1 - 2 s q) along u. At right angles to the plane (*)
+/// follows from l' >= l - s l. Within it the left side is r/l' n n^T, n at right angles to u', and so (*) states that
+/// r/l' (sin^2 a / (2 s q) + cos^2 a / q) <= 1, or with z = sin^2 a that sqrt(1 - z) - sqrt(s^2 - z) >= (1 - s) (1 - z
+/// + z / (2 s)). At z = 0 both sides are 1 - s; up to z = s^2 the left side is convex, the right side is linear, and at
+/// z = 0 the slope of the left side is larger by 1 - s.
 [[nodiscard]] inline std::optional<SpringStiffness<double>> min_stiffness(const Spring<double>& spring,
-                                                                          const Vector3<double>& reach,
+                                                                          const Vector3<double>& edge,
                                                                           double displacement) noexcept {
-    constexpr double rounding = 1e-14;  // more than what is lost here
-    const double length = norm(reach);
+    constexpr double rounding = 1e-14;  // above the rounding error here
+    const double length = norm(edge);
     if (!(2 * displacement < length)) return std::nullopt;
     const double q = (1 + rounding) * spring.rest_length / (length - displacement), s = displacement / length;
     if (!(q <= 2 && 2 * s * q <= 1)) return std::nullopt;
     return SpringStiffness<double>{spring.stiffness * (1 - rounding - 2 * s * q), spring.stiffness * (1 - rounding - q),
-                                   reach / length};
+                                   edge / length};
 }
 
 /// A spring as an `Element`, between its two ends.
@@ -199,24 +200,24 @@ struct SpringElement {
     Scalar rest_length;  ///< [m]
 
     template <Real N>
-    [[nodiscard]] SpringForce<N> pull_towards(const Vector3<N>& reach) const noexcept {
+    [[nodiscard]] SpringForce<N> force_along(const Vector3<N>& edge) const noexcept {
         static_assert(SpringLaw<Law, N>,
                       "a law must take SpringState of the scalar it is asked in: an equilibrium is found in double");
-        return pull_of<N>(*law, reach, static_cast<N>(stiffness), static_cast<N>(rest_length));
+        return spring_force<N>(*law, edge, static_cast<N>(stiffness), static_cast<N>(rest_length));
     }
     template <Real N>
     [[nodiscard]] SpringResponse<N> response(N length) const noexcept {
-        constexpr N shortest = (std::numeric_limits<N>::min)();  // a law is asked for no less
+        constexpr N shortest = (std::numeric_limits<N>::min)();  // no law is called with a smaller length
         return (*law)(
             SpringState<N>{static_cast<N>(stiffness), static_cast<N>(rest_length), (std::max)(length, shortest)});
     }
 
     template <Real N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 2>& x, std::size_t i) const noexcept {
-        const auto spring = pull_towards<N>(x[1 - i] - x[i]);
-        const SpringStiffness<N> most{(std::max)(spring.along, N(0)), (std::max)(spring.across, N(0)),
-                                      spring.direction};
-        return {spring.force(), block_of(most)};
+        const auto spring = force_along<N>(x[1 - i] - x[i]);
+        const SpringStiffness<N> bound{(std::max)(spring.along, N(0)), (std::max)(spring.across, N(0)),
+                                       spring.direction};
+        return {spring.force(), block_of(bound)};
     }
     template <Real N>
     [[nodiscard]] N energy(const Corners<N, 2>& x) const noexcept {
@@ -225,20 +226,20 @@ struct SpringElement {
     template <Real N>
     [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 2>& x, std::size_t i,
                                                 const Vector3<N>& displacement) const noexcept {
-        const Vector3<N> reach = x[1 - i] - x[i];
-        const N length = norm(reach), far = detail::largest_magnitude(x[i]);
-        const auto before = response(length), after = response(norm<N>(reach - displacement));
+        const Vector3<N> edge = x[1 - i] - x[i];
+        const N length = norm(edge), far = detail::largest_magnitude(x[i]);
+        const auto before = response(length), after = response(norm<N>(edge - displacement));
         return {after.energy - before.energy, before.energy + std::abs(before.tension) * (length + far)};
     }
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 2>& x, std::size_t i,
                                                 std::size_t j) const noexcept {
-        const auto block = block_of<double>(pull_towards<double>(x[1] - x[0]));
+        const auto block = block_of<double>(force_along<double>(x[1] - x[0]));
         return dense(i == j ? block : -1.0 * block);
     }
 };
 static_assert(Element<SpringElement<float, LinearSpring>> && Element<SpringElement<double, ExponentialSpring>>);
 
-/// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1): constant once built, no positions in it.
+/// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1). Immutable; holds no positions.
 template <Real Scalar_, CheckedSpringLaw<Scalar_> Law>
 class MassSpringNetwork {
   public:
@@ -246,7 +247,8 @@ class MassSpringNetwork {
 
     static constexpr bool never_stiffens = membrane::never_stiffens<Law>();
 
-    /// @throws InvalidInput for a number that is negative, not finite, missing, or of the wrong count. Cost: O(V + F log F).
+    /// @throws InvalidInput for a number that is negative, not finite, missing, or of the wrong count. Cost: O(V + F
+    /// log F).
     MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law, const NetworkOptions<Scalar>& options);
 
     [[nodiscard]] Index vertex_count() const noexcept { return ends_.row_count(); }
@@ -273,26 +275,27 @@ class MassSpringNetwork {
         return viscosity_.empty() ? Scalar(0) : viscosity_[static_cast<std::size_t>(v)];
     }
 
-    /// Calls `act(pull)` with the `SpringForce` of each spring of vertex `v` at positions `x`.
+    /// Calls `act(force)` with the `SpringForce` of each spring of vertex `v` at positions `x`.
     template <class Act>
     void for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept;
 
     /// Sum of the spring forces on vertex `v` at positions `x`.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
-    /// The same, and a bound of the energy. A spring of stiffness k and tension T that is l long stores
-    /// k (l' - r)^2 / 2 and a constant when it is l' long, r = l - T / k (or less, where it never stiffens): of
-    /// k (l'^2 - 2 r l' + r^2) / 2 only the second term is no square of a distance. Let u be the direction away from the
-    /// other end. A vertex that moves by a along u and by b across, no more than rho in all, makes
-    /// l' = sqrt((l + a)^2 + b^2) >= l + a + b^2 / (2 (l + rho)). So the energy stays below one that curves by k along the
-    /// spring and by k (1 - r / (l + rho)) across it. `stiffness_reduction` is the sum of k min(r / l, 1) (I - u u^T), `size` the
-    /// smallest max(l, r): with these, relief / (1 + rho / size) is no more than the sum of k r / (l + rho) (I - u u^T).
+    /// Sum of the spring forces on vertex `v`, and a bound of the energy. A spring of stiffness k, tension T and length
+    /// l stores at the length l' the energy k (l' - r)^2 / 2 and a constant, r = l - T / k (or less, if it never
+    /// stiffens). Of k (l'^2 - 2 r l' + r^2) / 2 only the second term is not quadratic in the position. Let u be the
+    /// direction away from the other end. A displacement of the vertex by a along u and b across, of length at most
+    /// rho, makes l' = sqrt((l + a)^2 + b^2) >= l + a + b^2 / (2 (l + rho)). So the energy stays below a quadratic of
+    /// stiffness k along the spring and k (1 - r / (l + rho)) across it. `stiffness_reduction` is the sum of k min(r /
+    /// l, 1) (I - u u^T), `size` the smallest max(l, r): with these, stiffness_reduction / (1 + rho / size) is at most
+    /// the sum of k r / (l + rho) (I - u u^T).
     [[nodiscard]] EnergyMajoriser<Scalar> majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
-    /// Second derivative of the energy by the place of vertex `v` alone [N/m].
-    [[nodiscard]] Symmetric3<Scalar> curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+    /// Hessian of the energy by the position of vertex `v` alone [N/m].
+    [[nodiscard]] Symmetric3<Scalar> hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
-    /// What moving vertex `v` by `displacement` [m] costs.
+    /// Change of the energy if vertex `v` is displaced by `displacement` [m].
     [[nodiscard]] EnergyChange<Scalar> energy_change(Index v, const Vector3<Scalar>& displacement,
                                                      const ConstPointsRef<Scalar>& x) const noexcept;
 
@@ -305,8 +308,8 @@ class MassSpringNetwork {
     /// Energy stored in all springs [J]. Cost: O(springs).
     [[nodiscard]] Scalar energy(const ConstPointsRef<Scalar>& x) const noexcept;
 
-    /// An unbalanced force that is nothing beside the others [N]: 1e-9 of the stiffest spring stretched by its own
-    /// length, or what the spacing of numbers makes of it where that is more.
+    /// A negligible residual force [N]: 1e-9 of the force of the stiffest spring stretched by its own length, or its
+    /// stiffness times 64 roundings of a coordinate if that is larger.
     [[nodiscard]] Scalar force_tolerance() const noexcept { return negligible_force_; }
 
   private:
@@ -390,8 +393,8 @@ template <class Act>
 void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
     const Vector3<Scalar> here = point(x, v);
     for (const auto& end : springs_of(v)) {
-        const Vector3<Scalar> reach = point(x, end.other) - here;
-        act(pull_of<Scalar>(law_, reach, end.stiffness, end.rest_length));
+        const Vector3<Scalar> edge = point(x, end.other) - here;
+        act(spring_force<Scalar>(law_, edge, end.stiffness, end.rest_length));
     }
 }
 
@@ -411,7 +414,7 @@ EnergyMajoriser<Scalar> MassSpringNetwork<Scalar, Law>::majoriser(Index v,
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
-Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
+Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
     Symmetric3<Scalar> block;
     for_each_pull(v, x, [&](const SpringForce<Scalar>& spring) { add(block, spring); });
     return block;

@@ -5,43 +5,43 @@
 
 #include <membrane/core/check.hpp>
 
-/// What a tissue is made of, and what it lies on.
+/// Materials of a tissue and of the layer under it.
 ///
 ///     const auto capsule = membrane::materials::lens_capsule().typical;
 ///     const membrane::FoundationLayer cortex{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
 ///     cortex.normal_stiffness();                                                            // [N/m^3]
 namespace membrane {
 
-/// A thin tissue, the same in all directions of its surface.
+/// A thin tissue, isotropic in its surface.
 struct Material {
     double young_modulus = 0;  ///< E [Pa], positive
     double poisson_ratio = 0;  ///< nu, 0 to 0.5
     double thickness = 0;      ///< t [m], positive
     double density = 1000;     ///< [kg/m^3], positive
 
-    /// Tension of a sheet, per width, for each unit of strain in all directions of it: E t / (1 - nu) [N/m].
+    /// Tension of a sheet, per width, for a unit of equal strain in all directions of it: E t / (1 - nu) [N/m].
     [[nodiscard]] double biaxial_stiffness() const noexcept { return young_modulus * thickness / (1 - poisson_ratio); }
 
     /// @throws InvalidInput for a number out of its range
     void check() const;
 };
 
-/// The layer under a membrane, on ground that does not yield, as a Winkler foundation: each piece of it carries what is
-/// above it and nothing else. That holds for a layer thin against the contact. One as thick as a tool is wide also pulls
-/// down its surroundings, and feels softer than this.
+/// The layer under a membrane, on rigid ground, as a Winkler foundation: each piece of it carries only the load
+/// directly above it. This holds for a layer thin against the contact. A layer as thick as a tool is wide also deforms
+/// around the contact, and is softer than this model.
 struct FoundationLayer {
     double young_modulus = 0;  ///< E [Pa], positive
-    double poisson_ratio = 0;  ///< nu, 0 to 0.49: near 0.5 the layer does not give way to a press but flows aside, and
-                               ///< what it carries depends on the whole of the contact
+    double poisson_ratio = 0;  ///< nu, 0 to 0.49: near 0.5 the layer is not compressed but flows aside, and its
+                               ///< pressure at a point depends on the whole contact
     double thickness = 0;      ///< h [m], positive
 
-    /// Pressure for each unit of depth: the constrained modulus, E (1 - nu) / ((1 + nu) (1 - 2 nu)), over h [N/m^3].
+    /// Pressure per unit of depth: the constrained modulus, E (1 - nu) / ((1 + nu) (1 - 2 nu)), over h [N/m^3].
     [[nodiscard]] double normal_stiffness() const noexcept {
         const double nu = poisson_ratio;
         return young_modulus * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / thickness;
     }
 
-    /// Traction for each unit of shift along the surface: the shear modulus, E / (2 (1 + nu)), over h [N/m^3].
+    /// Traction per unit of displacement along the surface: the shear modulus, E / (2 (1 + nu)), over h [N/m^3].
     [[nodiscard]] double tangential_stiffness() const noexcept {
         return young_modulus / (2 * (1 + poisson_ratio)) / thickness;
     }
@@ -50,13 +50,13 @@ struct FoundationLayer {
     void check() const;
 };
 
-/// A tissue as published: a typical one, and how far those that were measured reach.
+/// Published constants of a tissue: typical ones, and the range of the measurements.
 struct MaterialRange {
     Material typical, least, most;
 };
 
-/// Tissues of the human eye. They stiffen when stretched, and differ from one eye and one experiment to the next: take
-/// these as a start, not as a measurement. Where only water's is known of a density, it is given as 1000.
+/// Tissues of the human eye. They stiffen when stretched, and differ between eyes and between experiments: these
+/// constants are a start, not a measurement. If no density of the tissue is known, it is that of water, 1000.
 namespace materials {
 
 /// In vivo 0.25 +- 0.1 MPa (mean and deviation, aged 21) at the pressure in the eye [Pye20]; more with age and pressure
@@ -68,16 +68,16 @@ namespace materials {
             {.young_modulus = 0.35e6, .poisson_ratio = 0.49, .thickness = 0.595e-3}};
 }
 
-/// 6 MPa in childhood, 3 MPa at 60, 1.5 MPa in extreme old age, Poisson ratio 0.47, all in stretch [Fisher69]. 11 to 15 um
-/// thick at the anterior pole, up to 16 um around it, 3.5 um at the posterior pole [Barraquer06].
+/// 6 MPa in childhood, 3 MPa at 60, 1.5 MPa in extreme old age, Poisson ratio 0.47, all in stretch [Fisher69]. 11 to 15
+/// um thick at the anterior pole, up to 16 um around it, 3.5 um at the posterior pole [Barraquer06].
 [[nodiscard]] constexpr MaterialRange lens_capsule() noexcept {
     return {{.young_modulus = 3e6, .poisson_ratio = 0.47, .thickness = 13e-6},
             {.young_modulus = 1.5e6, .poisson_ratio = 0.47, .thickness = 3.5e-6},
             {.young_modulus = 6e6, .poisson_ratio = 0.47, .thickness = 16e-6}};
 }
 
-/// 20 kPa, of cattle [Jones92]. An order of magnitude: experiments spread over about a decade [Ferrara21]. 0.2 to 0.3 mm
-/// thick, less with age [Alamouti03]. The Poisson ratio is that of tissue full of water, not measured.
+/// 20 kPa, of cattle [Jones92]. An order of magnitude: experiments spread over about a decade [Ferrara21]. 0.2 to 0.3
+/// mm thick, less with age [Alamouti03]. The Poisson ratio is that of tissue full of water, not measured.
 [[nodiscard]] constexpr MaterialRange retina() noexcept {
     return {{.young_modulus = 2e4, .poisson_ratio = 0.49, .thickness = 0.25e-3},
             {.young_modulus = 1e4, .poisson_ratio = 0.49, .thickness = 0.2e-3},

@@ -7,7 +7,7 @@
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/surface/moving_body.hpp>
 
-/// What holds the membrane to a body that moves.
+/// A foundation on a moving body.
 ///
 ///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));
 namespace membrane {
@@ -30,53 +30,53 @@ template <Real Number, Real Scalar>
 
 }  // namespace detail
 
-/// Any `FoundationModel` on a body that has moved: at each vertex it is shifted with the anchor, and turned as the body is there.
-/// What it is asked is brought to where the body is at rest, and its answer back. A view of both for the length of a call or
-/// two, see `on`.
+/// Any `FoundationModel` on a body that has moved: at each vertex the model is translated with the anchor and rotated
+/// with the body. Arguments are transformed to the rest pose of the body, results back. A short-lived view of both, see
+/// `on`.
 template <class Volume, Real Scalar>
 class MovedVolume {
   public:
     MovedVolume(const MovingBody<Scalar>& body, const Volume& volume) noexcept : body_(&body), volume_(&volume) {}
 
-    /// Tells a solver that the membrane has been taken along.
+    /// The body, with which a solver carries the membrane along.
     [[nodiscard]] const MovingBody<Scalar>& body() const noexcept { return *body_; }
 
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                                Scalar dt) const noexcept {
-        const Place place(*body_, v);
-        auto pull = volume_->force_on(v, place.point_to_body(position), place.point_to_body(start), dt);
-        pull.force = place.turn.vector_to_world(pull.force);
-        return pull;
+        const LocalFrame frame(*body_, v);
+        auto sum = volume_->force_on(v, frame.point_to_body(position), frame.point_to_body(start), dt);
+        sum.force = frame.turn.vector_to_world(sum.force);
+        return sum;
     }
 
-    /// Of a model that hands out its springs.
+    /// The spring of vertex `v`, if the model has springs.
     [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept requires
         requires(const Volume& volume) {
         volume.spring(v, start, dt);
     }
     {
-        const Place place(*body_, v);
-        auto spring = volume_->spring(v, place.point_to_body(start), dt);
-        spring.anchor = place.point_to_world(spring.anchor);
+        const LocalFrame frame(*body_, v);
+        auto spring = volume_->spring(v, frame.point_to_body(start), dt);
+        spring.anchor = frame.point_to_world(spring.anchor);
         return spring;
     }
 
-    /// Of a model whose anchors are those of the body at rest.
+    /// The current anchors, if those of the model are those of the body at rest [m].
     [[nodiscard]] const Points<Scalar>& anchors() const noexcept requires requires(const Volume& volume) {
         volume.anchors();
     }
     { return body_->anchors(); }
 
     template <Real Number = Scalar>
-    [[nodiscard]] Symmetric3<Number> curvature(Index v) const noexcept requires requires(const Volume& volume) {
-        volume.curvature(v);
+    [[nodiscard]] Symmetric3<Number> hessian(Index v) const noexcept requires requires(const Volume& volume) {
+        volume.hessian(v);
     }
     {
         const auto rotation = detail::rotation_in<Number>(body_->rotation_at(v));
-        if constexpr (requires { volume_->template curvature<Number>(v); }) {
-            return rotated(volume_->template curvature<Number>(v), rotation);
+        if constexpr (requires { volume_->template hessian<Number>(v); }) {
+            return rotated(volume_->template hessian<Number>(v), rotation);
         } else {
-            const Symmetric3<Scalar> k = volume_->curvature(v);
+            const Symmetric3<Scalar> k = volume_->hessian(v);
             return rotated<Number>({k.xx, k.yy, k.zz, k.xy, k.xz, k.yz}, rotation);
         }
     }
@@ -85,12 +85,12 @@ class MovedVolume {
         requires(const Volume& volume) {
         volume.energy(v, position);
     }
-    { return volume_->energy(v, Place(*body_, v).point_to_body(position)); }
+    { return volume_->energy(v, LocalFrame(*body_, v).point_to_body(position)); }
 
   private:
-    /// How things go along with vertex `v`.
-    struct Place {
-        Place(const MovingBody<Scalar>& body, Index v) noexcept
+    /// The rigid motion of the body at vertex `v`.
+    struct LocalFrame {
+        LocalFrame(const MovingBody<Scalar>& body, Index v) noexcept
             : at_rest(point(body.anchors_at_rest(), v)), now(point(body.anchors(), v)) {
             turn.rotation = body.rotation_at(v);
         }
@@ -108,7 +108,7 @@ class MovedVolume {
     const Volume* volume_;
 };
 
-/// `volume`, made for the body at rest, on `body` as it is now. Both must outlive what is returned.
+/// `volume`, made for the body at rest, on the current `body`. Both must outlive the result.
 template <Real Scalar, FoundationModel<Scalar> Volume>
 [[nodiscard]] MovedVolume<Volume, Scalar> on(const MovingBody<Scalar>& body, const Volume& volume) noexcept {
     return {body, volume};

@@ -8,24 +8,24 @@
 #include <membrane/model/elements.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// What keeps a stretched membrane in its shape.
+/// Loads that keep a stretched membrane in its shape.
 ///
 ///     const auto stretched = membrane::triangular_springs(mesh, material, 1.02);             // by 2 % on the mesh
 ///     const auto tissue = membrane::Tissue(springs, stretched, membrane::pressure(mesh, 2000.0));   // [Pa], or
 ///     const auto loads = membrane::balancing_loads(mesh, membrane::Tissue(springs, stretched));
-///     const auto still = membrane::Tissue(springs, stretched, loads);            // the mesh is its shape at rest
+///     const auto still = membrane::Tissue(springs, stretched, loads);            // the mesh is its equilibrium
 ///
-/// A stretched sheet resists a press like a drum: a tension of T [N/m] on a foundation of c [Pa/m] over ways of sqrt(T / c).
-/// It matters where that is longer than the triangles, or there is no foundation.
+/// A stretched sheet resists indentation like a drum: a tension of T [N/m] on a foundation of c [Pa/m] acts over a
+/// length of sqrt(T / c). It matters if this is longer than the triangles, or without a foundation.
 namespace membrane {
 
-/// A constant pressure on one triangle, along its normal, a third at each corner. On closed surfaces, and wherever the border is
-/// pinned, all of them together have an energy, less pressure times volume.
+/// A constant pressure on one triangle: its force is along the normal, a third at each corner. On a closed surface, or
+/// if the border is pinned, the loads of all triangles together have an energy, -pressure times volume.
 template <Number Scalar>
 struct PressureLoad {
     static constexpr std::size_t corner_count = 3;
 
-    Scalar pressure;  ///< [Pa], from inside where positive
+    Scalar pressure;  ///< [Pa], positive from inside
 
     template <Number N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 3>& x, std::size_t i) const noexcept {
@@ -72,20 +72,20 @@ struct DeadLoad {
     }
 };
 
-/// `pascal` on every triangle of `mesh`. By Laplace's law a sphere of radius r is in balance with a tension of
+/// `pascal` on every triangle of `mesh`. By Laplace's law a sphere of radius r balances it with a tension of
 /// pascal r / 2 [N/m]. @throws InvalidInput for a pressure that is not finite
 template <Real Scalar>
 [[nodiscard]] Elements<Scalar, PressureLoad<Scalar>> pressure(const TriangleMesh<Scalar>& mesh, double pascal);
 
-/// The loads that keep `network` at rest in the shape of `mesh`, to the last bit: on each vertex what it pulls with there,
-/// the other way round. What they stand for is all that is not modelled: pressure, anchors, tissue around.
+/// The loads for which the shape of `mesh` is an equilibrium of `network`, to the last bit: on each vertex the negative
+/// of the force of the network. They stand for pressure, anchors and surrounding tissue that are not modelled.
 /// @throws InvalidInput for a network of another mesh
 template <Real Scalar, ElasticNetwork<Scalar> Network>
 [[nodiscard]] Elements<Scalar, DeadLoad<Scalar>> balancing_loads(const TriangleMesh<Scalar>& mesh,
                                                                  const Network& network);
 
-// The force on corner i is p / 6 x_j x x_k but for terms that the triangles around i take off each other, as do those that
-// come from where the origin is, here the middle of the edge.
+// The force on corner i is p / 6 x_j x x_k, but for terms that cancel over the triangles around i. The terms that
+// depend on the origin, here the middle of the edge, cancel too.
 template <Number Scalar>
 Eigen::Matrix3d PressureLoad<Scalar>::hessian_block(const Corners<double, 3>& x, std::size_t i,
                                                     std::size_t j) const noexcept {

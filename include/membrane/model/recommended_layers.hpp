@@ -9,14 +9,14 @@
 #include <membrane/model/spring_stiffness.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// How many layers a membrane on a foundation needs.
+/// The number of layers for a membrane on a foundation.
 ///
 ///     const auto layers = membrane::recommended_layers(mesh, tissue, layer);
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = layers.tangential});
 namespace membrane {
 
-/// Over which what pulls at one place dies away, sqrt(membrane over foundation): of a pull along the normal by the
-/// foundation's normal stiffness, of one along the surface by its tangential stiffness [m].
+/// Lengths over which the displacement by a point force decays, sqrt(biaxial stiffness over foundation stiffness) [m]:
+/// of a force along the normal by the normal stiffness, of one along the surface by the tangential stiffness.
 struct DecayLengths {
     double normal, tangential;
 };
@@ -24,18 +24,19 @@ struct DecayLengths {
 /// @throws InvalidInput for a material or a foundation out of its range
 [[nodiscard]] inline DecayLengths decay_lengths(const Material& material, const FoundationLayer& foundation);
 
-/// For a solver's threshold of layers.
+/// Values for a solver's threshold of layers.
 struct RecommendedLayers {
-    Index normal;  ///< for what lifts the membrane; a tool that presses moves all it touches as layer 0, and needs less
-    Index tangential;  ///< for what pulls along it as well
+    Index normal;      ///< for a force that lifts; a pressing tool needs fewer, since layer 0 is all that it touches
+    Index tangential;  ///< for a force along the surface as well
 };
 
-/// Enough layers that the force of what holds one vertex is off by less than 1 %, and hardly more than that takes.
+/// Hardly more layers than needed for an error below 1 % of the reaction at one prescribed vertex.
 ///
-/// A chain of springs on a foundation, of one edge each, falls e-fold over 1 / (2 asinh(edge / (2 decay length))) springs.
-/// In those units it takes 2 layers less 0.7 along the surface; along the normal, where the membrane bends the pull into
-/// its own plane, 1.4 by the normal decay length and 0.7 by the tangential one, less 1.1. These numbers are fitted to
-/// equilibria of 399 materials on a sphere of 642 vertices.
+/// Along a chain of springs of one edge each on a foundation the displacement decays e-fold over
+/// 1 / (2 asinh(edge / (2 decay length))) springs. Let n and t be these numbers for the normal and the tangential decay
+/// length: a force along the surface needs 2 t - 0.7 layers, a force along the normal, which the membrane turns into
+/// its own plane, 1.4 n + 0.7 t - 1.1. The factors are fitted to equilibria of 399 materials on a sphere of 642
+/// vertices.
 /// @throws InvalidInput for a material or a foundation out of its range. O(F log F).
 template <Real Scalar>
 [[nodiscard]] RecommendedLayers recommended_layers(const TriangleMesh<Scalar>& mesh, const Material& material,

@@ -10,7 +10,7 @@
 #include <membrane/core/lanes.hpp>
 #include <membrane/core/types.hpp>
 
-/// What one spring does at a given length: constant stiffness, or stiffness as a function of the elongation.
+/// Tension of a spring at a given length: with constant stiffness, or stiffness as a function of the elongation.
 ///
 ///     struct Cubic {                                              // a law of one's own
 ///         template <membrane::Real Scalar>
@@ -19,7 +19,7 @@
 ///     const auto network = membrane::MassSpringNetwork(mesh, Cubic{}, {.stiffness = 40.0});
 namespace membrane {
 
-/// A spring as the law sees it.
+/// A spring, the input of a law.
 template <Number Scalar>
 struct SpringState {
     Scalar stiffness;    ///< of the spring at rest, k_ij [N/m], > 0
@@ -27,18 +27,18 @@ struct SpringState {
     Scalar length;       ///< l_ij [m], > 0
 };
 
-/// What the spring answers.
+/// The result of a law.
 template <Number Scalar>
 struct SpringResponse {
-    Scalar tension;    ///< [N], positive where the spring pulls its two ends together
+    Scalar tension;    ///< [N], positive if the spring pulls its two ends together
     Scalar stiffness;  ///< derivative of the tension by the length [N/m]
-    Scalar energy;     ///< stored since rest [J]
+    Scalar energy;     ///< 0 at rest length [J]
 };
 
-/// A law of springs. What the compiler cannot see: no tension and no energy at rest length, `tension` the derivative
-/// of `energy` and `stiffness` that of `tension`, finite for every finite length. One that also takes `Lanes` for its
-/// numbers lets a solver visit several vertices at once. Parts that call a law use what they
-/// need of the answer; the rest is not computed once the call is inlined.
+/// A law of springs. Beyond the signature: tension and energy are 0 at rest length, `tension` is the derivative of
+/// `energy` and `stiffness` that of `tension`, all finite for every finite length. If a law also takes `Lanes`, a
+/// solver updates several vertices at once. Members of the result that a caller does not use are not computed once the
+/// call is inlined.
 template <class Law, class Scalar>
 concept SpringLaw = Real<Scalar> && std::copyable<Law> && requires(const Law& law, const SpringState<Scalar>& state) {
     { law(state) }
@@ -57,12 +57,13 @@ consteval bool check_spring_law() noexcept {
 
 }  // namespace detail
 
-/// A `SpringLaw`; where it is none, the error says what is missing.
+/// A `SpringLaw`: if a type does not satisfy it, the error names the missing requirement.
 template <class Law, class Scalar>
 concept CheckedSpringLaw = detail::check_spring_law<Law, Scalar>();
 
-/// A law that sets `never_stiffens` says that no spring is stiffer at another length than it is at this one, or than its
-/// tension over its length if that is more. Then steps are known to be safe; with other laws, a solver has to look.
+/// A law that sets `never_stiffens` states that at no other length a spring is stiffer than at this one, or than its
+/// tension over its length if that is larger. Then updates guarantee descent; with other laws a solver needs a line
+/// search.
 template <class Law>
 [[nodiscard]] consteval bool never_stiffens() noexcept {
     if constexpr (requires { Law::never_stiffens; }) return Law::never_stiffens;
@@ -81,8 +82,8 @@ struct LinearSpring {
     }
 };
 
-/// Linear while it is stretched, slack where it is shorter than at rest, as fibres and thin tissue that wrinkles are:
-/// k max(l - r, 0). A membrane of such springs has no force of its own against being pressed together: its foundation has.
+/// Linear in stretch, slack if shorter than at rest, like fibres and thin tissue that wrinkles: k max(l - r, 0). A
+/// membrane of such springs has no force against compression; its foundation has.
 struct TensionSpring {
     template <Number Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
@@ -93,10 +94,10 @@ struct TensionSpring {
     }
 };
 
-/// Soft tissue stiffens as it is stretched: the tension grows exponentially with the strain e = (l - r) / r, as [Fung67]
-/// found for mesentery: k r (exp(a e) - 1) / a, of stiffness k at rest. Beyond `strain_limit` it goes on along its
-/// tangent, so that a wild position never overflows. A spring of rest length zero has no strain and stays linear.
-/// Calls exp: results may differ in the last bits from one mathematics library to another.
+/// Soft tissue stiffens as it is stretched: the tension grows exponentially with the strain e = (l - r) / r, as
+/// [Fung67] found for mesentery: k r (exp(a e) - 1) / a, of stiffness k at rest. Beyond `strain_limit` it continues
+/// along its tangent, so that extreme positions do not overflow. A spring of rest length zero has no strain and stays
+/// linear. Calls exp: results may differ in the last bits from one mathematics library to another.
 struct ExponentialSpring {
     double stiffening = 10;     ///< a; the stiffness grows e-fold for a strain of 1/a
     double strain_limit = 0.5;  ///< from here on the stiffness is constant
@@ -114,16 +115,16 @@ SpringResponse<Scalar> ExponentialSpring::operator()(const SpringState<Scalar>& 
     if (rest == 0) return LinearSpring{}(spring);
     const auto a = static_cast<Scalar>(stiffening);
     const Scalar strain = (spring.length - rest) / rest;
-    const Scalar held = (std::min)(strain, static_cast<Scalar>(strain_limit));
-    const Scalar growth = std::expm1(a * held);
+    const Scalar limited = (std::min)(strain, static_cast<Scalar>(strain_limit));
+    const Scalar growth = std::expm1(a * limited);
     const Scalar stiffness = spring.stiffness * (growth + 1);
     const Scalar tension = spring.stiffness * rest * growth / a;
-    // growth - a e loses all digits near rest; there the series says the same.
-    const Scalar z = a * held;
+    // growth - a e loses all digits near rest; there its series is used.
+    const Scalar z = a * limited;
     const Scalar series = Scalar(1) / 2 + z * (Scalar(1) / 6 + z * (Scalar(1) / 24 + z * (Scalar(1) / 120 + z / 720)));
     const Scalar bend = std::abs(z) < Scalar(1e-2) ? z * z * series : growth - z;
     const Scalar energy = spring.stiffness * rest * rest * bend / (a * a);
-    const Scalar beyond = (strain - held) * rest;
+    const Scalar beyond = (strain - limited) * rest;
     return {tension + stiffness * beyond, stiffness, energy + (tension + stiffness * beyond / 2) * beyond};
 }
 

@@ -12,30 +12,31 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Constants of springs from those of a tissue, so that a force does not depend on the mesh.
+/// Constants of springs from those of a material, so that a force does not depend on the mesh.
 ///
 ///     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
 ///                                                      {.stiffness = membrane::spring_stiffnesses(mesh, tissue),
 ///                                                       .mass = membrane::vertex_masses(mesh, tissue)});
-///     const auto foundation = membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, layer),
-///                                                             .tangential = membrane::tangential_stiffnesses(mesh, layer),
-///                                                             .recovery_time = 0.2});
+///     const auto foundation =
+///         membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, layer),
+///                                            .tangential = membrane::tangential_stiffnesses(mesh, layer),
+///                                            .recovery_time = 0.2});
 ///     tool.radius = membrane::tool_radius(tool.radius, membrane::mean_edge(mesh));
 namespace membrane {
 
-/// A stiffness for each spring [N/m], in the order of `Adjacency::edges()`: E' t (A1 + A2) / l^2, A1 and A2 the areas of
-/// the triangles at an edge of length l [VanGelder98]; none for an edge without length.
+/// A stiffness for each spring [N/m], in the order of `Adjacency::edges()`: E' t (A1 + A2) / l^2, A1 and A2 the areas
+/// of the triangles at an edge of length l [VanGelder98]; 0 for an edge of length 0.
 ///
-/// Springs alone make a sheet of Poisson ratio 1/3. At that ratio, on equilateral triangles, E' = E and all is exact. At
-/// another, E' = 2 E / (3 (1 - nu)): stretched alike in all directions, as a tool stretches it, the sheet has the right
-/// tension. Its shear modulus is then (1 + nu) / (2 (1 - nu)) times the right one, 1.39 times at 0.47. On irregular
-/// triangles there is an error that does not fall with their size: stretched alike in all directions without moving
-/// aside, every flat mesh is exact, but squares cut by a diagonal are a third too soft in shear along their sides.
+/// A sheet of springs alone has Poisson ratio 1/3. At this ratio, on equilateral triangles, E' = E is exact. At another
+/// ratio E' = 2 E / (3 (1 - nu)): under equal strain in all directions, as under a tool, the tension is exact; the
+/// shear modulus is (1 + nu) / (2 (1 - nu)) times the exact one, 1.39 times at 0.47. On irregular triangles there is an
+/// error that does not decrease with their size: every flat mesh is exact under equal strain in all directions without
+/// lateral displacement, but squares cut by a diagonal are a third too soft in shear along their sides.
 /// @throws InvalidInput for a material out of its range. O(F log F).
 template <Real Scalar>
 [[nodiscard]] std::vector<Scalar> spring_stiffnesses(const TriangleMesh<Scalar>& mesh, const Material& material);
 
-/// The area around each vertex, a third of each of its triangles [m^2]; all together, the area of the mesh.
+/// The area around each vertex, a third of each of its triangles [m^2]; the sum is the area of the mesh.
 template <Real Scalar>
 [[nodiscard]] std::vector<Scalar> vertex_areas(const TriangleMesh<Scalar>& mesh);
 
@@ -57,12 +58,12 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] Scalar mean_edge(const TriangleMesh<Scalar>& mesh);
 
-/// The radius of the ball that is to press triangles with edges of length `edge` in place of one of `radius` [m], with its
-/// centre in the same place: flat triangles whose corners lie on the one touch the other with their middles. Otherwise
-/// a coarse mesh is pressed in too deep: by edge^2 / (6 radius).
+/// The radius [m] of a sphere to use in place of a spherical tool of `radius` [m] against triangles with edges of
+/// length `edge` [m]: if the corners of flat triangles lie on the tool, their middles touch this sphere of the same
+/// centre. Without this correction a coarse mesh is indented too deep by edge^2 / (6 radius).
 ///
-/// With it, the force on a ball pressed in by half its radius is within 10 % of that on a fine mesh from a radius of 1.5
-/// edges on, within 5 % from 2.5 edges on, within 1 % from 4 on; smaller ones a mesh does not resolve.
+/// With it, the force on a sphere at a depth of half its radius is within 10 % of that on a fine mesh for a radius of
+/// at least 1.5 edges, within 5 % for 2.5 edges, within 1 % for 4 edges. A mesh does not resolve smaller tools.
 /// @throws InvalidInput for lengths that are not finite and positive, or a radius of no more than edge / sqrt(3)
 [[nodiscard]] inline double tool_radius(double radius, double edge);
 

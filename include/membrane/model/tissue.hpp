@@ -11,7 +11,7 @@
 #include <membrane/model/elements.hpp>
 #include <membrane/model/mass_spring_network.hpp>
 
-/// A network of springs, and elements beside them.
+/// A network of springs and other elements.
 ///
 ///     const auto springs = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 0.0});   // none
 ///     const auto tissue = membrane::Tissue(springs, membrane::triangular_springs(mesh, material),
@@ -20,9 +20,9 @@
 ///     const auto report = solver.step(x, dt, tissue, foundation, press(tool, contact));
 namespace membrane {
 
-/// Springs and elements of one membrane, an `ElasticNetwork`; masses, viscosities and pins are the springs'. A scene
-/// pays for the kinds of elements that it names, and where it names none, a `MassSpringNetwork` alone is faster: it
-/// visits several vertices at once, and needs no look at the energy to be safe.
+/// Springs and elements of one membrane, an `ElasticNetwork`; masses, viscosities and pins are the springs'. Cost: that
+/// of its kinds of elements. Without elements a `MassSpringNetwork` alone is faster: several of its vertices are
+/// updated at once, and non-stiffening springs need no line search.
 template <class Springs, class... Kinds>
 class Tissue {
   public:
@@ -47,7 +47,7 @@ class Tissue {
         for_each_kind([&](const auto& elements) { elements.for_each_element(act); });
     }
 
-    /// A vertex whose place changes the pull on another.
+    /// A vertex whose position changes the force on another.
     struct Neighbour {
         Index other;
     };
@@ -62,15 +62,15 @@ class Tissue {
 
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
-    /// The curvature of elements is what it is here; `size` is that of the springs.
+    /// Elements contribute their Hessian at `x`; `size` is that of the springs.
     [[nodiscard]] EnergyMajoriser<Scalar> majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
-    [[nodiscard]] Symmetric3<Scalar> curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
+    [[nodiscard]] Symmetric3<Scalar> hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
     [[nodiscard]] EnergyChange<Scalar> energy_change(Index v, const Vector3<Scalar>& displacement,
                                                      const ConstPointsRef<Scalar>& x) const noexcept;
 
   private:
     template <class Act>
-    void for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
+    void for_each_corner_force(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
         for_each_kind([&](const auto& elements) {
             elements.for_each(v, x, [&](const auto& placed, const auto& corners, std::size_t i) {
                 act(placed.element.force_on(corners, i));
@@ -124,9 +124,9 @@ template <class Springs, class... Kinds>
 auto Tissue<Springs, Kinds...>::force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept
     -> VertexForce<Scalar> {
     auto sum = springs_.force_on(v, x);
-    for_each_pull(v, x, [&](const CornerForce<Scalar>& corner) {
+    for_each_corner_force(v, x, [&](const CornerForce<Scalar>& corner) {
         sum.force += corner.force;
-        sum.stiffness += eigenvalue_bound(corner.curvature);
+        sum.stiffness += eigenvalue_bound(corner.hessian);
     });
     return sum;
 }
@@ -135,23 +135,22 @@ template <class Springs, class... Kinds>
 auto Tissue<Springs, Kinds...>::majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept
     -> EnergyMajoriser<Scalar> {
     auto sum = springs_.majoriser(v, x);
-    Symmetric3<Scalar> curvature;
-    for_each_pull(v, x, [&](const CornerForce<Scalar>& corner) {
+    Symmetric3<Scalar> hessian;
+    for_each_corner_force(v, x, [&](const CornerForce<Scalar>& corner) {
         sum.force += corner.force;
-        curvature += corner.curvature;
+        hessian += corner.hessian;
     });
-    const Scalar stiffness = eigenvalue_bound(curvature);
+    const Scalar stiffness = eigenvalue_bound(hessian);
     sum.stiffness += stiffness;
     sum.stiffness_reduction += diagonal3(stiffness);
-    sum.stiffness_reduction += Scalar(-1) * curvature;
+    sum.stiffness_reduction += Scalar(-1) * hessian;
     return sum;
 }
 
 template <class Springs, class... Kinds>
-auto Tissue<Springs, Kinds...>::curvature(Index v, const ConstPointsRef<Scalar>& x) const noexcept
-    -> Symmetric3<Scalar> {
-    auto sum = springs_.curvature(v, x);
-    for_each_pull(v, x, [&](const CornerForce<Scalar>& corner) { sum += corner.curvature; });
+auto Tissue<Springs, Kinds...>::hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept -> Symmetric3<Scalar> {
+    auto sum = springs_.hessian(v, x);
+    for_each_corner_force(v, x, [&](const CornerForce<Scalar>& corner) { sum += corner.hessian; });
     return sum;
 }
 

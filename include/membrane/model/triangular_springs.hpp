@@ -17,10 +17,10 @@
 ///     const auto tissue = membrane::Tissue(springs, membrane::triangular_springs(mesh, material));
 namespace membrane {
 
-/// Triangular biquadratic springs [Delingette08]: a triangle with edges of length l_k, L_k at rest, stores d.K d / 2 where
-/// d_k = l_k^2 - L_k^2: springs along its edges, and three that join two edges each. That is exactly the energy of a
-/// linear triangle of Saint Venant's and Kirchhoff's material in plane stress: what it comes to converges with the size of
-/// the triangles, whatever their shape. Like that material it gives way where it is squeezed to less than some 60 %.
+/// Triangular biquadratic springs [Delingette08]: a triangle with edges of length l_k, L_k at rest, stores d.K d / 2
+/// where d_k = l_k^2 - L_k^2: springs along its edges, and three that couple two edges each. This is exactly the energy
+/// of a linear triangle of Saint Venant-Kirchhoff material in plane stress: results converge with the size of the
+/// triangles, for any shape. Like that material it collapses if compressed to less than about 60 %.
 template <Number Scalar>
 struct TriangularSpring {
     static constexpr std::size_t corner_count = 3;
@@ -38,13 +38,14 @@ struct TriangularSpring {
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 3>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
 
-    /// Mean of the two principal tensions, a force for each width as it is now [N/m].
+    /// Mean of the two principal tensions, force per current width [N/m].
     template <Number N>
     [[nodiscard]] N mean_tension(const Corners<N, 3>& x) const noexcept;
 };
 
-/// One for each triangle of `mesh`, which is at rest as it is, or so many times as long all over as at rest. A triangle
-/// without area is left out. @throws InvalidInput for a material or a stretch out of its range. O(F).
+/// One for each triangle of `mesh`, whose lengths are `stretch` times those at rest. A triangle without area is left
+/// out.
+/// @throws InvalidInput for a material or a stretch out of its range. O(F).
 template <Real Scalar>
 [[nodiscard]] Elements<Scalar, TriangularSpring<Scalar>> triangular_springs(const TriangleMesh<Scalar>& mesh,
                                                                             const Material& material,
@@ -52,7 +53,7 @@ template <Real Scalar>
 
 namespace detail {
 
-// From a corner to the next two, and where these are in the order of the corners.
+// The numbers of the two corners after a corner.
 struct OtherCorners {
     explicit OtherCorners(std::size_t i) noexcept : next((i + 1) % 3), last((i + 2) % 3) {}
     std::size_t next, last;
@@ -63,7 +64,7 @@ template <Number N>
     return {squared_norm<N>(x[2] - x[1]), squared_norm<N>(x[0] - x[2]), squared_norm<N>(x[1] - x[0])};
 }
 
-// K d: half of the derivative of the energy by the squares is along the edges [N/m].
+// K d, the derivative of the energy by the squared edges [N/m]: half the force on an edge over its length.
 template <Number N, Number Scalar>
 [[nodiscard]] Vector3<N> times(const Symmetric3<Scalar>& k, const Vector3<N>& d) noexcept {
     const auto cast = [](const Scalar& number) { return static_cast<N>(number); };
@@ -81,8 +82,8 @@ template <Number Scalar>
     return i + j == 1 ? k.xy : i + j == 2 ? k.xz : k.yz;
 }
 
-/// K of a triangle with these corners. With n_i the gradient of barycentric coordinate i, the strain is -1/4 of the sum of
-/// d_k (n_i n_j^T + n_j n_i^T), k opposite of the edge from i to j.
+/// K of a triangle with these corners. With n_i the gradient of barycentric coordinate i, the strain is -1/4 of the sum
+/// of d_k (n_i n_j^T + n_j n_i^T), k opposite of the edge from i to j.
 [[nodiscard]] inline Symmetric3<double> stiffness_of(const Corners<double, 3>& x, const Material& material) {
     const double nu = material.poisson_ratio, sheet = material.young_modulus * material.thickness;
     const double lame = sheet * nu / (1 - nu * nu), shear = sheet / (2 * (1 + nu));
@@ -109,15 +110,15 @@ CornerForce<N> TriangularSpring<Scalar>::force_on(const Corners<N, 3>& x, std::s
     const N to_next = 2 * tensions[static_cast<Eigen::Index>(other.last)];
     const N to_last = 2 * tensions[static_cast<Eigen::Index>(other.next)];
     const Vector3<N> next = x[other.next] - x[i], last = x[other.last] - x[i];
-    // The square of the edge to the next corner is opposite of the last, and the other way round.
+    // The edge to the next corner is opposite of the last corner, and the edge to the last corner opposite of the next.
     const auto along_next = static_cast<N>(detail::entry(stiffness, other.last, other.last));
     const auto along_last = static_cast<N>(detail::entry(stiffness, other.next, other.next));
     const auto both = static_cast<N>(detail::entry(stiffness, other.next, other.last));
-    CornerForce<N> answer{to_next * next + to_last * last, outer<N>(4 * (along_next - both), next)};
-    answer.curvature += outer<N>(4 * (along_last - both), last);
-    answer.curvature += outer<N>(4 * both, next + last);
-    answer.curvature += diagonal3(larger<N>(to_next + to_last, N(0)));  // a push across is left out
-    return answer;
+    CornerForce<N> result{to_next * next + to_last * last, outer<N>(4 * (along_next - both), next)};
+    result.hessian += outer<N>(4 * (along_last - both), last);
+    result.hessian += outer<N>(4 * both, next + last);
+    result.hessian += diagonal3(larger<N>(to_next + to_last, N(0)));  // compression across the edges is left out
+    return result;
 }
 
 template <Number Scalar>
@@ -163,8 +164,8 @@ Eigen::Matrix3d TriangularSpring<Scalar>::hessian_block(const Corners<double, 3>
     return sum;
 }
 
-// Scaled by 1 + s, the triangle stores s times the sum of all tensions times its area, twice the mean, and as d changes by
-// 2 s l^2: the tensions are had from the squares of the edges.
+// Scaling by 1 + s adds the energy s times the area times the sum of the principal tensions, twice the mean, and
+// changes d by 2 s l^2: the squared edges give the mean tension.
 template <Number Scalar>
 template <Number N>
 N TriangularSpring<Scalar>::mean_tension(const Corners<N, 3>& x) const noexcept {

@@ -14,30 +14,30 @@
 #include <membrane/model/elastic_network.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// What holds the membrane to the body under it.
+/// The foundation: it supports the membrane on the body under it.
 ///
 ///     const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
 ///     solver.step(x, dt, network, foundation, press(tool, contact));               // the body stands still
 ///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));     // it moves, see `moved_volume.hpp`
 namespace membrane {
 
-/// Constants of the volume springs, the same for all vertices or one for each.
+/// Constants of the volume springs: one value for all vertices, or one for each vertex.
 template <Real Scalar>
 struct VolumeSpringOptions {
-    Field<Scalar> stiffness = {};  ///< k'_s [N/m], required; larger clings more
+    Field<Scalar> stiffness = {};  ///< k'_s [N/m], required; a larger one holds closer to the body
     Field<Scalar> damping = {};    ///< k'_d [N s/m], zero if not given; recovery takes the time k'_d / k'_s [s]
 };
-// For g++ 12, which otherwise breaks off over this type's initialiser inside another's.
+// For g++ 12, which otherwise fails on this type's initialiser inside another's.
 static_assert(std::is_default_constructible_v<VolumeSpringOptions<float>>);
 static_assert(std::is_default_constructible_v<VolumeSpringOptions<double>>);
 
-/// A model of the body under the membrane: the pull on vertex `v` at `position`, which was at `start` when the tick of
-/// length `dt` began. What the compiler cannot see: the pull does no work on the membrane over a closed path. One that
-/// hands out its springs, `spring(v, start, dt)`, lets a solver visit several vertices at once. For the parts that look for an
-/// equilibrium, one that is not alike in all directions may say its stiffness without damping as a `Symmetric3`,
-/// `curvature(v)`; one that is linear may say it in either number type, `curvature<Number>(v)`, and where it does not pull,
-/// `anchors()`: it is then evaluated in double even if it is of floats. A body that moves is no concern of a model's:
-/// `on(body, volume)` brings it there.
+/// A model of the foundation: its force on vertex `v` at `position`, which was at `start` when the tick of length `dt`
+/// [s] began. Beyond the signature: the force does no work on the membrane over a closed path. Optional members:
+/// `spring(v, start, dt)`, with which a solver updates several vertices at once; `hessian(v)`, the stiffness without
+/// damping as a `Symmetric3`, which an equilibrium needs of an anisotropic model; for a linear model
+/// `hessian<Number>(v)` in either number type and `anchors()`, the positions without force: an equilibrium then
+/// evaluates the model in double even if it is of floats. On a moving body a model is transformed by `on(body,
+/// volume)`.
 template <class Volume, class Scalar>
 concept FoundationModel = Real<Scalar> &&
     requires(const Volume& volume, Index v, const Vector3<Scalar>& position, Scalar dt) {
@@ -52,17 +52,17 @@ consteval bool check_volume_model() noexcept {
     static_assert(
         FoundationModel<Volume, Scalar>,
         "FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) "
-        "const noexcept must return Pull<Scalar>");
+        "const noexcept must return VertexForce<Scalar>");
     return FoundationModel<Volume, Scalar>;
 }
 
 }  // namespace detail
 
-/// A `FoundationModel`; where it is none, the error says what is missing.
+/// A `FoundationModel`: if a type does not satisfy it, the error names the missing requirement.
 template <class Volume, class Scalar>
 concept CheckedFoundationModel = detail::check_volume_model<Volume, Scalar>();
 
-/// No body under the membrane: nothing holds it, at no cost.
+/// No body under the membrane: no force, at no cost.
 struct NoFoundation {
     template <Real Scalar>
     [[nodiscard]] VertexForce<Scalar> force_on(Index, const std::type_identity_t<Vector3<Scalar>>&,
@@ -79,7 +79,7 @@ struct VolumeSpring {
     Scalar rate = 0;                                   ///< damping over the length of the tick, k'_d / dt [N/m]
     Scalar before = 0;                                 ///< its length when the tick began [m]
 
-    /// Its pull on the vertex at `position` but for the drag.
+    /// Its force on the vertex at `position`, without damping.
     [[nodiscard]] VertexForce<Scalar> elastic_pull(const Vector3<Scalar>& position) const noexcept {
         return {-stiffness * (position - anchor), stiffness + rate};
     }
@@ -89,9 +89,9 @@ struct VolumeSpring {
         return stiffness * squared_norm<Scalar>(position - anchor) / 2;
     }
 
-    /// The drag. The velocity along the spring in (5) is by how much its length has changed
-    /// over the tick: how often a solver visits the vertex within the tick does not change the damping, and
-    /// the damping force, like that of a spring, has an energy: k'_d (change of length)^2 / (2 dt).
+    /// The damping force. The velocity along the spring in (5) is its change of length over the tick: the number of
+    /// vertex updates within the tick does not change the damping, and the force has an energy, like that of a spring:
+    /// k'_d (change of length)^2 / (2 dt).
     [[nodiscard]] Vector3<Scalar> damping_force(const Vector3<Scalar>& position) const noexcept {
         const Vector3<Scalar> length = position - anchor;
         const Scalar square = squared_norm(length);
@@ -100,7 +100,7 @@ struct VolumeSpring {
         return -select<Scalar>(damps, rate * (now - before) / now, Scalar(0)) * length;
     }
 
-    /// Both.
+    /// Elastic force and damping force.
     [[nodiscard]] VertexForce<Scalar> force_on(const Vector3<Scalar>& position) const noexcept {
         auto sum = elastic_pull(position);
         if (any(rate != 0)) sum.force += damping_force(position);
@@ -138,9 +138,9 @@ class VirtualVolumeSprings {
         return spring(v, start, dt).force_on(position);
     }
 
-    /// The second derivative of the energy, from the constants as they are.
+    /// The Hessian of the energy, computed in `Number` from the constants [N/m].
     template <Real Number = Scalar>
-    [[nodiscard]] Symmetric3<Number> curvature(Index v) const noexcept {
+    [[nodiscard]] Symmetric3<Number> hessian(Index v) const noexcept {
         return diagonal3(static_cast<Number>(stiffness(v)));
     }
 

@@ -12,27 +12,27 @@
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/vertex_colouring.hpp>
 
-/// Which vertices a step updates.
+/// The vertices that a step updates.
 ///
 ///     active.arrange(network, seeds, options);
-///     for (const membrane::Index v : active.vertices()) { ... }                    // updates, nearest to the contact first
+///     for (const membrane::Index v : active.vertices()) { ... }           // updates, nearest to the contact first
 ///     const bool balanced = active.finish(network, is_balanced, moved);
 namespace membrane {
 
-/// The active vertices: the propagation queue, and outside it those that are awake, which a contact that has moved on or
-/// ended has left out of balance. A vertex stays awake until its forces balance. A neighbour that moves wakes it again if it
-/// was active since all were last in balance; beyond the layers vertices stay asleep.
+/// The active vertices: the propagation queue, and outside it the vertices awake, whose forces do not balance after a
+/// contact moved on or ended. A vertex stays awake until its forces balance. A moving neighbour wakes it again if it
+/// was active since the last equilibrium; beyond the layers vertices stay asleep.
 ///
-/// With `adaptive_layers` the queue begins each step with layer 0, `grow` adds a layer, and no vertex stays asleep whose
-/// neighbours move.
+/// With `adaptive_layers` the queue begins each step with layer 0, `grow` adds a layer, and no vertex stays asleep
+/// whose neighbours move.
 class ActiveVertices {
   public:
     explicit ActiveVertices(Index vertex_count);
 
-    /// Begins a step: builds the queue if the seeds have changed, and lists the active vertices: the queue, then those awake,
-    /// then those that the queue has dropped, as many as `options` leaves capacity for, layer 0 and one more in any case.
-    /// Vertices of the queue beyond the capacity are active in later steps. What the last call has arranged is undone unless
-    /// `finish` came after it. Online.
+    /// Begins a step: builds the queue if the seeds have changed, and lists the active vertices: the queue, then those
+    /// awake, then those that the queue has dropped, up to the capacity by `options`, layer 0 and one more in any case.
+    /// Vertices of the queue beyond the capacity are active in later steps. A last call without `finish` is undone.
+    /// Online.
     template <class Network, class Options>
     void arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept;
 
@@ -41,13 +41,13 @@ class ActiveVertices {
     [[nodiscard]] std::span<const Index> contact_layer() const noexcept { return vertices().first(layer_0().size()); }
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return queue_; }
 
-    /// How many of `vertices`, the first, are the queue's.
+    /// Number of the first `vertices` that are in the queue.
     [[nodiscard]] std::size_t from_queue() const noexcept { return from_queue_; }
 
-    /// Where in `vertices` the groups end that those outside the queue are in, if they are updated in groups.
+    /// Ends in `vertices` of the groups outside the queue, if they are updated in groups.
     [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return groups_.ends(); }
 
-    /// Whether the queue is another one than at the last call of this.
+    /// Whether the queue has changed since the last call.
     [[nodiscard]] bool take_new_queue() noexcept { return std::exchange(has_new_queue_, false); }
 
     /// The layer whose forces are evaluated, but not updated yet: the first beyond the queue, if it may `grow`.
@@ -55,7 +55,7 @@ class ActiveVertices {
         return has_frontier_ ? queue_.layer(queue_.layer_count() - 1) : std::span<const Index>();
     }
 
-    /// Whether some have to wait for a later step, for lack of capacity.
+    /// Whether vertices wait for a later step for lack of capacity.
     [[nodiscard]] bool truncated() const noexcept { return truncated_; }
 
     /// Adds the frontier to the active vertices, at the end. Online.
@@ -68,8 +68,8 @@ class ActiveVertices {
         activated_.insert(v);
     }
 
-    /// Ends a step: awake are now the vertices of the active ones and the frontier that are not balanced, `is_balanced(v)`,
-    /// those that had to wait, and the neighbours of those that `moved`. Returns whether all vertices balance.
+    /// Ends a step: awake are now the active and frontier vertices for which `is_balanced(v)` is false, the vertices
+    /// that had to wait, and the neighbours of those that `moved`. Returns whether the forces on all vertices balance.
     template <class Network, class IsBalanced>
     [[nodiscard]] bool finish(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept;
 
@@ -98,9 +98,9 @@ class ActiveVertices {
     PropagationQueue queue_;
     IndexSet seeds_, next_seeds_;
     IndexSet awake_, next_awake_;
-    IndexSet dropped_;    // by the queue, which has gone elsewhere, or has no capacity
+    IndexSet dropped_;    // by the queue, because it changed or lacks capacity
     IndexSet active_;     // in this step
-    IndexSet activated_;  // active since all were last in balance
+    IndexSet activated_;  // active since the last equilibrium
     VertexColouring groups_;
     Index capacity_ = 0;  // for active vertices
     std::size_t from_queue_ = 0;
@@ -110,7 +110,7 @@ class ActiveVertices {
     bool has_new_queue_ = false;
     bool queue_fits_ = true, truncated_ = false;
     bool queue_balanced_ = true;
-    bool is_open_ = false;  // something is arranged, and not finished
+    bool is_open_ = false;  // between `arrange` and `finish`
 };
 
 inline ActiveVertices::ActiveVertices(Index vertex_count)
@@ -130,7 +130,7 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     as_needed_ = options.adaptive_layers;
     order_ = as_needed_ ? UpdateOrder::breadth_first : options.order;
     if (order_ == UpdateOrder::colour_all && options.max_vertex_updates != unlimited)
-        order_ = UpdateOrder::colour_layers;  // what is left out is to be the farthest
+        order_ = UpdateOrder::colour_layers;  // so that the farthest vertices are left out
     layers_before_ =
         order_ == UpdateOrder::colour_all ? std::exchange(layers_, options.layers) : queue_.layer_count() - 1;
     next_seeds_.clear();
@@ -139,13 +139,13 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     const auto before = seeds_.items(), now = next_seeds_.items();
     const bool is_new = as_needed_ || !std::equal(now.begin(), now.end(), before.begin(), before.end());
     if (is_new) {
-        // What a constraint has let go of, too: the force that was balanced there is another one now.
+        // Vertices that a constraint released, too: the forces on them have changed.
         drop(as_needed_ ? layer_0() : queue_.vertices());
         build_queue(network, seeds, as_needed_ ? 0 : options.layers);
     }
     capacity_ = capacity_for(options);
     const bool fits = static_cast<Index>(queue_.vertices().size()) <= capacity_ - capacity_of_others();
-    if (!fits && (is_new || queue_fits_)) drop(queue_.vertices());  // what does not fit takes turns with the others
+    if (!fits && (is_new || queue_fits_)) drop(queue_.vertices());  // vertices beyond the capacity take turns
     queue_fits_ = fits;
 
     active_.clear();
@@ -159,18 +159,18 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     extend(network, options);
 }
 
-// How many vertices a step may update: what layer 0 is updated more often is taken off the rest.
+// Number of vertices that a step may update: the additional updates of layer 0 reduce those of the others.
 template <class Options>
 Index ActiveVertices::capacity_for(const Options& options) const noexcept {
     if (options.max_vertex_updates == unlimited) return unlimited;
     const auto touched = static_cast<Index>(layer_0().size());
     const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_iterations + 1);
     const auto passes =
-        (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // its forces, before a layer is added
+        (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // forces of a layer before it is added
     return touched + static_cast<Index>((std::max)((options.max_vertex_updates - own) / passes, std::int64_t{1}));
 }
 
-// Vertices awake or dropped by the queue have their turns under a lasting contact, too.
+// Capacity reserved for vertices awake or dropped by the queue: they are updated under a lasting contact, too.
 inline Index ActiveVertices::capacity_of_others() const noexcept {
     const auto touched = static_cast<Index>(layer_0().size());
     return (std::min)(awake_.count() + dropped_.count(), std::clamp(capacity_ / 4, Index(1), capacity_ - touched));
@@ -203,7 +203,7 @@ void ActiveVertices::grow(const Network& network, const Options& options) noexce
     extend(network, options);
 }
 
-// The next layer, whose forces are evaluated. Of one beyond the capacity those are awake whose neighbours move.
+// Makes the next layer the frontier. If it exceeds the capacity, a vertex of it is awake only if a neighbour moves.
 template <class Network, class Options>
 void ActiveVertices::extend(const Network& network, const Options& options) noexcept {
     has_frontier_ = as_needed_ && queue_.layer_count() <= options.layers && queue_.grow(network);
@@ -232,7 +232,7 @@ void ActiveVertices::find_awake(IsBalanced is_balanced) noexcept {
         }
     }
     queue_balanced_ = true;
-    const bool queue_returns = !as_needed_ && !truncated_;  // in the next step, whole
+    const bool queue_returns = !as_needed_ && !truncated_;  // the next step updates the whole queue
     const auto check = [&](Index v) {
         activated_.insert(v);
         if (is_balanced(v)) return;

@@ -8,7 +8,7 @@
 #include <membrane/solve/step_state.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// What a constraint sees of a step.
+/// The interface of a step to its constraints.
 ///
 ///     void begin(membrane::ConstraintContext<double>& context) const noexcept {      // of a constraint of one's own
 ///         if (!context.check(v)) return;
@@ -19,8 +19,8 @@ namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// The vertices that a step works on, as its constraints see them: they name the vertices where a force enters, prescribe
-/// where some are, and add forces to others. A vertex that is named or moved is loaded, at the cost of three numbers.
+/// The vertices of a step, for its constraints: they seed the vertices where a force enters, prescribe positions, and
+/// add forces. A vertex that is seeded or moved is loaded, at the cost of three numbers.
 template <Real Scalar>
 class ConstraintContext {
   public:
@@ -42,19 +42,19 @@ class ConstraintContext {
         if (state_.is_fixed(v)) state_.clear_response(v);
     }
 
-    /// Where `v` is [m], and where it was when the step began.
+    /// Position of `v` now, and at the start of the step [m].
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept {
         return state_.loaded.contains(v) ? state_.position_of(v) : start(v);
     }
     [[nodiscard]] Vector3<Scalar> start(Index v) const noexcept { return point(x_, v); }
 
-    /// `v` is at `target`, or where it was when the step began, until the step ends. A pinned vertex stays where it is, a
-    /// prescribed one too if there is no target.
+    /// Prescribes `target` [m] for `v` until the step ends; without a target, its start position. A pinned vertex does
+    /// not move; without a target a prescribed vertex does not move either.
     void prescribe(Index v, const Vector3<Scalar>& target) noexcept;
     void prescribe(Index v) noexcept;
     [[nodiscard]] bool prescribed(Index v) const noexcept { return state_.prescribed.contains(v); }
 
-    /// Whether nothing moves `v` in this step but `prescribe`: it is pinned or prescribed.
+    /// Whether `v` is pinned or prescribed: in this step only `prescribe` moves it.
     [[nodiscard]] bool fixed(Index v) const noexcept {
         return state_.loaded.contains(v) ? state_.is_fixed(v) : is_pinned_(network_, v);
     }
@@ -62,7 +62,8 @@ class ConstraintContext {
     /// Moves `v` by a displacement [m].
     void move(Index v, const Vector3<Scalar>& by) noexcept { place(v, position(v) + by); }
 
-    /// Adds to the external force on `v` for this step [N]. It moves active vertices: `seed` one in `begin` to make it active.
+    /// Adds to the external force on `v` for this step [N]. Only active vertices move by it: `seed` makes one active in
+    /// `begin`.
     void add_force(Index v, const Vector3<Scalar>& force) noexcept {
         state_.forced.insert(v);
         auto& number = state_.row(state_.force, v).number;
@@ -75,28 +76,28 @@ class ConstraintContext {
         state_.added_stiffness[static_cast<std::size_t>(v)] += by;
     }
 
-    /// How far a vertex of layer 0 moves for `force` by the rule of its last update, not at all if it is fixed [m].
+    /// Response of a vertex of layer 0 to `force` by its last update [m]; zero if it is fixed.
     [[nodiscard]] Vector3<Scalar> response(Index v, const Vector3<Scalar>& force) const noexcept {
         return fixed(v) ? Vector3<Scalar>(Vector3<Scalar>::Zero()) : state_.compliance_block(v) * force;
     }
 
-    /// How far at least [m/N].
+    /// Lower bound of the compliance of `v` by its last update [m/N]; zero if it is fixed.
     [[nodiscard]] Scalar compliance(Index v) const noexcept { return fixed(v) ? Scalar(0) : state_.compliance(v); }
 
     /// At the end of the step: the sum of all forces on `v` [N].
     [[nodiscard]] Vector3<Scalar> residual_force(Index v) const noexcept { return state_.residual_force(v); }
 
-    /// A change of force that is not worth making [N].
+    /// A negligible change of force [N].
     [[nodiscard]] Scalar force_tolerance() const noexcept { return state_.force_tolerance; }
 
-    /// The point with this number that this constraint had in the step before, or null; `corner` is its first corner.
-    /// Cost: linear in the points with that first corner.
+    /// The contact point of this constraint with this triangle and feature in the last step, or null; `corner` is its
+    /// first corner. Cost: linear in the points with that first corner.
     [[nodiscard]] const ContactPoint<Scalar>* cached_point(Index triangle, int feature, Index corner) const noexcept;
 
-    /// Keeps a point of this constraint for the next step; refuses the step where there is no room for more.
+    /// Adds a point of this constraint, and keeps it for the next step; beyond the capacity the step is refused.
     void add_point(const ContactPoint<Scalar>& point) noexcept;
 
-    /// The points of this constraint, in this step and in the one before.
+    /// The points of this constraint, in this step and in the last one.
     [[nodiscard]] std::span<ContactPoint<Scalar>> points() noexcept {
         return state_.point_ranges[constraint_].of(state_.points.items());
     }
@@ -115,7 +116,7 @@ class ConstraintContext {
     void select_constraint(std::size_t constraint) noexcept { constraint_ = constraint; }
     [[nodiscard]] std::size_t constraint() const noexcept { return constraint_; }
 
-    /// The constraint that is selected has no points yet.
+    /// Begins the points of the selected constraint.
     void begin_points() noexcept { state_.point_ranges[constraint_] = {state_.points.size(), state_.points.size()}; }
 
     void load(Index v) noexcept {
@@ -126,7 +127,7 @@ class ConstraintContext {
         state_.set_position(v, target);
     }
 
-    /// The position that `v` goes back to: where it was when `keep` was called, or when the step began.
+    /// The position to which `go_back` moves `v`: that at the call of `keep`, or at the start of the step.
     void keep(Index v) noexcept {
         load(v);
         state_.kept.insert(v);
@@ -140,7 +141,7 @@ class ConstraintContext {
         return state_.kept.contains(v) ? state_.row(state_.anchor, v).point() : start(v);
     }
 
-    /// All that this step moves goes back to where it was kept, part of the distance or all of it.
+    /// Moves all free vertices back towards their kept positions, by `part` of the distance, 0 to 1.
     void go_back(Scalar part) noexcept {
         for (const Index v : state_.loaded.items()) {
             const Vector3<Scalar> now = position(v), before = kept(v);
@@ -148,8 +149,8 @@ class ConstraintContext {
         }
     }
 
-    /// By how much a fixed vertex yields to the tools that press on it, as a spring of its support stiffness does [m]; no
-    /// other does.
+    /// Displacement of a fixed vertex by the tools that press on it, as of a spring of its support stiffness [m]; zero
+    /// for other vertices.
     [[nodiscard]] Vector3<Scalar> support_displacement(Index v) const noexcept {
         const Scalar stiffness = state_.support_stiffness(v);
         if (!state_.pressed_supports.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
@@ -177,7 +178,7 @@ class ConstraintContext {
 
     const ConstPointsRef<Scalar>& x_;  // when the step began
     StepState<Scalar>& state_;
-    const void* network_;  // of a type that only the next knows
+    const void* network_;  // its type is known to `is_pinned_`
     bool (*is_pinned_)(const void*, Index) noexcept;
     std::size_t constraint_ = 0;
 };

@@ -7,23 +7,24 @@
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/tool_contact.hpp>
 
-/// What a constraint asks of a membrane, in the same few words whatever its type, for those who do not step: Newton's
-/// method, the error bound, what judges a trial.
+/// The description of a constraint, independent of its type: for Newton's method, the error bound and trials.
 ///
 ///     for_each_term(constraint, [&](const membrane::ConstraintTerm& term) { ... });
 ///
 ///     template <class Terms>                                                        // of a constraint of one's own
-///     void describe(const Clamp& clamp, Terms& terms) { terms.add(membrane::ConstraintTerm::hold(clamp.vertex, clamp.target)); }
+///     void describe(const Clamp& clamp, Terms& terms) {
+///         terms.add(membrane::ConstraintTerm::hold(clamp.vertex, clamp.target));
+///     }
 namespace membrane {
 
-/// A point of the membrane that is held or pulled at, or a tool that the surface stays outside of. In double.
+/// A point of the membrane with a target or a load, or a tool that the surface stays outside of. In double.
 struct ConstraintTerm {
     enum class Kind : unsigned char {
-        pin,          ///< the vertex stays where it is; no force enters there
-        hold_vertex,  ///< it is at `target`
+        pin,          ///< the vertex does not move; no force enters there
+        hold_vertex,  ///< the vertex is at `target`
         hold_point,   ///< the point of a triangle is at `target`
-        load,         ///< `force` acts on it
-        press,        ///< the surface stays outside `tool`, which touches it as `contact` says
+        load,         ///< `force` acts on the point
+        press,        ///< the surface stays outside `tool`, in the contact `contact`
     };
 
     Kind kind = Kind::pin;
@@ -33,7 +34,7 @@ struct ConstraintTerm {
     Vector3<double> force = Vector3<double>::Zero();             ///< [N]
     Tool<double> tool = {};
     Contact<double> contact = {};
-    std::size_t constraint = 0;  ///< which it is of those handed in, for whoever collects terms
+    std::size_t constraint = 0;  ///< number of the constraint; a collector of terms sets it
 
     [[nodiscard]] static ConstraintTerm pin(Index v) noexcept;
     [[nodiscard]] static ConstraintTerm hold(Index v, const Vector3<double>& target) noexcept;
@@ -43,18 +44,19 @@ struct ConstraintTerm {
                                              const Vector3<double>& force) noexcept;
     [[nodiscard]] static ConstraintTerm press(const Tool<double>& tool, const Contact<double>& contact) noexcept;
 
-    /// Whether there is a point that is held.
+    /// Whether the position of a point is prescribed.
     [[nodiscard]] bool holds() const noexcept { return kind != Kind::load && kind != Kind::press; }
 
     [[nodiscard]] double weight(std::size_t k) const noexcept { return weights[static_cast<Eigen::Index>(k)]; }
 
-    /// The point's place where the vertices are at `x` (3 x V [m]); of anything else that vertices have, its value there.
+    /// The point's position if the vertices are at `x` (3 x V [m]); for another vertex field `x`, its value at the
+    /// point.
     [[nodiscard]] Vector3<double> point_to_body(const Points<double>& x) const noexcept {
         return point_at(triangle_at(x, corners), weights);
     }
 
-    /// The part of the force on corner `k` that whoever holds the point feels. As the point goes a way, corner `k` goes
-    /// this part of it, if the corners go as little as they can.
+    /// Factor of the force on corner `k` in the force on the constraint. If the point is displaced by the least
+    /// displacement of the corners, corner `k` is displaced by this factor of it.
     [[nodiscard]] double share(std::size_t k) const noexcept { return weight(k) / squared_norm(weights); }
 };
 
@@ -101,7 +103,7 @@ void describe(const ToolContact<Scalar>& press, Terms& terms) {
 
 namespace detail {
 
-/// Takes terms by calling a function.
+/// A receiver of terms: calls a function for each.
 template <class Act>
 struct EachTerm {
     void add(const ConstraintTerm& term) { act(term); }
@@ -113,7 +115,7 @@ struct IgnoreTerm {
 
 }  // namespace detail
 
-/// What `describe(constraint, terms)` tells anybody about who has `terms.add(ConstraintTerm)`.
+/// A constraint that `describe(constraint, terms)` describes by calls of `terms.add(ConstraintTerm)`.
 template <class C>
 concept DescribedConstraint = requires(const C& constraint, detail::EachTerm<detail::IgnoreTerm>& terms) {
     describe(constraint, terms);
@@ -122,7 +124,7 @@ static_assert(DescribedConstraint<VertexAttachment<float>> && DescribedConstrain
 static_assert(DescribedConstraint<PinnedVertices> && DescribedConstraint<PointLoad<float>> &&
               DescribedConstraint<ToolContact<double>>);
 
-/// Calls `act(term)` for each term of the constraint; of one that does not describe itself, none is known.
+/// Calls `act(term)` for each term of the constraint; a constraint without `describe` has no known term.
 template <class C, class Act>
 void for_each_term(const C& constraint, Act act) {
     if constexpr (DescribedConstraint<C>) {

@@ -14,17 +14,17 @@
 #include <membrane/solve/predictor.hpp>
 #include <membrane/solve/surface_point.hpp>
 
-/// What acts on the membrane from outside, as arguments of a step.
+/// Constraints: arguments of a step that act on the membrane from outside.
 ///
 ///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact), pull(tool, grasp));
 ///     report.reactions[0]                                          // force of the membrane on the pressing tool [N]
 namespace membrane {
 
-/// Something that acts on the membrane during one step. `begin` names all vertices where its force enters, and puts in
-/// place what it holds; `enforce` is called after each update of layer 0, and once more at the end where vertices have
-/// moved since; it restores what they broke and says whether there was anything to restore; `reaction` is the force of the membrane on it
-/// [N]. One that something leads may say where that is, `driving_input(): DrivingInput<Scalar>`: the next steps are predicted from it. One
-/// that holds vertices may do so in `hold(context)`, which is called before any `begin`.
+/// A constraint on the membrane for one step. `begin` seeds all vertices where its force enters, and moves attached
+/// points to their targets. `enforce` is called after each update of layer 0, and at the end of the step if vertices
+/// have moved since: it restores the constraint, and returns whether it was violated. `reaction` is the force of the
+/// membrane on the constraint [N]. Optional members: `driving_input(): DrivingInput<Scalar>`, from which the next steps
+/// are extrapolated; `hold(context)`, which prescribes vertices and is called before any `begin`.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> &&
     requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
@@ -71,11 +71,11 @@ consteval bool check_constraint() noexcept {
 
 }  // namespace detail
 
-/// A `Constraint`; where it is none, the error says what is missing.
+/// A `Constraint`: if a type does not satisfy it, the error names the missing requirement.
 template <class C, class Scalar>
 concept CheckedConstraint = detail::check_constraint<C, Scalar>();
 
-/// A constraint of any type, which must outlive this: what a step does depends on no type of constraint.
+/// A reference to a constraint of any type, which must outlive it: the code of a step depends on no type of constraint.
 template <Real Scalar>
 class ConstraintRef {
   public:
@@ -83,7 +83,7 @@ class ConstraintRef {
     explicit ConstraintRef(const C& constraint) noexcept : constraint_(&constraint), calls_(&calls_of<C>) {}
 
     [[nodiscard]] bool valid() const noexcept { return calls_->valid(constraint_); }
-    [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return calls_->lead(constraint_); }
+    [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return calls_->driving_input(constraint_); }
     void hold(ConstraintContext<Scalar>& context) const noexcept { calls_->hold(constraint_, context); }
     void begin(ConstraintContext<Scalar>& context) const noexcept { calls_->begin(constraint_, context); }
     [[nodiscard]] bool enforce(ConstraintContext<Scalar>& context) const noexcept {
@@ -96,7 +96,7 @@ class ConstraintRef {
   private:
     struct Calls {
         bool (*valid)(const void*) noexcept;
-        DrivingInput<Scalar> (*lead)(const void*) noexcept;
+        DrivingInput<Scalar> (*driving_input)(const void*) noexcept;
         void (*hold)(const void*, ConstraintContext<Scalar>&) noexcept;
         void (*begin)(const void*, ConstraintContext<Scalar>&) noexcept;
         bool (*enforce)(const void*, ConstraintContext<Scalar>&) noexcept;
@@ -109,7 +109,7 @@ class ConstraintRef {
     template <class C>
     static constexpr Calls calls_of{
         .valid = [](const void* c) noexcept -> bool { return as<C>(c).valid(); },
-        .lead = [](const void* c) noexcept -> DrivingInput<Scalar> {
+        .driving_input = [](const void* c) noexcept -> DrivingInput<Scalar> {
             if constexpr (requires { as<C>(c).driving_input(); }) return as<C>(c).driving_input();
             return {};
         },
@@ -130,7 +130,7 @@ class ConstraintRef {
     const Calls* calls_;
 };
 
-/// All constraints of one step, in the order they were handed in.
+/// All constraints of one step, in the order of its arguments.
 template <Real Scalar>
 class ConstraintList {
   public:
@@ -140,11 +140,11 @@ class ConstraintList {
     [[nodiscard]] bool valid() const noexcept {
         return std::all_of(constraints_.begin(), constraints_.end(), [](const auto& c) { return c.valid(); });
     }
-    /// Where those that are led are led to.
+    /// Collects the inputs that drive the constraints.
     void collect_inputs(std::span<DrivingInput<Scalar>> inputs) const noexcept {
         for (std::size_t i = 0; i < constraints_.size(); ++i) inputs[i] = constraints_[i].driving_input();
     }
-    /// Vertices that a constraint holds are fixed for all of them, in whatever order they were handed in.
+    /// Begins all constraints. A vertex that one prescribes is fixed for all, in any order of the arguments.
     void begin() const noexcept {
         for_each([this](const auto& constraint, std::size_t) { constraint.hold(context_); });
         for_each([this](const auto& constraint, std::size_t) {
@@ -157,7 +157,7 @@ class ConstraintList {
         for_each([&](const auto& constraint, std::size_t) { changed |= constraint.enforce(context_); });
         return changed;
     }
-    /// The forces on those who act; false if any is not finite. Contact points have what was found of them from here on.
+    /// Computes the reactions; returns false if one is not finite. Updates the contact points from their packs.
     [[nodiscard]] bool react(std::span<Vector3<Scalar>> reactions) const noexcept {
         auto& state = context_.state();
         state.packs.unpack(state.points.items());
@@ -181,10 +181,10 @@ class ConstraintList {
     std::span<const ConstraintRef<Scalar>> constraints_;
 };
 
-/// Holds a point of a triangle at `target`; its corners are free otherwise.
+/// Attaches a point of a triangle to `target`; the corners are otherwise free.
 template <Real Scalar>
 struct PointAttachment {
-    Index triangle = no_index;  ///< none: holds nothing
+    Index triangle = no_index;  ///< `no_index`: no attachment
     std::array<Index, 3> corners{no_index, no_index, no_index};
     Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();
     Vector3<Scalar> target = Vector3<Scalar>::Zero();  ///< [m]
@@ -198,7 +198,7 @@ struct PointAttachment {
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
 };
 
-/// Holds a vertex at `target`.
+/// Attaches a vertex to `target`.
 template <Real Scalar>
 struct VertexAttachment {
     Index vertex;
@@ -216,9 +216,10 @@ struct VertexAttachment {
     }
 };
 
-/// Holds vertices where they are. No force enters there: they seed no queue. Their reactions add up.
+/// Fixes vertices at their positions. No force enters there: they seed no queue. The reaction is the sum over the
+/// vertices.
 struct PinnedVertices {
-    std::span<const Index> vertices;  ///< of the caller
+    std::span<const Index> vertices;  ///< owned by the caller
 
     [[nodiscard]] bool valid() const noexcept { return true; }
     template <Real Scalar>
@@ -251,19 +252,19 @@ struct PointLoad {
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>&) const noexcept { return -force; }
 };
 
-/// What forceps hold follows the tool.
+/// The point that forceps hold follows the tool.
 template <Real Scalar>
 [[nodiscard]] PointAttachment<Scalar> pull(const Tool<Scalar>& tool, const Grasp<Scalar>& grasp) noexcept {
     return {grasp.triangle, grasp.corners, grasp.barycentric, tool.position + grasp.offset};
 }
 
-/// Vertex `v` is held at `target` [m].
+/// Vertex `v` is attached to `target` [m].
 template <class Target>
-[[nodiscard]] VertexAttachment<typename Target::Scalar> force_on(Index v, const Target& target) noexcept {
+[[nodiscard]] VertexAttachment<typename Target::Scalar> pull(Index v, const Target& target) noexcept {
     return {v, target};
 }
 
-/// `vertices` stay where they are; the span must outlive the step.
+/// `vertices` keep their positions; the span must outlive the step.
 [[nodiscard]] inline PinnedVertices pin(std::span<const Index> vertices) noexcept { return {vertices}; }
 
 /// `force` [N] acts on the point `barycentric` of the triangle with the vertices `corners`.

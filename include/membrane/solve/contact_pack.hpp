@@ -21,7 +21,7 @@ namespace membrane {
 /// How a contact point follows the tool.
 enum class ContactKind : unsigned char {
     end,    ///< the point of the triangle nearest to an end of the tool's axis
-    plane,  ///< the same, but the normal is the triangle's, even where an edge or a corner is nearest
+    plane,  ///< as `end`, but the normal is the triangle's, even if an edge or a corner is nearest
     edge,   ///< the point of the edge from corner 0 to corner 1 nearest to the axis
     fixed,  ///< weights and normal stay as they are through a step
 };
@@ -29,7 +29,7 @@ enum class ContactKind : unsigned char {
 /// The feature of a point whose weights and normal stay as they are.
 inline constexpr int fixed_feature = -1;
 
-/// Features are numbered as `proximity` has its pairs.
+/// Features have the numbers of the pairs of `proximity`.
 template <Real Scalar>
 [[nodiscard]] constexpr ContactKind kind_of(const ContactPoint<Scalar>& point) noexcept {
     if (point.feature == fixed_feature) return ContactKind::fixed;
@@ -39,41 +39,41 @@ template <Real Scalar>
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// As many contact points of one kind as there are lanes, no two with a corner in common: what they act with, and what was
-/// found when they were last located. They lie in memory alike for every instruction set.
+/// Contact points of one kind, one for each lane, no two with a common corner: their forces, and their geometry at the
+/// last `locate`. The memory layout is the same for every instruction set.
 template <Real Scalar>
 struct alignas(32) ContactPack {
     using Wide = Lanes<Scalar>;
     static constexpr std::size_t lanes = Wide::count;
 
-    /// What the points act with on their corners.
+    /// Force and stiffness of the points on their corners.
     struct Load {
         Vector3<Wide> weights, normal;
         Wide force;               ///< multiplier [N], 0 or more
-        Vector3<Wide> stiffness;  ///< that it adds to each corner along the normal [N/m]
+        Vector3<Wide> stiffness;  ///< added to each corner along the normal [N/m]
     };
 
-    Load load;      ///< as found by the last pass
-    Load applied;   ///< what the rows of forces have of it
+    Load load;      ///< by the last pass
+    Load applied;   ///< included in the rows of forces
     Wide distance;  ///< of the tool's axis from the points, along their normals [m]
 
-    Vector3<Wide> free;                              ///< 1 for a corner that may move
-    Wide side;                                       ///< as of the points
-    Wide end;                                        ///< 0 or 1: which end of the tool's axis
-    Wide listed;                                     ///< 1 for lanes in use
-    Wide used;                                       ///< the same, but 0 where the tool's axis is nearest with an end
-    std::array<std::array<Index, lanes>, 3> corner;  ///< where the rows of the corners begin
-    std::array<Index, lanes> point;                  ///< which contact point, of all of the step
-    std::array<unsigned char, lanes> turn;           ///< which corner of the point is corner 0 here
+    Vector3<Wide> free;  ///< 1 for a corner that may move
+    Wide side;           ///< of the points, see `ContactPoint::side`
+    Wide end;            ///< 0 or 1: which end of the tool's axis
+    Wide listed;         ///< 1 for lanes in use
+    Wide used;           ///< as `listed`, but 0 if an end of the tool's axis is nearest to an edge
+    std::array<std::array<Index, lanes>, 3> corner;  ///< begins of the corners' rows
+    std::array<Index, lanes> point;                  ///< number of the contact point in the step
+    std::array<unsigned char, lanes> turn;           ///< number of the point's corner that is corner 0 here
     std::size_t size = 0;                            ///< lanes in use
     ContactKind kind = ContactKind::end;
-    bool on_fixed = false;   ///< whether a corner of one is fixed
-    bool has_sides = false;  ///< whether the side of one is known
-    bool acts = true;        ///< whether one pressed or was inside in the last pass over all
+    bool on_fixed = false;   ///< whether a corner of a point is fixed
+    bool has_sides = false;  ///< whether the side of a point is known
+    bool acts = true;        ///< whether a point pressed or penetrated in the last pass over all packs
 };
 
-/// Contact points in packs, for all constraints of a step. A point goes to the first pack of its kind with room that has none
-/// of its corners: as a greedy colouring goes, so that points of one pack may be solved at once.
+/// Contact points in packs, for all constraints of a step. A point joins the first pack of its kind with a free lane
+/// and none of its corners, a greedy colouring: so the points of one pack may be solved at once.
 template <Real Scalar>
 class ContactPacks {
   public:
@@ -87,12 +87,13 @@ class ContactPacks {
     [[nodiscard]] std::span<ContactPack<Scalar>> items() noexcept { return packs_.items(); }
     [[nodiscard]] std::span<const ContactPack<Scalar>> items() const noexcept { return packs_.items(); }
 
-    /// Appends packs of these points, whose forces are in the rows of forces; the first is number `first` of all. There is
-    /// room for as many packs as for points. Cost: linear in their number.
+    /// Appends packs of these points, whose forces are in the rows of forces; the first is number `first` of all. The
+    /// capacity in packs is that in points. Cost: linear in the points.
     template <class IsFixed>
     void append(std::span<const ContactPoint<Scalar>> points, std::size_t first, IsFixed is_fixed) noexcept;
 
-    /// Brings weights, normal and force of `points`, all of the step, up to date with their packs. Cost: linear in the points.
+    /// Brings weights, normal and force of `points`, all of the step, up to date with their packs. Cost: linear in the
+    /// points.
     void unpack(std::span<ContactPoint<Scalar>> points) const noexcept;
 
   private:
@@ -105,7 +106,7 @@ class ContactPacks {
                          const IsFixed& is_fixed) noexcept;
 
     FixedVector<ContactPack<Scalar>> packs_;
-    std::vector<std::uint64_t> colours_;  // of each vertex, those of the points it is a corner of; zero between calls
+    std::vector<std::uint64_t> colours_;  // of each vertex, the colours of its points as bits; zero between calls
     Index unused_row_;
 };
 
@@ -115,7 +116,7 @@ template <Real Scalar>
 void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     ContactPack<Scalar> pack;
     const Vector3<Lanes<Scalar>> none(0, 0, 0);
-    pack.load = {{1, 0, 0}, none, 0, none};  // of unused lanes: valid numbers
+    pack.load = {{1, 0, 0}, none, 0, none};  // unused lanes have valid numbers
     pack.applied = {none, none, 0, none};
     pack.free = none;
     pack.distance = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
@@ -157,13 +158,13 @@ template <class IsFixed>
 void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, std::size_t first,
                                   IsFixed is_fixed) noexcept {
     constexpr auto none = static_cast<std::size_t>(-1);
-    std::array<std::array<std::size_t, colour_count>, 4> open;  // of each kind and colour, the pack with room
+    std::array<std::array<std::size_t, colour_count>, 4> open;  // of each kind and colour, the pack with a free lane
     for (auto& of_kind : open) of_kind.fill(none);
     const auto colours = [this](Index v) -> std::uint64_t& { return colours_[static_cast<std::size_t>(v)]; };
     const auto add = [&](const ContactPoint<Scalar>& point) {
         const auto& v = point.corners;
         const ContactKind kind = kind_of(point);
-        // A vertex with so many points that all colours are taken has the next ones in packs of their own.
+        // If the points of a vertex have all colours, each further point gets a pack of its own.
         const auto colour = static_cast<std::size_t>(std::countr_one(colours(v[0]) | colours(v[1]) | colours(v[2])));
         std::size_t at = colour < colour_count ? open[static_cast<std::size_t>(kind)][colour] : none;
         if (at == none || packs_[at].size == lanes) {
@@ -177,7 +178,7 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
             if (colour < colour_count) colours(corner) |= std::uint64_t{1} << colour;
         }
     };
-    // Those that press first: points that are only near cost less in packs of their own.
+    // Pressing points first: in packs of their own, points that are only near cost less.
     const auto presses = [](const ContactPoint<Scalar>& point) { return !(point.force == Vector3<Scalar>::Zero()); };
     for (const auto& point : points) {
         if (presses(point)) add(point);

@@ -15,15 +15,14 @@
 #include <membrane/solve/step_state.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// Contact points against a tool, several at a time: where they are now, how deep the tool is in, and the force that keeps
-/// it out.
+/// Contact points against a tool, several at a time: their positions, penetrations and contact forces.
 ///
-///     membrane::push_out(state, tool, packs);                      // the surface yields before any force is known
+///     membrane::push_out(state, tool, packs);                      // moves the surface out of the tool
 ///     membrane::solve_contacts(state, tool, packs);                // projected Gauss-Seidel, one pass
 ///     membrane::apply_forces(state, packs);
 namespace membrane {
 
-/// The tool as contact points see it.
+/// The tool in contact.
 template <Real Scalar>
 struct ContactTool {
     Vector3<Scalar> position, axis;
@@ -31,34 +30,35 @@ struct ContactTool {
     Scalar radius;               ///< [m]
 };
 
-/// What one pass over contact points has changed.
+/// Result of one pass over contact points.
 template <Real Scalar>
 struct ContactPass {
-    Scalar largest = 0;     ///< change of a force [N]
-    bool released = false;  ///< whether a point was let go that pressed harder than what resists it
-    bool deep = false;      ///< whether the tool was inside a point by more than `deep_overlap` of an edge
+    Scalar largest = 0;     ///< largest change of a force [N]
+    bool released = false;  ///< whether a point was released whose force far exceeded the internal force
+    bool deep = false;      ///< whether a penetration was more than `deep_overlap` of an edge
 };
 
-/// What the tool may be inside the surface at the end of a tick is a part of an edge: this much [1].
+/// The penetration allowed at the end of a tick, relative to an edge [1].
 inline constexpr double deep_overlap = 0.005;
 
-/// One pass: brings each point up to date with the positions, and moves the free corners of one that is inside the tool until
-/// it is outside. Returns whether any had to move. Online. Cost: linear in the points.
+/// One pass: locates each point at the current positions, and moves the free corners of a penetrating point until it is
+/// outside the tool. Returns whether a point moved. Online. Cost: linear in the points.
 template <Real Scalar>
 bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool, std::span<ContactPack<Scalar>> packs) noexcept;
 
-/// One pass of projected Gauss-Seidel: brings each point up to date with the positions, changes its force by what closes
-/// the gap at the compliance of its corners, never below zero, and moves them along. A pass that comes `again`, before the
-/// vertices have moved, leaves out packs whose points neither pressed nor were inside. Online. Cost: linear in the points.
+/// One pass of projected Gauss-Seidel: locates each point at the current positions, changes its force by the gap over
+/// the compliance of its corners, never below zero, and moves the corners by their response. If `again`, without vertex
+/// updates since the last pass, skips packs whose points neither pressed nor penetrated. Online. Cost: linear in the
+/// points.
 template <Real Scalar>
 ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
                                    std::span<ContactPack<Scalar>> packs, bool again = false) noexcept;
 
-/// Lets the vertices feel the forces that these passes have found.
+/// Applies the forces found by these passes to the vertices.
 template <Real Scalar>
 void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept;
 
-/// How far one of these vertices has moved from its `anchor` at most, squared [m^2]. @pre they are kept
+/// The largest squared distance of one of these vertices from its `anchor` [m^2]. @pre they are kept
 template <Real Scalar>
 [[nodiscard]] Scalar largest_squared_move(const StepState<Scalar>& state, std::span<const Index> vertices) noexcept;
 
@@ -69,7 +69,7 @@ template <Real Scalar>
     return {a.x(), a.y(), a.z()};
 }
 
-/// Calls `act` with 0, 1 and 2. Written out by hand: compilers leave a long loop rolled up, and what it reads in memory.
+/// Calls `act` with 0, 1 and 2. Unrolled by hand: compilers do not unroll a long loop, and keep its data in memory.
 template <class Act>
 [[gnu::always_inline]] inline void each_corner(const Act& act) noexcept {
     act(std::integral_constant<std::size_t, 0>());
@@ -77,14 +77,15 @@ template <class Act>
     act(std::integral_constant<std::size_t, 2>());
 }
 
-/// A face that rocks under a tool moves the contact point along itself, and with it the force from corner to corner: for
-/// each corner the stiffness [N/m] that this amounts to. `moment` is the force times the distance from the face to the
-/// tool's axis [N m].
+/// The stiffness [N/m] of each corner by rocking: a triangle that rocks under a tool moves the contact point along
+/// itself, and so shifts the force between the corners. `moment` is the force times the distance from the triangle to
+/// the tool's axis [N m].
 template <Number N>
 [[nodiscard]] Vector3<N> rocking_stiffness(const Triangle<N>& triangle, const Vector3<N>& weights,
                                            const N& moment) noexcept {
     const Vector3<N> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, bc = triangle.c - triangle.b;
-    const Vector3<N> squares(squared_norm(bc), squared_norm(ac), squared_norm(ab));  // of the side across from each
+    const Vector3<N> squares(squared_norm(bc), squared_norm(ac),
+                             squared_norm(ab));  // of the edge opposite of each corner
     const auto missing = [&](Eigen::Index k) { return !(weights[k] > 0); };
     const auto in_face = smaller(smaller(weights[0], weights[1]), weights[2]) > 0;
     const auto at_corner = larger(larger(weights[0], weights[1]), weights[2]) >= 1;
@@ -100,11 +101,11 @@ template <Number N>
     return stiffness;
 }
 
-/// Beyond, squares overflow: half of the range, less a few bits.
+/// Squares of larger numbers overflow: half of the exponent range, less a few bits.
 template <Real Scalar>
 inline constexpr Scalar too_far = Scalar(sizeof(Scalar) == 4 ? 1e18 : 1e153);
 
-/// The tool stays on the side where it was found.
+/// The normal with the sign that keeps the tool on its last side.
 template <Real Scalar>
 [[gnu::always_inline, nodiscard]] inline Vector3<Lanes<Scalar>> on_same_side(const Vector3<Lanes<Scalar>>& normal,
                                                                              const ContactPack<Scalar>& pack) noexcept {
@@ -112,8 +113,8 @@ template <Real Scalar>
     return select<Wide>(dot(normal, pack.load.normal) < 0, -1, 1) * normal;
 }
 
-/// The normal of a pack along `along`, as far as there is a point: the tool stays on the side of the triangle, or of the edge
-/// or corner it is nearest to, where it was found. `separation` is from the points to the tool's axis [m].
+/// Sets the normal of a pack along `along` in lanes where the point is `found`: the tool stays on its last side of the
+/// triangle, or of the nearest edge or corner. `separation` is from the points to the tool's axis [m].
 template <Real Scalar>
 [[gnu::always_inline]] inline void set_normal(const typename Lanes<Scalar>::Mask& found,
                                               const Vector3<Lanes<Scalar>>& along,
@@ -133,10 +134,11 @@ template <Real Scalar>
     pack.distance = select<Wide>(exists, dot(separation, normal), 0);
 }
 
-/// Over the inside of a triangle the tool is on the side that is known; elsewhere, where it was found.
+/// Inside of a triangle the tool is on the known side; elsewhere it stays on its last side.
 template <Real Scalar>
-[[gnu::always_inline]] inline void keep_side(const typename Lanes<Scalar>::Mask& in_face,
-                                             const Vector3<Lanes<Scalar>>& area, ContactPack<Scalar>& pack) noexcept {
+[[gnu::always_inline]] inline void use_known_side(const typename Lanes<Scalar>::Mask& in_face,
+                                                  const Vector3<Lanes<Scalar>>& area,
+                                                  ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     if (!pack.has_sides) return;
     const auto known = in_face & (pack.side != Wide(0));
@@ -144,8 +146,8 @@ template <Real Scalar>
     for (Eigen::Index k = 0; k < 3; ++k) normal[k] = select<Wide>(known, pack.side * area[k], normal[k]);
 }
 
-/// `locate` where all points lie in the faces of their triangles, the usual case: one root and one division. False, and
-/// nothing is done, if one does not.
+/// `locate` for the usual case that all points lie inside their triangles: one root and one division. If a point does
+/// not, returns false and changes nothing.
 template <Real Scalar>
 [[gnu::always_inline]] inline bool locate_in_faces(const Triangle<Lanes<Scalar>>& triangle,
                                                    const Vector3<Lanes<Scalar>>& axis_point,
@@ -164,7 +166,7 @@ template <Real Scalar>
     const Wide per_length = 1 / root_of<Wide>(select<Wide>(in_face, whole, 1)), part = per_length * per_length;
     const Wide b = part * weight_b, c = part * weight_c;
     Vector3<Wide> normal = per_length * area;
-    keep_side(in_face, normal, pack);
+    use_known_side(in_face, normal, pack);
     normal = on_same_side(normal, pack);
     pack.load.weights = {larger<Wide>(0, 1 - b - c), b, c};
     pack.load.normal = normal;
@@ -173,8 +175,8 @@ template <Real Scalar>
     return true;
 }
 
-/// Brings weights, normal and distance of a pack up to date with the positions, its forces unchanged but for points that are
-/// no more.
+/// Updates weights, normal and distance of a pack to the current positions. Its forces stay, but for points that no
+/// longer exist.
 template <Real Scalar>
 [[gnu::always_inline]] inline void locate(const ContactTool<Scalar>& tool,
                                           const std::array<PaddedLanes<Scalar>, 3>& corner,
@@ -192,7 +194,7 @@ template <Real Scalar>
         const Vector3<Wide>& weights = nearest.barycentric;
         const Vector3<Wide> separation = axis_point - nearest.point, area = area_vector(triangle);
         const auto in_face = smaller(smaller(weights[0], weights[1]), weights[2]) > 0;
-        keep_side(in_face, area, pack);
+        use_known_side(in_face, area, pack);
         Vector3<Wide> along = area;
         if (pack.kind == ContactKind::end) {
             for (Eigen::Index k = 0; k < 3; ++k) along[k] = select<Wide>(in_face, area[k], separation[k]);
@@ -208,7 +210,7 @@ template <Real Scalar>
     }
 }
 
-/// Adds to the rows of forces what a pack acts with now, less what they have of it.
+/// Adds the change of a pack's forces since they were last applied to the rows of forces.
 template <Real Scalar>
 [[gnu::always_inline]] inline void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
@@ -230,7 +232,7 @@ template <Real Scalar>
     pack.applied = load;
 }
 
-/// By how much fixed corners yield to the tool.
+/// Compliance and displacement of fixed corners under the tool.
 template <Real Scalar>
 struct SupportOfPack {
     Lanes<Scalar> compliance = 0;            // of all points [m/N]
@@ -257,7 +259,7 @@ template <Real Scalar>
     return sum;
 }
 
-/// How far the tool is from the points of a pack, along their normals; where fixed corners yield, from there [m].
+/// Gap between the tool and the points of a pack, along their normals, with the displacement of fixed corners [m].
 template <Real Scalar>
 [[gnu::always_inline, nodiscard]] inline Lanes<Scalar> gap_of(const ContactTool<Scalar>& tool,
                                                               const ContactPack<Scalar>& pack,
@@ -265,7 +267,7 @@ template <Real Scalar>
     return pack.distance - support.displacement - tool.radius;
 }
 
-/// A gap that is not worth closing: what a negligible force makes of it, or a few roundings [m].
+/// A negligible gap: the response to a negligible force, or a few roundings [m].
 template <Real Scalar>
 [[gnu::always_inline, nodiscard]] inline Lanes<Scalar> gap_tolerance(const StepState<Scalar>& state,
                                                                      const std::array<PaddedLanes<Scalar>, 3>& corner,
@@ -291,10 +293,10 @@ template <Real Scalar>
             gather_padded(state.position.data(), pack.corner[2].data())};
 }
 
-/// How the corners of a pack respond to a newton along the normal, and what resists at them.
+/// Response of the corners of a pack to a unit force along the normal, and the internal force and stiffness there.
 template <Real Scalar>
 struct PackResponse {
-    std::array<Vector3<Lanes<Scalar>>, 3> of_corner;   // to its share [m/N]
+    std::array<Vector3<Lanes<Scalar>>, 3> of_corner;   // to its part of the force [m/N]
     Lanes<Scalar> compliance;                          // of the points [m/N]
     Lanes<Scalar> internal_force, internal_stiffness;  // sums over the corners [N], [N/m]
 };
@@ -324,8 +326,8 @@ template <Real Scalar>
     return response;
 }
 
-/// Changes the force of each point that acts by what closes its gap, never below zero, and moves the corners along. Returns
-/// the change.
+/// Changes the force of each acting point by its gap over its compliance, never below zero, and moves the corners by
+/// their response. Returns the absolute change [N].
 template <Real Scalar>
 [[gnu::always_inline]] inline Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lanes<Scalar>::Mask& acts,
                                                   const Lanes<Scalar>& gap, const Lanes<Scalar>& tolerance,
@@ -336,8 +338,8 @@ template <Real Scalar>
     const auto moves = acts & (response.compliance > 0);
     const Wide divisor = select<Wide>(moves, response.compliance, 1);
     Wide change = larger<Wide>(-gap / divisor, -pack.load.force);
-    // In balance the force is what springs and foundation at the corners resist with, or will once the gap is closed.
-    // Points that press much harder, where a tool has jumped to the wrong side of some, press against one another.
+    // At equilibrium the contact force balances the internal force at the corners, now or once the gap is closed. If a
+    // force is much larger, a tool has jumped to the wrong side of some points, and they press against one another.
     const Wide limit = 8 * (response.internal_force + abs(gap) * response.internal_stiffness);
     const auto too_hard = moves & (pack.load.force + change > limit);
     change = select<Wide>(too_hard, -pack.load.force, change);
@@ -370,7 +372,7 @@ template <Real Scalar>
     for (auto& pack : packs) {
         auto corner = detail::corners_of(state, pack);
         detail::locate(tool, corner, pack);
-        if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners yield by the forces up to here
+        if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners respond to the forces so far
         const auto support = detail::support_of(state, pack);
         const Wide gap = detail::gap_of(tool, pack, support);
         const auto inside = (pack.used > 0) & (-gap > detail::gap_tolerance(state, corner, pack, support));
@@ -396,7 +398,7 @@ template <Real Scalar>
         if (again && !pack.acts) continue;
         auto corner = detail::corners_of(state, pack);
         detail::locate(tool, corner, pack);
-        if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners yield by the forces up to here
+        if (pack.on_fixed) detail::add_forces(state, pack);  // fixed corners respond to the forces so far
         const auto support = detail::support_of(state, pack);
         const Wide gap = detail::gap_of(tool, pack, support);
         const auto acts = (pack.used > 0) & ((pack.load.force > 0) | (gap < 0));

@@ -8,15 +8,15 @@
 
 #include <membrane/core/types.hpp>
 
-/// When a step is to be over.
+/// The deadline of a step.
 ///
 ///     using Clock = std::chrono::steady_clock;
 ///     const auto deadline = membrane::Deadline([] { return Clock::now(); }, Clock::now() + 300us);
 ///     const auto report = solver.step_until(deadline, x, dt, network, foundation, press(tool, contact));
 namespace membrane {
 
-/// A time of the caller's clock. `now()` gives the time as a number [s] or as a time point of std::chrono; it is called
-/// within the step, so what the step promises, to call no system for one, it promises as far as the clock does.
+/// A time of the caller's clock. `now()` returns the time as a number [s] or as a time point of std::chrono. A step
+/// calls it: the guarantee that a step makes no system call holds if it holds for `now`.
 template <class Now>
 class Deadline {
   public:
@@ -24,7 +24,7 @@ class Deadline {
 
     Deadline(Now now, Time at) : now_(std::move(now)), at_(at) {}
 
-    /// Until then [s]; negative when it is past.
+    /// Time left [s]; negative after the deadline.
     [[nodiscard]] double left() const {
         if constexpr (std::is_arithmetic_v<Time>) {
             return static_cast<double>(at_) - static_cast<double>(now_());  // below zero for unsigned times, too
@@ -40,19 +40,19 @@ class Deadline {
     Time at_;
 };
 
-/// Beyond layer 0 the clock is read each time so many vertices have been updated.
+/// Number of vertex updates beyond layer 0 between readings of the clock.
 inline constexpr std::size_t updates_in_batch = 32;
 
-/// What the parts of a step cost, as the last steps have shown.
+/// Costs of the parts of a step, measured in the last steps.
 struct StepCosts {
     double update = 0;       ///< [s]
     double enforcement = 0;  ///< in updates
-    double residual = 4;     ///< of each vertex whose force is evaluated at the end, in updates; at first a guess
+    double residual = 4;     ///< of one residual force at the end, in updates; the initial value is a guess
     bool known = false;
 };
 
-/// The time that a step has: no limit, or until a deadline, of which it keeps as much for the residual forces at its end as
-/// those took lately. The clock is read with every contact iteration and every batch of updates beyond layer 0.
+/// The time budget of a step: no limit, or until a deadline less the recent cost of the residual forces at the end. The
+/// clock is read at every contact iteration and every batch of updates beyond layer 0.
 class TimeBudget {
   public:
     TimeBudget() = default;  ///< No limit.
@@ -66,15 +66,15 @@ class TimeBudget {
 
     [[nodiscard]] bool limited() const noexcept { return deadline_ != nullptr; }
 
-    /// The updates begin. At the end of the step so many forces are evaluated.
+    /// Begins the updates; at the end of the step the residual forces of `vertices` are evaluated.
     void begin(std::size_t vertices) {
         set_residual_count(vertices);
         if (limited()) left_ = left_of_(deadline_);
     }
     void set_residual_count(std::size_t vertices) { residual_count_ = static_cast<double>(vertices); }
 
-    /// Whether there is time for a contact iteration of so many updates, or for a batch beyond layer 0. The first of each is
-    /// made in any case, or a membrane would never come to rest.
+    /// Whether there is time for a contact iteration of so many updates, or for a batch beyond layer 0. The first of
+    /// each is always made, so that the membrane reaches its equilibrium.
     [[nodiscard]] bool has_time_for_contact(std::size_t updates) {
         return !limited() || std::exchange(first_contact_, false) ||
                has_time_for(static_cast<double>(updates) + costs_->enforcement);
@@ -94,7 +94,7 @@ class TimeBudget {
         if (limited()) costs_->enforcement = in_updates(lap());
     }
 
-    /// The step is over.
+    /// Ends the step.
     void end() {
         if (!limited() || residual_count_ == 0) return;
         const double found = in_updates(lap()) / residual_count_, known = costs_->residual;
@@ -112,7 +112,7 @@ class TimeBudget {
         return (std::max)(before - left_, 0.0);
     }
 
-    const void* deadline_ = nullptr;  // of whatever clock
+    const void* deadline_ = nullptr;  // its type is known to `left_of_`
     double (*left_of_)(const void* deadline) = nullptr;
     StepCosts* costs_ = nullptr;
     double left_ = 0, residual_count_ = 0, time_ = 0, updates_ = 0;

@@ -6,7 +6,7 @@
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/model/volume_springs.hpp>
 
-/// The usual way to move masses and springs, against which the quasi-static solver is measured.
+/// Explicit time integration of masses and springs, the reference for the quasi-static solver.
 ///
 ///     auto euler = membrane::ExplicitEuler(network);
 ///     auto v = membrane::Points<double>::Zero(3, network.vertex_count()).eval();
@@ -14,8 +14,8 @@
 namespace membrane {
 
 /// Explicit Euler, [Liu07] (2) and (3): all vertices at once, the velocity by the force, then the position by the *new*
-/// velocity. It is stable for dt sqrt(largest eigenvalue of M^-1 H) < 2 at the most, H the stiffness of all springs.
-/// Positions and velocities are the caller's; the forces within a step are the one thing it keeps.
+/// velocity. It is stable at most for dt sqrt(largest eigenvalue of M^-1 H) < 2, H the stiffness of all springs.
+/// The caller owns positions and velocities; this keeps only the forces of a step.
 template <Real Scalar>
 class ExplicitEuler {
   public:
@@ -26,8 +26,8 @@ class ExplicitEuler {
         if (!network.has_masses()) refuse("ExplicitEuler", "the network must have masses [kg]");
     }
 
-    /// One step of `dt` [s] under the springs, the viscosity and the foundation. `x` [m] and `velocity` [m/s] are 3 x V;
-    /// pinned vertices stay. False, with both as they were, where the result would not be finite or dt is not positive.
+    /// One step of `dt` [s] under the springs, the viscosity and the foundation. `x` [m] and `velocity` [m/s] are 3 x
+    /// V; pinned vertices stay. If the result is not finite or dt is not positive, returns false with both unchanged.
     /// Online. Cost: all springs.
     template <ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume>
     [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt, const Network& network,
@@ -36,7 +36,7 @@ class ExplicitEuler {
         return advance(x, velocity, dt, network, volume);
     }
 
-    /// The same with an external force on each vertex, F^ext of (1), 3 x V [N].
+    /// One step with an external force on each vertex, F^ext of (1), 3 x V [N].
     template <ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume>
     [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt, const Network& network,
                             const Volume& volume, const ConstPointsRef<Scalar>& external) noexcept {
@@ -44,7 +44,7 @@ class ExplicitEuler {
         return advance(x, velocity, dt, network, volume);
     }
 
-    /// Largest unbalanced force on a vertex in the last step, viscosity left out [N].
+    /// Largest residual force on a vertex in the last step, without viscosity [N].
     [[nodiscard]] Scalar residual() const noexcept { return residual_; }
 
   private:
@@ -69,7 +69,7 @@ bool ExplicitEuler<Scalar>::advance(PointsRef<Scalar>& x, PointsRef<Scalar>& vel
     previous_velocity_ = velocity;
     const ConstPointsRef<Scalar> here(x);
     for (Index v = 0; v < network.vertex_count(); ++v) {
-        // The foundation is damped by the vertex's velocity: over a tick it would have come from here.
+        // The velocity of the vertex damps the foundation: it gives the position at the start of the tick.
         const Vector3<Scalar> start = point(x, v) - dt * point(velocity, v);
         force_.col(v) += network.force_on(v, here).force + volume.force_on(v, point(x, v), start, dt).force;
     }

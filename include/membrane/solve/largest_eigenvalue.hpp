@@ -5,19 +5,19 @@
 
 namespace membrane {
 
-/// Largest curvature that the network gives the energy when vertex `v` moves alone [N/m]: the largest eigenvalue
-/// of the vertex's own 3 x 3 block. Moving vertices one by one converges while the step for each newton stays below 2
-/// over this; the sum of stiffnesses in `VertexForce` is a bound of it that costs nothing.
+/// The largest eigenvalue of the 3 x 3 Hessian block of vertex `v` in the network [N/m]. Updates vertex by vertex
+/// converge while the compliance of the step stays below 2 over this. The stiffness of `VertexForce` is a bound of it
+/// at no cost.
 template <Real Scalar, ElasticNetwork<Scalar> Network>
-[[nodiscard]] Scalar largest_curvature(const Network& network, Index v, const ConstPointsRef<Scalar>& x) noexcept {
-    return largest_eigenvalue(network.curvature(v, x));
+[[nodiscard]] Scalar largest_eigenvalue_at(const Network& network, Index v, const ConstPointsRef<Scalar>& x) noexcept {
+    return largest_eigenvalue(network.hessian(v, x));
 }
 
-/// At least that, in half the time; of several vertices at once, too.
+/// A bound of that eigenvalue from above, in half the time; in lanes, too.
 template <Number Scalar>
-[[nodiscard]] Scalar curvature_bound(const EnergyMajoriser<Scalar>& pull) noexcept {
-    Symmetric3<Scalar> block = diagonal3(pull.stiffness);
-    block += Scalar(-1) * pull.stiffness_reduction;
+[[nodiscard]] Scalar stiffness_bound_of(const EnergyMajoriser<Scalar>& majoriser) noexcept {
+    Symmetric3<Scalar> block = diagonal3(majoriser.stiffness);
+    block += Scalar(-1) * majoriser.stiffness_reduction;
     return eigenvalue_bound(block);
 }
 

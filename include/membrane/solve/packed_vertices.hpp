@@ -15,7 +15,7 @@
 
 /// Updates of several vertices at once.
 ///
-///     packed.assign(queue.vertices(), queue.colour_ends(), network);         // where the queue has changed
+///     packed.assign(queue.vertices(), queue.colour_ends(), network);         // if the queue has changed
 ///     packed.append(active.vertices(), active.from_queue(), active.colour_ends(), network);
 ///     packed.begin_step(scene);
 ///     for (std::size_t p = 0, end; p < packed.count(); p = end) {
@@ -24,8 +24,8 @@
 ///     }
 namespace membrane {
 
-/// Whether a rule's updates may be made in lanes: the network is of springs, their law and the rule take `Lanes`, the volume
-/// model hands out its springs, and no update needs a line search.
+/// Whether a rule's updates may be made in lanes: the network is of springs, their law and the rule take `Lanes`, the
+/// foundation model has `spring`, and no update needs a line search.
 template <class Scalar, class Rule, class Network, class Volume>
 concept UpdatesInLanes = (Network::never_stiffens ||
                           !is_safe_rule<Rule>)&&requires(const Rule& rule, const Network& network,
@@ -40,29 +40,29 @@ concept UpdatesInLanes = (Network::never_stiffens ||
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// The vertices of a queue, and then others, in packs of as many as there are lanes: of each its springs, its volume spring
-/// and whether it may move. Vertices of one pack are of one group, which no spring joins. Positions are in `StepState`.
-/// It holds as many groups as there is room for, from the first on.
+/// The vertices of a queue, and then others, in packs of one vertex for each lane: each with its springs, its volume
+/// spring and whether it is free. Vertices of one pack are of one group: no spring joins them. Positions are in
+/// `StepState`. It holds the first groups up to its capacity.
 template <Real Scalar>
 class PackedVertices {
   public:
     using Wide = Lanes<Scalar>;
 
-    /// Has room for `capacity` vertices.
+    /// Allocates for `capacity` vertices.
     template <ElasticNetwork<Scalar> Network>
     explicit PackedVertices(const Network& network, Index capacity = unlimited);
 
-    /// Packs these vertices, in groups that end at `ends`, in place of all there were. Online. Cost: their springs.
+    /// Replaces all vertices by these, in groups that end at `ends`. Online. Cost: their springs.
     template <class Network>
     void assign(std::span<const Index> vertices, std::span<const std::size_t> ends, const Network& network) noexcept;
 
-    /// Appends, until the next call, the groups of `vertices` from number `begin` on; none if not all of those that were
-    /// assigned have room. Online. Cost: their springs.
+    /// Appends, until the next call, the groups of `vertices` from number `begin` on. If the assigned vertices exceed
+    /// the capacity, appends nothing. Online. Cost: their springs.
     template <class Network>
     void append(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
                 const Network& network) noexcept;
 
-    /// How many vertices and packs there are.
+    /// Number of vertices, and of packs.
     [[nodiscard]] std::size_t size() const noexcept { return members_.size(); }
     [[nodiscard]] std::size_t count() const noexcept { return packs_.size(); }
 
@@ -80,7 +80,7 @@ class PackedVertices {
                                         packs.begin());
     }
 
-    /// The pack with which the group of pack `p` is over, `end` at the latest.
+    /// The end of the group of pack `p`, at most `end`.
     [[nodiscard]] std::size_t end_of_group(std::size_t p, std::size_t end) const noexcept {
         while (p + 1 < end && packs_[p].next_is_of_group) ++p;
         return p + 1;
@@ -89,18 +89,19 @@ class PackedVertices {
     /// All vertices in packs and their neighbours, each once: their positions must be loaded.
     [[nodiscard]] std::span<const Index> needed() const noexcept { return needed_.items(); }
 
-    /// Takes volume springs, masses and who is fixed for the step. @pre `needed` are loaded
+    /// Loads volume springs, masses and fixed vertices of the step. @pre `needed` are loaded
     template <class Scene>
     void begin_step(const Scene& scene) noexcept;
 
-    /// How many of pack `p` may move.
+    /// Number of free vertices of pack `p`.
     [[nodiscard]] Index free_count(std::size_t p) const noexcept { return terms_[p].free_count; }
 
     enum class Outcome : unsigned char { at_rest, moved, too_far };
 
-    /// Moves the vertices of packs number `begin` to `end`, all of one group, as `rule` says; `in_contact`, constraints act on
-    /// them, and their response is kept. Where a move may be beyond what is stable, it is `too_far`, and its pack stays as
-    /// it is. Some packs by each thread, and in a thread two at a time, whose roots and divisions overlap.
+    /// Updates the vertices of packs number `begin` to `end`, all of one group, by `rule`. If `in_contact`, constraints
+    /// act on them, and their response is kept. If a displacement may be unstable, the outcome is `too_far` and its
+    /// pack is unchanged. Threads share the packs; a thread updates two at a time, so that their roots and divisions
+    /// overlap.
     template <bool in_contact, class Scene, class Rule, Executor E>
     void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule, const E& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
@@ -110,27 +111,27 @@ class PackedVertices {
             if (p < begin + last) outcomes_[p] = update_pack<in_contact>(p, scene, rule);
         });
     }
-    /// What the last `update` has done with pack `p`.
+    /// Outcome of the last `update` for pack `p`.
     [[nodiscard]] Outcome outcome(std::size_t p) const noexcept { return outcomes_[p]; }
 
-    /// The same for one pack, which goes too far if that is `allowed`.
+    /// Updates one pack; if `allowed`, a displacement that may be unstable is made.
     template <bool in_contact, class Scene, class Rule>
     Outcome update_pack(std::size_t p, const Scene& scene, const Rule& rule, bool allowed = false) noexcept;
 
-    /// Leaves the forces on the vertices of pack `p` in the rows of residual forces.
+    /// Writes the forces on the vertices of pack `p` to the rows of residual forces.
     template <class Scene>
     void evaluate_residual(std::size_t p, const Scene& scene) const noexcept;
 
   private:
     static constexpr std::size_t lanes = Wide::count;
-    using Begins = std::array<Index, lanes>;  // of each lane, where its row begins
+    using Begins = std::array<Index, lanes>;  // begin of each lane's row
     struct Pack {
         std::size_t first, size;  // of the members
         std::size_t slot, slot_count;
         Begins own;
         bool next_is_of_group = false;
     };
-    // One spring of each vertex of a pack. It lies in memory alike for every instruction set.
+    // One spring of each vertex of a pack. The memory layout is the same for every instruction set.
     struct alignas(32) Slot {
         Wide stiffness, rest_length;
         Begins other;
@@ -138,7 +139,7 @@ class PackedVertices {
     struct alignas(32) Terms {
         VolumeSpring<Wide> spring;
         Wide mass = 1;
-        Wide free = 0;  // 1 where it may move
+        Wide free = 0;  // 1 for a free vertex
         Index free_count = 0;
         bool damps = false;
     };
@@ -159,7 +160,7 @@ class PackedVertices {
     }
     template <class Sum, class Scene>
     [[nodiscard]] Sum springs_on(std::size_t p, const Vector3<Wide>& here, const Scene& scene) const noexcept;
-    // Of a pack before it moves.
+    // State of a pack before its update.
     struct PackState {
         Vector3<Wide> here, constraint_force;
         VertexState<Wide> vertex;
@@ -181,12 +182,12 @@ class PackedVertices {
     void keep_response(std::size_t p, const PackState& at, const Symmetric3<Wide>& block,
                        StepState<Scalar>& rows) const noexcept;
 
-    // Packs are half empty at the worst that is made room for.
+    // The capacity allows for packs that are half empty.
     [[nodiscard]] static std::size_t packs_for(std::size_t vertices) noexcept {
         return vertices == 0 ? 0 : 2 * vertices / lanes + 64;
     }
 
-    Index unused_row_;  // where the row of unused lanes begins
+    Index unused_row_;  // begin of the row of unused lanes
     FixedVector<Index> members_;
     FixedVector<Pack> packs_;
     std::vector<Terms> terms_;
@@ -196,7 +197,7 @@ class PackedVertices {
     FixedVector<Index> needed_;
     std::vector<unsigned char> is_needed_;
     Extent assigned_;
-    bool is_whole_ = false;  // what was assigned has room
+    bool is_whole_ = false;  // all assigned vertices fit
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
@@ -237,7 +238,7 @@ void PackedVertices<Scalar>::append(std::span<const Index> vertices, std::size_t
     if (is_whole_) static_cast<void>(pack(vertices, begin, ends, network));
 }
 
-// False if there is no room for all.
+// False if the vertices exceed the capacity.
 template <Real Scalar>
 template <class Network>
 bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
@@ -262,8 +263,8 @@ void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
     needed_.cut(extent.needed);
 }
 
-// False if there is no room. Lanes without a vertex, and those of vertices with fewer springs, have springs of no length
-// that never pull.
+// False if the vertices exceed the capacity. Lanes without a vertex, and those of vertices with fewer springs, have
+// springs of length 0 without force.
 template <Real Scalar>
 template <class Network>
 bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const Network& network) noexcept {
@@ -325,20 +326,20 @@ template <class Sum, class Scene>
     const auto* rows = scene.state.position.data();
     const auto slots = std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count);
     constexpr std::size_t grain_size = 6;
-    std::array<SpringReach<Wide>, grain_size> reaches;
+    std::array<SpringEdge<Wide>, grain_size> edges;
     for (std::size_t first = 0; first < slots.size(); first += grain_size) {
         const auto some = slots.subspan(first, (std::min)(grain_size, slots.size() - first));
         for (std::size_t i = 0; i < some.size(); ++i) {
-            reaches[i] = SpringReach<Wide>(gather(rows, some[i].other.data()) - here);
+            edges[i] = SpringEdge<Wide>(gather(rows, some[i].other.data()) - here);
         }
         for (std::size_t i = 0; i < some.size(); ++i) {
-            add(sum, pull_of<Wide>(scene.network.law(), reaches[i], some[i].stiffness, some[i].rest_length));
+            add(sum, spring_force<Wide>(scene.network.law(), edges[i], some[i].stiffness, some[i].rest_length));
         }
     }
     return sum;
 }
 
-// Of the state of the vertices, what their springs do.
+// The part of the vertices' state by their springs.
 template <Real Scalar>
 template <class Rule, class Scene>
 [[gnu::always_inline]] inline auto PackedVertices<Scalar>::spring_state(std::size_t p, const Vector3<Wide>& here,
@@ -355,7 +356,7 @@ template <class Rule, class Scene>
     return vertex;
 }
 
-// Volume springs and constraints; `others` comes with what the latter do.
+// Adds the volume springs to `others`, which has the forces of constraints.
 template <Real Scalar>
 template <bool in_contact, class Scene>
 [[gnu::always_inline]] inline void PackedVertices<Scalar>::add_others(std::size_t p, const Vector3<Wide>& here,
@@ -369,7 +370,7 @@ template <bool in_contact, class Scene>
     }
 }
 
-// Compliance, and what resists without constraints; nothing where a vertex may not move.
+// Writes compliance, internal force and internal stiffness; zero for fixed vertices.
 template <Real Scalar>
 [[gnu::always_inline]] inline void PackedVertices<Scalar>::keep_response(std::size_t p, const PackState& at,
                                                                          const Symmetric3<Wide>& block,
@@ -386,7 +387,7 @@ template <Real Scalar>
                            rows.response.data() + 1, begins.data());
 }
 
-// What pulls on the vertices of a pack.
+// Evaluates the forces on the vertices of a pack.
 template <Real Scalar>
 template <bool in_contact, class Rule, class Scene>
 [[gnu::always_inline]] inline auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene) const noexcept
@@ -426,7 +427,7 @@ template <bool in_contact, class Scene, class Rule>
     if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
         if (!allowed && any(move.may_overshoot & may_move)) {
             const auto springs = springs_on<CurvedSum<Wide>>(p, at.here, scene).total();
-            const Wide bound = curvature_bound(springs) + at.others.stiffness;
+            const Wide bound = stiffness_bound_of(springs) + at.others.stiffness;
             if (any((move.compliance * bound >= 2) & may_move)) return Outcome::too_far;
         }
     }

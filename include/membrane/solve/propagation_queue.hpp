@@ -15,16 +15,16 @@
 ///     for (const membrane::Index v : queue.vertices()) { ... }              // nearest to the contact first
 namespace membrane {
 
-/// Vertices in the order of a breadth-first search from the seeds, [Liu07] 2.2: the seeds are layer 0, layer k holds the
-/// vertices that k springs and no fewer join to a seed, until they are grouped together. Within a layer, the order of
-/// arrival, or groups.
+/// Vertices in the order of a breadth-first search from the seeds, [Liu07] 2.2: the seeds are layer 0, layer k holds
+/// the vertices at k springs from the nearest seed, until `group` merges layers. Within a layer the order is
+/// breadth-first, or by groups.
 class PropagationQueue {
   public:
     explicit PropagationQueue(Index vertex_count)
         : reached_(vertex_count), layer_ends_(static_cast<std::size_t>(vertex_count)), groups_(vertex_count) {}
 
-    /// Builds the queue anew, up to layer `layers` (0 for the seeds alone, `unlimited` for all they are joined to). A
-    /// pinned vertex passes no force on: it is never in the queue. Seeds may be named twice.
+    /// Rebuilds the queue, up to layer `layers` (0: the seeds alone; `unlimited`: all vertices connected to them). A
+    /// pinned vertex transmits no force: it is never in the queue. Seeds may repeat.
     /// Online. Cost: the springs of the vertices in the queue.
     template <class Network>
     void build(const Network& network, std::span<const Index> seeds, Index layers) noexcept;
@@ -33,19 +33,19 @@ class PropagationQueue {
     template <class Network>
     bool grow(const Network& network) noexcept;
 
-    /// Orders every layer in groups that no spring joins; or layer 0 and all others together, in fewer and larger ones, which
-    /// makes one layer of them.
+    /// Orders every layer in groups; no spring joins two vertices of a group. If `together`, all layers beyond layer 0
+    /// are merged into one, with fewer and larger groups.
     /// Online. Cost: the springs of the vertices in the queue.
     template <class Network>
     void group(const Network& network, bool together = false) noexcept;
 
-    /// Where in `vertices` the groups end. None before `group` is called.
+    /// Ends of the groups in `vertices`; empty before `group` is called.
     [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return groups_.ends(); }
 
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
     [[nodiscard]] bool contains(Index v) const noexcept { return reached_.contains(v); }
 
-    /// How many layers there are: at most one more than asked for, fewer where the mesh ends before.
+    /// Number of layers: at most one more than `layers`, fewer if the mesh ends before.
     [[nodiscard]] Index layer_count() const noexcept { return static_cast<Index>(layer_ends_.size()); }
 
     /// The vertices of layer `k`. @pre 0 <= `k` < layer_count() (asserted)

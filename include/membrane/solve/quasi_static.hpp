@@ -26,7 +26,7 @@
 #include <membrane/solve/sweeps.hpp>
 #include <membrane/solve/vertex_update.hpp>
 
-/// Where the membrane comes to rest, and what it pushes back with.
+/// The quasi-static solver: equilibrium positions of the membrane and its reactions.
 ///
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
 ///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
@@ -35,7 +35,7 @@ namespace membrane {
 
 namespace detail {
 
-// Keeps the constructor from a network out of the way of the copy constructor.
+// Excludes the solver itself, so that a copy uses the copy constructor.
 template <class Network, class Scalar>
 concept NetworkOfSolver = !requires(Network & solver) {
     solver.wake_all();
@@ -46,29 +46,32 @@ concept NetworkOfSolver = !requires(Network & solver) {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// The quasi-static solver, [Liu07] 2.2: every step is taken to be at rest, and the vertices of the propagation queue
-/// move one after the other, nearest to the contact first, by the step rule, each seeing those that have moved.
+/// The quasi-static solver, [Liu07] 2.2: every step is assumed to be an equilibrium, and the vertices of the
+/// propagation queue are updated one after the other by the step rule, nearest to the contact first, each with the new
+/// positions of the others.
 ///
-/// Beyond the paper: a step starts from an extrapolation of the last one, if the tools move on as they did; it may sweep the queue
-/// several times; vertices that a contact leaves behind stay active until their forces balance, and then cost nothing; constraints keep
-/// their forces from step to step, so that a sweep ends with forces that balance. A step that is refused leaves the
-/// positions as they were, to the bit: it works on a copy of those that it loads, and writes back what has moved.
+/// Beyond the paper: a step starts from an extrapolation of the last displacements, if the tools repeat their motion;
+/// it may sweep the queue several times; after a contact has moved on, vertices stay active until their forces balance,
+/// and then cost nothing; constraints keep their forces from step to step, so that the forces balance after few sweeps.
+/// A step that is refused leaves the positions unchanged, to the bit: it works on a copy of the positions that it
+/// loads, and writes back those that changed.
 ///
-/// Positions, network and volume springs are arguments of each step, always those of one membrane; what is remembered
-/// (queue, vertices awake, packed springs, contact forces) is a cache: `reset` it where constants of the network have changed. One thread at a time for each solver.
+/// Positions, network and volume springs are arguments of each step, always those of one membrane; the solver's state
+/// (queue, vertices awake, packed springs, contact forces) is a cache: `reset` it if constants of the network change.
+/// One thread at a time for each solver.
 template <Real Scalar, CheckedStepRule<Scalar> Rule = BlockStep>
 class QuasiStaticSolver {
   public:
-    /// `executor` is for orders in which several threads may move vertices.
+    /// `executor` is for orders in which several threads may update vertices.
     /// @throws InvalidInput for options out of range, or a rule that needs masses the network does not have.
     /// Cost: O(V) memory.
     template <detail::NetworkOfSolver<Scalar> Network>
     explicit QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options = {}, const Rule& rule = {},
                                const AnyExecutor& executor = {});
 
-    /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
-    /// Cost: `sweeps` + 1 updates for each vertex in the queue or awake, in layer 0 `contact_iterations` in each sweep; an
-    /// update costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
+    /// Brings `x` (3 x V [m]) nearer to equilibrium in a tick of `dt` [s] under up to 16 constraints. Online.
+    /// Cost: `sweeps` + 1 updates for each vertex in the queue or awake, in layer 0 `contact_iterations` in each sweep;
+    /// an update costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
     template <CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
@@ -76,9 +79,10 @@ class QuasiStaticSolver {
         return step_in(TimeBudget(), x, dt, network, volume, refer_to(constraints...));
     }
 
-    /// The same, but stops at `deadline`. It may overrun by the error of its cost estimate, or by the minimum work: one
-    /// contact iteration, 32 updates beyond, and the residual forces of all active vertices. One thread does the updates. The next
-    /// step goes on where time ran out, so that a membrane comes to rest however little time its steps have.
+    /// A step that stops at `deadline`. It may overrun by the error of its cost estimate, or by the minimum work: one
+    /// contact iteration, 32 vertex updates, and the residual forces of all active vertices. One thread makes the
+    /// updates. The next step continues where time ran out, so that a membrane reaches its equilibrium under any
+    /// deadline.
     template <class Now, CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step_until(const Deadline<Now>& deadline, PointsRef<Scalar> x, Scalar dt,
@@ -87,17 +91,16 @@ class QuasiStaticSolver {
         return step_in(TimeBudget(deadline, costs_), x, dt, network, volume, refer_to(constraints...));
     }
 
-    /// Has the next steps update these vertices: what moved them, or their anchors, was not a step of this solver.
-    /// An index that is no vertex is passed over. A `MovingBody` says by itself what it moves.
+    /// Wakes vertices that were moved, or whose anchors were moved, by other means than a step of this solver. Ignores
+    /// an index that is no vertex. Not needed for the motion of a `MovingBody`.
     void wake(std::span<const Index> vertices) noexcept;
     void wake_all() noexcept;
 
-    /// Forgets everything that was remembered: a membrane that is not at rest stays as it is until woken. From here on
-    /// what a new solver does is done, to the bit. Cost: O(V).
+    /// Resets the solver to a new one, to the bit: a membrane out of equilibrium does not move until woken. Cost: O(V).
     void reset() noexcept;
 
-    /// The contact points of constraint number `i` in the last step that advanced, with the force on each [N]: how its reaction
-    /// is distributed. None for a constraint that has none. Valid until the next step.
+    /// The contact points of constraint number `i` in the last step that advanced, with the force on each [N], whose
+    /// sum is its reaction. Empty for a constraint without contact points. Valid until the next step.
     [[nodiscard]] std::span<const ContactPoint<Scalar>> contact_points(std::size_t i) const noexcept {
         if (i >= state_.previous_ranges.size()) return {};
         return state_.previous_ranges[i].of(state_.previous_points.items());
@@ -140,16 +143,16 @@ class QuasiStaticSolver {
     PackedVertices<Scalar> packed_;
     StepState<Scalar> state_;
     IndexSet last_prescribed_;
-    IndexSet woken_;            // since the last step
-    FixedVector<Index> moved_;  // in the last step that advanced, and by how much [m]
-    Points<Scalar> last_displacements_;
+    IndexSet woken_;                     // since the last step
+    FixedVector<Index> moved_;           // in the last step that advanced
+    Points<Scalar> last_displacements_;  // of `moved_` [m]
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
-    bool complete_ = false;           // the last step updated all active vertices as often as it should
+    bool complete_ = false;           // the last step made all its vertex updates
     RigidFrame<Scalar> pose_;         // of the body at the last step
-    std::uint64_t deformations_ = 0;  // of the body by then
-    std::size_t resume_ = 0;          // the number beyond layer 0 of the vertex at which time ran out
+    std::uint64_t deformations_ = 0;  // of the body at the last step
+    std::size_t resume_ = 0;          // number beyond layer 0 of the vertex at which time ran out
     StepCosts costs_;
 };
 
@@ -163,7 +166,7 @@ QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>&
 
 namespace detail {
 
-// Room for packed vertices: none where no volume model allows updates in lanes.
+// Capacity for packed vertices: 0 if no foundation model allows updates in lanes.
 template <class Scalar, class Rule, class Network>
 [[nodiscard]] Index max_in_lanes(const SolverOptions<Scalar>& options) noexcept {
     constexpr bool possible = UpdatesInLanes<Scalar, Rule, Network, NoFoundation>;
@@ -196,7 +199,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
     state_.force_tolerance = options.force_tolerance > 0 ? options.force_tolerance : network.force_tolerance();
 }
 
-// A step, in the order in which it happens.
+// One step, in temporal order.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network, class Volume>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt,
@@ -208,10 +211,10 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     report_ = {};
     report_.reactions = {reactions_.data(), constraints.size()};
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
-    follow_body(volume);  // with what the last step has loaded
+    follow_body(volume);  // uses the vertices loaded by the last step
     state_.begin_step();
 
-    // Views: nothing writes to `x` before the step is over, and `now` shows each move.
+    // Views: `x` does not change before the end of the step, and `now` shows each update.
     const ConstPointsRef<Scalar> start = x, now = state_.positions();
     ConstraintContext<Scalar> context(start, state_, network);
     const ConstraintList<Scalar> acting(context, constraints);
@@ -229,8 +232,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     sweeps.load_and_pack();
     sweeps.run();
     if (report_.status == StepStatus::advanced && !sweeps.evaluate_residuals()) {
-        state_.forget_points();  // what ran away may be a force from the step before
-        state_.restore(start);   // not finite there either: then the input is not valid
+        state_.forget_points();  // a force of the last step may have diverged
+        state_.restore(start);   // not finite at the start positions either: the input is invalid
         report_.status = sweeps.evaluate_residuals() ? StepStatus::unstable : StepStatus::invalid_input;
     }
     if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
@@ -241,7 +244,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     return report_;
 }
 
-// The body has moved since the last step, and the membrane with it: what is remembered goes along.
+// The body has moved since the last step, and the membrane with it: rotates the cached vectors.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Volume>
 void QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume& volume) noexcept {
@@ -258,8 +261,8 @@ void QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume&
     }
 }
 
-// Vertices that moved in the last step go on, as far as what drives them does. A step that was cut short is not
-// extrapolated: where vertices were not updated, the extrapolation would be extrapolated again, and grow from step to step.
+// Adds the extrapolated displacements to vertices that moved in the last step. An incomplete step is not extrapolated:
+// on vertices without update the extrapolation would be extrapolated again, and grow from step to step.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Volume>
 void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& acting,
@@ -267,9 +270,9 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
     if (!options_.predict) return;
     std::array<DrivingInput<Scalar>, StepState<Scalar>::max_constraints> inputs{};
     acting.collect_inputs(inputs);
-    if constexpr (moves<Volume>) {  // as they go on the body
-        for (auto& lead : inputs) {
-            if (lead) lead->at = lead->is_force ? pose_.vector_to_body(lead->at) : pose_.point_to_body(lead->at);
+    if constexpr (moves<Volume>) {  // relative to the body
+        for (auto& input : inputs) {
+            if (input) input->at = input->is_force ? pose_.vector_to_body(input->at) : pose_.point_to_body(input->at);
         }
     }
     const Scalar factor = predictor_.extrapolation_factor(inputs);
@@ -281,7 +284,7 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
     }
 }
 
-// The active vertices of this step, those that were prescribed until now as well.
+// Collects the active vertices of this step, including those prescribed only until the last step.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
@@ -296,7 +299,7 @@ void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
     active_.arrange(network, state_.seeds.items(), options_);
 }
 
-// Vertices that have moved get their new positions, and wake their neighbours.
+// Writes the positions of moved vertices, and wakes their neighbours.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Network& network,
@@ -322,7 +325,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status) noexcept {
-    if (status == StepStatus::unstable) state_.forget_points();  // what ran away may be a force from the step before
+    if (status == StepStatus::unstable) state_.forget_points();  // a force of the last step may have diverged
     predictor_.forget();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_.status = status;

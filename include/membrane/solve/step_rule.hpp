@@ -12,19 +12,19 @@
 #include <membrane/core/lanes.hpp>
 #include <membrane/model/elastic_network.hpp>
 
-/// How far a vertex moves for the force on it.
+/// Step rules: the displacement of a vertex for the force on it.
 ///
-///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::MassStep{});         // (4) as published
+///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::MassStep{});  // (4) as published
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::SafeStep{.omega = 1.5});
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6}, membrane::BlockStep{});
 namespace membrane {
 
-/// What multiplied with a force gives a move [m/N].
+/// Compliance: multiplied with a force, it gives a displacement [m/N].
 template <class C, class Scalar>
 concept Compliance = std::same_as<C, Scalar> || std::same_as<C, Symmetric3<Scalar>>;
 
-/// What a rule knows of the vertex it is asked about: the pull of springs, foundation, damping and constraints, and what
-/// follows. `stiffness` is the sum of all.
+/// Input of a rule for one vertex: force and stiffness, each a sum over springs, foundation, damping and constraints,
+/// and the members below.
 template <Number Scalar>
 struct VertexState : EnergyMajoriser<Scalar> {
     Scalar contact_stiffness = 0;  ///< the part of `stiffness` that acts along `contact_normal` alone [N/m]
@@ -34,10 +34,10 @@ struct VertexState : EnergyMajoriser<Scalar> {
     bool touched = false;  ///< a constraint acts on it
 };
 
-/// The distance that a vertex moves for each newton on it [m/N]: a number, or a `Symmetric3` for a rule whose
-/// moves are not along the force. What the compiler cannot see: not negative, finite. A rule that sets `needs_mass` is
-/// refused by the solver for a network without masses; only one that sets `needs_majoriser` is told `stiffness_reduction` and `size`.
-/// With one that sets `is_safe`, no visit of a vertex may raise the energy: where springs stiffen, the solver sees to it.
+/// A step rule: the compliance of a vertex [m/N], a number, or a `Symmetric3` for a rule whose displacements are not
+/// along the force. Beyond the signature: not negative, finite. If a rule sets `needs_mass`, the solver refuses a
+/// network without masses. Only a rule that sets `needs_majoriser` gets `stiffness_reduction` and `size`. If a rule
+/// sets `is_safe`, no vertex update may raise the energy: for springs that stiffen the solver adds a line search.
 template <class Rule, class Scalar>
 concept StepRule = Real<Scalar> && std::copyable<Rule> &&
     requires(const Rule& rule, const VertexState<Scalar>& vertex) {
@@ -58,7 +58,7 @@ consteval bool check_step_rule() noexcept {
 
 }  // namespace detail
 
-/// A `StepRule`; where it is none, the error says what is missing.
+/// A `StepRule`: if a type does not satisfy it, the error names the missing requirement.
 template <class Rule, class Scalar>
 concept CheckedStepRule = detail::check_step_rule<Rule, Scalar>();
 
@@ -67,7 +67,7 @@ template <class Rule, class Scalar>
 inline constexpr bool moves_along_force =
     std::same_as<Scalar, decltype(std::declval<const Rule&>().compliance(std::declval<const VertexState<Scalar>&>()))>;
 
-/// Whether `Rule` says that it is safe: there is no need to look whether its moves swing ever further out.
+/// Whether `Rule` sets `is_safe`: its updates need no check for divergence.
 template <class Rule>
 inline constexpr bool is_safe_rule = requires {
     requires Rule::is_safe;
@@ -86,7 +86,7 @@ struct MassStep {
 
 namespace detail {
 
-/// Where constraints act, they change their forces to what the vertices there answer: no more than that must they move.
+/// No over-relaxation where constraints act: they set their forces by the response of the vertices.
 template <Number Scalar>
 [[nodiscard]] Each<Scalar> relaxation(double omega, const VertexState<Scalar>& vertex) noexcept {
     return static_cast<Each<Scalar>>(vertex.touched ? (std::min)(omega, 1.0) : omega);
@@ -94,13 +94,13 @@ template <Number Scalar>
 
 }  // namespace detail
 
-/// Rule (4) with the mass that is always stable: dx = omega F / stiffness. No visit raises the energy (what springs and
-/// foundation store and damping takes, less the work of the constraints' forces) for 0 < omega < 2: along the way s F it is
+/// Rule (4) with a mass that is always stable: dx = omega F / stiffness. No update raises the energy (of springs,
+/// foundation and damping, less the work of the constraints' forces) for 0 < omega < 2: at the displacement s F it is
 /// at most E - s F^2 + s^2 F^2 stiffness / 2, which is below E for 0 < s < 2 / stiffness.
 struct SafeStep {
     static constexpr bool is_safe = true;
 
-    double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and beyond 1 may swing
+    double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and beyond 1 may oscillate
 
     template <Number Scalar>
     [[nodiscard]] Scalar compliance(const VertexState<Scalar>& vertex) const noexcept {
@@ -113,19 +113,19 @@ struct SafeStep {
     void check() const;
 };
 
-/// Newton's step of a vertex on its own 3 x 3 block, as vertex block descent takes it [Chen24], made safe without a
-/// look at the energy: dx = omega H^-1 F, H = stiffness I - relief / (1 + rho / size).
+/// Newton's step of a vertex on its own 3 x 3 block, as in vertex block descent [Chen24], with descent guaranteed
+/// without a line search: dx = omega H^-1 F, H = stiffness I - stiffness_reduction / (1 + rho / size).
 ///
-/// By `EnergyMajoriser` the energy is at most E - F.d + d.H d / 2 for every move d up to the length rho. As for `SafeStep`,
-/// d = omega H^-1 F does not raise it for 0 < omega < 2, if only rho is no shorter than d. No eigenvalue of `stiffness_reduction` is
-/// above half its trace b, so |H^-1 F| <= |F| / (stiffness - b / (1 + rho / size)): the rho that is chosen makes
-/// max(omega, 1) times the right side equal to rho, a quadratic equation. Near rest rho vanishes, and H is the second
-/// derivative of the energy, short springs apart, whose push across is left out. Where a contact adds a stiffness s along
-/// a normal n, s n n^T is added to H.
+/// By `EnergyMajoriser` the energy is at most E - F.d + d.H d / 2 for every displacement d up to the length rho. As for
+/// `SafeStep`, d = omega H^-1 F does not raise it for 0 < omega < 2, if rho is at least the length of d. No eigenvalue
+/// of `stiffness_reduction` exceeds half its trace b, so |H^-1 F| <= |F| / (stiffness - b / (1 + rho / size)): rho is
+/// chosen so that max(omega, 1) times the right side equals rho, a quadratic equation. Near equilibrium rho vanishes,
+/// and H is the Hessian of the energy, without the compression of short springs across their edges. If a contact adds a
+/// stiffness s along a normal n, s n n^T is added to H.
 struct BlockStep {
     static constexpr bool is_safe = true, needs_majoriser = true;
 
-    double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and may swing
+    double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and may oscillate
 
     template <Number Scalar>
     [[nodiscard]] Symmetric3<Scalar> compliance(const VertexState<Scalar>& vertex) const noexcept;
@@ -136,7 +136,7 @@ struct BlockStep {
 
 namespace detail {
 
-/// Makes the inverse of H that of H + stiffness normal normal^T [Sherman50].
+/// Updates the inverse of H to that of H + stiffness normal normal^T [Sherman50].
 template <Number Scalar>
 [[gnu::always_inline]] inline void stiffen(Symmetric3<Scalar>& compliance, const Scalar& stiffness,
                                            const Vector3<Scalar>& normal) noexcept {
@@ -164,12 +164,12 @@ Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) cons
     const Scalar per_stiffness = 1 / select(resists, all_round, Scalar(1));
     const Each<Scalar> relaxation = detail::relaxation(omega, vertex);
     const Scalar longest = per_stiffness * ((std::max)(relaxation, Each<Scalar>(1)) * norm(vertex.force));
-    // Beyond 1 / epsilon times the move nothing is lost by a smaller size.
+    // A size above 1 / epsilon times the displacement may be reduced to it without loss.
     const Scalar size = smaller<Scalar>(vertex.size, longest / Limits::epsilon() + (Limits::min)());
     // With b = trace / (2 stiffness): rho^2 + (size (1 - b) - longest) rho = longest size.
     const Scalar slack = size * (1 - per_stiffness * vertex.stiffness_reduction.trace() / 2) - longest;
     const Scalar rho = (root_of<Scalar>(slack * slack + 4 * longest * size) - slack) / 2;
-    // Nearly flat springs leave H nearly singular: cbrt(epsilon) keeps the determinant out of the rounding.
+    // Nearly flat springs leave H nearly singular: cbrt(epsilon) keeps the determinant above its rounding error.
     const auto flattest = static_cast<Each<Scalar>>(sizeof(Each<Scalar>) == 4 ? 4e-3 : 6e-6);
     const Scalar part = size / (size + larger<Scalar>(rho, flattest * size));
     Symmetric3<Scalar> block = (-per_stiffness * part) * vertex.stiffness_reduction;

@@ -17,7 +17,7 @@
 
 namespace membrane {
 
-/// What a constraint has of a list that all of them share.
+/// The range of one constraint in a list shared by all.
 struct ListRange {
     std::size_t begin = 0, end = 0;
 
@@ -29,12 +29,12 @@ struct ListRange {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// All that a step works with and keeps for the next one: of each vertex a row of four numbers in each of some arrays, read
-/// and written several at a time. The user's positions are read when a vertex is loaded, and written when the step is over:
-/// until then they are where the vertices were when it began.
+/// The state of a step, and what it keeps for the next one: for each vertex a row of four numbers in each of several
+/// arrays, read and written several rows at a time. The caller's positions are read when a vertex is loaded, and
+/// written at the end of the step: until then they are the start positions.
 ///
-/// A row is up to date where the vertex has been loaded in this step. `compliance` is that of the vertex's last update, in
-/// whatever step that was; `compliance_block` that of its last update in layer 0.
+/// A row is up to date if its vertex has been loaded in this step. `compliance` is that of the vertex's last update in
+/// any step, `compliance_block` that of its last update in layer 0.
 template <Real Scalar>
 struct StepState {
     /// The largest number of constraints of one step.
@@ -46,19 +46,19 @@ struct StepState {
 
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed.size()); }
 
-    /// Positions as parts that read a matrix see them.
+    /// The positions as a 3 x V matrix [m].
     [[nodiscard]] auto positions() const noexcept {
         using Map = Eigen::Map<const Points<Scalar>, 0, Eigen::OuterStride<>>;
         return Map(position.front().number.data(), 3, vertex_count(), Eigen::OuterStride<>(numbers_in_point));
     }
 
-    void begin_step() noexcept;  ///< No vertex is loaded, no force acts.
-    void end_step() noexcept;    ///< Keeps the contact points of the step that ends for the next one.
+    void begin_step() noexcept;  ///< Unloads all vertices, clears all forces.
+    void end_step() noexcept;    ///< Keeps the contact points of this step for the next one.
     void forget_points() noexcept;
     void reset() noexcept;                                              ///< As new.
-    void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< What is kept, with the body.
+    void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< Rotates the kept vectors with the body.
 
-    /// The first of the previous points whose first corner is `v`, and the next one of the same; or no index.
+    /// The first of the previous points whose first corner is `v`, and the next one with this corner; or `no_index`.
     [[nodiscard]] Index previous_at(Index v) const noexcept {
         return v >= 0 && v < vertex_count() ? first_previous[static_cast<std::size_t>(v)] : no_index;
     }
@@ -66,7 +66,7 @@ struct StepState {
         return next_of_same_corner[static_cast<std::size_t>(point)];
     }
 
-    /// Takes the position of `v` from `x`, unless it has been taken in this step.
+    /// Loads the position of `v` from `x`, unless it has been loaded in this step.
     template <class Network>
     void load(Index v, const ConstPointsRef<Scalar>& x, const Network& network) noexcept {
         if (!loaded.insert(v)) return;
@@ -75,7 +75,7 @@ struct StepState {
         row(position, v).number[2] = x(2, v);
         fixed[static_cast<std::size_t>(v)] = network.pinned(v) ? 1 : 0;
     }
-    /// Takes all loaded positions from `x` again, but for prescribed ones; no force of a constraint acts any more.
+    /// Reloads all loaded positions from `x`, except prescribed ones, and clears the forces of constraints.
     void restore(const ConstPointsRef<Scalar>& x) noexcept {
         for (const Index v : loaded.items()) {
             if (!prescribed.contains(v)) set_position(v, point(x, v));
@@ -91,7 +91,7 @@ struct StepState {
         return rows[static_cast<std::size_t>(v)];
     }
 
-    /// Where `v` is [m].
+    /// Position of `v` [m].
     [[nodiscard]] Vector3<Scalar> position_of(Index v) const noexcept { return row(position, v).point(); }
     void set_position(Index v, const Vector3<Scalar>& p) noexcept {
         auto& number = row(position, v).number;
@@ -101,26 +101,26 @@ struct StepState {
     /// The force of the constraints on `v` [N], and the stiffness that contact adds along it [N/m].
     [[nodiscard]] Vector3<Scalar> constraint_force(Index v) const noexcept { return row(force, v).point(); }
     [[nodiscard]] Scalar contact_stiffness(Index v) const noexcept {
-        return (std::max)(row(force, v).extra(), Scalar(0));  // a sum of differences: it may be below by rounding
+        return (std::max)(row(force, v).extra(), Scalar(0));  // a sum of differences, which may be negative by rounding
     }
 
-    /// The force of the tools on a fixed vertex [N], and its stiffness to them, 0 where none has come near [N/m].
+    /// The force of the tools on a fixed vertex [N], and its stiffness against them, 0 before a contact near it [N/m].
     [[nodiscard]] Vector3<Scalar> support_force(Index v) const noexcept { return row(support, v).point(); }
     [[nodiscard]] Scalar support_stiffness(Index v) const noexcept { return row(support, v).extra(); }
     void set_support_stiffness(Index v, Scalar stiffness) noexcept { row(support, v).number[3] = stiffness; }
 
-    /// The sum of all forces on `v` at the end of the step, and the size of it without damping [N].
+    /// The residual force on `v` at the end of the step, and its norm without damping [N].
     [[nodiscard]] Vector3<Scalar> residual_force(Index v) const noexcept { return row(residual, v).point(); }
     [[nodiscard]] Scalar unbalanced_force(Index v) const noexcept { return row(residual, v).extra(); }
     void set_residual(Index v, const Vector3<Scalar>& all, Scalar unbalanced) noexcept {
         row(residual, v).set(all, unbalanced);
     }
 
-    /// How far `v` moves at least for each newton, by its last update [m/N].
+    /// Lower bound of the compliance of `v`, by its last update [m/N].
     [[nodiscard]] Scalar compliance(Index v) const noexcept { return row(position, v).extra(); }
 
-    /// What the last update of `v` in layer 0 has found: by how much it moves for each newton, and its force and stiffness but
-    /// for those of contacts.
+    /// Results of the last update of `v` in layer 0: its compliance [m/N], and by `set_internal` its internal force [N]
+    /// and internal stiffness [N/m], without contacts.
     [[nodiscard]] Symmetric3<Scalar> compliance_block(Index v) const noexcept {
         const auto& a = row(response, 2 * v).number;
         const auto& b = row(response, 2 * v + 1).number;
@@ -132,7 +132,7 @@ struct StepState {
         row(response, 2 * v + 1).number[1] = block.yz;
         row(position, v).number[3] = least;
     }
-    /// Nothing moves `v`.
+    /// Sets the response of `v` to zero.
     void clear_response(Index v) noexcept {
         row(response, 2 * v) = row(response, 2 * v + 1) = {};
         row(position, v).number[3] = 0;
@@ -142,13 +142,13 @@ struct StepState {
         row(response, 2 * v + 1).number[3] = stiffness;
     }
 
-    // One row more than vertices, for lanes that are not in use. Three numbers, and the fourth:
+    // One row more than vertices, for unused lanes. Three numbers, and the fourth:
     Rows position;  ///< `position_of`, `compliance`
     Rows force;     ///< `constraint_force`, `contact_stiffness`
     Rows response;  ///< two rows: compliance xx, yy, zz, xy; xz, yz [m/N], internal force [N], internal stiffness [N/m]
     Rows support;   ///< of fixed vertices: `support_force`, `support_stiffness`
     Rows residual;  ///< `residual_force`, `unbalanced_force`
-    Rows anchor;    ///< where `kept` vertices go back to [m]
+    Rows anchor;    ///< positions to which `kept` vertices go back [m]
     std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
 
     IndexSet loaded, seeds, prescribed, forced;

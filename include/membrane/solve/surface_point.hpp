@@ -8,18 +8,18 @@
 #include <membrane/solve/constraint_context.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// What constraints do to a point of a triangle: they add forces to it or move it through the triangle's corners, each in
-/// proportion to its barycentric weight.
+/// Operations of constraints on a point of a triangle: forces and displacements are distributed to the triangle's
+/// corners in proportion to their barycentric weights.
 namespace membrane {
 
-/// The triangle with these vertices where it is now.
+/// The triangle of these vertices at their current positions.
 template <Real Scalar>
 [[nodiscard]] Triangle<Scalar> triangle_of(const ConstraintContext<Scalar>& context,
                                            const std::array<Index, 3>& corners) noexcept {
     return {context.position(corners[0]), context.position(corners[1]), context.position(corners[2])};
 }
 
-/// Whether the corners are vertices; if they are, they become seeds, else the step is refused.
+/// If all corners are vertices, seeds them and returns true; else the step is refused.
 template <Real Scalar>
 bool seed_corners(ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners) noexcept {
     for (const Index v : corners) {
@@ -48,7 +48,7 @@ template <Real Scalar>
     return free;
 }
 
-/// Whether the point hardly moves however far its free corners do: less than a tenth as far. No force moves it then.
+/// Whether the point moves less than a tenth as far as its free corners. Then no force moves it.
 template <Real Scalar>
 [[nodiscard]] bool is_rigid(const ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners,
                             const Vector3<Scalar>& weights) noexcept {
@@ -67,8 +67,8 @@ void move_point(ConstraintContext<Scalar>& context, const std::array<Index, 3>& 
     }
 }
 
-/// Moves the free corners as they move where the point goes by a displacement [m] and fixed corners yield as much as free
-/// ones: a point on fixed corners stays, and nothing jumps in between.
+/// Displaces the free corners as if all corners were free and the point moved by a displacement [m]: a point on fixed
+/// corners stays, and displacements are continuous in the weights.
 template <Real Scalar>
 void press_in(ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners, const Vector3<Scalar>& weights,
               const Vector3<Scalar>& by) noexcept {
@@ -79,7 +79,7 @@ void press_in(ConstraintContext<Scalar>& context, const std::array<Index, 3>& co
     }
 }
 
-/// How far the point moves for `force` on it [m].
+/// Response of the point to `force` [m].
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> response_of(const ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
                                           const Vector3<Scalar>& force) noexcept {
@@ -91,7 +91,7 @@ template <Real Scalar>
     return sum;
 }
 
-/// The force that would move it by a displacement [N]; none where nothing can.
+/// The force that moves the point by a displacement [N]; zero if no force can.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> force_for(const ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
                                         const Vector3<Scalar>& by) noexcept {
@@ -99,17 +99,17 @@ template <Real Scalar>
     const Vector3<Scalar> y = response_of<Scalar>(context, point, Vector3<Scalar>::UnitY());
     const Vector3<Scalar> z = response_of<Scalar>(context, point, Vector3<Scalar>::UnitZ());
     if (!(x[0] > 0)) return Vector3<Scalar>::Zero();
-    const Scalar stiffness = 1 / x[0];  // the determinant of compliances is their cube, and soon out of a float's range
+    const Scalar stiffness = 1 / x[0];  // scaled: the cubed compliances in a determinant may leave a float's range
     return inverse(stiffness * Symmetric3<Scalar>{x[0], y[1], z[2], x[1], x[2], y[2]}) * (stiffness * by);
 }
 
-/// A distance that is not worth moving a vertex by: what a negligible force does, or a few roundings [m].
+/// A negligible displacement of a vertex: the response to a negligible force, or a few roundings [m].
 template <Real Scalar>
 [[nodiscard]] Scalar negligible_distance(const ConstraintContext<Scalar>& context, Index v) noexcept {
     return (std::max)(context.force_tolerance() * context.compliance(v), detail::rounding_at(context.position(v)));
 }
 
-/// The same of a point where the springs of all corners resist.
+/// A negligible displacement of a point, by the compliances of all its corners [m].
 template <Real Scalar>
 [[nodiscard]] Scalar negligible_distance(const ConstraintContext<Scalar>& context,
                                          const ContactPoint<Scalar>& point) noexcept {
@@ -121,7 +121,7 @@ template <Real Scalar>
     return (std::max)(context.force_tolerance() * sum, detail::rounding_at(context.position(point.corners[0])));
 }
 
-/// Adds `force` [N] to what a point acts with, and lets its corners follow as far as they will for that.
+/// Adds `force` [N] to the force of a point, and moves its corners by their response.
 template <Real Scalar>
 void change_force(ConstraintContext<Scalar>& context, ContactPoint<Scalar>& point,
                   const Vector3<Scalar>& force) noexcept {
@@ -134,7 +134,7 @@ void change_force(ConstraintContext<Scalar>& context, ContactPoint<Scalar>& poin
     }
 }
 
-/// Adds the part of `force` [N] on the point that its fixed corners take to the force of the tools on these.
+/// Adds `force` [N] on the point, by weights, to the force of the tools on its fixed corners.
 template <Real Scalar>
 void add_support_forces(ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
                         const Vector3<Scalar>& force) noexcept {
@@ -143,7 +143,7 @@ void add_support_forces(ConstraintContext<Scalar>& context, const ContactPoint<S
     }
 }
 
-/// How far the fixed corners of the point yield to tools [m].
+/// Displacement of the point by its fixed corners under tools [m].
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> support_displacement(const ConstraintContext<Scalar>& context,
                                                    const ContactPoint<Scalar>& point) noexcept {

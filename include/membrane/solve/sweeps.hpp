@@ -18,9 +18,9 @@ namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// The sweeps of one step over its active vertices: in each, contact iterations, which are updates of layer 0 in turn with
-/// the constraints, and then an update of each vertex beyond. As many of the vertices as there is room for, the first, are
-/// updated in packs; the others one by one, to the same bits.
+/// The sweeps of one step over its active vertices: in each sweep contact iterations, which update layer 0 and then
+/// enforce the constraints, and then an update of each vertex beyond. The first vertices, up to the capacity, are
+/// updated in packs, the others one by one with the same bits.
 ///
 ///     sweeps.load_and_pack();
 ///     sweeps.run();
@@ -36,18 +36,17 @@ struct Sweeps {
     const ConstraintList<Scalar>& constraints;
     StepReport<Scalar>& report;
     TimeBudget budget;
-    std::size_t
-        resume;  // the number beyond layer 0 of the vertex at which time ran out, in the last step or in this one
+    std::size_t resume;  // number beyond layer 0 of the vertex at which time ran out, in the last step or in this one
 
-    std::size_t in_packs = 0;          // how many of the active vertices
-    std::size_t forces_seen = 0;       // how many vertices with a force of a constraint there were
-    bool constraints_hold = false;     // when they were last enforced, and nothing has moved since
-    bool constraints_changed = false;  // by the last enforcement, or that had no time
+    std::size_t in_packs = 0;          // number of active vertices in packs
+    std::size_t forces_seen = 0;       // number of vertices with a force of a constraint so far
+    bool constraints_hold = false;     // at the last enforcement, without a displacement since
+    bool constraints_changed = false;  // by the last enforcement, or it had no time
     bool stopped = false;              // time ran out beyond layer 0
 
     static constexpr bool can_use_lanes = UpdatesInLanes<Scalar, Rule, Network, Volume>;
 
-    /// Takes the positions of the active vertices and their neighbours.
+    /// Loads the positions of the active vertices and their neighbours.
     void load_and_pack() noexcept {
         if constexpr (can_use_lanes) pack();
         const auto one_by_one = active.vertices().subspan(in_packs);
@@ -57,7 +56,7 @@ struct Sweeps {
         budget.begin(active.vertices().size() + active.frontier().size());
     }
 
-    /// Sweeps until nothing changes, they are done, or time is up.
+    /// Sweeps until no vertex moves, `sweeps` are done, or time is up.
     void run() noexcept {
         bool changed = true;
         for (Index i = 0; i < options.sweeps && changed && !report.out_of_time; ++i) {
@@ -74,7 +73,7 @@ struct Sweeps {
         }
     }
 
-    /// The forces at the end on all active vertices; false if any is not finite.
+    /// Evaluates the residual forces on all active vertices; returns false if one is not finite.
     [[nodiscard]] bool evaluate_residuals() noexcept {
         bool finite = true;
         const auto count = [&](Index v) {
@@ -84,7 +83,7 @@ struct Sweeps {
             finite &= is_finite(force);
         };
         const auto evaluate = [&](Index v) {
-            const Vector3<Scalar> force = pull_on(scene, v).force;
+            const Vector3<Scalar> force = total_force(scene, v).force;
             scene.state.set_residual(v, force, norm(undamped_force(scene, v, force)));
             count(v);
         };
@@ -109,7 +108,7 @@ struct Sweeps {
   private:
     [[nodiscard]] bool advances() const noexcept { return report.status == StepStatus::advanced; }
 
-    // If the whole queue is active and no constraint adds a force beyond layer 0.
+    // Packs vertices if the whole queue is active and no constraint adds a force beyond layer 0.
     void pack() noexcept {
         const auto& queue = active.queue();
         if (active.take_new_queue()) packed.assign(queue.vertices(), queue.colour_ends(), scene.network);
@@ -120,7 +119,7 @@ struct Sweeps {
         in_packs = packed.size();
     }
 
-    // Whether one that was not seen before is.
+    // Whether a constraint adds a force to a further vertex, which is beyond layer 0.
     [[nodiscard]] bool forces_beyond_contact() noexcept {
         const auto forced = scene.state.forced.items();
         const auto unseen = forced.subspan(std::exchange(forces_seen, forced.size()));
@@ -151,7 +150,7 @@ struct Sweeps {
         return changed;
     }
 
-    // Packs beyond layer 0 take no force of a constraint: where one comes, their vertices are updated one by one.
+    // Packs beyond layer 0 have no force of a constraint: if one is added, their vertices are updated one by one.
     bool enforce() noexcept {
         constraints_hold = !constraints.enforce();
         budget.enforced();
@@ -159,7 +158,7 @@ struct Sweeps {
         return !constraints_hold;
     }
 
-    // From where time ran out on, round to there.
+    // Updates in a cycle from the vertex at which time ran out.
     bool update_beyond() noexcept {
         const std::size_t first = active.contact_layer().size(), end = active.vertices().size();
         const std::size_t begin = first + (std::min)(std::exchange(resume, 0), end - first);
@@ -179,7 +178,7 @@ struct Sweeps {
         }
         report.vertex_updates += static_cast<Index>(frontier.size());
         const bool needed = std::any_of(frontier.begin(), frontier.end(), [&](Index v) {
-            return !scene.state.is_fixed(v) && norm(pull_on(scene, v).force) > scene.state.force_tolerance;
+            return !scene.state.is_fixed(v) && norm(total_force(scene, v).force) > scene.state.force_tolerance;
         });
         budget.updated(frontier.size());
         if (!needed) return false;
@@ -191,7 +190,7 @@ struct Sweeps {
         return true;
     }
 
-    // The active vertices number `begin` to `end`.
+    // Updates the active vertices number `begin` to `end`.
     bool update_until_time_is_up(std::size_t begin, std::size_t end) noexcept {
         const std::size_t packed_end = std::clamp(in_packs, begin, end);
         bool changed = update_packs_until_time_is_up(packed.pack_from(begin), packed.pack_from(packed_end));
@@ -226,7 +225,8 @@ struct Sweeps {
         return false;
     }
 
-    // No spring joins the packs of a group: threads may share them, but under a deadline batches are too small.
+    // No spring joins the packs of a group: threads may share them. Under a deadline batches are too small to
+    // distribute.
     template <bool in_contact>
     bool update_packs(std::size_t p, [[maybe_unused]] std::size_t end) noexcept {
         bool changed = false;
@@ -244,7 +244,7 @@ struct Sweeps {
         return changed;
     }
 
-    // Where the stiffness bound does not prove that a move is stable, the largest eigenvalue of the block does or does not.
+    // If the stiffness bound does not prove that an update is stable, the largest eigenvalue of the block decides.
     template <bool in_contact>
     bool finish_update(std::size_t p) noexcept {
         using Outcome = typename PackedVertices<Scalar>::Outcome;

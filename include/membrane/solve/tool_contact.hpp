@@ -24,12 +24,12 @@
 ///     report.reactions[0]                                                    // force of the membrane on the tool [N]
 namespace membrane {
 
-/// Keeps the surface outside the tool, without friction: every touched triangle in its point nearest to the tool, by a
-/// force along the normal that pushes and never pulls, distributed to the corners by barycentric weights. Corners that are
-/// pinned or prescribed stay where they are, and push with their stiffness times how deep the tool is in, see
-/// `SolverOptions::rigid_stiffness`: there, and beside them, the tool stays inside by force over stiffness. If its axis is
-/// behind such a corner, it touches in its nearest point alone; where that passes a border, or another part of a surface
-/// that is folded around a pin more sharply than its triangles, the force may jump.
+/// Keeps the surface outside the tool, without friction. On the point of each contact triangle nearest to the tool a
+/// force along the normal pushes and never pulls; barycentric weights distribute it to the corners. Pinned and
+/// prescribed corners do not move, and push with their stiffness times the penetration, see
+/// `SolverOptions::rigid_stiffness`: there, and beside them, a penetration of force over stiffness remains. If the
+/// tool's axis is behind such a corner, contact is at the nearest point only; if this point passes a border, or another
+/// part of a surface folded around a pin more sharply than its triangles, the force may jump.
 template <Real Scalar>
 struct ToolContact {
     Tool<Scalar> tool;
@@ -51,7 +51,7 @@ struct ToolContact {
     using Corners = std::array<Index, 3>;
 
     bool seed(Context& context) const noexcept;
-    void list_watched(Context& context) const noexcept;
+    void list_candidates(Context& context) const noexcept;
     void carry_with_tool(Context& context) const noexcept;
     void clear_contact_point(Context& context) const noexcept;
     void find_points(Context& context) const noexcept;
@@ -73,7 +73,7 @@ struct ToolContact {
     [[nodiscard]] static bool on_support(const Context& context) noexcept {
         return !context.points().empty() && context.points().front().feature == fixed_feature;
     }
-    // The triangle as a tool finds it, now and where its vertices were kept.
+    // The triangle with support displacements, at the current positions and at the kept positions.
     [[nodiscard]] static Triangle<Scalar> surface_triangle(const Context& context, const Corners& corners) noexcept {
         const auto at = [&](Index v) { return Vector3<Scalar>(context.position(v) + context.support_displacement(v)); };
         return {at(corners[0]), at(corners[1]), at(corners[2])};
@@ -86,7 +86,7 @@ struct ToolContact {
 
 static_assert(Constraint<ToolContact<double>, double> && Constraint<ToolContact<float>, float>);
 
-/// The tool presses where it touches. Forceps that hold something press nothing.
+/// The tool presses at its contact. Forceps that hold a grasp do not press.
 template <Real Scalar>
 [[nodiscard]] ToolContact<Scalar> press(const Tool<Scalar>& tool, const Contact<Scalar>& contact,
                                         const Grasp<Scalar>& grasp = {}) noexcept {
@@ -95,16 +95,15 @@ template <Real Scalar>
 
 namespace detail {
 
-// Points share vertices: until none is inside they are moved out this often at the most.
+// Points share vertices: largest number of passes that move them out of the tool.
 inline constexpr int max_push_passes = 8;
 
-// And this often they are solved at the most before the vertices find their balance anew: as a rule, and while the tool is deep
-// inside.
+// Largest number of contact passes before vertices are updated again: as a rule, and at a deep penetration.
 inline constexpr int all_contact_passes = 8, deep_contact_passes = 16;
 
-/// As a rule. Few points, on a coarse mesh, have each a large part of the force, and more passes give a better one; of many
-/// each has little. Where points are `stiff`, beside fixed corners or several of a shaft on one triangle, a pass moves each
-/// by little.
+/// Number of passes as a rule. Few points, on a coarse mesh, each have a large part of the force, and more passes
+/// improve it; many points each have little. If points are `stiff`, beside fixed corners or several of a shaft on one
+/// triangle, a pass moves each only a little.
 [[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool stiff) noexcept {
     constexpr int least = 2, points_of_all_passes = 32;
     if (stiff || points == 0) return all_contact_passes;
@@ -123,7 +122,7 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
     for (const auto& point : context.previous_points()) add_support_forces(context, point, point.force);
     const auto out = direction_out_of_support(context);
     if (contact.tunnelled && !out) carry_with_tool(context);
-    list_watched(context);
+    list_candidates(context);
     if (!contact.tunnelled && !out && contact.gap < -negligible_distance(context, contact.corners[0])) {
         clear_contact_point(context);
     }
@@ -159,7 +158,7 @@ bool ToolContact<Scalar>::seed(Context& context) const noexcept {
 
 // The vertices that must not pass the tool.
 template <Real Scalar>
-void ToolContact<Scalar>::list_watched(Context& context) const noexcept {
+void ToolContact<Scalar>::list_candidates(Context& context) const noexcept {
     for (const auto& candidates : contact.candidates) {
         for (const Index v : candidates.corners) {
             contact.tunnelled ? context.keep(v) : context.keep_start(v);
@@ -168,12 +167,12 @@ void ToolContact<Scalar>::list_watched(Context& context) const noexcept {
     }
 }
 
-// The tool does not pass the surface: triangles that it crossed since the last tick are carried with it, all the distance or
-// until they are one radius ahead.
+// The tool does not pass the surface: triangles on its path since the last tick are carried with it, by the whole path
+// or until they are one radius ahead.
 //
-// Seen from a tool that moves by d, a vertex that moves by w d, 0 <= w <= 1, moves by (w - 1) d. So the tool can meet
-// only points of triangles that lie on its path, and does not meet one a part s of the path ahead if the corners there
-// move by w > 1 - s. Triangles off the path are safe however their corners move by such w.
+// Relative to a tool that moves by d, a vertex that moves by w d, 0 <= w <= 1, moves by (w - 1) d. So the tool can hit
+// only points of triangles that lie on its path, and does not hit a point a part s of the path ahead if the corners
+// there move by w > 1 - s. It does not hit triangles off the path for any such w of their corners.
 template <Real Scalar>
 void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
     const Vector3<Scalar> path = contact.axis_point - contact.previous_axis_point;
@@ -197,7 +196,7 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
     }
 }
 
-// The surface yields at the contact point first, to where it just touches the tool, if it is not there already.
+// If the contact point penetrates, moves the surface there until it just touches the tool.
 template <Real Scalar>
 void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
     const Vector3<Scalar> now = point_at(surface_triangle(context, contact.corners), contact.barycentric);
@@ -205,8 +204,8 @@ void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
     if (dot(by, contact.normal) < 0) press_in<Scalar>(context, contact.corners, contact.barycentric, by);
 }
 
-// The tracker has found the points on the surface as the last step left it. Those of a shaft, and what a tool has crossed, are
-// found anew where the surface is expected now: there they may be on the other side.
+// The tracker has found the points on the surface of the last step. The points of a shaft, or of a tool that has
+// tunnelled, are found again on the extrapolated surface: there they may be on the other side.
 template <Real Scalar>
 void ToolContact<Scalar>::find_points(Context& context) const noexcept {
     const bool as_found = feature_pairs(tool) == 1 && !contact.tunnelled;
@@ -221,7 +220,7 @@ void ToolContact<Scalar>::find_points(Context& context) const noexcept {
     }
 }
 
-// A point that was there in the last step goes on with its force; another one joins if it is near enough.
+// A point of the last step keeps its force; another one is added if it is within the detection distance.
 template <Real Scalar>
 void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point) const noexcept {
     const auto* before = context.cached_point(point.triangle, point.feature, point.corners[0]);
@@ -231,7 +230,8 @@ void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point
     point.normal = direction(apart ? point.normal : Vector3<Scalar>(contact.previous_axis_point - contact.axis_point),
                              contact.normal);
     point.on_fixed = std::any_of(point.corners.begin(), point.corners.end(), [&](Index v) { return context.fixed(v); });
-    // Fixed corners have not been carried along: what the tool has crossed is between it and where it was.
+    // Fixed corners have not been carried along: a triangle that the tool has passed is between its last and its new
+    // position.
     if (contact.tunnelled && point.on_fixed) {
         const Vector3<Scalar> came = contact.previous_axis_point - contact.axis_point + distance * point.normal -
                                      support_displacement(context, point);
@@ -242,14 +242,14 @@ void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point
     context.add_point(point);
 }
 
-// Vertices move by more than the radius of a tiny tool while the step balances them, and a nearest edge or corner says nothing
-// of the side then. So the tool stays in front of the planes of the triangles that it is in front of, all through the step: at
-// a convex edge this is too far out, by less than the radius. The end of a shaft thinner than an edge may be thrown as far, past
-// edges that turn its direction round; over the inside of a triangle of a closed surface it is on the side where the step began.
-// Under a thick one triangles are small enough to turn over, and have no such side.
+// In a step vertices move by more than the radius of a tiny tool, and then a nearest edge or corner does not determine
+// the side. So the tool stays in front of the planes of the triangles that it is in front of, throughout the step: at a
+// convex edge this is too far out, by less than the radius. Relative to the end of a shaft thinner than an edge
+// vertices move as far, past edges that reverse the normal; inside of a triangle of a closed surface it keeps the side
+// of the start of the step. Under a thick shaft triangles are small enough to turn over, and have no such side.
 template <Real Scalar>
 void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept {
-    constexpr Scalar tiny = Scalar(2e-5);  // squared radius by area: a tool of less than a 300th of an edge
+    constexpr Scalar tiny = Scalar(2e-5);  // squared radius over area: a tool thinner than a 300th of an edge
     if (point.feature < 0 || point.feature > 1) return;
     const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
     const Scalar size = norm(area), square = contact.radius * contact.radius;
@@ -262,7 +262,7 @@ void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scal
     if (point.by_plane) point.normal = direction<Scalar>(contact.side * area, point.normal);
 }
 
-// The points' forces act from here on.
+// Applies the points' forces and packs the points.
 template <Real Scalar>
 void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
     auto& state = context.state();
@@ -278,8 +278,8 @@ void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
     range.end = state.packs.size();
 }
 
-// Fixed vertices do not yield to a tool, and one that is deeper in than its radius has its axis behind them. It touches
-// the surface in one point then, the nearest, as it did before: the direction out is given, no other.
+// Fixed vertices do not yield to a tool: if it penetrates by more than its radius, its axis is behind them. Then
+// contact is at the nearest point only, on the side of the last step. Returns the direction out of the surface there.
 template <Real Scalar>
 std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(const Context& context) const noexcept {
     const Vector3<Scalar> fixed = contact.barycentric - free_weights(context, contact.corners, contact.barycentric);
@@ -288,7 +288,7 @@ std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(con
     for (const auto& point : context.previous_points()) pressed += point.force;
     const bool turned = dot(pressed, contact.normal) > 0;
     const Vector3<Scalar> out = turned ? Vector3<Scalar>(-contact.normal) : contact.normal;
-    // A point is given a radius: half of that far from the surface there is a direction still.
+    // A point tool has a contact radius: beyond half of it from the surface the direction is defined.
     const Scalar ahead = (contact.radius - tool.radius) / 2;
     if (!(dot<Scalar>(contact.axis_point - contact.point, out) < ahead)) return std::nullopt;
     return out;
@@ -302,7 +302,8 @@ void ToolContact<Scalar>::touch_support(Context& context, const Vector3<Scalar>&
     context.add_point({contact.triangle, fixed_feature, contact.corners, contact.barycentric, out, force, true});
 }
 
-// Whether a shaft's axis point is on a triangle or behind, but for rounding, and in front after the triangle has moved.
+// Whether a shaft's axis point is on a triangle or behind it, up to rounding, and in front of it after the triangle has
+// moved.
 template <Real Scalar>
 bool ToolContact<Scalar>::comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept {
     if (feature_pairs(tool) == 1) return false;
@@ -311,8 +312,8 @@ bool ToolContact<Scalar>::comes_out(const Triangle<Scalar>& before, const Triang
            dot<Scalar>(contact.axis_point - now.a, front_now) > 0;
 }
 
-// However far vertices have jumped, the surface has not passed the tool: if it would have, all go back to before the earliest
-// time of impact, with some clearance.
+// If a candidate triangle passed the tool's axis point, all vertices go back to before the earliest time of impact,
+// with some clearance.
 template <Real Scalar>
 void ToolContact<Scalar>::prevent_tunnelling(Context& context) const noexcept {
     if (on_support(context)) return;
@@ -348,7 +349,7 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
         deep = pass.deep;
         released = released || pass.released;
         if (i == 0) first = pass.largest;
-        // The vertices have to find their balance anew.
+        // Stops if the vertices need updates first.
         if (!(i + 1 < most ? pass.largest > first / 2 : pass.deep)) break;
     }
     for (int i = 0; deep && i < detail::max_push_passes; ++i) deep = push_out(context.state(), shape(), packs(context));
@@ -357,10 +358,10 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     return first > 0 || released || has_new_overlap(context);
 }
 
-// Whether a triangle that was out of range when the step began, and has no contact point in it, has come into the tool.
+// Whether a triangle that was out of range at the start of the step, and has no contact point, penetrates now.
 template <Real Scalar>
 bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept {
-    if (on_support(context)) return false;  // no other point counts
+    if (on_support(context)) return false;  // contact is at this point only
     const int features = feature_pairs(tool);
     const auto points = context.points();
     auto next = points.begin();  // in the same order
@@ -372,7 +373,7 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
             }
             const auto nearest = proximity(surface_triangle(context, touched.corners), tool, feature);
             const Scalar slack = negligible_distance(context, touched.corners[0]);
-            if (nearest && norm(nearest->reach) < contact.radius - slack) return true;
+            if (nearest && norm(nearest->separation) < contact.radius - slack) return true;
         }
     }
     return false;

@@ -11,8 +11,8 @@
 
 namespace membrane {
 
-/// Vertices in an order in which many that follow on one another may be visited all at once: in groups that no spring
-/// joins, each vertex in the first group that holds no neighbour of it.
+/// Greedy colouring of vertices: an order in groups whose vertices no spring joins, so that those of a group may be
+/// updated at once. Each vertex is in the first group without a neighbour of it.
 ///
 ///     membrane::VertexColouring groups(network.vertex_count());
 ///     groups.add(network, vertices, 0, 100);           // now in another order
@@ -30,7 +30,7 @@ class VertexColouring {
     template <class Network>
     void add(const Network& network, IndexSet& set, std::size_t begin, std::size_t end) noexcept;
 
-    /// Where in the set each group ends, and the next one begins.
+    /// End of each group in the set, where the next one begins.
     [[nodiscard]] std::span<const std::size_t> ends() const noexcept { return ends_.items(); }
 
     void clear() noexcept { ends_.clear(); }
@@ -39,7 +39,7 @@ class VertexColouring {
     FixedVector<std::size_t> ends_;
     std::vector<Index> group_of_;  // of each vertex that is being ordered
     std::vector<Index> barred_;    // of each group, the last vertex that has a neighbour there
-    std::vector<Index> fill_;      // of each group, how many are in it; then, where its next one goes
+    std::vector<Index> fill_;      // of each group, its size; then, the position of its next vertex
     std::vector<Index> order_;
 };
 
@@ -62,11 +62,11 @@ void VertexColouring::add(const Network& network, IndexSet& set, std::size_t beg
         ++fill_[at(group)];
         group_of_[at(v)] = group;
     }
-    Index place = 0;
+    Index group_end = 0;
     for (Index group = 0; group < groups; ++group) {
-        const Index first = place;
-        place += std::exchange(fill_[at(group)], first);
-        ends_.push(begin + at(place));
+        const Index first = group_end;
+        group_end += std::exchange(fill_[at(group)], first);
+        ends_.push(begin + at(group_end));
     }
     for (const Index v : vertices) order_[at(fill_[at(std::exchange(group_of_[at(v)], no_index))]++)] = v;
     set.reorder(begin, std::span(order_).first(vertices.size()));

@@ -12,7 +12,8 @@
 #include <membrane/solve/step_rule.hpp>
 #include <membrane/solve/step_state.hpp>
 
-/// One update: a vertex moves as the rule has it for the forces on it. The same code for one vertex and for several.
+/// One vertex update: the displacement of a vertex by the rule for the forces on it. One code serves one vertex and
+/// several.
 ///
 ///     auto state = membrane::state_of<Rule>(scene, v);
 ///     const auto move = membrane::move_of(rule, state, scene.state.force_tolerance);
@@ -21,7 +22,7 @@ namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// The input of one step, and where the vertices are in it.
+/// The input of one step, and the current positions.
 template <class Scalar, class Network, class Volume>
 struct StepInput {
     const ConstPointsRef<Scalar>& start;
@@ -32,26 +33,26 @@ struct StepInput {
     StepState<Scalar>& state;
 };
 
-/// The unit vector along `a`, zero where that is.
+/// The unit vector along `a`; zero if `a` is zero.
 template <Number N>
 [[gnu::always_inline, nodiscard]] inline Vector3<N> direction_or_zero(const Vector3<N>& a) noexcept {
     const N size = norm(a);
     return (1 / select<N>(size > 0, size, 1)) * a;
 }
 
-/// What a rule makes of the forces on a vertex, or on several.
+/// The displacement of a vertex, or of several, by a rule.
 template <Number N, class Compliance>
 struct VertexMove {
     using YesNo = decltype(N() < N());
 
     Compliance compliance;  ///< [m/N]
-    N least;                ///< no force moves the vertex less, for each newton [m/N]
+    N least;                ///< lower bound of the compliance in any direction [m/N]
     Vector3<N> displacement;
     YesNo moves;          ///< whether the force is above the tolerance
-    YesNo may_overshoot;  ///< whether the rule may move beyond what is stable, by the bound of the stiffness
+    YesNo may_overshoot;  ///< whether the displacement may be unstable, by the stiffness bound
 };
 
-/// The number as a block, for who needs it in all directions.
+/// A compliance as a 3 x 3 block.
 template <Number N>
 [[nodiscard]] const Symmetric3<N>& as_block(const Symmetric3<N>& block) noexcept {
     return block;
@@ -82,7 +83,7 @@ template <class Rule, Number N>
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
-/// What pulls on vertex `v` beside its springs: foundation, damping and constraints.
+/// Force and stiffness on vertex `v` by foundation, damping and constraints, without the network.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] VertexForce<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const Vector3<Scalar> of_constraints = scene.state.constraint_force(v);
@@ -93,14 +94,14 @@ template <class Scalar, class Network, class Volume>
     return {foundation.force + of_constraints, foundation.stiffness + stiffness};
 }
 
-/// All that pulls on it.
+/// Sum of all forces on vertex `v`, and its stiffness.
 template <class Scalar, class Network, class Volume>
-[[nodiscard]] VertexForce<Scalar> pull_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
+[[nodiscard]] VertexForce<Scalar> total_force(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const auto springs = scene.network.force_on(v, scene.x), others = others_on(scene, v);
     return {springs.force + others.force, springs.stiffness + others.stiffness};
 }
 
-/// The force `now` on vertex `v` without damping, which may hold in balance, for the length of a tick, what is not at rest.
+/// The force `now` on vertex `v` without damping, which may balance the forces for one tick out of equilibrium.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> undamped_force(const StepInput<Scalar, Network, Volume>& scene, Index v,
                                              const Vector3<Scalar>& now) noexcept {
@@ -139,12 +140,12 @@ template <class Rule, class Scalar, class Network, class Volume>
     return state;
 }
 
-/// Whether a vertex that moves by `compliance` times the force on it overshoots by more each time.
+/// Whether updates of a vertex by `compliance` times its force diverge: each overshoots by more than the last.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] bool diverges(const StepInput<Scalar, Network, Volume>& scene, Index v, Scalar compliance) noexcept {
     const Scalar others = others_on(scene, v).stiffness;
-    if (compliance * (curvature_bound(scene.network.majoriser(v, scene.x)) + others) < 2) return false;
-    return compliance * (largest_curvature<Scalar>(scene.network, v, scene.x) + others) >= 2;
+    if (compliance * (stiffness_bound_of(scene.network.majoriser(v, scene.x)) + others) < 2) return false;
+    return compliance * (largest_eigenvalue_at<Scalar>(scene.network, v, scene.x) + others) >= 2;
 }
 
 /// Backtracking line search, where springs may stiffen and `Rule` guarantees descent: halves the displacement until the

@@ -11,14 +11,14 @@
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Who is next to whom on a surface.
+/// Neighbours of vertices and triangles on a surface.
 ///
 ///     const membrane::Adjacency adjacency(mesh);
 ///     for (const auto [first, second] : adjacency.edges()) { ... }
 ///     for (const membrane::Index w : adjacency.neighbours(v)) { ... }
 namespace membrane {
 
-/// Neighbours of vertices and triangles in flat arrays. Owns all it holds; the mesh may go.
+/// Neighbours of vertices and triangles in flat arrays. Owns its data: the mesh need not outlive it.
 class Adjacency {
   public:
     /// O(F log F).
@@ -33,14 +33,14 @@ class Adjacency {
     /// @pre `v` is a vertex (asserted).
     [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return triangles_of_[v]; }
 
-    /// The triangle across each side of `f`, side k from corner k to the next; `no_index` at a border.
+    /// The triangle across each side of `f`, side k running from corner k to the next; `no_index` at a border.
     /// @pre `f` is a triangle (asserted).
     [[nodiscard]] const std::array<Index, 3>& triangle_neighbours(Index f) const noexcept;
 
     /// The two vertices of each edge, the lower first; ascending.
     [[nodiscard]] std::span<const std::array<Index, 2>> edges() const noexcept { return edges_; }
 
-    /// Vertices on an edge that has one triangle only, ascending; none when the surface is closed.
+    /// Vertices on an edge that has one triangle only, ascending; empty if the surface is closed.
     [[nodiscard]] std::span<const Index> border_vertices() const noexcept { return border_vertices_; }
 
     /// Whether every edge has two triangles.
@@ -56,7 +56,7 @@ class Adjacency {
     CompressedRows<Index> triangles_of_;
 };
 
-/// The vertices on the border of `mesh`, ascending: a rim to be pinned. O(F log F).
+/// The vertices on the border of `mesh`, ascending, for example to pin a rim. O(F log F).
 template <Real Scalar>
 [[nodiscard]] std::vector<Index> border(const TriangleMesh<Scalar>& mesh) {
     const Adjacency adjacency(mesh);
@@ -67,7 +67,7 @@ template <Real Scalar>
 Adjacency::Adjacency(const TriangleMesh<Scalar>& mesh) {
     collect_edges(mesh.triangles());
     neighbours_ = CompressedRows<Index>(mesh.vertex_count(), [&](auto put) {
-        for (const auto& [first, second] : edges_) {  // ascending, so each row is
+        for (const auto& [first, second] : edges_) {  // ascending, so each row is ascending
             put(first, second);
             put(second, first);
         }

@@ -8,20 +8,21 @@
 #include <membrane/core/lanes.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// Boxes along the axes, and what is near them.
+/// Axis-aligned boxes, and tests of points and capsules against them.
 ///
 ///     membrane::Box<double> box;
 ///     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) box.include(point(x, v));
 ///     if (squared_distance(box, tool.position) > tool.radius * tool.radius) { /* the tool contacts nothing */ }
 namespace membrane {
 
-/// All points between two corners, borders included [m]; empty until something is included. Of `Lanes`: several boxes.
+/// The points between two corners, borders included [m]; empty until a point or box is included. With `Lanes`: several
+/// boxes.
 template <Number N>
 struct Box {
     Vector3<N> low = Vector3<N>::Constant((std::numeric_limits<Each<N>>::max)());
     Vector3<N> high = Vector3<N>::Constant(std::numeric_limits<Each<N>>::lowest());
 
-    /// Grows to hold `p`; coordinates that are NaN are left out.
+    /// Grows to contain `p`; NaN coordinates are ignored.
     void include(const Vector3<N>& p) noexcept;
     void include(const Box& other) noexcept;
 };
@@ -30,7 +31,7 @@ struct Box {
 template <Number N>
 [[nodiscard]] Box<N> bounds(const Triangle<N>& triangle) noexcept;
 
-/// The axis along which the box is longest, 0 to 2; the first of equals.
+/// The axis along which the box is longest, 0 to 2; the lowest of equal axes.
 template <Real Scalar>
 [[nodiscard]] int major_axis(const Box<Scalar>& box) noexcept;
 
@@ -38,42 +39,42 @@ template <Real Scalar>
 template <Number N>
 [[nodiscard]] auto overlap(const Box<N>& a, const Box<Each<N>>& b) noexcept;
 
-/// How far apart they are along the axis where that is most [m]; not positive where they overlap.
+/// Largest gap between the boxes along one axis [m]; not positive if they overlap.
 template <Real Scalar>
 [[nodiscard]] Scalar gap_between(const Box<Scalar>& a, const Box<Scalar>& b) noexcept;
 
-/// Whether the point, or another box that is not empty, lies within.
+/// Whether the point, or another box that is not empty, lies within the box.
 template <Real Scalar>
 [[nodiscard]] bool contains(const Box<Scalar>& box, const Vector3<Scalar>& p) noexcept;
 template <Real Scalar>
 [[nodiscard]] bool contains(const Box<Scalar>& box, const Box<Scalar>& other) noexcept;
 
-/// From `q` to the nearest point of the box, 0 inside [m^2].
+/// Squared distance from `q` to the box, 0 inside [m^2].
 template <Number N>
 [[nodiscard]] N squared_distance(const Box<N>& box, const Vector3<Each<N>>& q) noexcept;
 
-/// From `q` to the farthest corner, along the axis where that is most [m].
+/// Largest distance along one axis from `q` to a corner of the box [m].
 template <Real Scalar>
 [[nodiscard]] Scalar reach(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept;
 
-/// A capsule made ready to be tested against many boxes; a segment if its radius is zero.
+/// A capsule prepared for tests against many boxes; a segment if its radius is zero.
 template <Real Scalar>
 class CapsuleQuery {
   public:
     static constexpr Scalar never = 2;
 
-    /// Around the segment between two points. The boxes to test lie in `all`: its size tells how much the capsule must
-    /// be thickened, so that rounding errors never make it miss a box.
+    /// Around the segment between two points. The boxes to test must lie in `all`: its size sets by how much the
+    /// capsule is thickened, so that rounding errors never make it miss a box.
     CapsuleQuery(const Vector3<Scalar>& from, const Vector3<Scalar>& to, Scalar radius,
                  const Box<Scalar>& all) noexcept;
 
-    /// A bound from below of how far along the segment, 0 to 1, the capsule meets the box; `never` if it does not.
+    /// Lower bound of the fraction of the segment, 0 to 1, at which the capsule meets the box; `never` if it does not.
     template <Number N>
     [[nodiscard]] N entry(const Box<N>& box) const noexcept;
 
   private:
-    Vector3<Scalar> to_near_, to_far_;  // where it begins, seen from the sides of a box that it meets and leaves by
-    Vector3<Scalar> pace_;              // what part of the segment it takes to advance by a metre
+    Vector3<Scalar> to_near_, to_far_;  // start of the segment, offset for the sides where it enters and leaves a box
+    Vector3<Scalar> inverse_step_;      // one over each component of the segment [1/m]
 };
 
 template <Number N>
@@ -153,12 +154,13 @@ CapsuleQuery<Scalar>::CapsuleQuery(const Vector3<Scalar>& from, const Vector3<Sc
     using std::abs;
     using Limits = std::numeric_limits<Scalar>;
     const Scalar size = reach(all, from) + radius, margin = radius + 64 * Limits::epsilon() * size;
-    // A step below the rounding is lost in the margin; taken for no shorter, nothing times its pace overflows.
+    // A component below rounding is covered by the margin. It is clamped, so that products with its inverse do not
+    // overflow.
     const Scalar shortest = (std::max)(Limits::epsilon() * size, (Limits::min)());
     for (int k = 0; k < 3; ++k) {
         const Scalar step = to[k] - from[k];
-        pace_[k] = 1 / (abs(step) >= shortest ? step : shortest);
-        const Scalar ahead = pace_[k] > 0 ? margin : -margin;
+        inverse_step_[k] = 1 / (abs(step) >= shortest ? step : shortest);
+        const Scalar ahead = inverse_step_[k] > 0 ? margin : -margin;
         to_near_[k] = from[k] + ahead;
         to_far_[k] = from[k] - ahead;
     }
@@ -169,11 +171,11 @@ template <Number N>
 N CapsuleQuery<Scalar>::entry(const Box<N>& box) const noexcept {
     N first = 0, last = 1;
     for (int k = 0; k < 3; ++k) {
-        const bool forward = pace_[k] > 0;
+        const bool forward = inverse_step_[k] > 0;
         const N& near = forward ? box.low[k] : box.high[k];
         const N& far = forward ? box.high[k] : box.low[k];
-        first = larger<N>(first, (near - to_near_[k]) * pace_[k]);
-        last = smaller<N>(last, (far - to_far_[k]) * pace_[k]);
+        first = larger<N>(first, (near - to_near_[k]) * inverse_step_[k]);
+        last = smaller<N>(last, (far - to_far_[k]) * inverse_step_[k]);
     }
     return select<N>(first <= last, first, never);
 }

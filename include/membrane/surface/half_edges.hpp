@@ -10,14 +10,14 @@
 
 #include <membrane/core/types.hpp>
 
-/// The sides of all triangles, those on one edge together: what checks and adjacency are made from.
+/// The half-edges of all triangles, grouped by edge: the input of checks and adjacency.
 ///
 ///     for_each_edge(half_edges(triangles), [](std::span<const HalfEdge> sides) {
-///         // sides.size() is 1 at a border, 2 inside a surface, more where it is not one
+///         // sides.size() is 1 at a border, 2 inside a surface, more at a non-manifold edge
 ///     });
 namespace membrane {
 
-/// One side of one triangle, seen from its edge.
+/// One side of one triangle, oriented as its edge.
 struct HalfEdge {
     Index first, second;  ///< The edge's vertices, first < second.
     Index apex;           ///< The triangle's third vertex.
@@ -29,7 +29,7 @@ struct HalfEdge {
 };
 
 /// The 3 F half-edges, ascending by edge, then apex, then triangle. O(F log F).
-/// @pre No triangle names a vertex twice.
+/// @pre No triangle has a vertex twice.
 [[nodiscard]] inline std::vector<HalfEdge> half_edges(const Triangles& triangles);
 
 /// Calls `visit` with the half-edges of each edge, edges ascending.

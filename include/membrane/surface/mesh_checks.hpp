@@ -18,14 +18,14 @@
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/mesh_defect.hpp>
 
-/// The checks that a mesh must stand: `TriangleMesh` refuses at the first defect, `validate` collects them all.
+/// Checks of a mesh: `TriangleMesh` refuses the first defect, `validate` collects all defects.
 ///
-///     check_edges(sides, triangle_count, found);  // calls found(MeshDefect, vertices, triangles, parts of a message...)
+///     check_edges(sides, found);  // calls found(MeshDefect, vertices, triangles, parts of a message...)
 ///
-/// What they call may return: then they go on.
+/// If `found` returns, the check goes on.
 namespace membrane::detail {
 
-/// Three to a column, without a copy.
+/// Maps the numbers as columns of three, without a copy.
 template <class Number, std::size_t n>
 auto by_threes(std::string_view component, std::span<Number, n> numbers, std::string_view what) {
     if (numbers.size() % 3 != 0) {
@@ -35,7 +35,7 @@ auto by_threes(std::string_view component, std::span<Number, n> numbers, std::st
     return Eigen::Map<const Columns>(numbers.data(), 3, static_cast<Eigen::Index>(numbers.size() / 3));
 }
 
-/// Refuses at compile time what is no mesh at all.
+/// Refuses at compile time types that cannot be a mesh.
 template <class P, class T>
 constexpr void check_types() {
     static_assert(P::RowsAtCompileTime == 3 || P::RowsAtCompileTime == Eigen::Dynamic,
@@ -47,7 +47,8 @@ constexpr void check_types() {
                   "triangles must be of an integer type: pass triangles.cast<int>()");
 }
 
-/// Refuses a matrix that has not three rows, or more columns than can be numbered; nothing has been stored yet.
+/// Refuses a matrix that does not have three rows, or has more columns than `Index` can number. Nothing is stored
+/// before.
 template <class Found>
 void check_shape(std::string_view component, Eigen::Index rows, Eigen::Index columns, Eigen::Index most,
                  MeshDefect none, Found found) {
@@ -62,7 +63,7 @@ void check_shape(std::string_view component, Eigen::Index rows, Eigen::Index col
     if (columns > most) refuse(component, "at most ", most, " ", what, " can be numbered, got ", columns);
 }
 
-/// The shapes of positions and triangles.
+/// Checks the shapes of positions and triangles.
 template <class P, class T, class Found>
 void check_shapes(std::string_view component, const P& positions, const T& triangles, Found found) {
     constexpr Eigen::Index most = (std::numeric_limits<Index>::max)();
@@ -70,8 +71,8 @@ void check_shapes(std::string_view component, const P& positions, const T& trian
     check_shape(component, triangles.rows(), triangles.cols(), most / 3, MeshDefect::no_triangles, found);
 }
 
-/// Whether triangle `f` names three different vertices; looked at before they are stored as `Index`, which could hide
-/// what they are.
+/// Whether triangle `f` has three different, existing vertices. Checked before they are stored as `Index`, which could
+/// hide a wrong number.
 template <class T, class Found>
 bool check_corners(const T& triangles, Eigen::Index f, Eigen::Index vertex_count, Found found) {
     using Corner = typename T::Scalar;
@@ -92,7 +93,8 @@ bool check_corners(const T& triangles, Eigen::Index f, Eigen::Index vertex_count
     return true;
 }
 
-/// Whether one can compute with point `v`; if so, `largest` grows to its largest magnitude [m].
+/// Whether the coordinates of vertex `v` are finite and not too large. If so, `largest` grows to their largest
+/// magnitude [m].
 template <Real Scalar, class Found>
 bool check_point(const Points<Scalar>& x, Index v, Scalar& largest, Found found) {
     const Scalar most = std::sqrt(std::sqrt((std::numeric_limits<Scalar>::max)())) / 4;
@@ -115,7 +117,7 @@ bool check_point(const Points<Scalar>& x, Index v, Scalar& largest, Found found)
     return true;
 }
 
-/// Whether the surface has size and area, and numbers fine enough for its edges.
+/// Whether the surface has a size and an area, and floating point resolves its edges.
 template <Real Scalar, class Found>
 bool check_size(const Points<Scalar>& x, const Triangles& triangles, Scalar largest_coordinate, Found found) {
     using Limits = std::numeric_limits<Scalar>;
@@ -149,7 +151,7 @@ bool check_size(const Points<Scalar>& x, const Triangles& triangles, Scalar larg
     return false;
 }
 
-/// Triangles that lie on one edge and have the same third vertex, and edges of three triangles or more.
+/// Finds triangles with the same three vertices, and edges of three triangles or more.
 template <class Found>
 void check_edges(std::span<const HalfEdge> sides, Found found) {
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
@@ -158,7 +160,7 @@ void check_edges(std::span<const HalfEdge> sides, Found found) {
         for (std::size_t i = 1; i < edge.size(); ++i) {
             const HalfEdge &before = edge[i - 1], &side = edge[i];
             if (side.apex != before.apex) ++different;
-            if (side.apex != before.apex || side.apex < second) continue;  // told once, at the lowest two vertices
+            if (side.apex != before.apex || side.apex < second) continue;  // reported once, at the lowest two vertices
             const bool same = side.forward == before.forward;
             found(same ? MeshDefect::duplicate_triangle : MeshDefect::double_sided_triangle, {first, second, side.apex},
                   {before.triangle, side.triangle}, "triangles ", before.triangle, " and ", side.triangle,
@@ -173,13 +175,14 @@ void check_edges(std::span<const HalfEdge> sides, Found found) {
     });
 }
 
-/// Whether two triangles lie side by side at an edge, and run along it in the same direction.
+/// Whether exactly two triangles share the edge and run along it in the same direction.
 inline bool against(std::span<const HalfEdge> edge) {
     return edge.size() == 2 && edge[0].forward == edge[1].forward && edge[0].apex != edge[1].apex;
 }
 
-/// Which triangles are to be turned together, so that neighbours run along their edge in opposite directions: number f
-/// is triangle f as it is, f + `triangle_count` turned. Both in one set: the surface is one-sided.
+/// Sets of triangles with consistent orientation, in which neighbours run along their edge in opposite directions.
+/// Element f is triangle f as given, element f + `triangle_count` is triangle f reversed. If one set has both, the
+/// surface is one-sided.
 inline DisjointSets turns(std::span<const HalfEdge> sides, std::size_t triangle_count) {
     DisjointSets sets(2 * triangle_count);
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
@@ -192,16 +195,16 @@ inline DisjointSets turns(std::span<const HalfEdge> sides, std::size_t triangle_
     return sets;
 }
 
-/// Neighbours that are turned against each other, and surfaces where that cannot be helped.
+/// Finds neighbours of opposite orientation, and one-sided surfaces.
 template <class Found>
 void check_turns(std::span<const HalfEdge> sides, std::size_t triangle_count, Found found) {
     DisjointSets sets(0);
-    std::vector<bool> told;
+    std::vector<bool> reported;
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
         if (!against(edge)) return;
-        if (told.empty()) {
+        if (reported.empty()) {
             sets = turns(sides, triangle_count);
-            told.assign(2 * triangle_count, false);
+            reported.assign(2 * triangle_count, false);
         }
         const Index f = edge[0].triangle, g = edge[1].triangle, first = edge[0].first, second = edge[0].second;
         const std::size_t set = sets.find(static_cast<std::size_t>(f));
@@ -209,15 +212,15 @@ void check_turns(std::span<const HalfEdge> sides, std::size_t triangle_count, Fo
             found(MeshDefect::inconsistent_orientation, {first, second}, {f, g}, "triangles ", f, " and ", g,
                   " run along edge ", first, "-", second,
                   " in the same direction, expected opposite ones; turn one of them");
-        } else if (!told[set]) {
-            told[set] = true;
+        } else if (!reported[set]) {
+            reported[set] = true;
             found(MeshDefect::one_sided, {first, second}, {f, g},
                   "the surface is one-sided (a Moebius strip), expected two sides");
         }
     });
 }
 
-/// Which corners hang together by edges around their vertex: number 3 f + k is corner k of triangle f.
+/// Sets of corners that edges connect around their vertex: element 3 f + k is corner k of triangle f.
 inline DisjointSets fans(const Triangles& triangles, std::span<const HalfEdge> sides) {
     const auto corner_at = [&](const HalfEdge& side, Index v) {
         const Index k = triangles(side.side, side.triangle) == v ? side.side : (side.side + 1) % 3;
@@ -232,20 +235,20 @@ inline DisjointSets fans(const Triangles& triangles, std::span<const HalfEdge> s
     return sets;
 }
 
-/// A vertex whose triangles do not all hang together by edges at that vertex; told once. Triangles of `no_index` are
-/// left out.
+/// Finds vertices whose triangles are not all connected by edges at that vertex; each is reported once. Triangles of
+/// `no_index` are skipped.
 template <class Found>
 void check_fans(const Triangles& triangles, std::span<const HalfEdge> sides, Index vertex_count, Found found) {
     DisjointSets fan_of = fans(triangles, sides);
     const auto none = static_cast<std::size_t>(triangles.size());
     std::vector<std::size_t> first_fan(static_cast<std::size_t>(vertex_count), none);
-    std::vector<bool> told(static_cast<std::size_t>(vertex_count), false);
+    std::vector<bool> reported(static_cast<std::size_t>(vertex_count), false);
     for (std::size_t corner = 0; corner < none; ++corner) {
         if (triangles.data()[corner] == no_index) continue;
         const auto v = static_cast<std::size_t>(triangles.data()[corner]);
         if (first_fan[v] == none) first_fan[v] = fan_of.find(corner);
-        if (first_fan[v] == fan_of.find(corner) || told[v]) continue;
-        told[v] = true;
+        if (first_fan[v] == fan_of.find(corner) || reported[v]) continue;
+        reported[v] = true;
         const auto f = static_cast<Index>(first_fan[v] / 3), g = static_cast<Index>(corner / 3);
         found(MeshDefect::non_manifold_vertex, {static_cast<Index>(v)}, {f, g}, "vertex ", v, " joins triangles ", f,
               " and ", g, ", which no edges connect around it, expected one fan of triangles");

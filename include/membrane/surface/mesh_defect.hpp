@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string_view>
 
-/// What can be wrong with a mesh, how bad that is, and what to do.
+/// Kinds of mesh defects, their severity and their remedy.
 ///
 ///     for (const auto& finding : membrane::validate(x, triangles).findings) {
 ///         std::cout << name(finding.defect) << ": " << finding.text << "; " << remedy(finding.defect) << "\n";
@@ -22,36 +22,36 @@ enum class MeshDefect : std::uint8_t {
     coordinate_not_finite,
     coordinate_too_large,  ///< Squares of areas overflow.
     too_small,             ///< Squares of areas vanish.
-    too_coarse,            ///< Numbers so far from 0 are too coarse for the edges.
+    too_coarse,            ///< So far from 0, floating point does not resolve the edges.
     all_at_one_point,
     all_on_one_line,
-    duplicate_triangle,        ///< Another names the same vertices, in the same turn,
-    double_sided_triangle,     ///< or in the opposite one.
-    non_manifold_edge,         ///< Three triangles or more.
+    duplicate_triangle,        ///< Two triangles have the same vertices in the same orientation,
+    double_sided_triangle,     ///< or in opposite orientation.
+    non_manifold_edge,         ///< An edge of three triangles or more.
     one_sided,                 ///< A Moebius strip, a Klein bottle.
     inconsistent_orientation,  ///< Two triangles run along their edge in the same direction.
     non_manifold_vertex,       ///< It joins triangles that no edges connect around it.
 
-    coincident_vertices,         ///< At the very same place.
-    nearly_coincident_vertices,  ///< Nearer than the tolerance.
+    coincident_vertices,         ///< At equal positions.
+    nearly_coincident_vertices,  ///< Closer than the tolerance.
     zero_area,                   ///< Exactly: the corners are on one line.
-    needle,                      ///< The shortest side is a millionth of the longest, or less.
+    needle,                      ///< The shortest edge is at most a millionth of the longest.
     cap,                         ///< An angle of 179.999 degrees or more.
-    isolated_vertex,             ///< No triangle names it.
+    isolated_vertex,             ///< No triangle references it.
     missing_triangle,            ///< A border of three edges.
     t_junction,                  ///< A vertex of the border on the middle of an edge of the border.
     several_components,
     no_volume,          ///< Closed and flat.
     inward,             ///< Closed, and its triangles run clockwise seen from outside.
     nested_components,  ///< One closed component inside another.
-    self_intersection,  ///< Triangles meet elsewhere than at what they share.
+    self_intersection,  ///< Triangles intersect outside their common vertices and edges.
 };
 
 inline constexpr std::size_t mesh_defect_count = static_cast<std::size_t>(MeshDefect::self_intersection) + 1;
 
 enum class Severity : std::uint8_t {
     error,    ///< `TriangleMesh` refuses the mesh.
-    warning,  ///< It is accepted as it is, and may behave in a way nobody wants.
+    warning,  ///< The mesh is accepted unchanged and may behave in an unwanted manner.
 };
 
 [[nodiscard]] constexpr Severity severity(MeshDefect defect) noexcept {
@@ -64,18 +64,18 @@ struct DefectText {
     std::string_view name, remedy;
 };
 
-/// In the order of the kinds.
+/// In the order of `MeshDefect`.
 inline constexpr std::array<DefectText, mesh_defect_count> defect_texts{{
     {"no vertices", "pass the positions, one point a column"},
     {"no triangles", "pass the triangles, three vertices a column"},
-    {"index out of range", "count vertices from 0; look for triangles cut off or of another mesh"},
+    {"index out of range", "count vertices from 0; check for triangles cut off or of another mesh"},
     {"repeated vertex", "repair with .drop_repeated"},
-    {"coordinate not finite", "look for what wrote it: it cannot be guessed"},
-    {"coordinate too large", "look for what wrote it, or choose metres as unit"},
+    {"coordinate not finite", "check the program that wrote it: it cannot be repaired"},
+    {"coordinate too large", "check the program that wrote it, or choose metres as unit"},
     {"too small", "choose metres as unit, or use double"},
     {"too coarse", "move the mesh to the origin, or use double"},
-    {"all at one point", "look for what wrote the positions"},
-    {"all on one line", "look for what wrote the positions"},
+    {"all at one point", "check the program that wrote the positions"},
+    {"all on one line", "check the program that wrote the positions"},
     {"duplicate triangle", "repair with .drop_duplicates"},
     {"double-sided triangle", "repair with .drop_duplicates: a membrane is one sheet, with two sides anyway"},
     {"non-manifold edge", "remove triangles until two are left, or give the others vertices of their own"},
@@ -99,12 +99,12 @@ inline constexpr std::array<DefectText, mesh_defect_count> defect_texts{{
 
 }  // namespace detail
 
-/// In a word or two.
+/// A short name.
 [[nodiscard]] constexpr std::string_view name(MeshDefect defect) noexcept {
     return detail::defect_texts[static_cast<std::size_t>(defect)].name;
 }
 
-/// What to do.
+/// How to remove the defect.
 [[nodiscard]] constexpr std::string_view remedy(MeshDefect defect) noexcept {
     return detail::defect_texts[static_cast<std::size_t>(defect)].remedy;
 }

@@ -13,68 +13,70 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// The body under the membrane, where it moves in the world: the one thing that tells all parts how.
+/// The moving body under the membrane: one source of its motion for all parts.
 ///
 ///     auto body = membrane::MovingBody(mesh);
-///     if (!body.move_to(pose, x)) ...                                          // each tick: rigidly, or
-///     if (!body.move_to(anchors, dt, x)) ...                                   // anyhow
+///     if (!body.move_to(pose, x)) ...                                          // each tick: a rigid motion, or
+///     if (!body.move_to(anchors, dt, x)) ...                                   // any motion
 ///     tree.refit(x);
 ///     const auto contact = tracker.update(tree, x, tool, body);
 ///     const auto grasp   = grasper.update(contact, x, tool, body);
-///     const auto report  = solver.step(x, dt, network, on(body, foundation), press(tool, contact, grasp), pull(tool, grasp));
+///     const auto report  = solver.step(x, dt, network, on(body, foundation), press(tool, contact, grasp),
+///                                     pull(tool, grasp));
 ///     device.write(feel({tool, smooth(contact, body), report, grasp}));
 namespace membrane {
 
-/// Where the body is and how it came there: the anchors, which are where the membrane would be without any tool, and the
-/// pose, which carries the mesh to them as nearly as a rigid motion can.
+/// Motion of the body. The anchors are the positions of the membrane without any tool; the pose is the best rigid
+/// motion from the mesh to the anchors.
 ///
-/// A move takes the membrane along, pinned vertices too: each vertex goes with its anchor, and its distance from that is
-/// turned as the pose is. What parts remember (contact, grasp, forces, displacements) they turn and shift with the pose at
-/// their next call. So a membrane and a tool that move rigidly with the body feel nothing of it: all is as at rest, to
-/// rounding. Vertices are woken only when anchors move other than rigidly.
+/// A motion carries the membrane, pinned vertices included: the offset of each vertex from its anchor is kept and
+/// rotated with the pose. The state of other parts (contact, grasp, forces, displacements) is transformed with the pose
+/// at their next call. So a rigid motion of body, membrane and tool together has no effect, up to rounding. Vertices
+/// are woken only if the motion of the anchors is not rigid.
 ///
-/// A body that only moves rigidly, as an eye in its orbit, needs none of this where positions need not be in the world:
-/// with `to_body_frame(tool, frame)` the membrane stays in the body's frame, at no cost. Loads of a network that keep their
-/// direction in the world (`DeadLoad`) do not turn with a body, and force policies that remember a position there
-/// (`ContactFriction`) do not go along; with `to_body_frame` they do.
+/// A body with rigid motion only, as an eye in its orbit, does not need this class if positions need not be in the
+/// world: with `to_body_frame(tool, frame)` the membrane stays in the frame of the body, at no cost. Loads with a fixed
+/// direction in the world (`DeadLoad`) do not rotate with a body, and force policies that store a position in the world
+/// (`ContactFriction`) do not move with it; with `to_body_frame` they do.
 template <Real Scalar>
 class MovingBody {
   public:
-    /// At rest, its anchors the positions of `mesh`. Cost: O(F log F).
+    /// At the identity pose, with the positions of `mesh` as anchors. Cost: O(F log F).
     explicit MovingBody(const TriangleMesh<Scalar>& mesh);
 
-    /// The body is at `pose`, which carries it from where the mesh is; `x` (3 x V [m]), on the body, goes along. To be
-    /// called in every tick: velocities are those of the last call. Then refit the tree, all of it.
+    /// Moves the body to `pose`, relative to the mesh, and with it `x` (3 x V [m]). Call it in every tick: velocities
+    /// are those of the last call. Then refit the whole tree.
     ///
-    /// False, and nothing has changed, for a number that is not finite in `pose` or `x`, or that would come out so. Online.
-    /// Cost: O(V). @pre `x` has a column for each vertex, and the pose's rotation is one (asserted)
+    /// If a number in `pose`, in `x` or in the result is not finite, returns false and changes nothing. Online. Cost:
+    /// O(V). @pre `x` has a column for each vertex, and the rotation of the pose is orthonormal (asserted)
     [[nodiscard]] bool move_to(const RigidFrame<Scalar>& pose, PointsRef<Scalar> x) noexcept;
 
-    /// The same for a body that moves anyhow: its anchors are at `anchors` (3 x V [m]) now, and got there in `dt` [s]. The
-    /// pose is the best fit in the sense of least squares, by quaternions [Horn87]. Cost: O(F).
+    /// Moves a body of any motion: its anchors are now at `anchors` (3 x V [m]), after a motion of `dt` [s]. The pose
+    /// is the least-squares fit, by quaternions [Horn87]. Cost: O(F).
     /// @pre as many anchors as vertices (asserted)
     [[nodiscard]] bool move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept;
 
     [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
 
-    /// Of the surface that the anchors are the vertices of, unit length, 3 x V.
+    /// Unit normals at the vertices of the surface of the anchors, 3 x V.
     [[nodiscard]] const Points<Scalar>& normals() const noexcept { return normals_; }
 
-    /// From the mesh to the anchors. The velocities are of the last move.
+    /// The rigid motion from the mesh to the anchors, with the velocities of the last motion.
     [[nodiscard]] const RigidFrame<Scalar>& pose() const noexcept { return pose_; }
 
-    /// How often anchors have moved other than rigidly: a membrane at rest is then out of balance.
+    /// Number of motions of the anchors that were not rigid. Each takes a membrane out of equilibrium.
     [[nodiscard]] std::uint64_t deformations() const noexcept { return deformations_; }
 
-    /// Velocity at `place` of what is fixed to the body at the point `barycentric` of the triangle of vertices `corners`
+    /// Velocity at `position` of a point fixed to the body at `barycentric` in the triangle of vertices `corners`
     /// [m/s].
-    [[nodiscard]] Vector3<Scalar> velocity_at(const Vector3<Scalar>& place, const std::array<Index, 3>& corners,
+    [[nodiscard]] Vector3<Scalar> velocity_at(const Vector3<Scalar>& position, const std::array<Index, 3>& corners,
                                               const Vector3<Scalar>& barycentric) const noexcept;
 
-    /// How the body is turned at vertex `v`: as the pose is, and where it is deformed so that the normal there stays normal.
+    /// Rotation of the body at vertex `v`: that of the pose. If the body is deformed, a further rotation aligns the
+    /// normal at rest with the present normal.
     [[nodiscard]] Eigen::Matrix<Scalar, 3, 3> rotation_at(Index v) const noexcept;
 
-    /// The anchors of the body at rest: the mesh.
+    /// The anchors of the undeformed body: the positions of the mesh.
     [[nodiscard]] const Points<Scalar>& anchors_at_rest() const noexcept { return at_rest_; }
 
   private:
@@ -85,11 +87,11 @@ class MovingBody {
     Points<Scalar> at_rest_;
     VertexNormals<Scalar> surface_;
     Points<Scalar> normals_at_rest_, anchors_, normals_;
-    Points<Scalar> previous_;        // anchors before the last move
-    Points<Scalar> next_, carried_;  // during a move: its anchors, and the membrane's positions
+    Points<Scalar> previous_;        // anchors before the last motion
+    Points<Scalar> next_, carried_;  // during a motion: new anchors, new positions of the membrane
     RigidFrame<Scalar> pose_;
-    Scalar rate_ = 0;        // the last move's 1 / dt; zero: velocities are the pose's [1/s]
-    bool deformed_ = false;  // anchors are not where the pose carries the mesh
+    Scalar rate_ = 0;        // 1 / dt of the last motion; 0: velocities are those of the pose [1/s]
+    bool deformed_ = false;  // anchors differ from the mesh at the pose
     std::uint64_t deformations_ = 0;
 };
 
@@ -99,7 +101,7 @@ namespace detail {
 [[nodiscard]] inline std::array<double, 4> largest_eigenvector(std::array<std::array<double, 4>, 4> a) noexcept {
     std::array<std::array<double, 4>, 4> vectors{};  // as columns
     for (std::size_t i = 0; i < 4; ++i) vectors[i][i] = 1;
-    for (int sweep = 0; sweep < 16; ++sweep) {  // quadratic: six or so will do
+    for (int sweep = 0; sweep < 16; ++sweep) {  // quadratic convergence: about six suffice
         bool done = true;
         for (std::size_t p = 0; p < 3; ++p) {
             for (std::size_t q = p + 1; q < 4; ++q) {
@@ -208,7 +210,7 @@ bool MovingBody<Scalar>::move_to(const ConstPointsRef<Scalar>& anchors, Scalar d
     return true;
 }
 
-// To the anchors in `next_`, which are those of `pose`.
+// Moves the membrane to the anchors in `next_`, which belong to `pose`.
 template <Real Scalar>
 bool MovingBody<Scalar>::carry(const RigidFrame<Scalar>& pose, PointsRef<Scalar>& x) noexcept {
     const auto motion = motion_between(pose_, pose);
@@ -226,7 +228,7 @@ bool MovingBody<Scalar>::carry(const RigidFrame<Scalar>& pose, PointsRef<Scalar>
 
 template <Real Scalar>
 RigidFrame<Scalar> MovingBody<Scalar>::fit(const ConstPointsRef<Scalar>& anchors) const noexcept {
-    // In parts of the largest number, so that no product overflows.
+    // Relative to the largest coordinate, so that no product overflows.
     const auto size_of = [](const auto& points) {
         const auto largest = static_cast<double>(points.size() > 0 ? points.cwiseAbs().maxCoeff() : Scalar(0));
         return (std::max)(largest, (std::numeric_limits<double>::min)());
@@ -257,7 +259,7 @@ RigidFrame<Scalar> MovingBody<Scalar>::fit(const ConstPointsRef<Scalar>& anchors
     return pose;
 }
 
-// Whether `motion` takes the points `from` to the anchors, but for rounding.
+// Whether `motion` maps the points `from` to the anchors, up to rounding.
 template <Real Scalar>
 bool MovingBody<Scalar>::is_carried(const RigidFrame<Scalar>& motion, const Points<Scalar>& from) const noexcept {
     Scalar off = 0, size = 0;
@@ -270,22 +272,22 @@ bool MovingBody<Scalar>::is_carried(const RigidFrame<Scalar>& motion, const Poin
 }
 
 template <Real Scalar>
-Vector3<Scalar> MovingBody<Scalar>::velocity_at(const Vector3<Scalar>& place, const std::array<Index, 3>& corners,
+Vector3<Scalar> MovingBody<Scalar>::velocity_at(const Vector3<Scalar>& position, const std::array<Index, 3>& corners,
                                                 const Vector3<Scalar>& barycentric) const noexcept {
-    if (rate_ == 0) return pose_.velocity_at(place);
+    if (rate_ == 0) return pose_.velocity_at(position);
     const Vector3<Scalar> now = point_at(triangle_at(anchors_, corners), barycentric);
     const Vector3<Scalar> before = point_at(triangle_at(previous_, corners), barycentric);
-    return rate_ * (now - before) + cross<Scalar>(pose_.angular_velocity, place - now);
+    return rate_ * (now - before) + cross<Scalar>(pose_.angular_velocity, position - now);
 }
 
 template <Real Scalar>
 Eigen::Matrix<Scalar, 3, 3> MovingBody<Scalar>::rotation_at(Index v) const noexcept {
     if (!deformed_) return pose_.rotation;
-    // Turned on by the smallest angle that takes the normal along.
+    // Rotated further by the smallest angle that aligns the normals.
     const Vector3<Scalar> from = pose_.vector_to_world(point(normals_at_rest_, v)), to = point(normals_, v);
     const Vector3<Scalar> axis = cross(from, to);
     const Scalar cosine = dot(from, to);
-    if (!(cosine > Scalar(-0.5))) return pose_.rotation;  // about which axis is hardly known
+    if (!(cosine > Scalar(-0.5))) return pose_.rotation;  // here the axis is ill-conditioned
     Eigen::Matrix<Scalar, 3, 3> rotation;
     for (Eigen::Index k = 0; k < 3; ++k) {
         const Vector3<Scalar> column = pose_.rotation.col(k), turned = cross(axis, column);

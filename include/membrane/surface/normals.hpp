@@ -15,7 +15,7 @@
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/triangle.hpp>
 
-/// Which way a surface faces as it moves.
+/// Normals of a moving surface.
 ///
 ///     auto normals = membrane::VertexNormals(mesh);
 ///     normals.update(x, report.moved);    // in the loop: the moved vertices and their neighbours
@@ -24,33 +24,33 @@ namespace membrane {
 
 namespace detail {
 
-/// The border of the triangles around a vertex; see `borders_of`.
-struct Border {
-    std::array<Index, 6> vertices;  ///< The first, of most vertices all.
-    Index rest = 0, rest_size = 0;  ///< Where the others are in an array of them.
+/// The one-ring of a vertex; see `one_rings_of`.
+struct OneRing {
+    std::array<Index, 6> vertices;          ///< The first six, for most vertices all.
+    Index overflow = 0, overflow_size = 0;  ///< Start and number of the others in `VertexNormals::overflow_`.
 };
 
 }  // namespace detail
 
-/// Unit normals of the vertices, weighted by the area of their triangles. Owns all it holds; the mesh may go.
+/// Unit normals of the vertices, weighted by the area of their triangles. Owns its data: the mesh need not outlive it.
 ///
-/// An update of the moved vertices gives the same bits as one of all. A vertex whose triangles have no area together,
-/// or are not finite or too large for the numbers, gets its normal at rest, and (0, 0, 1) if it had none there or has
-/// no triangles: always a finite vector of length 1.
+/// An update of the moved vertices gives the same bits as an update of all. If the triangles of a vertex have no area
+/// together, are not finite or too large, the vertex gets its normal at rest, or (0, 0, 1) if it had none or has no
+/// triangles: always a finite vector of length 1.
 template <Real Scalar>
 class VertexNormals {
   public:
-    /// Of the mesh at rest. O(F log F).
+    /// The normals of the mesh at rest. O(F log F).
     explicit VertexNormals(const TriangleMesh<Scalar>& mesh);
 
-    /// Of all vertices, at the positions `x`, 3 x V [m]. O(F), no allocation.
+    /// Updates the normals of all vertices, at the positions `x`, 3 x V [m]. O(F), no allocation.
     /// @pre `x` has a column for each vertex (asserted).
     void update(const ConstPointsRef<Scalar>& x) noexcept;
 
-    /// Of the vertices `moved` and their neighbours, each once; a vertex may be named several times. Returns them, valid
-    /// until the next update: no other normal has changed, and no point is read but the corners of their triangles. Linear
-    /// in the number of these, no allocation.
-    /// @pre `x` has a column for each vertex and `moved` names vertices (asserted).
+    /// Updates the normals of the vertices `moved` and their neighbours, each once; `moved` may have duplicates.
+    /// Returns these vertices, valid until the next update. No other normal changes, and only the corners of their
+    /// triangles are read. Linear in their number, no allocation.
+    /// @pre `x` has a column for each vertex and all `moved` are vertices (asserted).
     std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
     /// 3 x V, unit length.
@@ -58,26 +58,26 @@ class VertexNormals {
 
   private:
     static constexpr auto lanes = static_cast<Index>(Lanes<Scalar>::count);
-    static constexpr Index at_a_time = 256;  // vertices: what is in between stays in the cache
+    static constexpr Index batch_size = 256;  // vertices of a batch: intermediate results stay in the cache
 
     template <class VertexAt>
     void face(const ConstPointsRef<Scalar>& x, Index count, const VertexAt& vertex) noexcept;
     template <class VertexAt>
     void normalise(const ConstPointsRef<Scalar>& x, const VertexAt& vertex, Index first, Index end) noexcept;
-    void check(const Vector3<Scalar>& place, Index v, Scalar squared) noexcept;
+    void check(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept;
 
-    std::vector<detail::Border> borders_;
-    std::vector<Index> rests_;  // of the borders
+    std::vector<detail::OneRing> one_rings_;
+    std::vector<Index> overflow_;  // vertices of one-rings beyond the first six
     Points<Scalar> values_;
     Points<Scalar> at_rest_;
     IndexSet updated_;                        // by the last call
-    std::vector<PaddedPoint<Scalar>> areas_;  // twice those around the vertices at hand, as z, x, y; then their normals
+    std::vector<PaddedPoint<Scalar>> areas_;  // of a batch: twice the areas as z, x, y; then the normals
 };
 
-/// The angle-weighted normal where `barycentric` says, of the face, edge or corner: its sign against the way from there
-/// to a point tells inside from outside when that is the surface point nearest to it [Baerentzen05].
-/// `barycentric` is exactly zero at the corners that have no part in it, as `closest_point` gives it. Unit length, or
-/// zero where the triangles around have no area. No allocation; linear in the triangles of a corner.
+/// The angle-weighted normal of the face, edge or corner at `barycentric`. If this is the surface point nearest to a
+/// point q, the sign of its dot product with the vector to q separates inside from outside [Baerentzen05].
+/// `barycentric` must be exactly zero at the corners not involved, as from `closest_point`. Unit length, or zero if the
+/// triangles around it have no area. No allocation; linear in the triangles of a corner.
 /// @pre `f` is a triangle (asserted).
 template <class Positions>
 [[nodiscard]] Vector3<typename Positions::Scalar> pseudo_normal(
@@ -86,7 +86,7 @@ template <class Positions>
 
 namespace detail {
 
-/// `a` at unit length, or `otherwise` where its length is not a number one can divide by.
+/// `a` at unit length, or `otherwise` if its length is not finite or too small to divide by.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> unit_or(const Vector3<Scalar>& a, const Vector3<Scalar>& otherwise) noexcept {
     const Scalar squared = squared_norm(a);
@@ -94,10 +94,10 @@ template <Real Scalar>
     return a / std::sqrt(squared);
 }
 
-/// What the triangles around each vertex have for a border, counter-clockwise: its neighbours; if these do not go all the
-/// way round, the vertex and its neighbours. An even number: where it would be odd, the first comes again.
+/// The one-ring of each vertex, counter-clockwise: its neighbours; at a border, the vertex and its neighbours. If the
+/// number is odd, the first vertex is appended, so that it is even.
 template <Real Scalar>
-[[nodiscard]] CompressedRows<Index> borders_of(const TriangleMesh<Scalar>& mesh) {
+[[nodiscard]] CompressedRows<Index> one_rings_of(const TriangleMesh<Scalar>& mesh) {
     const Adjacency adjacency(mesh);
     const auto& triangles = mesh.triangles();
     return {mesh.vertex_count(), [&](auto put) {
@@ -124,23 +124,23 @@ template <Real Scalar>
             }};
 }
 
-/// Twice the area that the border encloses, as z, x, y: whatever is inside, triangles from its first point to its others
-/// have the same together. They are taken two at a time, as the product of their diagonals.
+/// Twice the area that the one-ring encloses, as z, x, y. The triangles from its first vertex have this area together.
+/// They are computed two at a time, as the cross product of their diagonals.
 template <Real Scalar>
-[[gnu::always_inline]] inline PaddedVector<Scalar> area_within(const Border& border, const Index* references,
+[[gnu::always_inline]] inline PaddedVector<Scalar> area_within(const OneRing& ring, const Index* overflow,
                                                                const Scalar* x, std::ptrdiff_t stride) noexcept {
     const auto at = [&](Index v) { return PaddedVector<Scalar>::load_point(x + v * stride); };
-    const auto first = at(border.vertices[0]);
-    auto last = at(border.vertices[1]);
+    const auto first = at(ring.vertices[0]);
+    auto last = at(ring.vertices[1]);
     const auto next_two = [&](Index p, Index q) {
         const auto next = at(q), a = at(p) - first, b = next - last;
         last = next;
         return a * b.turned() - a.turned() * b;
     };
-    auto area = next_two(border.vertices[2], border.vertices[3]);
-    area = area + next_two(border.vertices[4], border.vertices[5]);
-    for (Index k = border.rest; k < border.rest + border.rest_size; k += 2) {
-        area = area + next_two(references[k], references[k + 1]);
+    auto area = next_two(ring.vertices[2], ring.vertices[3]);
+    area = area + next_two(ring.vertices[4], ring.vertices[5]);
+    for (Index k = ring.overflow; k < ring.overflow + ring.overflow_size; k += 2) {
+        area = area + next_two(overflow[k], overflow[k + 1]);
     }
     return area;
 }
@@ -155,21 +155,21 @@ template <Real Scalar>
 
 template <Real Scalar>
 VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
-    : borders_(static_cast<std::size_t>(mesh.vertex_count())),
+    : one_rings_(static_cast<std::size_t>(mesh.vertex_count())),
       values_(3, mesh.vertex_count()),
       at_rest_(Vector3<Scalar>::UnitZ().eigen().replicate(1, mesh.vertex_count())),
       updated_(mesh.vertex_count()),
-      areas_(static_cast<std::size_t>(at_a_time)) {
-    const CompressedRows<Index> whole = detail::borders_of(mesh);
+      areas_(static_cast<std::size_t>(batch_size)) {
+    const CompressedRows<Index> whole = detail::one_rings_of(mesh);
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
-        detail::Border& border = borders_[static_cast<std::size_t>(v)];
+        detail::OneRing& ring = one_rings_[static_cast<std::size_t>(v)];
         const auto points = whole[v];
-        const std::size_t here = (std::min)(points.size(), border.vertices.size());
-        border.vertices.fill(points[0]);
-        border.rest = static_cast<Index>(rests_.size());
-        border.rest_size = static_cast<Index>(points.size() - here);
-        for (std::size_t k = 0; k < here; ++k) border.vertices[k] = points[k];
-        for (const Index w : points.subspan(here)) rests_.push_back(w);
+        const std::size_t here = (std::min)(points.size(), ring.vertices.size());
+        ring.vertices.fill(points[0]);
+        ring.overflow = static_cast<Index>(overflow_.size());
+        ring.overflow_size = static_cast<Index>(points.size() - here);
+        for (std::size_t k = 0; k < here; ++k) ring.vertices[k] = points[k];
+        for (const Index w : points.subspan(here)) overflow_.push_back(w);
     }
     update(mesh.positions());
     at_rest_ = values_;
@@ -187,16 +187,16 @@ std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar
     MEMBRANE_ASSERT(x.cols() == values_.cols());
     updated_.clear();
     for (const Index v : moved) updated_.insert(v);
-    // The neighbours of what moves have nearly all moved too: one branch for all of them is predicted.
+    // Neighbours of moved vertices have mostly moved too: one branch for all of them is predicted.
     for (const Index v : moved) {
-        const detail::Border& border = borders_[static_cast<std::size_t>(v)];
+        const detail::OneRing& ring = one_rings_[static_cast<std::size_t>(v)];
         bool all_in = true;
-        for (const Index w : border.vertices) all_in &= updated_.contains(w);
+        for (const Index w : ring.vertices) all_in &= updated_.contains(w);
         if (!all_in) {
-            for (const Index w : border.vertices) updated_.insert(w);
+            for (const Index w : ring.vertices) updated_.insert(w);
         }
-        for (Index k = border.rest; k < border.rest + border.rest_size; ++k) {
-            updated_.insert(rests_[static_cast<std::size_t>(k)]);
+        for (Index k = ring.overflow; k < ring.overflow + ring.overflow_size; ++k) {
+            updated_.insert(overflow_[static_cast<std::size_t>(k)]);
         }
     }
     const auto updated = updated_.items();
@@ -204,43 +204,43 @@ std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar
     return updated;
 }
 
-/// Finds the normals of `vertex(n)` for n from 0 to `count` - 1.
+/// Computes the normals of `vertex(n)` for n from 0 to `count` - 1.
 template <Real Scalar>
 template <class VertexAt>
 void VertexNormals<Scalar>::face(const ConstPointsRef<Scalar>& x, Index count, const VertexAt& vertex) noexcept {
-    // Read once: for all the compiler knows, what is stored below changes them.
-    const detail::Border* borders = borders_.data();
-    const Index* references = rests_.data();
-    const Scalar* places = x.data();
+    // Read once: the compiler must assume that the stores below change them.
+    const detail::OneRing* rings = one_rings_.data();
+    const Index* overflow = overflow_.data();
+    const Scalar* positions = x.data();
     PaddedPoint<Scalar>* areas = areas_.data();
     const std::ptrdiff_t stride = x.outerStride();
-    for (Index first = 0; first < count; first += at_a_time) {
-        const Index some = (std::min)(at_a_time, count - first);
+    for (Index first = 0; first < count; first += batch_size) {
+        const Index some = (std::min)(batch_size, count - first);
         for (Index k = 0; k < some; ++k) {
-            const auto area = detail::area_within(borders[vertex(first + k)], references, places, stride);
+            const auto area = detail::area_within(rings[vertex(first + k)], overflow, positions, stride);
             area.store(areas[k].number.data());
         }
-        const auto at_hand = [&](Index k) { return vertex(first + k); };
+        const auto batch_vertex = [&](Index k) { return vertex(first + k); };
         Index k = 0;
-        for (; k + lanes <= some; k += lanes) normalise(x, at_hand, k, k + lanes);
-        if (k < some) normalise(x, at_hand, k, some);
+        for (; k + lanes <= some; k += lanes) normalise(x, batch_vertex, k, k + lanes);
+        if (k < some) normalise(x, batch_vertex, k, some);
     }
 }
 
-/// Makes normals of areas `first` to `end` - 1, those of `vertex(first)` and so on; as many as there are lanes at most:
-/// square root and division are slow one by one.
+/// Normalises the areas `first` to `end` - 1, those of `vertex(first)` to `vertex(end - 1)`, at most as many as there
+/// are lanes: square root and division are slow one by one.
 template <Real Scalar>
 template <class VertexAt>
 [[gnu::always_inline]] inline void VertexNormals<Scalar>::normalise(const ConstPointsRef<Scalar>& x,
                                                                     const VertexAt& vertex, Index first,
                                                                     Index end) noexcept {
     std::array<Index, Lanes<Scalar>::count> begins, vertices;
-    PaddedVector<Scalar> places;
+    PaddedVector<Scalar> positions;
     for (std::size_t i = 0; i < vertices.size(); ++i) {
         const Index k = (std::min)(first + static_cast<Index>(i), end - 1);
         begins[i] = numbers_in_point * k;
         vertices[i] = vertex(k);
-        places = places + PaddedVector<Scalar>::load_point(x.data() + vertices[i] * x.outerStride());
+        positions = positions + PaddedVector<Scalar>::load_point(x.data() + vertices[i] * x.outerStride());
     }
     const Vector3<Lanes<Scalar>> turned = gather(areas_.data(), begins.data());
     const Vector3<Lanes<Scalar>> area(turned.y(), turned.z(), turned.x());
@@ -251,18 +251,18 @@ template <class VertexAt>
         values_.col(vertices[i]) = Vector3<Scalar>(normal[0], normal[1], normal[2]);
     }
 
-    Scalar all = places.sum();  // finite only if all that is added is; a vertex is no part of its border
+    Scalar all = positions.sum();  // finite only if all summands are; a vertex is not in its one-ring
     for (std::size_t i = 0; i < vertices.size(); ++i) all += squared[i];
     if (is_finite(all) && !any(squared < (std::numeric_limits<Scalar>::min)())) [[likely]]
         return;
     for (std::size_t i = 0; i < vertices.size(); ++i) check(point(x, vertices[i]), vertices[i], squared[i]);
 }
 
-/// Gives vertex `v` its normal at rest unless it has one; `squared` is the square of twice its area.
+/// Sets the normal at rest of vertex `v` if it has no other; `squared` is the square of twice its area.
 template <Real Scalar>
-[[gnu::noinline]] void VertexNormals<Scalar>::check(const Vector3<Scalar>& place, Index v, Scalar squared) noexcept {
+[[gnu::noinline]] void VertexNormals<Scalar>::check(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept {
     const bool measurable = is_finite(squared) && squared >= (std::numeric_limits<Scalar>::min)();
-    if (!measurable || !is_finite(place)) values_.col(v) = at_rest_.col(v);
+    if (!measurable || !is_finite(position)) values_.col(v) = at_rest_.col(v);
 }
 
 template <class Positions>

@@ -10,29 +10,29 @@
 #include <membrane/surface/box.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// A mesh in an order in which what is near in space is near in memory.
+/// A mesh in an order in which elements close in space are close in memory.
 ///
 ///     const auto [near, source_vertex, triangle_before] = membrane::reordered(mesh);
 ///     for (membrane::Index v = 0; v < near.vertex_count(); ++v) colour_now[v] = colour[source_vertex[v]];
 namespace membrane {
 
-/// A mesh, and what its vertices and triangles were before.
+/// A mesh, and the former indices of its vertices and triangles.
 template <Real Scalar>
 struct ReorderedMesh {
     TriangleMesh<Scalar> mesh;
-    std::vector<Index> source_vertex;    ///< vertex v was this one
-    std::vector<Index> triangle_before;  ///< triangle f was this one
+    std::vector<Index> source_vertex;    ///< former index of vertex v
+    std::vector<Index> triangle_before;  ///< former index of triangle f
 };
 
-/// The same surface, its vertices along a curve that fills space [Morton66], its triangles by the first of their vertices.
-/// A tool that comes to another place finds there in few lines of the cache what it needs, which tells from about
-/// 100,000 vertices on. The same for the same mesh, on every machine; what is in this order stays in it. O(F log F).
+/// The surface with its vertices along a space-filling curve [Morton66], and its triangles by the first of their
+/// vertices. A tool at a new position needs few cache lines, which matters from about 100,000 vertices on.
+/// Deterministic on every machine; a mesh in this order keeps it. O(F log F).
 template <Real Scalar>
 [[nodiscard]] ReorderedMesh<Scalar> reordered(const TriangleMesh<Scalar>& mesh);
 
 namespace detail {
 
-/// The lowest 21 bits of `number`, two zeros between any two.
+/// The lowest 21 bits of `number`, with two zeros between neighbours.
 [[nodiscard]] constexpr std::uint64_t spread_bits(std::uint64_t number) noexcept {
     number &= 0x1fffff;
     number = (number | number << 32) & 0x1f00000000ffff;
@@ -42,7 +42,7 @@ namespace detail {
     return (number | number << 2) & 0x1249249249249249;
 }
 
-/// The numbers 0, 1, ... by their keys; those with the same key as they came.
+/// The indices 0, 1, ... sorted by their keys; equal keys keep their order.
 template <class Key>
 [[nodiscard]] std::vector<Index> sorted_by(const std::vector<Key>& keys) {
     std::vector<Index> order(keys.size());
@@ -62,15 +62,15 @@ ReorderedMesh<Scalar> reordered(const TriangleMesh<Scalar>& mesh) {
     for (Index v = 0; v < mesh.vertex_count(); ++v) all.include(point(x, v));
     const Vector3<Scalar> low = all.low, size = all.high - all.low;
     const Scalar cells = Scalar(1 << 21) * (1 - Scalar(1e-6)), per_metre = cells / size.maxCoeff();
-    std::vector<std::uint64_t> place;
+    std::vector<std::uint64_t> cell_keys;
     for (const auto& p : x.colwise()) {
         std::uint64_t key = 0;
         for (const Index k : {0, 1, 2}) {
             key |= detail::spread_bits(static_cast<std::uint64_t>((p[k] - low[k]) * per_metre)) << k;
         }
-        place.push_back(key);
+        cell_keys.push_back(key);
     }
-    const std::vector<Index> vertices = detail::sorted_by(place);
+    const std::vector<Index> vertices = detail::sorted_by(cell_keys);
 
     std::vector<Index> now(vertices.size());
     for (std::size_t v = 0; v < vertices.size(); ++v)

@@ -11,7 +11,7 @@
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Surfaces that need no file.
+/// Surfaces made without a file.
 ///
 ///     const auto sphere = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});   // 642 vertices
 ///     const auto skin   = membrane::sheet<float>({.width = 0.1, .height = 0.05, .columns = 40, .rows = 20});
@@ -42,14 +42,14 @@ struct SphericalCapOptions {
 };
 
 /// A sphere around the origin: 10 * 4^s + 2 vertices, 20 * 4^s triangles. The regular icosahedron with its vertices at
-/// the directions of (0, +-1, +-phi) and cyclic permutations, each triangle split at its edges' midpoints, which move
-/// out to the sphere. The first 12 vertices have five neighbours, all others six.
+/// the directions of (0, +-1, +-phi) and cyclic permutations, each triangle split at its edges' midpoints, projected
+/// to the sphere. The first 12 vertices have five neighbours, all others six.
 /// @throws InvalidInput if an option is out of its range
 template <Real Scalar = double>
 [[nodiscard]] TriangleMesh<Scalar> icosphere(const IcosphereOptions& options = {});
 
-/// A rectangle around the origin at z = 0, facing +z: (columns + 1) * (rows + 1) vertices, row by row, and two triangles
-/// for each square, cut from its lower left to its upper right.
+/// A rectangle around the origin at z = 0, facing +z: (columns + 1) * (rows + 1) vertices, row by row, and two
+/// triangles for each square, cut from its lower left to its upper right.
 /// @throws InvalidInput if an option is out of its range
 template <Real Scalar = double>
 [[nodiscard]] TriangleMesh<Scalar> sheet(const SheetOptions& options = {});
@@ -76,8 +76,8 @@ inline void check_count(std::string_view shape, std::string_view option, Index c
     if (count < least || count > most) refuse(shape, option, " must be ", least, " to ", most, ", got ", count);
 }
 
-/// Every triangle into four. `x` has room for the new vertices from `vertex_count` on, which grows by one for each
-/// edge; they come to lie on the unit sphere.
+/// Splits every triangle into four. `x` has capacity for the new vertices from `vertex_count` on, which grows by one
+/// for each edge. New vertices lie on the unit sphere.
 inline Triangles subdivided(const Triangles& triangles, Points<double>& x, Index& vertex_count) {
     Triangles midpoints(3, triangles.cols());
     for_each_edge(half_edges(triangles), [&](std::span<const HalfEdge> sides) {
@@ -96,12 +96,12 @@ inline Triangles subdivided(const Triangles& triangles, Points<double>& x, Index
     return finer;
 }
 
-/// A centre with rings of 6, 12, 18 ... vertices around it; `place(r, angle)` is where a vertex of ring r goes.
-template <Real Scalar, class Place>
-TriangleMesh<Scalar> concentric(Index rings, Place place) {
+/// A centre with rings of 6, 12, 18 ... vertices around it; `position(r, angle)` is that of a vertex of ring r.
+template <Real Scalar, class Position>
+TriangleMesh<Scalar> concentric(Index rings, Position position) {
     const auto first_of = [](Index ring) { return ring == 0 ? 0 : 1 + 3 * ring * (ring - 1); };
     Points<double> x(3, first_of(rings + 1));
-    x.col(0) = place(0, 0.0);
+    x.col(0) = position(0, 0.0);
     Triangles triangles(3, 6 * rings * rings);
     Eigen::Index f = 0;
     for (Index ring = 1; ring <= rings; ++ring) {
@@ -109,7 +109,7 @@ TriangleMesh<Scalar> concentric(Index rings, Place place) {
         const auto outer = [&](Index i) { return first_of(ring) + i % count; };
         const auto inner = [&](Index i) { return first_of(ring - 1) + i % inner_count; };
         for (Index i = 0; i < count; ++i) {
-            x.col(outer(i)) = place(ring, 2 * std::numbers::pi * i / count);
+            x.col(outer(i)) = position(ring, 2 * std::numbers::pi * i / count);
             const Index j = i - i / ring;  // each of the six sectors has one inner vertex less
             triangles.col(f++) << inner(j), outer(i), outer(i + 1);
             if (i % ring + 1 < ring) triangles.col(f++) << inner(j), outer(i + 1), inner(j + 1);

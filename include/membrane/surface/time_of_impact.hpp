@@ -11,8 +11,9 @@
 
 namespace membrane {
 
-/// When the triangle first passes `q` as its corners move in straight lines: a time from 0 to 1 just before it does, or
-/// 1 if it does not. The volume between triangle and `q` is a cubic of time, and changes its sign there.
+/// Time of impact of the triangle with `q` as its corners move in straight lines: a time from 0 to 1 just before the
+/// impact, or 1 if there is none. The volume between triangle and `q` is a cubic of time, and changes its sign at the
+/// impact.
 template <Real Scalar>
 [[nodiscard]] Scalar time_of_impact(const Triangle<Scalar>& from, const Triangle<Scalar>& to,
                                     const Vector3<Scalar>& q) noexcept;
@@ -27,13 +28,14 @@ template <Real Scalar>
     return between(between(ab, bc), between(bc, cd));
 }
 
-/// `part / whole` between 0 and 1, whatever the two are.
+/// `part / whole` clamped to [0, 1], for any two numbers.
 template <Real Scalar>
 [[nodiscard]] Scalar quotient_inside(Scalar part, Scalar whole) noexcept {
     return whole < 0 ? fraction(-part, -whole) : fraction(part, whole);
 }
 
-/// 0, 1, and the times between where the cubic may turn, ascending: it is monotonic from each to the next.
+/// 0, 1, and the times between at which the cubic may have an extremum, ascending: it is monotonic from each to the
+/// next.
 template <Real Scalar>
 [[nodiscard]] std::array<Scalar, 4> turning_times(const std::array<Scalar, 4>& p) noexcept {
     const Scalar c = p[1] - p[0], b = (p[2] - p[1]) - c, a = (p[3] - p[2]) - (p[2] - p[1]) - b;  // a t^2 + 2 b t + c
@@ -61,7 +63,7 @@ Scalar time_of_impact(const Triangle<Scalar>& from, const Triangle<Scalar>& to, 
         (volume(begin.a, end.b, end.c) + volume(end.a, begin.b, end.c) + volume(end.a, end.b, begin.c)) / 3,
         volume(end.a, end.b, end.c)};
     const auto [least, most] = std::minmax_element(volumes.begin(), volumes.end());
-    if (*least > 0 || *most < 0) return 1;  // a cubic stays between its coefficients
+    if (*least > 0 || *most < 0) return 1;  // a cubic stays between its Bernstein coefficients
 
     const Scalar size = detail::largest_magnitude<Scalar>(swept.high - swept.low);
     const auto is_behind = [&](Scalar t) { return detail::cubic_at(volumes, t) < 0; };

@@ -9,24 +9,24 @@
 #include <membrane/core/check.hpp>
 #include <membrane/core/lanes.hpp>
 
-/// One triangle and what can be near it: a point, a segment, a box.
+/// Proximity of one triangle to a point, a segment or a box.
 ///
 ///     const auto triangle = membrane::triangle_at(x, mesh.triangles().col(f));
 ///     const auto nearest  = membrane::closest_point(triangle, tool.position);
 ///     if (nearest.squared_distance < radius * radius) { /* the tool contacts at nearest.point */ }
 ///
 /// All functions are pure, do not allocate and cost a bounded number of operations. Differences are taken first, so
-/// accuracy depends on the size of the triangle and the distances, not on where the origin is. Triangles without area,
-/// down to three equal corners, are segments or points. No finite input gives a NaN.
+/// accuracy depends on the size of the triangle and the distances, not on the position of the origin. Triangles without
+/// area, down to three equal corners, are segments or points. No finite input gives a NaN.
 namespace membrane {
 
-/// Three corners, counter-clockwise seen from outside [m]. Of `Lanes`: several triangles.
+/// Three corners, counter-clockwise seen from outside [m]. With `Lanes`: several triangles.
 template <Number N>
 struct Triangle {
     Vector3<N> a, b, c;
 };
 
-/// A point of a triangle and how far it is from what was asked about. Of `Lanes`: of several triangles.
+/// A point of a triangle and its squared distance from the query. With `Lanes`: of several triangles.
 template <Number N>
 struct TrianglePoint {
     Vector3<N> barycentric;  ///< Weights of a, b, c: not negative, sum 1; exactly zero for corners not involved.
@@ -52,25 +52,25 @@ struct SegmentHit {
 template <class Positions, class Corners>
 [[nodiscard]] Triangle<typename Positions::Scalar> triangle_at(const Positions& x, const Corners& corners) noexcept;
 
-/// The normal, as long as the triangle is large [m^2].
+/// The normal, with the area of the triangle as its length [m^2].
 template <Number N>
 [[nodiscard]] Vector3<N> area_vector(const Triangle<N>& triangle) noexcept;
 
-/// The point with the weights `barycentric`; the corner itself, to the bit, where one weight is 1 and the others 0.
+/// The point with the weights `barycentric`; exactly a corner if its weight is 1 and the others are 0.
 template <Number N>
 [[nodiscard]] Vector3<N> point_at(const Triangle<N>& triangle, const Vector3<N>& barycentric) noexcept;
 
-/// The point of the triangle nearest to `q`; of several triangles at once, to the same bits. A triangle whose height is below sqrt(epsilon) of its edges counts as its
-/// three edges, which moves the answer by no more than that height. One that is not finite, or so large that the square
-/// of its area is not, is infinitely far away.
+/// The point of the triangle nearest to `q`; several triangles at once give the same bits. A triangle whose height is
+/// below sqrt(epsilon) of its edges counts as its three edges, which moves the point by at most that height. If a
+/// triangle is not finite, or the square of its area overflows, its distance is infinite.
 template <Number N>
 [[nodiscard]] TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept;
 
-/// How far `closest_point` is from `q` [m^2], to the same bits.
+/// Squared distance of `closest_point` from `q` [m^2], with the same bits.
 template <Number N>
 [[nodiscard]] N squared_distance(const Triangle<N>& triangle, const Vector3<N>& q) noexcept;
 
-/// The nearest points of the triangle and of the segment from `p` to `q`; at distance 0 where they cross.
+/// The nearest points of the triangle and of the segment from `p` to `q`; at distance 0 if they intersect.
 template <Real Scalar>
 [[nodiscard]] SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, const Vector3<Scalar>& p,
                                                      const Vector3<Scalar>& q) noexcept;
@@ -80,24 +80,25 @@ template <Real Scalar>
 [[nodiscard]] SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, int k, const Vector3<Scalar>& p,
                                                      const Vector3<Scalar>& q) noexcept;
 
-/// Where the segment first meets the triangle, from either side; edges, corners and the segment's ends belong to it.
+/// The first point where the segment meets the triangle, from either side; edges, corners and the segment's ends belong
+/// to it.
 ///
-/// Watertight: what could be a hit within the rounding errors of the computation is one, so that no segment slips
-/// through between two triangles with a common edge. A segment in the plane of the triangle enters at an edge, or
-/// starts inside. A triangle without area is never hit: its neighbours are.
+/// Watertight: a possible hit within the rounding errors is a hit, so that no segment passes between two triangles with
+/// a common edge. A segment in the plane of the triangle enters at an edge, or starts inside. A triangle without area
+/// is never hit: its neighbours are.
 template <Real Scalar>
 [[nodiscard]] std::optional<SegmentHit<Scalar>> first_hit(const Triangle<Scalar>& triangle, const Vector3<Scalar>& from,
                                                           const Vector3<Scalar>& to) noexcept;
 
-/// Whether the triangle and the box between the corners `low` and `high` have a point in common, borders included; what
-/// could be one within the rounding errors is one. Separating axes, all 13 [Akenine-Moeller01].
+/// Whether the triangle and the box between the corners `low` and `high` have a common point, borders included; a
+/// possible common point within the rounding errors is one. Separating axes, all 13 [Akenine-Moeller01].
 template <Real Scalar>
 [[nodiscard]] bool touches_box(const Triangle<Scalar>& triangle, const Vector3<Scalar>& low,
                                const Vector3<Scalar>& high) noexcept;
 
 namespace detail {
 
-/// `part / whole` between 0 and 1, whatever the two are.
+/// `part / whole` clamped to [0, 1], for any two numbers.
 template <Number N>
 [[gnu::always_inline, nodiscard]] inline N fraction(const N& part, const N& whole) noexcept {
     const auto inside = (part > 0) & (part < whole);
@@ -110,13 +111,13 @@ template <Number N>
     return larger(larger<N>(abs(a.x()), abs(a.y())), N(abs(a.z())));
 }
 
-/// What a few roundings come to at a point as far out as `a`.
+/// Bound of a few rounding errors at a point of the magnitude of `a`.
 template <Real Scalar>
 [[nodiscard]] Scalar rounding_at(const Vector3<Scalar>& a) noexcept {
     return 16 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude(a);
 }
 
-/// Corner 0, 1, 2, and 0 again.
+/// Corner `k`: 0, 1, 2, or 3 for corner 0.
 template <Real Scalar>
 [[nodiscard]] const Vector3<Scalar>& corner(const Triangle<Scalar>& triangle, int k) noexcept {
     return k == 1 ? triangle.b : k == 2 ? triangle.c : triangle.a;
@@ -151,8 +152,8 @@ Vector3<N> point_at(const Triangle<N>& triangle, const Vector3<N>& barycentric) 
 
 namespace detail {
 
-/// What is not asked for of the point is not computed. With `branches` a triangle that is faced costs half: for several
-/// triangles that pays where all of them are.
+/// Inline, so that unused results are not computed. With `branches`, a triangle with its nearest point on the face
+/// costs half: for several triangles only if this holds for all of them.
 template <bool branches, Number N>
 [[gnu::always_inline]] inline TrianglePoint<N> closest_point_inline(const Triangle<N>& triangle,
                                                                     const Vector3<N>& q) noexcept {
@@ -162,11 +163,11 @@ template <bool branches, Number N>
     const N whole = squared_norm(normal);
     const N weight_b = dot(normal, cross(aq, ac)), weight_c = dot(normal, cross(ab, aq));
     const N weight_a = whole - weight_b - weight_c;
-    const auto finite = whole <= (Limits::max)();  // else a corner is not, or far too large
+    const auto finite = whole <= (Limits::max)();  // otherwise a corner is not finite or far too large
     const auto has_area = whole > Limits::epsilon() * (squared_norm(ab) * squared_norm(ac));
     const auto over_face = finite & has_area & (weight_a >= 0) & (weight_b >= 0) & (weight_c >= 0);
 
-    const N divisor = select<N>(over_face, whole, 1);  // beside the face, nothing may overflow
+    const N divisor = select<N>(over_face, whole, 1);  // outside the face no quotient may overflow
     const N b = select<N>(over_face, weight_b / divisor, 0), c = select<N>(over_face, weight_c / divisor, 0);
     Vector3<N> barycentric(larger<N>(0, 1 - b - c), b, c);
     N nearest = squared_norm<N>(aq - b * ab - c * ac);
@@ -176,7 +177,7 @@ template <bool branches, Number N>
         Vector3<N> weights(1, 0, 0);
         const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge)
             __attribute__((always_inline)) {
-            if (Real<N> && !any(faces)) return;  // of several triangles, which of them count no processor predicts
+            if (Real<N> && !any(faces)) return;  // for several triangles this branch is not predictable
             const N along = fraction(dot(offset, edge), squared_norm(edge));
             const N squared_distance = squared_norm<N>(offset - along * edge);
             const auto nearer = finite & faces & (squared_distance < on_edges);
@@ -209,14 +210,14 @@ N squared_distance(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
 
 namespace detail {
 
-/// A point of a segment, and of an edge the point nearest to it.
+/// The nearest points of a segment and an edge.
 template <Number N>
 struct SegmentAndEdge {
-    N along, foot;  ///< of the segment, and of the edge: 0 to 1
+    N along, foot;  ///< fraction of the segment, and of the edge: 0 to 1
 };
 
-/// The nearest points of two lines, each then clamped to its segment in turn [Ericson05] 5.1.9. `offset` is from the start
-/// of the segment to that of the edge.
+/// The nearest points of two lines, each then clamped to its segment in turn [Ericson05] 5.1.9. `offset` runs from the
+/// start of the segment to that of the edge.
 template <Number N>
 [[gnu::always_inline, nodiscard]] inline SegmentAndEdge<N> closest_on_edge(const Vector3<N>& segment,
                                                                            const Vector3<N>& edge,
@@ -259,12 +260,12 @@ SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, const V
 
 namespace detail {
 
-/// Relative bound, with room to spare, of the rounding error of a sum of products of three differences, in units of
+/// Relative bound, with a safety factor, of the rounding error of a sum of products of three differences, in units of
 /// the product of their largest components.
 template <Real Scalar>
 inline constexpr Scalar rounding = 64 * std::numeric_limits<Scalar>::epsilon();
 
-/// Narrows [first, last] to where `value + along * slope` is not negative; says whether anything is left.
+/// Narrows [first, last] to where `value + along * slope` is not negative; returns false if the interval is empty.
 template <Real Scalar>
 [[nodiscard]] bool clip(Scalar value, Scalar slope, Scalar& first, Scalar& last) noexcept {
     if (slope == 0) return value >= 0;
@@ -273,12 +274,12 @@ template <Real Scalar>
     return first <= last;
 }
 
-/// A segment against a triangle that it does not run in the plane of, or beside.
+/// Intersection of a segment with a triangle that is not parallel to it.
 template <Number N>
 struct Crossing {
     using YesNo = decltype(N() < N());
-    YesNo clear, met;   ///< `met` only counts where it is `clear`
-    N distance, whole;  ///< on the segment; the quotient is how far along
+    YesNo clear, met;   ///< `met` is valid only if `clear`
+    N distance, whole;  ///< of the segment; distance / whole is the fraction
 
     /// Cramer's rule for from + along * segment = a + b * ab + c * ac [Moeller97], signs decided before the division.
     Crossing(const Triangle<N>& triangle, const Vector3<Each<N>>& from, const Vector3<Each<N>>& to) noexcept {
@@ -299,15 +300,15 @@ struct Crossing {
     }
 };
 
-/// The weights follow from the point on the segment: solved for together with it, they would part from it where the
-/// segment meets the plane at a small angle.
+/// The weights are computed from the point on the segment. A common solution would separate them from it if the segment
+/// meets the plane at a small angle.
 template <Real Scalar>
 [[nodiscard]] SegmentHit<Scalar> hit_at(const Triangle<Scalar>& triangle, const Vector3<Scalar>& from,
                                         const Vector3<Scalar>& segment, Scalar along) noexcept {
     return {along, closest_point<Scalar>(triangle, from + along * segment).barycentric};
 }
 
-/// `first_hit` for a segment that runs in the triangle's plane, or beside it.
+/// `first_hit` for a segment in the triangle's plane, or parallel to it.
 template <Real Scalar>
 [[nodiscard]] std::optional<SegmentHit<Scalar>> first_hit_in_plane(const Triangle<Scalar>& triangle,
                                                                    const Vector3<Scalar>& from,
@@ -315,12 +316,12 @@ template <Real Scalar>
     const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, start = from - triangle.a;
     const Vector3<Scalar> normal = cross(ab, ac);
     const Scalar size = (std::max)(largest_magnitude(ab), largest_magnitude(ac));
-    const Scalar reach = (std::max)(size, largest_magnitude(start));
+    const Scalar extent = (std::max)(size, largest_magnitude(start));
     if (!(squared_norm(normal) > std::numeric_limits<Scalar>::epsilon() * (squared_norm(ab) * squared_norm(ac)))) {
         return std::nullopt;
     }
     Scalar first = 0, last = 1;
-    const Scalar height = dot(normal, start), climb = dot(normal, segment), slack = rounding<Scalar> * reach * size;
+    const Scalar height = dot(normal, start), climb = dot(normal, segment), slack = rounding<Scalar> * extent * size;
     if (!clip(slack * size + height, climb, first, last)) return std::nullopt;
     if (!clip(slack * size - height, -climb, first, last)) return std::nullopt;
     for (int k = 0; k < 3; ++k) {
@@ -352,8 +353,8 @@ bool touches_box(const Triangle<Scalar>& triangle, const Vector3<Scalar>& low, c
     const Vector3<Scalar> corners[] = {triangle.a - centre, triangle.b - centre, triangle.c - centre};
     const auto overlap_along = [&](const Vector3<Scalar>& axis) {
         const Scalar a = dot(axis, corners[0]), b = dot(axis, corners[1]), c = dot(axis, corners[2]);
-        const Scalar reach = (half.x() * abs(axis.x()) + half.y() * abs(axis.y())) + half.z() * abs(axis.z());
-        return (std::min)((std::min)(a, b), c) <= reach && (std::max)((std::max)(a, b), c) >= -reach;
+        const Scalar half_width = (half.x() * abs(axis.x()) + half.y() * abs(axis.y())) + half.z() * abs(axis.z());
+        return (std::min)((std::min)(a, b), c) <= half_width && (std::max)((std::max)(a, b), c) >= -half_width;
     };
     if (!overlap_along({1, 0, 0}) || !overlap_along({0, 1, 0}) || !overlap_along({0, 0, 1})) return false;
     for (int k = 0; k < 3; ++k) {

@@ -23,24 +23,24 @@ namespace membrane {
 
 /// An oriented surface of triangles, with or without a border, constant once built.
 ///
-/// Accepted as they are: vertices that no triangle names, several vertices at one place, triangles without area among
+/// Accepted unchanged: vertices without triangles, several vertices at one position, triangles without area among
 /// others that have some, several components, a surface that faces inward.
 template <Real Scalar>
 class TriangleMesh {
   public:
     /// From points 3 x V [m] and triangles 3 x F of any integer type, counter-clockwise seen from outside.
     /// @throws InvalidInput unless
-    ///   - the shapes are as said, there is a triangle at least, and each names three different vertices that exist;
+    ///   - the shapes are as above, there is at least one triangle, and each has three different vertices that exist;
     ///   - coordinates are finite, squares of areas neither overflow nor vanish, and the mean edge is at least a
     ///     hundred times the spacing of numbers at the largest coordinate;
     ///   - some triangle has an area;
-    ///   - no two triangles name the same three vertices, at most two share an edge and they run along it in opposite
+    ///   - no two triangles have the same three vertices, at most two share an edge and they run along it in opposite
     ///     directions, and the triangles of each vertex form one fan.
     /// O(F log F).
     template <class P, class T>
     TriangleMesh(const Eigen::MatrixBase<P>& positions, const Eigen::MatrixBase<T>& triangles);
 
-    /// The same from x y z x y z ... [m] and three vertices for each triangle.
+    /// From x y z x y z ... [m] and three vertices for each triangle.
     template <std::integral I, std::size_t n>
     TriangleMesh(std::span<const Scalar> xyz, std::span<I, n> corners);
 
@@ -68,7 +68,7 @@ namespace detail {
 
 inline constexpr std::string_view triangle_mesh = "TriangleMesh";
 
-/// The first defect is the last.
+/// Refuses the first defect.
 struct RefuseDefect {
     template <class... Parts>
     void operator()(MeshDefect, const std::vector<Index>&, const std::vector<Index>&, const Parts&... parts) const {

@@ -9,7 +9,7 @@ endforeach()
 
 foreach(unasked membrane_tests membrane_examples membrane_benchmarks membrane_warnings)
     if(TARGET ${unasked})
-        message(FATAL_ERROR "${unasked} is there, though nobody asked for it")
+        message(FATAL_ERROR "${unasked} is there without being requested")
     endif()
 endforeach()
 

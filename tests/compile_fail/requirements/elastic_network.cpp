@@ -7,9 +7,9 @@
 // wrong: ElasticNetwork: mass(Index) const noexcept must return Scalar
 // wrong: ElasticNetwork: viscosity(Index) const noexcept must return Scalar
 // wrong: ElasticNetwork: neighbours(Index) const must give a range of something with .other, an Index
-// wrong: ElasticNetwork: force_on(Index, const ConstPointsRef<Scalar>&) const noexcept must return Pull<Scalar>
+// wrong: ElasticNetwork: force_on(Index, const ConstPointsRef<Scalar>&) const noexcept must return VertexForce<Scalar>
 // wrong: ElasticNetwork: majoriser(Index, const ConstPointsRef<Scalar>&) const noexcept must return EnergyMajoriser<Scalar>
-// wrong: ElasticNetwork: curvature(Index, const ConstPointsRef<Scalar>&) const noexcept must return Symmetric3<Scalar>
+// wrong: ElasticNetwork: hessian(Index, const ConstPointsRef<Scalar>&) const noexcept must return Symmetric3<Scalar>
 // wrong: ElasticNetwork: energy_change(Index, const Vector3<Scalar>&, const ConstPointsRef<Scalar>&) const noexcept must
 // wrong: ElasticNetwork: force_tolerance() const noexcept must return Scalar
 #include <type_traits>
@@ -35,7 +35,7 @@ struct Net {
     std::conditional_t<WRONG == 8, const Index*, const End*> neighbours(Index) const noexcept;
     membrane::VertexForce<double> force_on(Index, const X&) const noexcept(WRONG != 9);
     membrane::EnergyMajoriser<double> majoriser(Index, const X&) const noexcept(WRONG != 10);
-    membrane::Symmetric3<double> curvature(Index, const X&) const noexcept(WRONG != 11);
+    membrane::Symmetric3<double> hessian(Index, const X&) const noexcept(WRONG != 11);
     membrane::EnergyChange<double> energy_change(Index, const membrane::Vector3<double>&, const X&) const
         noexcept(WRONG != 12);
     double force_tolerance() const noexcept(WRONG != 13);
