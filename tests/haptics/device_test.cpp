@@ -152,7 +152,7 @@ TEST_CASE("a device is copied and moved in the middle of its script", "[device]"
 TEMPLATE_TEST_CASE("scripts and options that make no sense are refused by name", "[device][bad]", double, float) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
-    const auto refused = [](const std::vector<Waypoint<S>>& script, const NullDeviceOptions& options = {}) {
+    const auto refused = [](const std::vector<Waypoint<S>>& script, const ScriptedDeviceOptions& options = {}) {
         return test::refusal([&] { ScriptedDevice<S> device(script, options); });
     };
     const std::string name = "ScriptedDevice: ";

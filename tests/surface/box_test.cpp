@@ -84,7 +84,8 @@ TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther t
             const Vector3<S> part = random.vector<S>(0, 1);
             const Vector3<S> p = box.low + part.cwiseProduct(box.high - box.low);
             CHECK(squared_norm<S>(q - p) >= squared_distance(box, q) * (1 - 8 * std::numeric_limits<S>::epsilon()));
-            CHECK((q - p).cwiseAbs().maxCoeff() <= reach(box, q) * (1 + 2 * std::numeric_limits<S>::epsilon()));
+            CHECK((q - p).cwiseAbs().maxCoeff() <=
+                  max_axis_distance(box, q) * (1 + 2 * std::numeric_limits<S>::epsilon()));
         }
         if (squared_distance(box, q) > 0) continue;
         CHECK((at_most(box.low, q) && at_most(q, box.high)));

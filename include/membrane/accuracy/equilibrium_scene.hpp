@@ -253,7 +253,7 @@ inline LoadStep EquilibriumScene::goals(double part) const {
         }
     }
     for (const auto& term : attachments_) {
-        goals.places.push_back(interpolated(term.point_to_body(start_), term.target));
+        goals.places.push_back(interpolated(term.point_in(start_), term.target));
     }
     for (const auto& pressing : tools_) {
         goals.tools.push_back(pressing.tool);

@@ -314,7 +314,7 @@ bool EquilibriumSolver<ElasticModel>::can_move(const std::array<Index, 3>& corne
 
 template <class ElasticModel>
 Vector3<double> EquilibriumSolver<ElasticModel>::off_target(std::size_t i) const noexcept {
-    return scene_.point_attachments()[i].point_to_body(here_.elastic.x) - goals_.places[i];
+    return scene_.point_attachments()[i].point_in(here_.elastic.x) - goals_.places[i];
 }
 
 }  // namespace membrane

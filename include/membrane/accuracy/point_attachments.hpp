@@ -71,11 +71,11 @@ bool PointAttachments::independent(IsFixed fixed) const noexcept {
 }
 
 inline void PointAttachments::project(Points<double>& f) const noexcept {
-    for (const auto& term : places()) shift(term, -term.point_to_body(f), f);
+    for (const auto& term : places()) shift(term, -term.point_in(f), f);
 }
 
 inline void PointAttachments::project_positions(Points<double>& y) const noexcept {
-    for (const auto& term : places()) shift(term, term.target - term.point_to_body(y), y);
+    for (const auto& term : places()) shift(term, term.target - term.point_in(y), y);
 }
 
 inline double PointAttachments::slip(const Points<double>& y) const noexcept {
@@ -84,7 +84,7 @@ inline double PointAttachments::slip(const Points<double>& y) const noexcept {
         double size = norm(term.target);
         for (std::size_t k = 0; k < 3; ++k) size += std::abs(term.weight(k)) * norm(point(y, term.corners[k]));
         const double left =
-            norm<double>(term.target - term.point_to_body(y)) + 8 * std::numeric_limits<double>::epsilon() * size;
+            norm<double>(term.target - term.point_in(y)) + 8 * std::numeric_limits<double>::epsilon() * size;
         squares += left * left / squared_norm(term.weights);
     }
     return (1 + 1e-9) * std::sqrt(squares);

@@ -432,7 +432,7 @@ bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar s
     const Index f = surface_.walk_to_closest(scene.anchors, near, q);
     const auto nearest = closest_point(surface_.triangle(scene.anchors, f), q);
     const Vector3<Scalar> outward = side * surface_.outward(scene.anchors, f, nearest.barycentric);
-    const auto hit = scene.tree.first_hit(scene.x, q, q + 2 * reach(scene.tree.box(0), q) * outward);
+    const auto hit = scene.tree.first_hit(scene.x, q, q + 2 * max_axis_distance(scene.tree.box(0), q) * outward);
     if (hit.triangle == no_index) return false;
     return side * dot<Scalar>(area_vector(surface_.triangle(scene.x, hit.triangle)), outward) > 0;
 }

@@ -72,7 +72,7 @@ struct Waypoint {
 static_assert(std::is_default_constructible_v<Waypoint<float>>);
 static_assert(std::is_default_constructible_v<Waypoint<double>>);
 
-struct NullDeviceOptions {
+struct ScriptedDeviceOptions {
     double tick = 1e-3;  ///< time from one `read` to the next [s]
     double radius = 0;   ///< of the tool [m]
 };
@@ -167,7 +167,7 @@ class ScriptedDevice {
   public:
     /// @throws InvalidInput if the script is empty, not finite or not ascending in time, or if an option is out of its
     /// range
-    explicit ScriptedDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options = {},
+    explicit ScriptedDevice(std::vector<Waypoint<Scalar>> script, const ScriptedDeviceOptions& options = {},
                             const Holder& hand = Holder());
 
     /// Whether the script has not ended.
@@ -204,8 +204,8 @@ class ScriptedDevice {
 };
 
 template <Real Scalar, CheckedHand<Scalar> Holder>
-ScriptedDevice<Scalar, Holder>::ScriptedDevice(std::vector<Waypoint<Scalar>> script, const NullDeviceOptions& options,
-                                               const Holder& hand)
+ScriptedDevice<Scalar, Holder>::ScriptedDevice(std::vector<Waypoint<Scalar>> script,
+                                               const ScriptedDeviceOptions& options, const Holder& hand)
     : script_(std::move(script)),
       tick_(static_cast<Scalar>(options.tick)),
       radius_(static_cast<Scalar>(options.radius)),

@@ -51,7 +51,7 @@ struct ConstraintTerm {
 
     /// The point's position if the vertices are at `x` (3 x V [m]); for another vertex field `x`, its value at the
     /// point.
-    [[nodiscard]] Vector3<double> point_to_body(const Points<double>& x) const noexcept {
+    [[nodiscard]] Vector3<double> point_in(const Points<double>& x) const noexcept {
         return point_at(triangle_at(x, corners), weights);
     }
 

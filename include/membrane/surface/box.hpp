@@ -55,7 +55,7 @@ template <Number N>
 
 /// Largest distance along one axis from `q` to a corner of the box [m].
 template <Real Scalar>
-[[nodiscard]] Scalar reach(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept;
+[[nodiscard]] Scalar max_axis_distance(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept;
 
 /// A capsule prepared for tests against many boxes; a segment if its radius is zero.
 template <Real Scalar>
@@ -142,7 +142,7 @@ N squared_distance(const Box<N>& box, const Vector3<Each<N>>& q) noexcept {
 }
 
 template <Real Scalar>
-Scalar reach(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept {
+Scalar max_axis_distance(const Box<Scalar>& box, const Vector3<Scalar>& q) noexcept {
     Scalar most = 0;
     for (int k = 0; k < 3; ++k) most = (std::max)((std::max)(most, q[k] - box.low[k]), box.high[k] - q[k]);
     return most;
@@ -153,7 +153,7 @@ CapsuleQuery<Scalar>::CapsuleQuery(const Vector3<Scalar>& from, const Vector3<Sc
                                    const Box<Scalar>& all) noexcept {
     using std::abs;
     using Limits = std::numeric_limits<Scalar>;
-    const Scalar size = reach(all, from) + radius, margin = radius + 64 * Limits::epsilon() * size;
+    const Scalar size = max_axis_distance(all, from) + radius, margin = radius + 64 * Limits::epsilon() * size;
     // A component below rounding is covered by the margin. It is clamped, so that products with its inverse do not
     // overflow.
     const Scalar shortest = (std::max)(Limits::epsilon() * size, (Limits::min)());
