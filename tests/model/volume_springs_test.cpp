@@ -135,7 +135,7 @@ TEMPLATE_TEST_CASE("a spring without length does not act", "[network]", double, 
 
 TEMPLATE_TEST_CASE("no volume springs, no pull", "[network]", double, float) {
     using S = TestType;
-    const auto pull = NoFoundation{}.pull<S>(3, {1, 2, 3}, {4, 5, 6}, S(0.1));
+    const auto pull = NoFoundation{}.force_on<S>(3, {1, 2, 3}, {4, 5, 6}, S(0.1));
     CHECK(pull.force == Vector3<S>(0, 0, 0));
     CHECK(pull.stiffness == 0);
     STATIC_REQUIRE(std::is_empty_v<NoFoundation>);

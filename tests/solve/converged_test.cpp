@@ -34,12 +34,12 @@ struct Scene {
                    ? spherical_cap({.radius = radius, .diameter = 1.5 * radius, .rings = 4 + random.index(5)})
                    : icosphere({.radius = radius, .subdivisions = 1 + random.index(2)})),
           network(mesh, {}, {.stiffness = 40.0, .pinned = random.chance(0.5) ? border(mesh) : std::vector<Index>{}}),
-          foundation(40 * std::pow(10.0, random.number(-1.0, 3.0))),
-          foundation(mesh, {.stiffness = foundation, .damping = random.chance(0.5) ? 0.02 : 0.0}) {}
+          foundation_stiffness(40 * std::pow(10.0, random.number(-1.0, 3.0))),
+          foundation(mesh, {.stiffness = foundation_stiffness, .damping = random.chance(0.5) ? 0.02 : 0.0}) {}
 
     TriangleMesh<double> mesh;
     MassSpringNetwork<double, LinearSpring> network;
-    double foundation;  // [N/m]
+    double foundation_stiffness;  // [N/m]
     VirtualVolumeSprings<double> foundation;
 };
 
