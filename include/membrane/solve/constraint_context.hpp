@@ -84,7 +84,7 @@ class ConstraintContext {
     /// Lower bound of the compliance of `v` by its last update [m/N]; zero if it is fixed.
     [[nodiscard]] Scalar compliance(Index v) const noexcept { return fixed(v) ? Scalar(0) : state_.compliance(v); }
 
-    /// At the end of the step: the sum of all forces on `v` [N].
+    /// At the end of the step: the sum of all forces on `v` [N]. @pre `v` is a seed, prescribed, or active
     [[nodiscard]] Vector3<Scalar> residual_force(Index v) const noexcept { return state_.residual_force(v); }
 
     /// A negligible change of force [N].

@@ -70,8 +70,8 @@ class QuasiStaticSolver {
                                AnyExecutor executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to equilibrium in a tick of `dt` [s] under up to 16 constraints. Online.
-    /// Cost: `sweeps` + 1 updates for each vertex in the queue or awake, in layer 0 `contact_iterations` in each sweep;
-    /// an update costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
+    /// Cost: `sweeps` + 1 evaluations of each active vertex; in layer 0, up to `sweeps` times `contact_iterations` + 1. An
+    /// evaluation costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
     template <CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
@@ -100,7 +100,8 @@ class QuasiStaticSolver {
     void reset() noexcept;
 
     /// The contact points of constraint number `i` in the last step that advanced, with the force on each [N], whose
-    /// sum is its reaction. Empty for a constraint without contact points. Valid until the next step.
+    /// sum is its reaction. Empty for a constraint without contact points, and after a
+    /// step with unstable or infinite forces. Valid until the next step.
     [[nodiscard]] std::span<const ContactPoint<Scalar>> contact_points(std::size_t i) const noexcept {
         if (i >= state_.previous_ranges.size()) return {};
         return state_.previous_ranges[i].of(state_.previous_points.items());
@@ -166,7 +167,7 @@ QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>&
 
 namespace detail {
 
-// Capacity for packed vertices: 0 if no foundation model allows updates in lanes.
+// Capacity for packed vertices: 0 if no foundation model, or the options, allow no updates in lanes.
 template <class Scalar, class Rule, class Network>
 [[nodiscard]] Index max_in_lanes(const SolverOptions<Scalar>& options) noexcept {
     constexpr bool possible = UpdatesInLanes<Scalar, Rule, Network, NoFoundation>;

@@ -24,7 +24,7 @@ enum class UpdateOrder {
 /// Options of the solver. More layers, sweeps and iterations are more accurate, and cost more.
 template <Real Scalar>
 struct SolverOptions {
-    Index layers = 6;              ///< the queue's threshold; `unlimited`: all vertices connected to the seeds
+    Index layers = 6;              ///< of the queue beyond layer 0; `unlimited`: all vertices connected to the seeds
     bool adaptive_layers = false;  ///< adds a layer, up to `layers`, while a force on it exceeds `force_tolerance`
     Index sweeps = 2;              ///< passes over the queue in each step
     Index contact_iterations = 3;  ///< updates of layer 0 in each sweep at most: vertices in contact converge last

@@ -34,7 +34,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// written at the end of the step: until then they are the start positions.
 ///
 /// A row is up to date if its vertex has been loaded in this step. `compliance` is that of the vertex's last update in
-/// any step, `compliance_block` that of its last update in layer 0.
+/// any step, `compliance_block` that of its last update in layer 0 or alone.
 template <Real Scalar>
 struct StepState {
     /// The largest number of constraints of one step.
@@ -234,7 +234,8 @@ template <Real Scalar>
 void StepState<Scalar>::reset() noexcept {
     begin_step();
     forget_points();
-    for (Rows* rows : {&position, &response, &support}) std::fill(rows->begin(), rows->end(), PaddedPoint<Scalar>{});
+    for (Rows* rows : {&position, &response, &support, &residual})
+        std::fill(rows->begin(), rows->end(), PaddedPoint<Scalar>{});
 }
 
 template <Real Scalar>

@@ -20,7 +20,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The sweeps of one step over its active vertices: in each sweep contact iterations, which update layer 0 and then
 /// enforce the constraints, and then an update of each vertex beyond. The first vertices, up to the capacity, are
-/// updated in packs, the others one by one with the same bits.
+/// updated in packs, the others one by one; the results are equal to the bit.
 ///
 ///     sweeps.load_and_pack();
 ///     sweeps.run();
@@ -40,8 +40,8 @@ struct Sweeps {
 
     std::size_t in_packs = 0;          // number of active vertices in packs
     std::size_t forces_seen = 0;       // number of vertices with a force of a constraint so far
-    bool constraints_hold = false;     // at the last enforcement, without a displacement since
-    bool constraints_changed = false;  // by the last enforcement, or it had no time
+    bool constraints_hold = false;     // the last enforcement found no violation, and nothing has moved since
+    bool constraints_changed = false;  // by the final enforcement, or there was no time for it
     bool stopped = false;              // time ran out beyond layer 0
 
     static constexpr bool can_use_lanes = UpdatesInLanes<Scalar, Rule, Network, Volume>;
@@ -67,7 +67,7 @@ struct Sweeps {
             if (moved) constraints_hold = false;
             changed |= moved;
         }
-        if (changed && !constraints_hold) {
+        if ((changed || report.out_of_time) && !constraints_hold) {
             if (!budget.has_time_to_enforce()) report.out_of_time = true;
             constraints_changed = report.out_of_time || enforce();
         }

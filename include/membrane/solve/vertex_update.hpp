@@ -100,7 +100,7 @@ template <class Scalar, class Network, class Volume>
     return {springs.force + others.force, springs.stiffness + others.stiffness};
 }
 
-/// The force `now` on vertex `v` without damping, which may balance the forces for one tick out of equilibrium.
+/// The force `now` on vertex `v`, without damping: damping may balance the forces for one tick out of equilibrium.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> undamped_force(const StepInput<Scalar, Network, Volume>& scene, Index v,
                                              const Vector3<Scalar>& now) noexcept {
