@@ -21,8 +21,9 @@
 namespace membrane {
 
 /// A constraint on the membrane for one step. `begin` seeds all vertices where its force enters, and moves attached
-/// points to their targets. `enforce` is called after each update of layer 0, and, if there is time, once more at the
-/// end of a step after whose last call vertices moved or that changed something: it restores the constraint, and returns whether it was violated. `reaction` is the force of the
+/// points to their targets. `enforce` restores the constraint, and returns whether it was violated. It is called after
+/// each update of layer 0, and, if there is time, at the end of the step unless nothing has changed since the last call
+/// and that found no violation. `reaction` is the force of the
 /// membrane on the constraint [N]. Optional members: `driving_input(): DrivingInput<Scalar>`, from which the next steps
 /// are extrapolated; `hold(context)`, which prescribes vertices and is called before any `begin`.
 template <class C, class Scalar>

@@ -70,8 +70,8 @@ class QuasiStaticSolver {
                                AnyExecutor executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to equilibrium in a tick of `dt` [s] under up to 16 constraints. Online.
-    /// Cost: `sweeps` + 1 evaluations of each active vertex; in layer 0, up to `sweeps` times `contact_iterations` + 1. An
-    /// evaluation costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
+    /// Cost: `sweeps` + 1 evaluations of each active vertex; in layer 0, up to `sweeps` times `contact_iterations` + 1.
+    /// An evaluation costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
     template <CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
