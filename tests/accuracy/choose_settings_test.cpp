@@ -142,7 +142,8 @@ struct Scene {
 struct Judge {
     const Scene& scene;
     CountedStroke stroke;
-    std::vector<ReferenceTick> references = equilibria(scene.mesh, scene.network, scene.foundation, stroke, tick_stride);
+    std::vector<ReferenceTick> references =
+        equilibria(scene.mesh, scene.network, scene.foundation, stroke, tick_stride);
 
     static constexpr Index tick_stride = 2;  // most of the error is in few ticks, where the tool sets on or turns
     Outcome operator()(const SolverOptions<double>& options) const {
@@ -408,8 +409,10 @@ TEST_CASE("what makes no sense is refused") {
           "choose_settings: contact_iterations must be at least 1, got 0");
     CHECK(refused(percent, {.others = {.max_vertex_updates = 0}}) ==
           "QuasiStaticSolver: max_vertex_updates must be at least 1, got 0");
-    CHECK(refused(percent, {.safety_factor = 0.5}) == "choose_settings: safety_factor must be finite and at least 1, got 0.5");
-    CHECK_THAT(refused(percent, {.safety_factor = nan}), ContainsSubstring("safety_factor must be finite and at least 1, got"));
+    CHECK(refused(percent, {.safety_factor = 0.5}) ==
+          "choose_settings: safety_factor must be finite and at least 1, got 0.5");
+    CHECK_THAT(refused(percent, {.safety_factor = nan}),
+               ContainsSubstring("safety_factor must be finite and at least 1, got"));
     CHECK(refused(percent, {.tick_stride = 0}) == "choose_settings: tick_stride must be at least 1, got 0");
     CHECK(refused(percent, {.repetitions = 0}) == "choose_settings: plays must be at least 1, got 0");
 

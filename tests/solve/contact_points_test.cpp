@@ -173,7 +173,8 @@ TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by 
         apply_forces(state, state.packs.items());
         for (const auto& point : patch.unpacked()) {
             const S force = -dot(point.force, point.normal);
-            const S gap = norm(proximity(patch.triangle(point.triangle), patch.tool, 0)->separation) - patch.tool.radius;
+            const S gap =
+                norm(proximity(patch.triangle(point.triangle), patch.tool, 0)->separation) - patch.tool.radius;
             REQUIRE(force >= 0);
             REQUIRE(norm<S>(point.force + force * point.normal) <= slack);
             REQUIRE(gap >= -slack);
@@ -246,7 +247,8 @@ TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals",
         for (const auto& point : patch.points) {
             const auto now = patch.triangle(point.triangle), before = triangle_at(patch.x, point.corners);
             const bool was_inside = norm(proximity(before, patch.tool, 0)->separation) < patch.tool.radius - slack;
-            REQUIRE(norm(proximity(now, patch.tool, 0)->separation) >= patch.tool.radius * (1 - 100 * slack) - 10 * slack);
+            REQUIRE(norm(proximity(now, patch.tool, 0)->separation) >=
+                    patch.tool.radius * (1 - 100 * slack) - 10 * slack);
             if (!was_inside) REQUIRE(norm<S>(now.a - before.a) <= slack);
         }
     }

@@ -196,7 +196,8 @@ void check_converged(const Run& run) {
     const bool all_free = run.pins.empty() && border(run.scene.mesh).empty();
     if (all_free) REQUIRE(norm(sum) <= static_cast<double>(layer_0.size()) * limit);
     if (run.contact.touching() && !run.grasp.holding()) {
-        const double slack = run.tolerance / run.scene.foundation_stiffness + 1e-9;  // what the force does to a vertex [m]
+        const double slack =
+            run.tolerance / run.scene.foundation_stiffness + 1e-9;  // what the force does to a vertex [m]
         REQUIRE(overlap(run.scene.mesh, run.x, run.tool, [&](Index v) { return run.is_fixed(v); }) <= slack);
     }
 }
