@@ -414,7 +414,7 @@ TEST_CASE("what makes no sense is refused") {
     CHECK_THAT(refused(percent, {.safety_factor = nan}),
                ContainsSubstring("safety_factor must be finite and at least 1, got"));
     CHECK(refused(percent, {.tick_stride = 0}) == "choose_settings: tick_stride must be at least 1, got 0");
-    CHECK(refused(percent, {.repetitions = 0}) == "choose_settings: plays must be at least 1, got 0");
+    CHECK(refused(percent, {.repetitions = 0}) == "choose_settings: repetitions must be at least 1, got 0");
 
     const SmallScene apart(2 * radius);
     CHECK(refusal([&] { (void)apart.choose(percent); }) ==

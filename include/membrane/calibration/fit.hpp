@@ -198,7 +198,7 @@ Fit fit(const ForceTable& table, const std::vector<double>& start, const Model& 
         refuse(detail::fit_name, "start of constant ", k, " must be finite and positive, got ", start[k]);
     }
     if (table.depth.size() <= start.size()) {
-        refuse(detail::fit_name, "the table must have more rows than next are constants, ", start.size(), ", got ",
+        refuse(detail::fit_name, "the table must have more rows than there are constants, ", start.size(), ", got ",
                table.depth.size());
     }
     return detail::FitSearch<Model>(table, start, model, options).run();
