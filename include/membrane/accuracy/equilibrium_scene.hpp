@@ -130,7 +130,7 @@ template <class C>
 consteval bool check_static_constraint() noexcept {
     static_assert(
         StaticConstraint<C>,
-        "StaticConstraint: value must be describe(const C&, EquilibriumScene&) in the namespace of the constraint");
+        "StaticConstraint: there must be describe(const C&, EquilibriumScene&) in the namespace of the constraint");
     return StaticConstraint<C>;
 }
 
