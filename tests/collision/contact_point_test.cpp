@@ -29,8 +29,8 @@ S sampled_distance(const Triangle<S>& triangle, const Tool<S>& tool) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a contact point is where its feature is nearest; the least gap is the tool's", "[contact_point]",
-                   double, float) {
+TEMPLATE_TEST_CASE("a contact point is where its feature is nearest, and the least gap is that of the tool",
+                   "[contact_point]", double, float) {
     using S = TestType;
     constexpr std::array<Index, 3> corners{3, 1, 4};
     int none = 0;
