@@ -66,8 +66,11 @@ membrane::VertexState<S> bare_state(const SceneOf<membrane::NoVolumeSprings>& sc
     const auto springs = scene.network.pull(v, scene.x);
     state.force = springs.force;
     state.stiffness = springs.stiffness;
-    state.force += scene.state.constraint_force(v);
-    state.stiffness += scene.state.contact_stiffness(v) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
+    const membrane::Pull<S> constraints{
+        scene.state.constraint_force(v),
+        scene.state.contact_stiffness(v) + scene.state.added_stiffness[static_cast<std::size_t>(v)]};
+    state.force += constraints.force;
+    state.stiffness += constraints.stiffness;
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : S(0);
     state.dt = scene.dt;
     state.touched = scene.state.seeds.contains(v);

@@ -85,12 +85,11 @@ template <class Rule, Number N>
 /// What pulls on vertex `v` beside its springs: foundation, damping and constraints.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] Pull<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
-    const Vector3<Scalar> of_constraints = scene.state.constraint_force(v);
-    const Scalar stiffness =
-        scene.state.contact_stiffness(v) + scene.state.added_stiffness[static_cast<std::size_t>(v)];
-    if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {of_constraints, stiffness};
+    const auto& state = scene.state;
+    const Scalar stiffness = state.contact_stiffness(v) + state.added_stiffness[static_cast<std::size_t>(v)];
+    if constexpr (std::is_same_v<Volume, NoVolumeSprings>) return {state.constraint_force(v), stiffness};
     const auto foundation = scene.volume.pull(v, point(scene.x, v), point(scene.start, v), scene.dt);
-    return {foundation.force + of_constraints, foundation.stiffness + stiffness};
+    return {foundation.force + state.constraint_force(v), foundation.stiffness + stiffness};
 }
 
 /// All that pulls on it.
