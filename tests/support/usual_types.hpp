@@ -29,7 +29,7 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
     PREFIX class membrane::QuasiStaticSolver<SCALAR, membrane::RULE>;                                 \
     PREFIX membrane::QuasiStaticSolver<SCALAR, membrane::RULE>::QuasiStaticSolver(                    \
         const usual::Springs<SCALAR>&, const membrane::SolverOptions<SCALAR>&, const membrane::RULE&, \
-        const membrane::AnyExecutor&);                                                                \
+        membrane::AnyExecutor);                                                                       \
     MEMBRANE_USUAL_STEP(PREFIX, SCALAR, RULE, membrane::VirtualVolumeSprings<SCALAR>)
 
 /// `PREFIX` is `template` where they are compiled, and `extern template` everywhere else.

@@ -74,7 +74,7 @@ class AnyExecutor {
 
     /// Allocates, but for `OneThread`.
     template <detail::OtherExecutor E>
-    AnyExecutor([[maybe_unused]] const E& executor) {
+    AnyExecutor([[maybe_unused]] const E& executor) {  // NOLINT(google-explicit-constructor)
         if constexpr (!std::same_as<E, OneThread>) {
             executor_ = std::make_shared<const E>(executor);
             run_ = [](const void* of, Index count, const TaskRef& task) noexcept {

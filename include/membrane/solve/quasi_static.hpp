@@ -64,7 +64,7 @@ class QuasiStaticSolver {
     /// Cost: O(V) memory.
     template <detail::NetworkOfSolver<Scalar> Network>
     explicit QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options = {}, const Rule& rule = {},
-                               const AnyExecutor& executor = {});
+                               AnyExecutor executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to rest in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 updates for each vertex in the queue or awake, in layer 0 `contact_visits` in each sweep; an
@@ -157,7 +157,7 @@ template <
     class Network, class Rule = BlockStep,
     bool = CheckedElasticNetwork<Network, typename Network::Scalar>&& CheckedStepRule<Rule, typename Network::Scalar>>
 QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>& = {}, const Rule& = {},
-                  const AnyExecutor& = {}) -> QuasiStaticSolver<typename Network::Scalar, Rule>;
+                  AnyExecutor = {}) -> QuasiStaticSolver<typename Network::Scalar, Rule>;
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
@@ -175,10 +175,10 @@ template <class Scalar, class Rule, class Network>
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <detail::NetworkOfSolver<Scalar> Network>
 QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options,
-                                                   const Rule& rule, const AnyExecutor& executor)
+                                                   const Rule& rule, AnyExecutor executor)
     : rule_(rule),
       options_((options.check(), options)),
-      executor_(executor),
+      executor_(std::move(executor)),
       active_(network.vertex_count()),
       packed_(network, detail::most_in_lanes<Scalar, Rule, Network>(options)),
       state_(network.vertex_count(), options.most_touches),
