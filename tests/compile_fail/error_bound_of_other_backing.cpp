@@ -5,8 +5,8 @@
 
 struct Tether {
     template <membrane::Real Scalar>
-    membrane::VertexForce<Scalar> pull(membrane::Index, const membrane::Vector3<Scalar>& position,
-                                       const membrane::Vector3<Scalar>&, Scalar) const noexcept {
+    membrane::VertexForce<Scalar> force_on(membrane::Index, const membrane::Vector3<Scalar>& position,
+                                           const membrane::Vector3<Scalar>&, Scalar) const noexcept {
         return {-membrane::norm(position) * position, 2 * membrane::norm(position)};
     }
 };

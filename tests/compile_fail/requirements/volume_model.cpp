@@ -9,12 +9,12 @@
 
 struct Body {
 #if WRONG == 4  // where the vertex was at the tick's beginning is left out
-    membrane::VertexForce<double> pull(membrane::Index, const membrane::Vector3<double>&, double) const noexcept;
+    membrane::VertexForce<double> force_on(membrane::Index, const membrane::Vector3<double>&, double) const noexcept;
 #elif WRONG != 3
-    std::conditional_t<WRONG == 2, double, membrane::VertexForce<double>> pull(membrane::Index,
-                                                                               const membrane::Vector3<double>&,
-                                                                               const membrane::Vector3<double>&,
-                                                                               double) const noexcept(WRONG != 1);
+    std::conditional_t<WRONG == 2, double, membrane::VertexForce<double>> force_on(membrane::Index,
+                                                                                   const membrane::Vector3<double>&,
+                                                                                   const membrane::Vector3<double>&,
+                                                                                   double) const noexcept(WRONG != 1);
 #endif
 };
 
