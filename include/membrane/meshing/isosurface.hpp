@@ -259,10 +259,8 @@ template <class Surface>
     std::vector<std::array<Index, 3>> triangles;
     for (const auto& corners : std::exchange(soup.triangles, {})) {
         std::size_t k = 0;  // rotated so that the corner that differs from the others comes first
-        while (k < 2 &&
-               (stays(corners[k]) == stays(corners[(k + 1) % 3]) || stays(corners[k]) == stays(corners[(k + 2) % 3]))) {
-            ++k;
-        }
+        const auto differs = [&](std::size_t i) { return stays(corners[k]) != stays(corners[(k + i) % 3]); };
+        while (k < 2 && !(differs(1) && differs(2))) ++k;
         const Index a = corners[k], b = corners[(k + 1) % 3], c = corners[(k + 2) % 3];
         if (stays(a) && stays(b) && stays(c)) {
             triangles.push_back({a, b, c});
