@@ -87,6 +87,22 @@ TEMPLATE_TEST_CASE("every lane comes to what its number would by itself", "[lane
     }
 }
 
+TEMPLATE_TEST_CASE("a direction has length 1 or is zero, in every lane as its number has it", "[lanes]", float,
+                   double) {
+    using S = TestType;
+    using Wide = Lanes<S>;
+    Vector3<Wide> several(0, 0, 0);
+    for (std::size_t i = 1; i < Wide::count; ++i) {
+        for (Eigen::Index k = 0; k < 3; ++k) several[k].set(i, S(i) * S(1 + k) - 4);
+    }
+    const auto directions = direction_or_zero(several);
+    for (std::size_t i = 0; i < Wide::count; ++i) {
+        const Vector3<S> one(several[0][i], several[1][i], several[2][i]), expected = direction_or_zero(one);
+        CHECK(Vector3<S>(directions[0][i], directions[1][i], directions[2][i]) == expected);
+        CHECK(std::abs(norm(expected) - (i == 0 ? 0 : 1)) < 4 * std::numeric_limits<S>::epsilon());
+    }
+}
+
 TEMPLATE_TEST_CASE("lanes are set one by one, all at once, and from numbers in a row", "[lanes]", float, double) {
     using S = TestType;
     Random random(1);

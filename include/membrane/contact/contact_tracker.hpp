@@ -531,10 +531,9 @@ void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span
             triangles[i] = touched[(std::min)(first + i, touched.size() - 1)].triangle;
         }
         const auto nearest = surface_.closest_points(scene.x, triangles, centre);
-        const Vector3<Wide> separation = Vector3<Wide>(centre.x(), centre.y(), centre.z()) - nearest.point;
+        const Vector3<Wide> separation = centre.template cast<Wide>() - nearest.point;
+        const Vector3<Wide> normal = direction_or_zero(separation);
         const Wide distance = norm(separation);
-        const Wide per_length = select<Wide>(distance > 0, 1 / select<Wide>(distance > 0, distance, 1), 0);
-        const Vector3<Wide> normal = per_length * separation;
         for (std::size_t i = 0; i < (std::min)(triangles.size(), touched.size() - first); ++i) {
             const auto of_lane = [i](const Vector3<Wide>& a) { return Vector3<Scalar>(a[0][i], a[1][i], a[2][i]); };
             const auto& [f, corners] = touched[first + i];

@@ -193,7 +193,7 @@ Triangle<Lanes<Scalar>> LocalSurface<Scalar>::gather(const ConstPointsRef<Scalar
 template <Real Scalar>
 TrianglePoint<Lanes<Scalar>> LocalSurface<Scalar>::closest_points(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                                   const Vector3<Scalar>& q) const noexcept {
-    return closest_point<Lanes<Scalar>>(gather(x, some), Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));
+    return closest_point<Lanes<Scalar>>(gather(x, some), q.template cast<Lanes<Scalar>>());
 }
 
 template <Real Scalar>
@@ -202,7 +202,7 @@ Lanes<Scalar> LocalSurface<Scalar>::squared_distances(const ConstPointsRef<Scala
     if constexpr (Lanes<Scalar>::parts > 1) {  // several registers, no blend instruction: scalar code is faster
         return Lanes<Scalar>::of([&](std::size_t i) { return squared_distance(triangle(x, some[i]), q); });
     }
-    return squared_distance(gather(x, some), Vector3<Lanes<Scalar>>(q.x(), q.y(), q.z()));
+    return squared_distance(gather(x, some), q.template cast<Lanes<Scalar>>());
 }
 
 template <Real Scalar>

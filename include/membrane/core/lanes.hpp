@@ -264,4 +264,11 @@ template <Number N>
     return select(b < a, b, a);
 }
 
+/// The unit vector along `a`; zero if `a` is zero.
+template <Number N>
+[[gnu::always_inline, nodiscard]] inline Vector3<N> direction_or_zero(const Vector3<N>& a) noexcept {
+    const N size = norm(a);
+    return (1 / select<N>(size > 0, size, 1)) * a;
+}
+
 }  // namespace membrane

@@ -64,11 +64,6 @@ template <Real Scalar>
 
 namespace detail {
 
-template <Real Scalar>
-[[nodiscard]] Vector3<Lanes<Scalar>> broadcast(const Vector3<Scalar>& a) noexcept {
-    return {a.x(), a.y(), a.z()};
-}
-
 /// Calls `act` with 0, 1 and 2. Unrolled by hand: compilers do not unroll a long loop, and keep its data in memory.
 template <class Act>
 [[gnu::always_inline]] inline void each_corner(const Act& act) noexcept {
@@ -185,10 +180,11 @@ template <Real Scalar>
     const Triangle<Wide> triangle{corner[0].point, corner[1].point, corner[2].point};
     const auto listed = pack.listed > 0;
     if (pack.kind == ContactKind::fixed) {
-        const Vector3<Wide> separation = broadcast(tool.axis_point) - point_at(triangle, pack.load.weights);
+        const Vector3<Wide> separation = tool.axis_point.template cast<Wide>() - point_at(triangle, pack.load.weights);
         pack.distance = dot(separation, pack.load.normal);
     } else if (pack.kind != ContactKind::edge) {
-        const Vector3<Wide> axis_point = broadcast(tool.position) + pack.end * broadcast(tool.axis);
+        const Vector3<Wide> axis_point =
+            tool.position.template cast<Wide>() + pack.end * tool.axis.template cast<Wide>();
         if (locate_in_faces(triangle, axis_point, pack)) return;
         const auto nearest = closest_point_inline<false>(triangle, axis_point);
         const Vector3<Wide>& weights = nearest.barycentric;
@@ -202,7 +198,7 @@ template <Real Scalar>
         pack.load.weights = weights;
         set_normal(listed, along, separation, pack);
     } else {
-        const Vector3<Wide> start = broadcast(tool.position), axis = broadcast(tool.axis);
+        const Vector3<Wide> start = tool.position.template cast<Wide>(), axis = tool.axis.template cast<Wide>();
         const auto nearest = closest_on_edge<Wide>(axis, triangle.b - triangle.a, triangle.a - start);
         pack.load.weights = Vector3<Wide>(1 - nearest.foot, nearest.foot, 0);
         const Vector3<Wide> separation = (start + nearest.along * axis) - point_at(triangle, pack.load.weights);

@@ -231,13 +231,11 @@ struct Sweeps {
     bool update_packs(std::size_t p, [[maybe_unused]] std::size_t end) noexcept {
         bool changed = false;
         if constexpr (can_use_lanes) {
+            const AnyExecutor calling_thread;
+            const AnyExecutor& distributor = budget.limited() ? calling_thread : executor;
             while (p < end && advances()) {
                 const std::size_t group_end = packed.end_of_group(p, end);
-                if (budget.limited()) {
-                    packed.template update<in_contact>(p, group_end, scene, rule, OneThread{});
-                } else {
-                    packed.template update<in_contact>(p, group_end, scene, rule, executor);
-                }
+                packed.template update<in_contact>(p, group_end, scene, rule, distributor);
                 for (; p < group_end && advances(); ++p) changed |= finish_update<in_contact>(p);
             }
         }

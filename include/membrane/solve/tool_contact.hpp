@@ -159,8 +159,8 @@ bool ToolContact<Scalar>::seed(Context& context) const noexcept {
 // The vertices that must not pass the tool.
 template <Real Scalar>
 void ToolContact<Scalar>::list_candidates(Context& context) const noexcept {
-    for (const auto& candidates : contact.candidates) {
-        for (const Index v : candidates.corners) {
+    for (const auto& candidate : contact.candidates) {
+        for (const Index v : candidate.corners) {
             contact.tunnelled ? context.keep(v) : context.keep_start(v);
             context.state().candidates.insert(v);
         }

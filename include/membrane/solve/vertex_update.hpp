@@ -33,13 +33,6 @@ struct StepInput {
     StepState<Scalar>& state;
 };
 
-/// The unit vector along `a`; zero if `a` is zero.
-template <Number N>
-[[gnu::always_inline, nodiscard]] inline Vector3<N> direction_or_zero(const Vector3<N>& a) noexcept {
-    const N size = norm(a);
-    return (1 / select<N>(size > 0, size, 1)) * a;
-}
-
 /// The displacement of a vertex, or of several, by a rule.
 template <Number N, class Compliance>
 struct VertexMove {
