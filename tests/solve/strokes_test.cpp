@@ -6,6 +6,7 @@
 
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
+#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
@@ -56,9 +57,7 @@ struct Membrane {
     explicit Membrane(int subdivisions)
         : mesh(icosphere<S>({.radius = S(Stroke::body), .subdivisions = subdivisions})) {}
 
-    [[nodiscard]] double edge() const {
-        return Stroke::body * std::sqrt(8 * 3.14159265 / (std::sqrt(3.0) * mesh.vertex_count()));
-    }
+    [[nodiscard]] double edge() const { return double(mean_edge(mesh)); }
 
     TriangleMesh<S> mesh;
     MassSpringNetwork<S, LinearSpring> network{mesh, {}, {.stiffness = S(40)}};
@@ -106,7 +105,7 @@ TEMPLATE_TEST_CASE(
     using S = TestType;
     constexpr std::array shapes{Shape::sphere, Shape::shaft, Shape::point};
     constexpr std::array depths{0.5e-3, 1e-3, 1.5e-3, 2e-3};
-    constexpr std::array speeds{0.02, 0.05, 0.1};
+    constexpr std::array speeds{0.005, 0.02, 0.05, 0.1};
     const bool all = cases(1, 2) == 2;
     const int finest = all ? 6 : cases_are_slow ? 3 : 4;
     for (int subdivisions = 3; subdivisions <= finest; ++subdivisions) {
@@ -123,8 +122,7 @@ TEMPLATE_TEST_CASE(
                 REQUIRE(outcome.advanced);
                 REQUIRE(outcome.at_rest);
                 REQUIRE(outcome.overlap <= 0.01 + (sizeof(S) == 4 ? 1e-5 : 1e-9));  // rounding of positions
-                // What holds a point that is dragged several edges deep is a fold, and any number of folds is at rest.
-                if (stroke.shape != Shape::point) REQUIRE(outcome.force <= 2 * exact);
+                REQUIRE(outcome.force <= 2 * exact);
             }
         }
     }
