@@ -57,9 +57,8 @@ struct Membrane {
     explicit Membrane(int subdivisions)
         : mesh(icosphere<S>({.radius = S(Stroke::body), .subdivisions = subdivisions})) {}
 
-    [[nodiscard]] double edge() const { return double(mean_edge(mesh)); }
-
     TriangleMesh<S> mesh;
+    double edge = double(mean_edge(mesh));
     MassSpringNetwork<S, LinearSpring> network{mesh, {}, {.stiffness = S(40)}};
     VirtualVolumeSprings<S> foundation{mesh, {.stiffness = S(8), .damping = S(0.02)}};
 };
@@ -90,7 +89,7 @@ Outcome play(const Membrane<S>& membrane, const Stroke& stroke, const SolverOpti
             const Vector3<S> other_end = tool.position + tool.axis;
             const auto nearest = closest_to_segment(triangle_at(x, touched.corners), tool.position, other_end);
             const double distance = std::sqrt(double(nearest.on_triangle.squared_distance));
-            outcome.overlap = std::max(outcome.overlap, (double(contact.radius) - distance) / membrane.edge());
+            outcome.overlap = std::max(outcome.overlap, (double(contact.radius) - distance) / membrane.edge);
         }
         outcome.at_rest = t >= stroke.ticks() && report.converged && !contact.touching();
     }
