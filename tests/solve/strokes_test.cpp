@@ -121,7 +121,9 @@ TEMPLATE_TEST_CASE(
                 const Outcome outcome = play<S>(membrane, stroke, {.layers = layers, .sweeps = sweeps});
                 REQUIRE(outcome.advanced);
                 REQUIRE(outcome.at_rest);
-                REQUIRE(outcome.overlap <= 0.01 + (sizeof(S) == 4 ? 1e-5 : 1e-9));  // rounding of positions
+                // With half the effort, a point that did not penetrate in the last pass may be moved inside by others.
+                const double allowed = sweeps == 1 ? 0.012 : 0.01;
+                REQUIRE(outcome.overlap <= allowed + (sizeof(S) == 4 ? 1e-5 : 1e-9));  // rounding of positions
                 const bool bounded = outcome.force <= 2 * exact;
                 if (stroke.shape != Shape::point) REQUIRE(bounded);
                 beyond += !bounded;
