@@ -151,7 +151,7 @@ std::vector<Tool<double>> tools_at(const std::vector<Stroke>& strokes, double pa
 /// Moves the tools in over several ticks and waits for rest; whether it came.
 template <Real S>
 bool press_to_rest(LoopOf<S>& loop, const std::vector<Stroke>& strokes, int ticks = 10) {
-    for (int i = 1; i < ticks; ++i) loop.tick(tools_at(strokes, static_cast<double>(i) / ticks));
+    for (int i = 1; i <= ticks; ++i) loop.tick(tools_at(strokes, static_cast<double>(i) / ticks));
     for (int i = 0; i < 2000; ++i) {
         if (loop.tick(tools_at(strokes, 1)).converged) return true;
     }
