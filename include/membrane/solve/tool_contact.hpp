@@ -30,6 +30,9 @@ namespace membrane {
 /// `SolverOptions::rigid_stiffness`: there, and beside them, a penetration of force over stiffness remains. If the
 /// tool's axis is behind such a corner, contact is at the nearest point only; if this point passes a border, or another
 /// part of a surface folded around a pin more sharply than its triangles, the force may jump.
+///
+/// A sphere whose radius is less than a 50th of an edge, as that of a point is, stays in front of the planes of the
+/// triangles that it touches: on a convex edge or corner it is too far out, by less than its radius.
 template <Real Scalar>
 struct ToolContact {
     Tool<Scalar> tool;
@@ -242,14 +245,14 @@ void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point
     context.add_point(point);
 }
 
-// In a step vertices move by more than the radius of a tiny or fast tool, and then a nearest edge or corner does not
+// In a step vertices move by more than the radius of a tiny tool, and then a nearest edge or corner does not
 // determine the side. So the tool stays in front of the planes of the triangles that it is in front of, throughout the
 // step: at a convex edge this is too far out, by less than the radius. Relative to the end of a shaft thinner than an
 // edge vertices move as far, past edges that reverse the normal; inside of a triangle of a closed surface it keeps the
 // side of the start of the step. Under a thick shaft triangles are small enough to turn over, and have no such side.
 template <Real Scalar>
 void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept {
-    constexpr Scalar tiny = Scalar(2e-5);  // squared radius over area: a tool thinner than a 300th of an edge
+    constexpr Scalar tiny = Scalar(5e-4);  // squared radius over area: a tool thinner than a 50th of an edge
     if (point.feature < 0 || point.feature > 1) return;
     const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
     const Scalar size = norm(area), square = contact.radius * contact.radius;
@@ -257,8 +260,7 @@ void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scal
         if (contact.closed && square < size) point.side = dot(point.normal, area) < 0 ? Scalar(-1) : Scalar(1);
         return;
     }
-    const bool fast = square < 4 * squared_norm<Scalar>(contact.axis_point - contact.previous_axis_point);
-    if (!fast && !(square < tiny * size)) return;
+    if (!(square < tiny * size)) return;
     point.by_plane = contact.side * dot(point.normal, area) > 0;
     if (point.by_plane) point.normal = direction<Scalar>(contact.side * area, point.normal);
 }
