@@ -418,7 +418,7 @@ TEST_CASE("each box holds those below it, the first the surface", "[tree]") {
         CHECK(tree.statistics().largest_leaf == expected.largest_leaf);
         for (Index i = 0; i < expected.nodes; ++i) {
             const auto& node = shape.nodes[static_cast<std::size_t>(i)];
-            Box<double> around;
+            Aabb<double> around;
             for (Index k = 0; k < node.count; ++k) {
                 const Index f = shape.triangles[static_cast<std::size_t>(node.first + k)];
                 around.include(bounds(triangle_at(mesh.positions(), mesh.triangles().col(f))));

@@ -155,12 +155,12 @@ template <class Found>
 bool check_t_junctions(const CheckedMesh& mesh, std::span<const std::vector<HalfEdge>> borders, double tolerance,
                        std::int64_t effort, Found found) {
     std::vector<HalfEdge> edges;
-    std::vector<Box<double>> boxes;
+    std::vector<Aabb<double>> boxes;
     for (const auto& line : borders) {
         for (const HalfEdge& side : line) {
             if (!mesh.finite[static_cast<std::size_t>(side.triangle)]) continue;
             edges.push_back(side);
-            Box<double> box;
+            Aabb<double> box;
             for (const Index v : {side.first, side.second}) {
                 box.include(point(mesh.x, v) - Vector3<double>::Constant(tolerance));
                 box.include(point(mesh.x, v) + Vector3<double>::Constant(tolerance));
