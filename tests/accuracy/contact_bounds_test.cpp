@@ -118,7 +118,7 @@ Points<double> state_outside(const Pressed& membrane, const Points<double>& y, d
             const Vector3<double> end = membrane.tool.position + membrane.tool.axis;
             const auto nearest = closest_to_segment(triangle, membrane.tool.position, end);
             const Vector3<double> reach =
-                nearest.on_triangle.point - membrane.tool.position - nearest.along * membrane.tool.axis;
+                nearest.on_triangle.point - membrane.tool.position - nearest.fraction * membrane.tool.axis;
             const double overlap = membrane.tool.radius - norm(reach);
             deepest = std::max(deepest, overlap);
             if (overlap > 0) {

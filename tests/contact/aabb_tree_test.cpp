@@ -244,7 +244,7 @@ TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tr
                                                   [&](const auto& t) { return test::meet(t, exact(from), exact(to)); });
             if ((hit.triangle == no_index) != all.empty()) FAIL_CHECK(all.size() << " are hit");
             if (hit.triangle == no_index || all.empty()) {
-                CHECK((hit.along == 1 || hit.triangle != no_index));
+                CHECK((hit.fraction == 1 || hit.triangle != no_index));
                 continue;
             }
             ++hits;
@@ -258,8 +258,9 @@ TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tr
             const Vector3<S> segment = to - from, normal = area_vector(triangle);
             const S slope = std::abs(dot(segment, normal)) / (norm(segment) * norm(normal));
             const S slack = 256 * std::numeric_limits<S>::epsilon() * scene.scale(from) / slope;
-            if (!(std::abs(hit.along - first) * norm(segment) <= slack)) FAIL_CHECK(hit.along << ", not " << first);
-            CHECK(norm<S>(point_at(triangle, hit.barycentric) - (from + hit.along * segment)) <= slack);
+            if (!(std::abs(hit.fraction - first) * norm(segment) <= slack))
+                FAIL_CHECK(hit.fraction << ", not " << first);
+            CHECK(norm<S>(point_at(triangle, hit.barycentric) - (from + hit.fraction * segment)) <= slack);
         }
     }
     CHECK(hits > cases(5000));
@@ -282,7 +283,7 @@ TEMPLATE_TEST_CASE("what touches only just, touches", "[tree]", float, double) {
         REQUIRE(six.size() == 6);
         const auto hit = tree.first_hit(x, above, below);
         CHECK(hit.triangle == six.front());
-        CHECK(hit.along == S(0.75));
+        CHECK(hit.fraction == S(0.75));
         CHECK(hit.barycentric.maxCoeff() == 1);
         CHECK(tree.first_hit(x, above, corner).triangle == six.front());
         CHECK(tree.first_hit(x, corner, above).triangle == six.front());
@@ -299,8 +300,8 @@ TEMPLATE_TEST_CASE("what touches only just, touches", "[tree]", float, double) {
 
         // In the plane: from outside it enters at the border, from inside it hits at once.
         const auto border = tree.first_hit(x, Vector3<S>(-8, S(0.5), 0), Vector3<S>(8, S(0.5), 0));
-        CHECK(border.along == Approx(0.25));
-        CHECK(tree.first_hit(x, Vector3<S>(S(0.3), S(0.1), 0), Vector3<S>(8, 0, 0)).along == 0);
+        CHECK(border.fraction == Approx(0.25));
+        CHECK(tree.first_hit(x, Vector3<S>(S(0.3), S(0.1), 0), Vector3<S>(8, 0, 0)).fraction == 0);
         CHECK(tree.first_hit(x, Vector3<S>(5, 5, 0), Vector3<S>(5, -5, 0)).triangle == no_index);
         CHECK(tree.closest_point(x, corner).squared_distance == 0);
         CHECK(tree.closest_point(x, above).squared_distance == 9);
@@ -380,7 +381,7 @@ TEST_CASE("copies answer alike, and go their own ways", "[tree]") {
             const auto hit = tree.first_hit(moved_x, q, p);
             answers.insert(answers.end(),
                            {nearest.squared_distance, double(nearest.triangle), double(nearest.nodes_visited),
-                            hit.along, double(hit.triangle), double(hit.nodes_visited)});
+                            hit.fraction, double(hit.triangle), double(hit.nodes_visited)});
         }
         return answers;
     };
@@ -404,7 +405,7 @@ TEMPLATE_TEST_CASE("an engine's buffer is searched in place", "[tree]", float, d
     CHECK(same_boxes(tree, same));
     const Vector3<S> q(S(0.3), S(1.2), S(-0.4));
     CHECK(tree.closest_point(x, q).point == same.closest_point(mesh.positions(), q).point);
-    CHECK(tree.first_hit(x, q, -q).along == same.first_hit(mesh.positions(), q, -q).along);
+    CHECK(tree.first_hit(x, q, -q).fraction == same.first_hit(mesh.positions(), q, -q).fraction);
 }
 
 TEST_CASE("each box holds those below it, the first the surface", "[tree]") {
@@ -532,7 +533,7 @@ TEST_CASE("a single triangle is a tree", "[tree]") {
     CHECK(tree.statistics().nodes == 1);
     CHECK(tree.closest_point(mesh.positions(), {1, 1, 1}).squared_distance == Approx(4.0 / 3));
     CHECK(tree.closest_point(mesh.positions(), {1, 1, 1}).nodes_visited == 2);  // around the surface, and the leaf
-    CHECK(tree.first_hit(mesh.positions(), {0, 0, 0}, {1, 1, 1}).along == Approx(1.0 / 3));
+    CHECK(tree.first_hit(mesh.positions(), {0, 0, 0}, {1, 1, 1}).fraction == Approx(1.0 / 3));
 }
 
 TEST_CASE("a threshold below 1 is refused by name", "[tree][bad]") {
@@ -565,7 +566,7 @@ TEMPLATE_TEST_CASE("a query that makes no sense finds nothing", "[tree][bad]", f
             CHECK(is_finite(nearest.point));
             for (const auto& hit : {tree.first_hit(x, q, good), tree.first_hit(x, good, q)}) {
                 CHECK(hit.triangle == no_index);
-                CHECK(hit.along == 1);
+                CHECK(hit.fraction == 1);
                 CHECK(hit.nodes_visited == 0);
             }
             CHECK(nothing([&](auto visit) { return tree.overlap_sphere(x, q, S(9), visit); }));

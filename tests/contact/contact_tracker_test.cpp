@@ -88,7 +88,7 @@ TEST_CASE("the tracker agrees with a search of the whole surface along random tr
         double height = random.number(0.5, 1.5);
         for (int tick = 0; tick < 20; ++tick) {
             over = (over + 0.1 * edge * displacement).normalized();
-            const Vector foot = 3 * over * (1 - tree.first_hit(x, 3 * over, Vector::Zero()).along);
+            const Vector foot = 3 * over * (1 - tree.first_hit(x, 3 * over, Vector::Zero()).fraction);
             height = std::clamp(height + random.number(-0.05, 0.05) * edge / tool.radius, 0.4, 1.6);
             tool.position = foot + height * tool.radius * over;
             const auto contact = tracker.update(tree, x, tool);

@@ -99,7 +99,7 @@ double overlap(const TriangleMesh<double>& mesh, const Points<double>& x, const 
     for (Index f = 0; f < mesh.triangle_count(); ++f) {
         const auto corners = mesh.triangles().col(f);
         for (int pair = 0; pair < feature_pairs(tool); ++pair) {
-            const auto found = proximity(triangle_at(x, corners), tool, pair);
+            const auto found = closest_points(triangle_at(x, corners), tool, pair);
             if (!found || norm(found->separation) >= nearest) continue;
             nearest = norm(found->separation);
             gives_way = std::none_of(corners.begin(), corners.end(), is_fixed);

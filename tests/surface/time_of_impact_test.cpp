@@ -33,8 +33,8 @@ TEST_CASE("a triangle that moves as a whole passes where and when a line says") 
         if (hit) {
             ++passings;
             REQUIRE(time < 1);
-            REQUIRE(std::abs(time - hit->along) < 1e-6);
-            REQUIRE(time <= hit->along + 1e-12);
+            REQUIRE(std::abs(time - hit->fraction) < 1e-6);
+            REQUIRE(time <= hit->fraction + 1e-12);
         } else if (time < 1) {
             const auto at = moved(from, time * displacement);
             REQUIRE(membrane::closest_point<double>(at, q).barycentric.minCoeff() < 1e-3);

@@ -159,7 +159,7 @@ inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, 
         const auto triangle = triangle_at(y, corners);
         if (detail::is_far(triangle, tool, 1.25 * tool.radius)) continue;
         const auto nearest = closest_to_segment(triangle, tool.position, end);
-        const Vector3<double> separation = nearest.on_triangle.point - tool.position - nearest.along * tool.axis;
+        const Vector3<double> separation = nearest.on_triangle.point - tool.position - nearest.fraction * tool.axis;
         const Vector3<double> u = direction<double>(separation, Vector3<double>::Zero());
         const Wide wide_u = wide(u), axis = wide(tool.axis);
         long double distance = std::numeric_limits<long double>::infinity(), size = axis.norm() + tool.radius;

@@ -30,8 +30,8 @@ struct SurfacePoint {
 /// The first intersection of a segment with the surface.
 template <Real Scalar>
 struct SurfaceHit {
-    Index triangle;  ///< `no_index`: no intersection.
-    Scalar along;    ///< 0 at the segment's start, 1 at its end.
+    Index triangle;   ///< `no_index`: no intersection.
+    Scalar fraction;  ///< 0 at the segment's start, 1 at its end.
     Vector3<Scalar> barycentric;
     Index nodes_visited;
 };
@@ -149,10 +149,10 @@ SurfaceHit<Scalar> AabbTree<Scalar>::first_hit(const ConstPointsRef<Scalar>& x, 
     const auto examine = [&](Index f, const Triangle<Scalar>& triangle) {
         const auto hit = membrane::first_hit(triangle, from, to);
         if (!hit) return;
-        const bool tie = hit->along == best.along && (best.triangle == no_index || f < best.triangle);
-        if (!(hit->along < best.along || tie)) return;
-        best = {f, hit->along, hit->barycentric, 0};
-        limit = best.along + epsilon;
+        const bool tie = hit->fraction == best.fraction && (best.triangle == no_index || f < best.triangle);
+        if (!(hit->fraction < best.fraction || tie)) return;
+        best = {f, hit->fraction, hit->barycentric, 0};
+        limit = best.fraction + epsilon;
     };
     best.nodes_visited = boxes_.search(x, detail::SegmentKey<Scalar>{probe, from, to}, limit, examine);
     return best;

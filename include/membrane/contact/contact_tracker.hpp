@@ -317,7 +317,7 @@ bool ContactTracker<Scalar>::sweep_test(const Scene& scene, Contact<Scalar>& con
         auto passed = contact_where_passed(surface_, scene.x, hit.triangle, hit.barycentric, from, now, side);
         if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it ends on the surface
         if (passed.gap > 0) {
-            if (hit.along < negligible_part) return false;  // it leaves the surface it was on
+            if (hit.fraction < negligible_part) return false;  // it leaves the surface it was on
             if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from))
                 return false;                // it leaves the inside
             passed.normal = -passed.normal;  // a crease, or the other side of an open surface
@@ -416,11 +416,11 @@ std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene
         const auto other = surface_.triangle(scene.x, g);
         if (!(inward * climb(other) > 0)) continue;
         const auto there = hit_in(other);
-        const Scalar length = there ? inward * (there->along - here->along) : Scalar(0);
+        const Scalar length = there ? inward * (there->fraction - here->fraction) : Scalar(0);
         if (length > 0) inside = (std::min)(inside, length);
     }
     if (inside > 1) return std::nullopt;
-    return tool.position + (here->along + inward * inside / 2) * tool.axis;
+    return tool.position + (here->fraction + inward * inside / 2) * tool.axis;
 }
 
 // Whether `q` is behind the surface, not outside in a crease. An open surface has no inside: `q` is behind it if the
@@ -489,7 +489,7 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
     rebound_ticks_ = contact.tunnelled ? ticks_after_tunnelling : (std::max)(rebound_ticks_ - 1, 0);
     collect_candidates(rebound_ticks_ > 0 ? candidate_rings_after_tunnelling : candidate_rings);
     listed_.clear();
-    for (const Index f : candidates_.items()) listed_.push({f, surface_.corners(f)});
+    for (const Index f : candidates_.items()) listed_.try_push_back({f, surface_.corners(f)});
     contact.closed = surface_.closed();
     contact.radius = scene.radius;
     contact.detection_distance = scene.detection_distance;
@@ -505,7 +505,7 @@ void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& co
     points_.clear();
     const auto list = [&](const ContactPoint<Scalar>& point) {
         if (!contact.tunnelled && point.gap + scene.radius > scene.detection_distance) return;
-        if (!points_.push(point)) contact.has_all_points = false;
+        if (!points_.try_push_back(point)) contact.has_all_points = false;
     };
     const int features = feature_pairs(scene.tool);
     if (features == 1) return find_points_of_sphere(scene, contact.triangles, list);

@@ -27,7 +27,7 @@ class IndexSet {
     bool insert(Index i) noexcept {
         if (contains(i)) return false;
         mark_[static_cast<std::size_t>(i)] = current_;
-        items_.push(i);
+        items_.try_push_back(i);
         return true;
     }
 

@@ -222,7 +222,7 @@ const ContactPoint<Scalar>* ConstraintContext<Scalar>::cached_point(Index triang
 
 template <Real Scalar>
 void ConstraintContext<Scalar>::add_point(const ContactPoint<Scalar>& point) noexcept {
-    if (!state_.points.push(point)) state_.full = true;
+    if (!state_.points.try_push_back(point)) state_.full = true;
     state_.point_ranges[constraint_].end = state_.points.size();
 }
 

@@ -155,7 +155,7 @@ class PackedVertices {
     void truncate(const Extent& extent) noexcept;
     void need(Index v) noexcept {
         unsigned char& marked = is_needed_[static_cast<std::size_t>(v)];
-        if (marked == 0) needed_.push(v);
+        if (marked == 0) needed_.try_push_back(v);
         marked = 1;
     }
     template <class Sum, class Scene>
@@ -257,10 +257,10 @@ bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t b
 template <Real Scalar>
 void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
     for (const Index v : needed_.items().subspan(extent.needed)) is_needed_[static_cast<std::size_t>(v)] = 0;
-    members_.cut(extent.members);
-    packs_.cut(extent.packs);
+    members_.truncate(extent.members);
+    packs_.truncate(extent.packs);
     slot_count_ = extent.slots;
-    needed_.cut(extent.needed);
+    needed_.truncate(extent.needed);
 }
 
 // False if the vertices exceed the capacity. Lanes without a vertex, and those of vertices with fewer springs, have
@@ -274,11 +274,11 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
     Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}, false};
     pack.own.fill(unused_row_);
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
-    if (!packs_.push(pack)) return false;
+    if (!packs_.try_push_back(pack)) return false;
     const auto slots = std::span(slots_).subspan(slot_count_, springs);
     for (Slot& slot : slots) slot = {Scalar(0), Scalar(0), pack.own};
     for (std::size_t i = 0; i < vertices.size(); ++i) {
-        members_.push(vertices[i]);
+        members_.try_push_back(vertices[i]);
         need(vertices[i]);
         Slot* slot = slots.data();
         for (const auto& spring : network.springs_of(vertices[i])) {

@@ -75,7 +75,7 @@ void PropagationQueue::build(const Network& network, std::span<const Index> seed
         if (!network.pinned(v)) reached_.insert(v);
     }
     if (vertices().empty()) return;
-    layer_ends_.push(vertices().size());
+    layer_ends_.try_push_back(vertices().size());
     while (layer_count() <= layers && grow(network)) {
     }
 }
@@ -90,7 +90,7 @@ bool PropagationQueue::grow(const Network& network) noexcept {
         }
     }
     if (vertices().size() == end) return false;
-    layer_ends_.push(vertices().size());
+    layer_ends_.try_push_back(vertices().size());
     return true;
 }
 
@@ -98,8 +98,8 @@ template <class Network>
 void PropagationQueue::group(const Network& network, bool together) noexcept {
     groups_.clear();
     if (together && layer_count() > 1) {
-        layer_ends_.cut(1);
-        layer_ends_.push(vertices().size());
+        layer_ends_.truncate(1);
+        layer_ends_.try_push_back(vertices().size());
     }
     const auto ends = layer_ends_.items();
     for (std::size_t k = 0; k < ends.size(); ++k) groups_.add(network, reached_, k > 0 ? ends[k - 1] : 0, ends[k]);

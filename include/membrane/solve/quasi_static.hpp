@@ -309,7 +309,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     for (const Index v : state_.loaded.items()) {
         const Vector3<Scalar> now = state_.position_of(v), before = point(x, v);
         if (now == before) continue;
-        moved_.push(v);
+        moved_.try_push_back(v);
         if (options_.predict) last_displacements_.col(v) = now - before;
         x.col(v) = now;
     }

@@ -185,7 +185,7 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
         const auto before = kept_triangle(context, v);
         const auto hit = first_hit(before, contact.previous_axis_point, contact.axis_point);
         if (!hit) continue;
-        const Scalar part = 1 - detail::fraction(hit->along * length - contact.radius, length);
+        const Scalar part = 1 - detail::fraction(hit->fraction * length - contact.radius, length);
         for (const Index corner : v) {
             if (context.fixed(corner)) continue;
             const Vector3<Scalar> so_far = context.position(corner) - context.kept(corner);
@@ -372,7 +372,7 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
                 ++next;
                 continue;
             }
-            const auto nearest = proximity(surface_triangle(context, touched.corners), tool, feature);
+            const auto nearest = closest_points(surface_triangle(context, touched.corners), tool, feature);
             const Scalar slack = negligible_distance(context, touched.corners[0]);
             if (nearest && norm(nearest->separation) < contact.radius - slack) return true;
         }
