@@ -17,7 +17,7 @@ constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr std::array<Index, 3> corners{0, 1, 2};
 const Vector3<double> middle = Vector3<double>::Constant(1.0 / 3), target(1, 2, 3);
 
-/// Four vertices, the last one pinned; told by constraint 5.
+/// Four vertices, the last one pinned; described by constraint 5.
 EquilibriumScene scene() {
     EquilibriumScene scene(Points<double>::Zero(3, 4), {0, 0, 0, 1});
     scene.select_constraint(5);
@@ -48,8 +48,8 @@ struct Clamp {
     Index first, second;
 };
 void describe(const Clamp& clamp, EquilibriumScene& scene) {
-    scene.hold(clamp.first);
-    scene.hold(clamp.second, target);
+    scene.prescribe(clamp.first);
+    scene.prescribe(clamp.second, target);
 }
 static_assert(StaticConstraint<Clamp> && !StaticConstraint<int>);
 
@@ -61,7 +61,7 @@ TEST_CASE("held vertices have their targets, pinned ones stay", "[rest_scene]") 
     CHECK(!held.fixed(0));
     CHECK(held.goals(1).targets.col(1) == target);
     CHECK(held.seeds() == std::vector<Index>{1});
-    CHECK(held.holds() == std::vector<std::pair<std::size_t, Index>>{{5, 1}});
+    CHECK(held.prescribed_vertices() == std::vector<std::pair<std::size_t, Index>>{{5, 1}});
 
     const auto pinned = scene_of(pull(3, target));
     CHECK(pinned.fixed(3));
@@ -71,7 +71,7 @@ TEST_CASE("held vertices have their targets, pinned ones stay", "[rest_scene]") 
     auto pins = scene_of(pin(vertices));
     CHECK((pins.fixed(0) && !pins.fixed(1) && pins.fixed(2)));
     CHECK(pins.seeds().empty());
-    CHECK(pins.holds().size() == 2);
+    CHECK(pins.prescribed_vertices().size() == 2);
 
     describe(pull(2, target), pins);  // the last one decides, but a pin has no wish of its own
     describe(pin(vertices), pins);
@@ -97,7 +97,7 @@ TEST_CASE("held and loaded points, and constraints of one's own", "[rest_scene]"
     CHECK(own.goals(1).targets.col(1) == target);
 }
 
-TEST_CASE("a tool that presses, and its way out", "[rest_scene]") {
+TEST_CASE("a tool that presses, and its exit displacement", "[rest_scene]") {
     const Tool<double> tool{.position = {0, 0, 0.1}};
     CHECK(scene_of(press(tool, Contact<double>::none())).tools().empty());
     auto contact = contact_above();

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <membrane/accuracy/factored_convexity.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
@@ -19,7 +19,7 @@
 #include "support/catch.hpp"
 #include "support/newton.hpp"
 #include "support/random.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 #include "support/sparse_newton.hpp"
 
 using namespace membrane;
@@ -223,7 +223,7 @@ TEST_CASE("between two equilibria of a dented sphere nothing is certified for th
     for (Index v = 0; v < dented.cols(); ++v) dented(2, v) = (std::min)(whole(2, v), 1.2 - whole(2, v));
     QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 50});
     solver.wake_all();
-    (void)test::settle_within(100, solver, dented, 1e-3, sphere.network, foundation);
+    (void)test::run_within(100, solver, dented, 1e-3, sphere.network, foundation);
     dented = sphere.still.equilibrium(dented).x;
     const double apart = farthest(whole, dented);
     REQUIRE(sphere.still.forces(dented).norm() < 1e-10);
@@ -350,9 +350,9 @@ TEST_CASE("bounds with points of triangles held", "[error_bound]") {
         if (!error.certified()) continue;
         ++certified;
         const auto place = [](const PointAttachment<double>& held) {
-            return test::HeldPlace{{held.corners.begin(), held.corners.end()},
-                                   {held.barycentric[0], held.barycentric[1], held.barycentric[2]},
-                                   held.target};
+            return test::AttachedPoint{{held.corners.begin(), held.corners.end()},
+                                       {held.barycentric[0], held.barycentric[1], held.barycentric[2]},
+                                       held.target};
         };
         const test::SmallMembrane<MassSpringNetwork<double, LinearSpring>> small{.network = network,
                                                                                  .anchors = mesh.positions(),

@@ -54,7 +54,7 @@ struct Scene {
     }
     Triangle<S> triangle(Index f) const { return triangle_at(x, mesh.triangles().col(f)); }
 
-    /// Pushes a few vertices, or all, and follows in one of the ways that there are.
+    /// Pushes a few vertices, or all, and refits in one of the possible forms.
     void deform(Random& random) {
         const bool all = random.chance(0.2);
         moved.clear();
@@ -98,7 +98,7 @@ bool same_boxes(const AabbTree<S>& a, const AabbTree<S>& b) {
     return a.statistics().nodes == b.statistics().nodes;
 }
 
-/// What a query visits, ascending, each once.
+/// The triangles a query reports, ascending, each once.
 template <class Query>
 std::vector<Index> visited(Query query) {
     std::vector<Index> found;
@@ -342,7 +342,7 @@ TEMPLATE_TEST_CASE("a refit of what moved gives the bits of a refit of all", "[t
     }
 }
 
-TEST_CASE("a refit fits what it is told of, and nothing else", "[tree]") {
+TEST_CASE("a refit fits the vertices it is given, and nothing else", "[tree]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
     const AabbTree<double> before(mesh, {.balance_threshold = 4});
     auto tree = before;
@@ -358,7 +358,7 @@ TEST_CASE("a refit fits what it is told of, and nothing else", "[tree]") {
     CHECK(tree.box(0).high == x.rowwise().maxCoeff());
 }
 
-TEST_CASE("copies answer alike, and go their own ways", "[tree]") {
+TEST_CASE("copies give equal results, and are independent", "[tree]") {
     auto mesh = std::make_unique<TriangleMesh<double>>(icosphere({.radius = 1, .subdivisions = 2}));
     auto x = mesh->positions();
     auto original = std::make_unique<AabbTree<double>>(*mesh);
@@ -374,16 +374,16 @@ TEST_CASE("copies answer alike, and go their own ways", "[tree]") {
     CHECK(same_boxes(copy, *original));
     const auto queries = [&](const AabbTree<double>& tree) {
         Random same(7);
-        std::vector<double> answers;
+        std::vector<double> results;
         for (int i = 0; i < 100; ++i) {
             const auto q = same.vector<double>(-2, 2), p = same.vector<double>(-2, 2);
             const auto nearest = tree.closest_point(moved_x, q);
             const auto hit = tree.first_hit(moved_x, q, p);
-            answers.insert(answers.end(),
+            results.insert(results.end(),
                            {nearest.squared_distance, double(nearest.triangle), double(nearest.nodes_visited),
                             hit.fraction, double(hit.triangle), double(hit.nodes_visited)});
         }
-        return answers;
+        return results;
     };
     const auto expected = queries(*original);
     const auto elsewhere = std::move(*original);
@@ -483,7 +483,7 @@ TEST_CASE("distances and intersections are those of CGAL's tree", "[tree][cgal]"
     CHECK(hits > cases(1000));
 }
 
-TEST_CASE("a tree as deep as can be gives the same answers", "[tree]") {
+TEST_CASE("a tree as deep as can be gives the same results", "[tree]") {
     Points<double> x(3, 3 * 120);
     Triangles triangles(3, 120);
     for (Index f = 0; f < 120; ++f) {  // each half as large and half as far as the one before

@@ -123,7 +123,7 @@ TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangl
             if (!near) continue;
             REQUIRE(near->barycentric.minCoeff() >= 0);
             REQUIRE(std::abs(near->barycentric.sum() - 1) <= 4 * std::numeric_limits<S>::epsilon());
-            // `reach` leads from the point of the triangle to the axis; to the pair's own end of it.
+            // `separation` runs from the point of the triangle to the axis; to the pair's own end of it.
             const Vector3<S> axis_point = point_at(triangle, near->barycentric) + near->separation;
             const Vector3<S> from_position = axis_point - tool.position;
             if (pair == 0) REQUIRE(norm(from_position) <= tolerance);

@@ -235,7 +235,7 @@ void check_folded(const TreeTopology& shape) {
             CHECK(place != wide.nodes.end());
         }
         CHECK(triangles == below(shape, wide.nodes[n]));
-        if (end != children.end()) CHECK(only_leaves);  // there is room only where nothing more can be folded in
+        if (end != children.end()) CHECK(only_leaves);  // there is a free slot only where nothing more can be folded in
     }
     for (std::size_t i = 0; i < shape.nodes.size(); ++i) {
         if (shape.nodes[i].is_leaf()) CHECK(named.count(static_cast<Index>(i)) == 1);

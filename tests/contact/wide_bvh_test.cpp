@@ -97,7 +97,7 @@ TEMPLATE_TEST_CASE("a query may have its own key of triangles", "[tree]", float,
 }
 
 // Nodes that are not full have places without a child.
-TEMPLATE_TEST_CASE("no key is reckoned with numbers that are none", "[tree][bad-input]", float, double) {
+TEMPLATE_TEST_CASE("no key is computed from numbers that are NaN", "[tree][bad-input]", float, double) {
     using S = TestType;
     const S far = std::sqrt((std::numeric_limits<S>::max)()) / 100;
     for (int seed = 1; seed <= cases(200); ++seed) {

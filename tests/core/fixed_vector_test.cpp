@@ -19,7 +19,7 @@ std::vector<Item> items_of(const FixedVector<Item>& list) {
 
 }  // namespace
 
-TEST_CASE("a list takes what it has room for, and says when it is full", "[core]") {
+TEST_CASE("a list takes as many items as its capacity, and says when it is full", "[core]") {
     FixedVector<int> list(3);
     CHECK(list.empty());
     for (int round = 0; round < 2; ++round) {
@@ -58,7 +58,7 @@ TEST_CASE("items of a list can be changed in place", "[core]") {
     CHECK(items_of(list) == std::vector<std::string>{"a!", "b!"});
 }
 
-TEST_CASE("a list never moves its items, and a copy keeps the room", "[core]") {
+TEST_CASE("a list never moves its items, and a copy keeps the capacity", "[core]") {
     FixedVector<int> list(100);
     list.try_push_back(0);
     const int* const first = list.items().data();

@@ -24,7 +24,7 @@ using namespace membrane;
 
 namespace {
 
-/// Keeps the compiler from leaving out what nobody looks at.
+/// Keeps the compiler from leaving out unused results.
 void used(const void* memory) {
     const void* volatile sink = memory;
     static_cast<void>(sink);

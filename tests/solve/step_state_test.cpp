@@ -107,7 +107,7 @@ TEST_CASE("previous points are found by their first corner, those of the last st
                 ++expected[static_cast<std::size_t>(corner)];
             }
             if (random.chance(0.3)) {
-                state.forget_points();
+                state.reset_points();
                 for (Index v = 0; v < vertices; ++v) REQUIRE(state.previous_at(v) == no_index);
             }
             state.end_step();

@@ -41,8 +41,8 @@ struct Mishap {
     }
 };
 
-/// A device with a hand, in millimetres and in a frame of its own; contact and solver; every policy, each in its turn; the
-/// limits; an observer; a recorder; both sides of the hand-over.
+/// A device with a hand, in millimetres and in a frame of its own; contact and solver; every policy, each in its turn;
+/// the limits; an observer; a recorder; both sides of the hand-over.
 template <membrane::Real S>
 struct HapticLoop {
     using V = membrane::Vector3<S>;
@@ -58,7 +58,7 @@ struct HapticLoop {
         if (!device.running()) device.reset();
         now += dt + mishap.late;
         const auto hand = in_scene(device.read(), mishap);
-        if (!mishap.frozen) simulate(policy == 3 ? coupling.follow(hand, reaction, S(dt)) : hand);
+        if (!mishap.frozen) simulate(policy == 3 ? coupling.update(hand, reaction, S(dt)) : hand);
         asked += mishap.force.cast<S>();
         felt = limit(asked, now, solves);
         observer.update(hand.position, felt, dt);

@@ -71,8 +71,8 @@ TEST_CASE("boxes overlap when no axis separates them, borders included", "[box]"
     CHECK_FALSE(overlap(box, Aabb<double>{}));
 }
 
-TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther than its reach", "[box]", float,
-                   double) {
+TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther than its farthest corner", "[box]",
+                   float, double) {
     using S = TestType;
     for (int seed = 1; seed <= cases(2000); ++seed) {
         CAPTURE(seed);

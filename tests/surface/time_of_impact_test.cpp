@@ -24,7 +24,7 @@ TEST_CASE("a triangle that moves as a whole passes where and when a line says") 
         test::Random random(static_cast<std::uint64_t>(seed));
         const Triangle<double> from{random.vector(), random.vector(), random.vector()};
         const Vector3<double> displacement = 2 * random.vector(), q = random.vector();
-        // From the triangle's own view the point moves the other way, in a straight line.
+        // From the triangle's own view the point moves in the opposite direction, in a straight line.
         const auto hit = membrane::first_hit<double>(from, q, q - displacement);
         const double time = membrane::time_of_impact<double>(from, moved(from, displacement), q);
         const double margin = hit ? hit->barycentric.minCoeff() : 1;

@@ -17,7 +17,7 @@
 /// The balance of forces on a membrane of linear springs.
 ///
 ///     membrane::EquilibriumProblem problem(network);                                            // offline
-///     if (problem.take(x, network, foundation, membrane::pull(7, target)) != ProblemStatus::valid) ...
+///     if (problem.assign(x, network, foundation, membrane::pull(7, target)) != ProblemStatus::valid) ...
 ///     problem.forces(problem.centre(), force, magnitude);                                // [N]
 namespace membrane {
 
@@ -25,8 +25,8 @@ namespace membrane {
 template <class Volume>
 concept LinearFoundation = std::same_as<Volume, NoFoundation> || std::same_as<Volume, VirtualVolumeSprings<float>> ||
                            std::same_as<Volume, VirtualVolumeSprings<double>> || std::same_as < Volume,
-        MovedVolume < VirtualVolumeSprings<float>,
-float >> || std::same_as<Volume, MovedVolume<VirtualVolumeSprings<double>, double>>;
+        MovingFoundation < VirtualVolumeSprings<float>,
+float >> || std::same_as<Volume, MovingFoundation<VirtualVolumeSprings<double>, double>>;
 
 enum class ProblemStatus {
     valid,
@@ -45,9 +45,9 @@ class EquilibriumProblem {
 
     /// Takes the membrane at `x` (3 x V [m]) and its constraints. Online. Cost: O(V + springs).
     template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
-    [[nodiscard]] ProblemStatus take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                     const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                     const Constraints&... constraints) noexcept;
+    [[nodiscard]] ProblemStatus assign(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                       const Constraints&... constraints) noexcept;
 
     /// Also fixes all vertices that are not in `free`. Online. Cost: O(V).
     [[nodiscard]] ProblemStatus fix_all_but(std::span<const Index> free) noexcept;
@@ -56,7 +56,7 @@ class EquilibriumProblem {
     [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
     [[nodiscard]] double foundation(Index v) const noexcept { return foundation_[at(v)].stiffness; }
 
-    /// The stiffness of the foundation minus the softening set since the last `take` [N/m].
+    /// The stiffness of the foundation minus the softening set since the last `assign` [N/m].
     [[nodiscard]] double support(Index v) const noexcept { return foundation(v) - softening_[at(v)]; }
     void soften(Index v, double by) noexcept { softening_[at(v)] = by; }
 
@@ -65,7 +65,7 @@ class EquilibriumProblem {
         return (fixed(spring.first) ? 0 : 1) + (fixed(spring.second) ? 0 : 1);
     }
 
-    /// The x of the last `take`, and x with prescribed vertices at their targets [m].
+    /// The x of the last `assign`, and x with prescribed vertices at their targets [m].
     [[nodiscard]] const Points<double>& given() const noexcept { return given_; }
     [[nodiscard]] const Points<double>& centre() const noexcept { return centre_; }
 
@@ -131,9 +131,9 @@ EquilibriumProblem::EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& net
 }
 
 template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
-ProblemStatus EquilibriumProblem::take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                       const Constraints&... constraints) noexcept {
+ProblemStatus EquilibriumProblem::assign(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                         const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                         const Constraints&... constraints) noexcept {
     if (x.cols() != vertex_count() || network.vertex_count() != vertex_count()) return ProblemStatus::invalid_input;
     if (network.springs().size() != springs_.size()) return ProblemStatus::invalid_input;
     take_springs(network.springs());
@@ -198,7 +198,7 @@ inline ProblemStatus EquilibriumProblem::take_term(const ConstraintTerm& term) n
     }
     const Index v = term.corners[0];
     switch (term.kind) {
-        case Kind::hold_vertex:
+        case Kind::prescribe_vertex:
             if ((fixed_[at(v)] & by_network) == 0) centre_.col(v) = term.target;
             [[fallthrough]];
         case Kind::pin: fix(v, by_constraint); return ProblemStatus::valid;
@@ -248,7 +248,7 @@ inline void EquilibriumProblem::project(Points<double>& f) const noexcept {
 }
 
 inline void EquilibriumProblem::share(const ConstraintTerm& term, std::vector<double>& weights) noexcept {
-    if (!term.holds()) return;
+    if (!term.prescribes()) return;
     for (std::size_t k = 0; k < 3; ++k) weights[at(term.corners[k])] += term.share(k);
 }
 

@@ -158,7 +158,7 @@ Points<double> EquilibriumSolver<ElasticModel>::newton_step() {
     system_.open(goals_.targets - x);
     elasticity_.add_stiffness(here_.elastic, system_);
     const Points<double> forces = applied(here_);
-    for (Index v = 0; v < forces.cols(); ++v) system_.push(v, forces.col(v));
+    for (Index v = 0; v < forces.cols(); ++v) system_.add_force(v, forces.col(v));
     stiffness_ = elasticity_.largest_stiffness(here_.elastic);
     add_rows();
     const auto solution = system_.solve(stiffness_);
@@ -294,7 +294,7 @@ template <class ElasticModel>
 std::vector<Vector3<double>> EquilibriumSolver<ElasticModel>::reactions(std::size_t count) const {
     std::vector<Vector3<double>> sums(count, Vector3<double>::Zero());
     const Points<double> forces = unbalanced(here_);
-    for (const auto& [constraint, v] : scene_.holds()) sums[constraint] += forces.col(v);
+    for (const auto& [constraint, v] : scene_.prescribed_vertices()) sums[constraint] += forces.col(v);
     for (const auto& term : scene_.loaded_places()) sums[term.constraint] -= term.force;
     for (std::size_t i = 0; i < attachment_forces_.size(); ++i)
         sums[scene_.point_attachments()[i].constraint] -= attachment_forces_[i];

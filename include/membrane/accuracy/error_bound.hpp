@@ -97,7 +97,7 @@ class ErrorBound {
     static constexpr std::size_t max_constraints = StepState<double>::max_constraints;
     static constexpr int max_attempts = 4;
 
-    void open(std::size_t constraint_count) noexcept;
+    void begin(std::size_t constraint_count) noexcept;
     template <class... Constraints>
     [[nodiscard]] ErrorReport report(const Constraints&... constraints) noexcept;
     void locate() noexcept;
@@ -153,8 +153,8 @@ template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar>...
 ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                       const Constraints&... constraints) noexcept {
-    open(sizeof...(Constraints));
-    switch (problem_.take(x, network, volume, constraints...)) {
+    begin(sizeof...(Constraints));
+    switch (problem_.assign(x, network, volume, constraints...)) {
         case ProblemStatus::valid: locate(); break;
         case ProblemStatus::contact: error_.status = BoundStatus::contact; return error_;
         case ProblemStatus::unsupported: error_.status = BoundStatus::unsupported; return error_;
@@ -168,8 +168,8 @@ template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... C
 ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
                                       const Volume& volume, const Constraints&... constraints) {
-    open(sizeof...(Constraints));
-    const ProblemStatus status = problem_.take(x, network, volume, constraints...);
+    begin(sizeof...(Constraints));
+    const ProblemStatus status = problem_.assign(x, network, volume, constraints...);
     if (rest.x.cols() != x.cols() || mesh.vertex_count() != x.cols() || !is_finite(rest.x)) return error_;
     if (status == ProblemStatus::invalid_input) return error_;
     if (status == ProblemStatus::unsupported || !problem_.places().empty()) {
@@ -182,7 +182,7 @@ ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_i
         if (touch.tool >= scene.tools().size()) return error_;
     }
     y_ = rest.x;
-    pressed_.take(problem_, mesh.triangles(), y_, scene.tools(), rest.contacts);
+    pressed_.assign(problem_, mesh.triangles(), y_, scene.tools(), rest.contacts);
     evaluate_residuals();
     error_.estimate = distance_;
     enclose();
@@ -190,7 +190,7 @@ ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_i
 }
 
 template <CheckedConvexityModel Convexity>
-void ErrorBound<Convexity>::open(std::size_t constraint_count) noexcept {
+void ErrorBound<Convexity>::begin(std::size_t constraint_count) noexcept {
     error_ = {};
     reactions_.fill({});
     error_.reactions = {reactions_.data(), constraint_count};
@@ -235,7 +235,7 @@ void ErrorBound<Convexity>::locate() noexcept {
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::enclose() noexcept {
     error_.status = BoundStatus::not_converged;
-    if (radius_ < 0 && !convex_within(1.05 * distance_ + pressed_.overlap())) {
+    if (radius_ < 0 && !convex_within(1.05 * distance_ + pressed_.penetration())) {
         error_.status = BoundStatus::not_convex;
         return;
     }
@@ -265,7 +265,7 @@ template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::evaluate_residuals() noexcept {
     problem_.forces(y_, force_, magnitude_);
     rest_ = force_;
-    pressed_.push(rest_, magnitude_);
+    pressed_.add_force(rest_, magnitude_);
     problem_.project(rest_);
     double rounding = 0, farthest = 0;
     for (Index v = 0; v < problem_.vertex_count(); ++v) {
@@ -282,9 +282,9 @@ template <CheckedConvexityModel Convexity>
 bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
     radius_ = radius;
     error_.convexity = -std::numeric_limits<double>::infinity();
-    if (!pressed_.around(problem_, force_, magnitude_, distance_ + radius)) return false;
+    if (!pressed_.bound_softening(problem_, force_, magnitude_, distance_ + radius)) return false;
     for (Index v = 0; v < problem_.vertex_count(); ++v) problem_.soften(v, pressed_.softening(v));
-    error_.convexity = convexity_.around(problem_, radius * (1 + 1e-12));
+    error_.convexity = convexity_.eigenvalue_bound(problem_, radius * (1 + 1e-12));
     return error_.convexity > 0;
 }
 
@@ -292,11 +292,11 @@ bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
 // state with all points at their targets.
 template <CheckedConvexityModel Convexity>
 double ErrorBound<Convexity>::enclosure() const noexcept {
-    const double slip = problem_.places().slip(y_);
+    const double violation = problem_.places().violation(y_);
     const double mu = error_.convexity;
-    const double half = (unbalanced_ + (slip > 0 ? stiffness_.largest() * slip : 0.0)) / (2 * mu);
+    const double half = (unbalanced_ + (violation > 0 ? stiffness_.largest() * violation : 0.0)) / (2 * mu);
     const double radius = half + std::sqrt(half * half + pressed_.work() / mu);
-    return (1 + 1e-9) * ((std::max)(radius, pressed_.min_radius()) + slip);
+    return (1 + 1e-9) * ((std::max)(radius, pressed_.min_radius()) + violation);
 }
 
 // A spring between vertices with shares a and b adds (a - b) times its change of force.
@@ -311,7 +311,7 @@ ForceEnclosure ErrorBound<Convexity>::enclose_reaction(const C& constraint, std:
         const bool presses = term.kind == ConstraintTerm::Kind::press && term.contact.touching();
         if (presses) pressed_.share(tool++, weights_);
         problem_.share(term, weights_);
-        varies |= presses || term.holds();
+        varies |= presses || term.prescribes();
     });
     if (!varies) return result;
     for (std::size_t v = 0; v < weights_.size(); ++v)

@@ -14,7 +14,7 @@ namespace membrane {
 /// Points of triangles attached to targets: each point is the weighted sum of three corners.
 ///
 ///     membrane::PointAttachments places;
-///     places.add(membrane::ConstraintTerm::hold(corners, weights, target));
+///     places.add(membrane::ConstraintTerm::prescribe(corners, weights, target));
 ///     places.project_positions(y);             // every point is at its target
 ///     places.project(displacement);            // and stays there if y moves by this
 class PointAttachments {
@@ -39,7 +39,7 @@ class PointAttachments {
     void project_positions(Points<double>& y) const noexcept;
 
     /// Upper bound of the distance to the nearest state with all points at their targets, rounding included [m].
-    [[nodiscard]] double slip(const Points<double>& y) const noexcept;
+    [[nodiscard]] double violation(const Points<double>& y) const noexcept;
 
   private:
     [[nodiscard]] std::span<const ConstraintTerm> places() const noexcept { return {places_.data(), count_}; }
@@ -78,7 +78,7 @@ inline void PointAttachments::project_positions(Points<double>& y) const noexcep
     for (const auto& term : places()) shift(term, term.target - term.point_in(y), y);
 }
 
-inline double PointAttachments::slip(const Points<double>& y) const noexcept {
+inline double PointAttachments::violation(const Points<double>& y) const noexcept {
     double squares = 0;
     for (const auto& term : places()) {
         double size = norm(term.target);

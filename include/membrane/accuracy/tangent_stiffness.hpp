@@ -102,14 +102,14 @@ template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> He
 TangentReport TangentStiffness::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                    const Held& held, const Others&... others) noexcept {
-    return condense(problem_.take(x, network, volume, held, others...), held);
+    return condense(problem_.assign(x, network, volume, held, others...), held);
 }
 
 template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
 TangentReport TangentStiffness::of(std::span<const Index> free, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                    const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                    const Held& held, const Others&... others) noexcept {
-    const auto status = problem_.take(x, network, volume, held, others...);
+    const auto status = problem_.assign(x, network, volume, held, others...);
     return condense(status == ProblemStatus::valid ? problem_.fix_all_but(free) : status, held);
 }
 

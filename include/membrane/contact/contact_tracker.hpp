@@ -93,7 +93,7 @@ class ContactTracker {
     // The tool may approach an open surface from either side.
     [[nodiscard]] bool is_first_seen() const noexcept { return !surface_.closed() && !last_.touching() && side_ == 0; }
     [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
-    bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    bool track(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool contacts(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool sweep_test(const Scene& scene, Contact<Scalar>& contact) const noexcept;
@@ -220,7 +220,7 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
     const Scene scene = scene_of(tree, x, tool, anchors);
     const bool before = last_.touching();
     Contact<Scalar> contact;
-    const bool followed = before && scene.travel <= surface_.mean_edge() && follow(scene, contact);
+    const bool followed = before && scene.travel <= surface_.mean_edge() && track(scene, contact);
     if (before && !followed) ++full_query_count_;
     if ((followed || find(scene, contact)) && contacts(scene, contact)) {
         complete(scene, contact);
@@ -260,7 +260,7 @@ auto ContactTracker<Scalar>::scene_of(const AabbTree<Scalar>& tree, const ConstP
 
 // Finds the contact among the triangles of the last tick and their neighbours; false if the tool has left all of them.
 template <Real Scalar>
-bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact) noexcept {
+bool ContactTracker<Scalar>::track(const Scene& scene, Contact<Scalar>& contact) noexcept {
     std::swap(near_, near_before_);
     near_.clear();
     queued_.clear();

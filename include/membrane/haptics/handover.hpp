@@ -62,7 +62,7 @@ class Latest {
 
     /// Called by the reader; valid until its next `read`.
     [[nodiscard]] const Snapshot<T>& read() noexcept {
-        slots_.take();
+        slots_.acquire();
         return slots_.front();
     }
 
@@ -107,7 +107,7 @@ class MovedPoints {
 
     /// Called by the reader; valid until its next `read`.
     [[nodiscard]] MovedSnapshot<Scalar> read() noexcept {
-        const bool newer = slots_.take();
+        const bool newer = slots_.acquire();
         const Slot& slot = slots_.front();
         return {slot.stamp, newer ? slot.moved.items() : std::span<const Index>(), slot.x};
     }

@@ -258,10 +258,10 @@ class MassSpringNetwork {
     /// The springs of vertex `v`, by ascending vertex at the other end.
     [[nodiscard]] std::span<const SpringEnd<Scalar>> springs_of(Index v) const noexcept { return ends_[v]; }
 
-    /// Calls `act(placed)` for each spring: `PlacedElement<SpringElement>`.
+    /// Calls `act(instance)` for each spring: `ElementInstance<SpringElement>`.
     template <class Act>
     void for_each_element(Act act) const {
-        for (const auto& spring : springs_) act(placed(spring));
+        for (const auto& spring : springs_) act(instance(spring));
     }
 
     [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const noexcept { return ends_[v]; }
@@ -302,7 +302,7 @@ class MassSpringNetwork {
     /// Tension of spring `s` [N].
     [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
         const auto& spring = springs_[static_cast<std::size_t>(s)];
-        return placed(spring).element.response(norm(edge_vector(spring, x))).tension;
+        return instance(spring).element.response(norm(edge_vector(spring, x))).tension;
     }
 
     /// Energy stored in all springs [J]. Cost: O(springs).
@@ -310,10 +310,10 @@ class MassSpringNetwork {
 
     /// A negligible residual force [N]: 1e-9 of the force of the stiffest spring stretched by its own length, or its
     /// stiffness times 64 roundings of a coordinate if that is larger.
-    [[nodiscard]] Scalar force_tolerance() const noexcept { return negligible_force_; }
+    [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
   private:
-    [[nodiscard]] PlacedElement<SpringElement<Scalar, Law>> placed(const Spring<Scalar>& spring) const noexcept {
+    [[nodiscard]] ElementInstance<SpringElement<Scalar, Law>> instance(const Spring<Scalar>& spring) const noexcept {
         return {{spring.first, spring.second}, {&law_, spring.stiffness, spring.rest_length}};
     }
     void build_springs(const Adjacency& adjacency, const Points<Scalar>& x, const NetworkOptions<Scalar>& options);
@@ -323,7 +323,7 @@ class MassSpringNetwork {
     CompressedRows<SpringEnd<Scalar>> ends_;  // each spring twice
     std::vector<Scalar> mass_, viscosity_;
     std::vector<unsigned char> pinned_;
-    Scalar negligible_force_ = 0;
+    Scalar force_tolerance_ = 0;
 };
 
 template <Real Scalar, class Law>
@@ -384,7 +384,7 @@ void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, c
     const Scalar spacing = std::numeric_limits<Scalar>::epsilon() * x.cwiseAbs().maxCoeff();
     for (const auto& s : springs_) {
         const Scalar force = s.stiffness * (std::max)(s.rest_length / Scalar(1e9), 64 * spacing);
-        negligible_force_ = (std::max)(negligible_force_, force);
+        force_tolerance_ = (std::max)(force_tolerance_, force);
     }
 }
 

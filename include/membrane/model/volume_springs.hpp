@@ -18,7 +18,7 @@
 ///
 ///     const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
 ///     solver.step(x, dt, network, foundation, press(tool, contact));               // the body stands still
-///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));     // it moves, see `moved_volume.hpp`
+///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));  // it moves, see `moving_foundation.hpp`
 namespace membrane {
 
 /// Constants of the volume springs: one value for all vertices, or one for each vertex.
@@ -109,7 +109,7 @@ struct VolumeSpring {
 };
 
 template <class Volume, Real Scalar>
-class MovedVolume;  // of moved_volume.hpp
+class MovingFoundation;  // of moving_foundation.hpp
 
 /// Virtual volume springs, [Liu07] (5): one for each vertex, of rest length zero, from the anchor to the vertex.
 template <Real Scalar>

@@ -28,9 +28,9 @@ namespace membrane {
 /// foundation model has `spring`, and no update needs a line search.
 template <class Scalar, class Rule, class Network, class Volume>
 concept UpdatesInLanes = (Network::never_stiffens ||
-                          !is_safe_rule<Rule>)&&requires(const Rule& rule, const Network& network,
-                                                         const SpringState<Lanes<Scalar>>& spring,
-                                                         const VertexState<Lanes<Scalar>>& vertex) {
+                          !is_descent_rule<Rule>)&&requires(const Rule& rule, const Network& network,
+                                                            const SpringState<Lanes<Scalar>>& spring,
+                                                            const VertexState<Lanes<Scalar>>& vertex) {
     network.law()(spring);
     rule.compliance(vertex);
 }
@@ -424,7 +424,7 @@ template <bool in_contact, class Scene, class Rule>
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
     const auto move = move_of(rule, at.vertex, rows.force_tolerance);
-    if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+    if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
         if (!allowed && any(move.may_overshoot & may_move)) {
             const auto springs = springs_on<CurvedSum<Wide>>(p, at.here, scene).total();
             const Wide bound = stiffness_bound_of(springs) + at.others.stiffness;
