@@ -23,17 +23,9 @@ namespace membrane {
 
 /// Bounds for tools in contact that hold at all states whose vertices are within `max_displacement` of y.
 ///
-/// A tool of radius R keeps each point p of the surface, a mean of three corners with weights b, at least R away from
-/// each point c of its axis: h = |p - c| - R >= 0. Each h is a convex function of the corners. At distance d, its
-/// second derivative is at most 1/d times the squared displacement of p, which is at most the mean of the squared
-/// displacements of the corners. So a multiplier l reduces the second derivative of the energy by at most l/d times
-/// that mean: all of them together reduce the stiffness, at each vertex, by the multipliers on its corners over d.
-///
-/// Bound of the multipliers at a vertex: let u be the unit vector between the closest points of axis and triangle at y,
-/// g their distance. As both are convex, no pair of points is closer along u. So if a pair has the distance R in the
-/// neighbourhood, the cosine of its direction with u is at least (g - max_displacement) / R. In equilibrium the contact
-/// forces on a vertex balance its springs and foundation. If their directions are within an angle a of a common middle,
-/// the sum of their magnitudes is at most that force over cos a.
+/// Contact forces reduce the stiffness, at each vertex, by at most the multipliers on its corners over the distance
+/// from the axis. At a vertex, the sum of the multipliers is at most the force of springs and foundation over the
+/// cosine of the largest angle between a contact direction and their middle. Derivation: README.md in this folder.
 class ContactBounds {
   public:
     /// Cost: O(V) memory.

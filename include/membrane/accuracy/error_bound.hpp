@@ -40,31 +40,11 @@ struct ErrorBoundOptions {
 /// Proves an upper bound of the distance of a membrane of linear springs from equilibrium. The state may come from any
 /// solver, which may have moved all of its vertices or only some: the equilibrium is that of all free vertices.
 ///
-/// Let E be the energy of springs, foundation and loads, x the state (with fixed vertices and attached points at their
-/// targets), and C all states whose free vertices are within rho of x: a convex set. If the stiffness has no eigenvalue
-/// below mu > 0 on C, as `Convexity` shows, then (grad E(a) - grad E(b)) . (a - b) >= mu |a - b|^2 for a and b in C, so
-/// C has at most one equilibrium. Take any y, its residual forces r = -grad E(y), and the ball B around it of radius e
-/// = |r| / mu. If B lies in C, then on its surface grad E(z) . (z - y) >= mu e^2 - |r| e = 0. The minimum of E in B is
-/// therefore an equilibrium: on the surface its gradient, if not zero, would point straight inwards, and the product
-/// would be negative. So C has exactly one equilibrium x*, and |x* - y| <= e. None of its vertices is farther from x
-/// than max |y_v - x_v| + e; if that is at most rho, B lies in C and the proof is complete.
-///
-/// y comes from Newton's method, started at x, with conjugate gradients (inexact, [Dembo82]): near the equilibrium e is
-/// small compared with the distance, and the bound hardly larger than the distance. The proof does not depend on that:
-/// it uses y and its forces as computed, with rounding. Point attachments restrict C to a plane, on which the proof
-/// holds for the projected forces.
-///
-/// A reaction q changes by at most the sum of k |w_i - w_j| over the springs at each free vertex, where w is the share
-/// of each vertex in q and no spring is stiffer than k in C. So q(x*) is within sqrt(sum of squares of these) e of
-/// q(y).
-///
-/// If tools press, y and the contact forces are those of an equilibrium computed before, r is the residual with them,
-/// and mu a bound of the stiffness minus the reduction by contact forces. Beyond that, contact forces change the energy
-/// by work across gaps and penetrations, at most some w (`ContactBounds`): mu |x - y|^2 <= |r| |x - y| + w for an
-/// equilibrium x in C, and two in C are equal. The minimum of E outside the tools within a ball B in C around y is one:
-/// if it were on the surface, a force would hold it there, which only adds to the left side; so e, the radius, is where
-/// both sides are equal. (The increase of contact forces by this force is outweighed too while e is below the smallest
-/// distance from the axis times the smallest cosine, and above the displacement that clears the penetrations.)
+/// The bound is e = |r| / mu: r are the residual forces of a state y near `x`, and no eigenvalue of the stiffness is
+/// below mu > 0 around it, as `Convexity` shows. y comes from Newton's method with conjugate gradients (inexact,
+/// [Dembo82]), so that near the equilibrium the bound is hardly larger than the distance. With tools, y is an
+/// equilibrium computed before, and `ContactBounds` bounds the work of the contact forces. Proof: README.md in this
+/// folder.
 ///
 /// Rounding is that of IEEE double: with -ffast-math this is no proof. The equilibrium has no damping forces. A
 /// reaction in a step's report may include some; its distance from the equilibrium's reaction is bounded all the same.

@@ -167,17 +167,8 @@ template <Number Scalar>
 /// Lower bound of the stiffness of a linear spring at all edge vectors within `displacement` [m] of `edge`; there it is
 /// in no direction stiffer than its constant k. If the spring may become too short for the bound, returns nullopt.
 ///
-/// At an edge vector d of length l and direction u the Hessian of k (|d| - r)^2 / 2 is k I - k r/l (I - u u^T). Let d'
-/// be at most s l away from d. In the plane of d and d', at an angle a from u, d' is no shorter than l' = l (cos a -
-/// sqrt(s^2 - sin^2 a)), and with q = r / (l - s l)
-///
-///     r/l' (I - u' u'^T)  <=  q (I - u u^T) + 2 s q u u^T,                                                     (*)
-///
-/// so that the stiffness is at least k (1 - q) across u and k (1 - 2 s q) along u. At right angles to the plane (*)
-/// follows from l' >= l - s l. Within it the left side is r/l' n n^T, n at right angles to u', and so (*) states that
-/// r/l' (sin^2 a / (2 s q) + cos^2 a / q) <= 1, or with z = sin^2 a that sqrt(1 - z) - sqrt(s^2 - z) >= (1 - s) (1 - z
-/// + z / (2 s)). At z = 0 both sides are 1 - s; up to z = s^2 the left side is convex, the right side is linear, and at
-/// z = 0 the slope of the left side is larger by 1 - s.
+/// With the length l of `edge`, `displacement` = s l and q = r / (l - s l) it is k (1 - q) across the edge and
+/// k (1 - 2 s q) along it, r the rest length. Derivation: README.md in this folder.
 [[nodiscard]] inline std::optional<SpringStiffness<double>> min_stiffness(const Spring<double>& spring,
                                                                           const Vector3<double>& edge,
                                                                           double displacement) noexcept {
