@@ -238,9 +238,9 @@ TEST_CASE("with a tool in contact the equilibrium is no farther than the bound",
             ErrorBound<FactoredConvexity> sharp(membrane.network);
             const auto pressing = press(membrane.tool, membrane.contact);
             const auto simple =
-                quick.of(rest, membrane.x, membrane.mesh, membrane.network, membrane.foundation, pressing);
+                quick.compute(rest, membrane.x, membrane.mesh, membrane.network, membrane.foundation, pressing);
             const auto error =
-                sharp.of(rest, membrane.x, membrane.mesh, membrane.network, membrane.foundation, pressing);
+                sharp.compute(rest, membrane.x, membrane.mesh, membrane.network, membrane.foundation, pressing);
             auto& count = counts[stiffness < 0.1 ? 0 : stiffness < 1 ? 1 : 2];
             ++count.all;
             count.quick += simple.certified();
@@ -300,7 +300,7 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     ErrorBound bound(membrane.network);
     const auto pressing = press(membrane.tool, membrane.contact);
     const auto of = [&](const Equilibrium& found, const auto&... constraints) {
-        return bound.of(found, membrane.x, membrane.mesh, membrane.network, membrane.foundation, constraints...);
+        return bound.compute(found, membrane.x, membrane.mesh, membrane.network, membrane.foundation, constraints...);
     };
     CHECK(of(rest, pressing).certified());
     CHECK_FALSE(of(rest, pressing, pressing).certified());
@@ -310,7 +310,7 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     CHECK_FALSE(of(rest, pressing, pull(membrane.contact.corners[0], held)).certified());
     CHECK(of(rest, pressing, PointAttachment<double>{0, {0, 1, 2}, {0.2, 0.3, 0.5}, held}).status ==
           BoundStatus::unsupported);
-    CHECK(bound.of(membrane.x, membrane.network, membrane.foundation, pressing).status == BoundStatus::contact);
+    CHECK(bound.compute(membrane.x, membrane.network, membrane.foundation, pressing).status == BoundStatus::contact);
 
     Equilibrium wrong = rest;
     wrong.x(0, 5) = std::numeric_limits<double>::quiet_NaN();
@@ -318,7 +318,7 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     wrong.x = rest.x.leftCols(7);
     CHECK(of(wrong, pressing).status == BoundStatus::invalid_input);
     const auto other = icosphere<double>({.radius = 1, .subdivisions = 1});
-    CHECK(bound.of(rest, membrane.x, other, membrane.network, membrane.foundation, pressing).status ==
+    CHECK(bound.compute(rest, membrane.x, other, membrane.network, membrane.foundation, pressing).status ==
           BoundStatus::invalid_input);
     wrong = rest;
     for (auto& touch : wrong.contacts) touch.multiplier *= 3;
@@ -328,6 +328,6 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     // Without tools it is the same bound as online, only found from where the equilibrium is known.
     const auto alone = equilibrium(membrane.x, membrane.mesh, membrane.network, membrane.foundation, {});
     const auto offline = of(alone);
-    const auto online = bound.of(membrane.x, membrane.network, membrane.foundation);
+    const auto online = bound.compute(membrane.x, membrane.network, membrane.foundation);
     CHECK(offline.certified() == online.certified());
 }

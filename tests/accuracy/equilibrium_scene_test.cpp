@@ -88,8 +88,8 @@ TEST_CASE("held and loaded points, and constraints of one's own", "[rest_scene]"
     CHECK(scene_of(pull(Tool<double>{}, Grasp<double>{})).point_attachments().empty());
 
     const auto loaded = scene_of(load(corners, middle, target));
-    REQUIRE(loaded.loaded_places().size() == 1);
-    CHECK(loaded.loaded_places()[0].force == target);
+    REQUIRE(loaded.loads().size() == 1);
+    CHECK(loaded.loads()[0].force == target);
     CHECK(loaded.seeds().size() == 3);
 
     const auto own = scene_of(Clamp{0, 1});

@@ -353,8 +353,8 @@ TEST_CASE_METHOD(Touched, "the README's bound") {
     const Eigen::Vector3d target = 1.01 * x.col(7);
     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
     // [bound]
-    auto bound = membrane::ErrorBound(network);                                      // once: allocates all it needs
-    const auto error = bound.of(x, network, foundation, membrane::pull(7, target));  // allocates nothing
+    auto bound = membrane::ErrorBound(network);  // once: allocates all it needs
+    const auto error = bound.compute(x, network, foundation, membrane::pull(7, target));  // allocates nothing
     if (error.certified()) {
         const double displacement = error.position;  // no vertex is farther off [m]
         const double force =

@@ -58,9 +58,9 @@ struct Loop {
 
 /// A hand that taps and strokes, a solver that takes its time, and whatever can go wrong.
 template <class S>
-class Mishaps {
+class FaultInjector {
   public:
-    explicit Mishaps(std::uint64_t seed) : random_(seed) {}
+    explicit FaultInjector(std::uint64_t seed) : random_(seed) {}
 
     void tick() {
         if (left_ == 0) {
@@ -105,7 +105,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
     const LimitOptions options;
     const double slew = device.peak_force / options.rise_time;
     ForceLimiter limit(device, options);
-    Mishaps<S> scene(7);
+    FaultInjector<S> scene(7);
     Vector3<S> before = Vector3<S>::Zero();
     double clean_since = 0, last_solve = 0, last = 0, thermal_load = 0;
     std::uint64_t state = 0;
@@ -150,7 +150,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
     using S = TestType;
     const LimitOptions options;
     test::HapticLoop<S> loop(11);
-    test::Mishaps mishaps(5);
+    test::FaultInjector faults(5);
     const auto device = loop.limit.device();
     const double slew = device.peak_force / options.rise_time;
     Vector3<S> before = Vector3<S>::Zero(), asked_before = before;
@@ -159,8 +159,8 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
     long frozen = 0, whole = 0, pushed = 0;
     const int ticks = cases(8'000, 500'000);  // of each scalar
     for (int i = 0; i < ticks; ++i) {
-        const auto mishap = mishaps.next();
-        loop.tick(mishap);
+        const auto fault = faults.next();
+        loop.tick(fault);
         const double size = size_of(loop.felt), asked = size_of(loop.asked);
         const double may_change = slew * std::clamp(loop.now - last, 0.0, options.max_tick);
         if (!(is_finite(loop.felt) && size <= device.peak_force && within_slew(before, loop.felt, may_change))) {
@@ -174,7 +174,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
         // A policy that asks for more than the device bears, or for it too suddenly, is no fault, but is limited.
         const bool bearable =
             asked <= device.continuous_force && within_slew(asked_before, loop.asked, slew * loop.dt * (1 - 1e-5));
-        if (mishap.any() || loop.solves == solves || !bearable) clean_since = loop.now;
+        if (fault.any() || loop.solves == solves || !bearable) clean_since = loop.now;
         if (loop.now - clean_since > 0.2) {
             ++whole;
             pushed += asked > 0;

@@ -53,7 +53,7 @@ TEST_CASE("what is moved is moved in the step, and the positions of the user sta
     const Points<double> before = scene.points;
     context.move(2, {1, 0, 0});
     context.move(2, {0, 1, 0});
-    context.place(4, {7, 8, 9});
+    context.set_position(4, {7, 8, 9});
     CHECK(norm<double>(context.position(2) - point(before, 2) - Vector3<double>(1, 1, 0)) < 1e-15);
     CHECK(context.position(4) == Vector3<double>(7, 8, 9));
     CHECK(context.start(4) == point(before, 4));

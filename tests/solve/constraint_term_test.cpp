@@ -93,7 +93,7 @@ TEST_CASE("Newton's method and the error bound take a constraint of one's own th
     CHECK(own.reactions[0] == known.reactions[0] + known.reactions[1]);
 
     ErrorBound bound(network);
-    const auto error = bound.of(own.x, network, foundation, clamp);
+    const auto error = bound.compute(own.x, network, foundation, clamp);
     REQUIRE(error.certified());
     CHECK(error.position < 1e-12);
     CHECK((error.reactions[0].centre - own.reactions[0]).norm() <= error.reactions[0].radius);

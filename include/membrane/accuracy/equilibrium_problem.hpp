@@ -79,7 +79,7 @@ class EquilibriumProblem {
     void project(Points<double>& f) const noexcept;
 
     /// The attached points and their targets.
-    [[nodiscard]] const PointAttachments& places() const noexcept { return places_; }
+    [[nodiscard]] const PointAttachments& attachments() const noexcept { return attachments_; }
 
     /// Adds to `weights` (V) the share of the force on each vertex in the reaction of `term`; nothing for a load or a
     /// tool.
@@ -105,7 +105,7 @@ class EquilibriumProblem {
     std::vector<double> softening_;
     std::vector<unsigned char> fixed_;  // bits: by network, constraint, caller
     Points<double> load_, given_, centre_;
-    PointAttachments places_;
+    PointAttachments attachments_;
     double rounding_ = 0;
     bool touched_ = false;  // by a tool
 };
@@ -142,7 +142,7 @@ ProblemStatus EquilibriumProblem::assign(const std::type_identity_t<ConstPointsR
         given_.col(v) = centre_.col(v) = point(x, v).template cast<double>();
     }
     load_.setZero();
-    places_.clear();
+    attachments_.clear();
     std::fill(softening_.begin(), softening_.end(), 0.0);
     touched_ = false;
     if (!take_foundation<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::invalid_input;
@@ -205,7 +205,7 @@ inline ProblemStatus EquilibriumProblem::take_term(const ConstraintTerm& term) n
         case Kind::load:
             for (std::size_t k = 0; k < 3; ++k) load_.col(term.corners[k]) += term.weight(k) * term.force;
             return ProblemStatus::valid;
-        default: return places_.add(term) ? ProblemStatus::valid : ProblemStatus::unsupported;
+        default: return attachments_.add(term) ? ProblemStatus::valid : ProblemStatus::unsupported;
     }
 }
 
@@ -219,7 +219,7 @@ inline ProblemStatus EquilibriumProblem::fix_all_but(std::span<const Index> free
 }
 
 inline ProblemStatus EquilibriumProblem::check_places() const noexcept {
-    const bool independent = places_.independent([&](Index v) { return fixed(v); });
+    const bool independent = attachments_.independent([&](Index v) { return fixed(v); });
     return independent ? ProblemStatus::valid : ProblemStatus::unsupported;
 }
 
@@ -244,7 +244,7 @@ inline void EquilibriumProblem::project(Points<double>& f) const noexcept {
     for (Index v = 0; v < vertex_count(); ++v) {
         if (fixed(v)) f.col(v).setZero();
     }
-    places_.project(f);
+    attachments_.project(f);
 }
 
 inline void EquilibriumProblem::share(const ConstraintTerm& term, std::vector<double>& weights) noexcept {

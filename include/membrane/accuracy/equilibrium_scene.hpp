@@ -50,10 +50,10 @@ struct ScenePress {
 
 /// Targets, loads and tools of one increment.
 struct LoadStep {
-    Points<double> targets;               ///< of fixed vertices; for the others, the start positions, 3 x V [m]
-    Points<double> loads;                 ///< on each vertex, 3 x V [N]
-    std::vector<Vector3<double>> places;  ///< targets of the attached points [m]
-    std::vector<Tool<double>> tools;      ///< that are in contact
+    Points<double> targets;  ///< of fixed vertices; for the others, the start positions, 3 x V [m]
+    Points<double> loads;    ///< on each vertex, 3 x V [N]
+    std::vector<Vector3<double>> attached_points;  ///< targets of the attached points [m]
+    std::vector<Tool<double>> tools;               ///< that are in contact
 };
 
 /// The constraints of one membrane, in double. All input is checked.
@@ -100,7 +100,7 @@ class EquilibriumScene {
         return prescribed_vertices_;
     }
     [[nodiscard]] const std::vector<ConstraintTerm>& point_attachments() const noexcept { return attachments_; }
-    [[nodiscard]] const std::vector<ConstraintTerm>& loaded_places() const noexcept { return loads_; }
+    [[nodiscard]] const std::vector<ConstraintTerm>& loads() const noexcept { return loads_; }
     [[nodiscard]] const std::vector<ScenePress>& tools() const noexcept { return tools_; }
 
     /// Vertices to which a force is applied.
@@ -258,7 +258,7 @@ inline LoadStep EquilibriumScene::goals(double part) const {
         }
     }
     for (const auto& term : attachments_) {
-        goals.places.push_back(interpolated(term.point_in(start_), term.target));
+        goals.attached_points.push_back(interpolated(term.point_in(start_), term.target));
     }
     for (const auto& pressing : tools_) {
         goals.tools.push_back(pressing.tool);

@@ -295,7 +295,7 @@ std::vector<Vector3<double>> EquilibriumSolver<ElasticModel>::reactions(std::siz
     std::vector<Vector3<double>> sums(count, Vector3<double>::Zero());
     const Points<double> forces = unbalanced(here_);
     for (const auto& [constraint, v] : scene_.prescribed_vertices()) sums[constraint] += forces.col(v);
-    for (const auto& term : scene_.loaded_places()) sums[term.constraint] -= term.force;
+    for (const auto& term : scene_.loads()) sums[term.constraint] -= term.force;
     for (std::size_t i = 0; i < attachment_forces_.size(); ++i)
         sums[scene_.point_attachments()[i].constraint] -= attachment_forces_[i];
     for (const auto& point : here_.contacts)
@@ -314,7 +314,7 @@ bool EquilibriumSolver<ElasticModel>::can_move(const std::array<Index, 3>& corne
 
 template <class ElasticModel>
 Vector3<double> EquilibriumSolver<ElasticModel>::off_target(std::size_t i) const noexcept {
-    return scene_.point_attachments()[i].point_in(here_.elastic.x) - goals_.places[i];
+    return scene_.point_attachments()[i].point_in(here_.elastic.x) - goals_.attached_points[i];
 }
 
 }  // namespace membrane

@@ -19,7 +19,7 @@
 ///
 ///     membrane::ErrorBound bound(network);                                          // offline: allocates all it needs
 ///     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
-///     const auto error = bound.of(x, network, foundation, membrane::pull(7, target));
+///     const auto error = bound.compute(x, network, foundation, membrane::pull(7, target));
 ///     if (error.certified()) {
 ///         error.position                                                            // no vertex is farther off [m]
 ///         error.reactions[0].max_distance_to(report.reactions[0])                   // error bound of a force [N]
@@ -27,7 +27,7 @@
 ///
 /// With a tool in contact, from an equilibrium computed by Newton's method:
 ///     const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
-///     const auto error = bound.of(rest, x, mesh, network, foundation, press(tool, contact));
+///     const auto error = bound.compute(rest, x, mesh, network, foundation, press(tool, contact));
 namespace membrane {
 
 struct ErrorBoundOptions {
@@ -61,17 +61,17 @@ class ErrorBound {
     /// Bounds the error of the state `x` (3 x V [m]) under the constraints of a step. Online. Cost: O(V + springs) for
     /// each CG iteration, and the cost of `Convexity`, usually two or three times.
     template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar>... Constraints>
-    [[nodiscard]] ErrorReport of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                 const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                 const Constraints&... constraints) noexcept;
+    [[nodiscard]] ErrorReport compute(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                      const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                      const Constraints&... constraints) noexcept;
 
     /// Bounds the error with tools in contact; `rest` is the equilibrium under these constraints. No tool may touch a
     /// fixed or prescribed vertex, nor a vertex that another tool may touch, and there may be no point attachment.
     /// @throws InvalidInput for a constraint that is not valid. Offline.
     template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
-    [[nodiscard]] ErrorReport of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                 const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
-                                 const Volume& volume, const Constraints&... constraints);
+    [[nodiscard]] ErrorReport compute(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                      const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
+                                      const Volume& volume, const Constraints&... constraints);
 
   private:
     static constexpr std::size_t max_constraints = StepState<double>::max_constraints;
@@ -130,9 +130,9 @@ ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network,
 
 template <CheckedConvexityModel Convexity>
 template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar>... Constraints>
-ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                      const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                      const Constraints&... constraints) noexcept {
+ErrorReport ErrorBound<Convexity>::compute(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                           const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                           const Constraints&... constraints) noexcept {
     begin(sizeof...(Constraints));
     switch (problem_.assign(x, network, volume, constraints...)) {
         case ProblemStatus::valid: locate(); break;
@@ -145,14 +145,16 @@ ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<
 
 template <CheckedConvexityModel Convexity>
 template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
-ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                      const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
-                                      const Volume& volume, const Constraints&... constraints) {
+ErrorReport ErrorBound<Convexity>::compute(const Equilibrium& rest,
+                                           const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                           const TriangleMesh<Scalar>& mesh,
+                                           const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                           const Constraints&... constraints) {
     begin(sizeof...(Constraints));
     const ProblemStatus status = problem_.assign(x, network, volume, constraints...);
     if (rest.x.cols() != x.cols() || mesh.vertex_count() != x.cols() || !is_finite(rest.x)) return error_;
     if (status == ProblemStatus::invalid_input) return error_;
-    if (status == ProblemStatus::unsupported || !problem_.places().empty()) {
+    if (status == ProblemStatus::unsupported || !problem_.attachments().empty()) {
         error_.status = BoundStatus::unsupported;
         return error_;
     }
@@ -192,7 +194,7 @@ ErrorReport ErrorBound<Convexity>::report(const Constraints&... constraints) noe
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::locate() noexcept {
     y_ = problem_.centre();
-    problem_.places().project_positions(y_);
+    problem_.attachments().project_positions(y_);
     evaluate_residuals();
     error_.status = BoundStatus::not_converged;
     for (double before = std::numeric_limits<double>::infinity(); unbalanced_ < before / 2;) {
@@ -236,7 +238,7 @@ bool ErrorBound<Convexity>::refine() noexcept {
                          {.tolerance = 1e-2, .iterations = options_.cg_iterations - error_.cg_iterations});
     error_.cg_iterations += report.iterations;
     y_ += displacement_;
-    problem_.places().project_positions(y_);
+    problem_.attachments().project_positions(y_);
     return report.convex;
 }
 
@@ -272,7 +274,7 @@ bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
 // state with all points at their targets.
 template <CheckedConvexityModel Convexity>
 double ErrorBound<Convexity>::enclosure() const noexcept {
-    const double violation = problem_.places().violation(y_);
+    const double violation = problem_.attachments().violation(y_);
     const double mu = error_.convexity;
     const double half = (unbalanced_ + (violation > 0 ? stiffness_.largest() * violation : 0.0)) / (2 * mu);
     const double radius = half + std::sqrt(half * half + pressed_.work() / mu);

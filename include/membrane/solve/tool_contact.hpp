@@ -190,7 +190,7 @@ void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
             if (context.fixed(corner)) continue;
             const Vector3<Scalar> so_far = context.position(corner) - context.kept(corner);
             if (dot(so_far, path) < part * squared_norm(path)) {
-                context.place(corner, context.kept(corner) + part * path);
+                context.set_position(corner, context.kept(corner) + part * path);
             }
         }
     }
