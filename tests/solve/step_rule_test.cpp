@@ -46,7 +46,7 @@ TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", double, float) {
     CHECK((BlockStep{.omega = 1.5}.compliance(vertex) * Vector3<S>(1, 2, 3) - Vector3<S>(1, 2, 3) * S(1.5) / 8).norm() <
           8 * std::numeric_limits<S>::epsilon());
     // What a constraint acts on is not relaxed beyond its response.
-    vertex.touched = true;
+    vertex.constrained = true;
     CHECK(SafeStep{.omega = 1.5}.compliance(vertex) == S(1) / 8);
     CHECK(SafeStep{.omega = 0.5}.compliance(vertex) == S(0.5) / 8);
     STATIC_REQUIRE_FALSE(StepRule<int, S>);
@@ -64,7 +64,7 @@ TEMPLATE_TEST_CASE("a contact stiffens a block along its normal alone", "[rule]"
         vertex.force = random.vector(S(-1), S(1));
         for (int i = 0; i < 3; ++i)
             vertex.stiffness_reduction += outer<S>(vertex.stiffness / 4, random.unit_vector<S>());
-        vertex.touched = true;
+        vertex.constrained = true;
         const auto without = BlockStep{}.compliance(vertex);
         vertex.contact_stiffness = std::pow(S(10), random.number(S(-2), S(2)));
         vertex.stiffness += vertex.contact_stiffness;

@@ -73,13 +73,13 @@ TEST_CASE("the state of a vertex has all that pulls on it", "[update]") {
             REQUIRE(state.stiffness == Approx(stiffness));
             REQUIRE(state.mass == 0.5);
             REQUIRE(state.dt == 0.1);
-            REQUIRE_FALSE(state.touched);
+            REQUIRE_FALSE(state.constrained);
         }
         REQUIRE(state_of<Numbers>(step.scene, v).stiffness_reduction.trace() == 0);
         REQUIRE(state_of<Blocks>(step.scene, v).stiffness_reduction.trace() ==
                 step.network.majoriser(v, step.x).stiffness_reduction.trace());
         step.state.seeds.insert(v);
-        REQUIRE(state_of<Blocks>(step.scene, v).touched);
+        REQUIRE(state_of<Blocks>(step.scene, v).constrained);
 
         // What damping holds back is no rest.
         const Vector3<double> lasting =

@@ -107,7 +107,7 @@ class EquilibriumProblem {
     Points<double> load_, given_, centre_;
     PointAttachments attachments_;
     double rounding_ = 0;
-    bool touched_ = false;  // by a tool
+    bool has_contact_ = false;  // by a tool
 };
 
 template <Real Scalar, class Law>
@@ -144,12 +144,12 @@ ProblemStatus EquilibriumProblem::assign(const std::type_identity_t<ConstPointsR
     load_.setZero();
     attachments_.clear();
     std::fill(softening_.begin(), softening_.end(), 0.0);
-    touched_ = false;
+    has_contact_ = false;
     if (!take_foundation<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::invalid_input;
     ProblemStatus status = ProblemStatus::valid;
     ((status = status == ProblemStatus::valid ? take_constraint(constraints) : status), ...);
     if (status == ProblemStatus::valid) status = check_places();
-    return status == ProblemStatus::valid && touched_ ? ProblemStatus::contact : status;
+    return status == ProblemStatus::valid && has_contact_ ? ProblemStatus::contact : status;
 }
 
 template <class Springs>
@@ -190,7 +190,7 @@ ProblemStatus EquilibriumProblem::take_constraint(const C& constraint) noexcept 
 inline ProblemStatus EquilibriumProblem::take_term(const ConstraintTerm& term) noexcept {
     using Kind = ConstraintTerm::Kind;
     if (term.kind == Kind::press) {
-        touched_ |= term.contact.touching();
+        has_contact_ |= term.contact.touching();
         return ProblemStatus::valid;
     }
     for (const Index v : term.corners) {

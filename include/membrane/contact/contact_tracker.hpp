@@ -28,12 +28,12 @@ template <Real Scalar>
 class MovingBody;  // of moving_body.hpp
 
 struct TrackerOptions {
-    double margin = 0.01;              ///< triangles this near count as touched; a point has this radius [mean edges]
+    double margin = 0.01;              ///< triangles this near are in contact; a point has this radius [mean edges]
     Index full_query_interval = 128;   ///< ticks in contact between tree queries for further folds in contact
     Index max_contact_points = 16384;  ///< capacity for contact points; determines memory, not time
 };
 
-/// Without contact, queries the tree. In contact, tests the triangles touched in the last tick and their neighbours
+/// Without contact, queries the tree. In contact, tests the contact triangles of the last tick and their neighbours
 /// [Liu07] 2.3: the cost depends on the contact area, not on the size of the mesh.
 ///
 /// Beyond the paper: the search floods every triangle within the detection distance. If the reference point of the tool
@@ -64,7 +64,7 @@ class ContactTracker {
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
 
-    /// Number of tree queries for touched triangles during contact, since construction.
+    /// Number of tree queries for contact triangles during contact, since construction.
     [[nodiscard]] Index full_query_count() const noexcept { return full_query_count_; }
 
     /// Drops contact and tool: from here on the tracker equals a new one, bit for bit.
@@ -93,7 +93,7 @@ class ContactTracker {
     // The tool may approach an open surface from either side.
     [[nodiscard]] bool is_first_seen() const noexcept { return !surface_.closed() && !last_.touching() && side_ == 0; }
     [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
-    bool track(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool contacts(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool sweep_test(const Scene& scene, Contact<Scalar>& contact) const noexcept;
@@ -113,7 +113,7 @@ class ContactTracker {
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void find_points(const Scene& scene, Contact<Scalar>& contact) noexcept;
     template <class List>
-    void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> touched,
+    void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                const List& list) const noexcept;
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
@@ -220,7 +220,7 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
     const Scene scene = scene_of(tree, x, tool, anchors);
     const bool before = last_.touching();
     Contact<Scalar> contact;
-    const bool followed = before && scene.travel <= surface_.mean_edge() && track(scene, contact);
+    const bool followed = before && scene.travel <= surface_.mean_edge() && follow(scene, contact);
     if (before && !followed) ++full_query_count_;
     if ((followed || find(scene, contact)) && contacts(scene, contact)) {
         complete(scene, contact);
@@ -260,7 +260,7 @@ auto ContactTracker<Scalar>::scene_of(const AabbTree<Scalar>& tree, const ConstP
 
 // Finds the contact among the triangles of the last tick and their neighbours; false if the tool has left all of them.
 template <Real Scalar>
-bool ContactTracker<Scalar>::track(const Scene& scene, Contact<Scalar>& contact) noexcept {
+bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact) noexcept {
     std::swap(near_, near_before_);
     near_.clear();
     queued_.clear();
@@ -521,22 +521,22 @@ void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& co
 // The contact points of a sphere, several triangles at a time.
 template <Real Scalar>
 template <class List>
-void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> touched,
+void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                                    const List& list) const noexcept {
     using Wide = Lanes<Scalar>;
     const Vector3<Scalar>& centre = scene.tool.position;
     std::array<Index, Wide::count> triangles;
-    for (std::size_t first = 0; first < touched.size(); first += triangles.size()) {
+    for (std::size_t first = 0; first < listed.size(); first += triangles.size()) {
         for (std::size_t i = 0; i < triangles.size(); ++i) {
-            triangles[i] = touched[(std::min)(first + i, touched.size() - 1)].triangle;
+            triangles[i] = listed[(std::min)(first + i, listed.size() - 1)].triangle;
         }
         const auto nearest = surface_.closest_points(scene.x, triangles, centre);
         const Vector3<Wide> separation = centre.template cast<Wide>() - nearest.point;
         const Vector3<Wide> normal = direction_or_zero(separation);
         const Wide distance = norm(separation);
-        for (std::size_t i = 0; i < (std::min)(triangles.size(), touched.size() - first); ++i) {
+        for (std::size_t i = 0; i < (std::min)(triangles.size(), listed.size() - first); ++i) {
             const auto of_lane = [i](const Vector3<Wide>& a) { return Vector3<Scalar>(a[0][i], a[1][i], a[2][i]); };
-            const auto& [f, corners] = touched[first + i];
+            const auto& [f, corners] = listed[first + i];
             ContactPoint<Scalar> point{f, 0, corners, of_lane(nearest.barycentric), of_lane(normal)};
             point.gap = distance[i] - scene.radius;
             list(point);
@@ -544,7 +544,7 @@ void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span
     }
 }
 
-// The candidates: the near triangles and `rings` rings around them. The triangles of a vertex form one fan: if not all
+// The listed: the near triangles and `rings` rings around them. The triangles of a vertex form one fan: if not all
 // are near, one that is near shares a side with one that is not. So the first ring expands only near triangles with a
 // side neighbour that is not near.
 template <Real Scalar>

@@ -13,9 +13,9 @@ namespace membrane {
 
 /// A set of vertex or triangle indices in order of insertion. `clear` is O(1), amortised.
 ///
-///     IndexSet touched(mesh.triangle_count());
-///     if (touched.insert(f)) { ... }         // f was not in it
-///     for (const Index f : touched.items()) { ... }
+///     IndexSet found(mesh.triangle_count());
+///     if (found.insert(f)) { ... }         // f was not in it
+///     for (const Index f : found.items()) { ... }
 class IndexSet {
   public:
     IndexSet() = default;

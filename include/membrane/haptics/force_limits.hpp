@@ -88,7 +88,7 @@ class MotorThermalModel {
 
 /// Limits a force for a device, in a fixed order:
 /// 1. fault: a force that is not finite becomes zero, since the later limits compute with it;
-/// 2. watchdog and soft start: a factor on the requested force, since they doubt the force itself;
+/// 2. watchdog and soft start: a factor on the requested force, as that force itself may be wrong;
 /// 3. peak and heat: the limits of the device, on the scaled force;
 /// 4. slew, against the force that the device got in the last tick. The part of that force which is no longer requested
 ///    falls straight towards zero at once. Any other change is bounded, also of direction: a reversal passes

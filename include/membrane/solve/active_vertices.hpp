@@ -163,17 +163,18 @@ void ActiveVertices::begin_step(const Network& network, std::span<const Index> s
 template <class Options>
 Index ActiveVertices::capacity_for(const Options& options) const noexcept {
     if (options.max_vertex_updates == unlimited) return unlimited;
-    const auto touched = static_cast<Index>(layer_0().size());
-    const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_iterations + 1);
+    const auto contact_count = static_cast<Index>(layer_0().size());
+    const auto own = std::int64_t{contact_count} * (std::int64_t{options.sweeps} * options.contact_iterations + 1);
     const auto passes =
         (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // forces of a layer before it is added
-    return touched + static_cast<Index>((std::max)((options.max_vertex_updates - own) / passes, std::int64_t{1}));
+    return contact_count + static_cast<Index>((std::max)((options.max_vertex_updates - own) / passes, std::int64_t{1}));
 }
 
 // Capacity reserved for vertices awake or dropped by the queue: they are updated under a lasting contact, too.
 inline Index ActiveVertices::capacity_of_others() const noexcept {
-    const auto touched = static_cast<Index>(layer_0().size());
-    return (std::min)(awake_.count() + dropped_.count(), std::clamp(capacity_ / 4, Index(1), capacity_ - touched));
+    const auto contact_count = static_cast<Index>(layer_0().size());
+    return (std::min)(awake_.count() + dropped_.count(),
+                      std::clamp(capacity_ / 4, Index(1), capacity_ - contact_count));
 }
 
 inline void ActiveVertices::drop(std::span<const Index> vertices) noexcept {

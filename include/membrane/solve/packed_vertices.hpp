@@ -411,7 +411,7 @@ template <bool in_contact, class Rule, class Scene>
     at.vertex.stiffness += at.others.stiffness;
     at.vertex.mass = terms_[p].mass;
     at.vertex.dt = scene.dt;
-    at.vertex.touched = in_contact;
+    at.vertex.constrained = in_contact;
     return at;
 }
 

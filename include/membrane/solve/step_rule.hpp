@@ -29,9 +29,9 @@ template <Number Scalar>
 struct VertexState : EnergyMajoriser<Scalar> {
     Scalar contact_stiffness = 0;  ///< the part of `stiffness` that acts along `contact_normal` alone [N/m]
     Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();
-    Scalar mass = 0;       ///< [kg], zero where the network has none
-    Each<Scalar> dt = 0;   ///< [s]
-    bool touched = false;  ///< a constraint acts on it
+    Scalar mass = 0;           ///< [kg], zero where the network has none
+    Each<Scalar> dt = 0;       ///< [s]
+    bool constrained = false;  ///< a constraint acts on it
 };
 
 /// A step rule: the compliance of a vertex [m/N], a number, or a `Symmetric3` for a rule whose displacements are not
@@ -90,7 +90,7 @@ namespace detail {
 /// No over-relaxation where constraints act: they set their forces by the response of the vertices.
 template <Number Scalar>
 [[nodiscard]] Each<Scalar> relaxation(double omega, const VertexState<Scalar>& vertex) noexcept {
-    return static_cast<Each<Scalar>>(vertex.touched ? (std::min)(omega, 1.0) : omega);
+    return static_cast<Each<Scalar>>(vertex.constrained ? (std::min)(omega, 1.0) : omega);
 }
 
 }  // namespace detail
@@ -176,7 +176,7 @@ Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) cons
     Symmetric3<Scalar> block = (-per_stiffness * part) * vertex.stiffness_reduction;
     block += diagonal3(Scalar(1));
     Symmetric3<Scalar> compliance = inverse(block, select<Scalar>(resists, relaxation * per_stiffness, Scalar(0)));
-    if (vertex.touched) detail::add_stiffness(compliance, vertex.contact_stiffness, vertex.contact_normal);
+    if (vertex.constrained) detail::add_stiffness(compliance, vertex.contact_stiffness, vertex.contact_normal);
     return compliance;
 }
 

@@ -275,7 +275,7 @@ struct Sweeps {
             }
         }
         state.set_compliance(v, as_block<Scalar>(move.compliance), move.least);
-        if (vertex.touched) {
+        if (vertex.constrained) {
             state.set_internal(v, norm<Scalar>(vertex.force - state.constraint_force(v)),
                                vertex.stiffness - vertex.contact_stiffness);
         }

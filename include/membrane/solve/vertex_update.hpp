@@ -124,8 +124,8 @@ template <class Rule, class Scalar, class Network, class Volume>
     state.stiffness += others.stiffness;
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : Scalar(0);
     state.dt = scene.dt;
-    state.touched = scene.state.seeds.contains(v);
-    if (state.touched) {
+    state.constrained = scene.state.seeds.contains(v);
+    if (state.constrained) {
         state.contact_stiffness = scene.state.contact_stiffness(v);
         state.contact_normal = direction_or_zero(scene.state.constraint_force(v));
     }
