@@ -121,8 +121,8 @@ TEST_CASE("targets, loads and tools come on in parts", "[rest_scene]") {
     CHECK(end.targets.col(0) == target);
     CHECK((half.loads.rowwise().sum() - 0.5 * target).norm() < 1e-15);
     CHECK((end.loads.rowwise().sum() - target).norm() < 1e-15);
-    CHECK((half.places[0] - target).norm() < 1e-15);
-    CHECK(end.places[0] == 2 * target);
+    CHECK((half.attached_points[0] - target).norm() < 1e-15);
+    CHECK(end.attached_points[0] == 2 * target);
     CHECK((half.tools[0].position - Vector3<double>(0, 0, 0.2)).norm() < 1e-15);
     CHECK(end.tools[0].position == Vector3<double>(0, 0, 0.1));
 }

@@ -484,7 +484,7 @@ TEST_CASE("a bound remembers nothing, and its copies are their own", "[error_bou
     ErrorBound copy = sphere.quick;
     (void)sphere.quick.compute(x, sphere.network, foundation, pull(9, 0.9 * point(x, 9)), pin(std::array{1, 2}));
     for (auto* bound : {&copy, &sphere.quick}) {
-        const auto again = bound->of(x, sphere.network, foundation, pull(5, target));
+        const auto again = bound->compute(x, sphere.network, foundation, pull(5, target));
         CHECK(again.position == first.position);
         CHECK(again.reactions.size() == 1);
     }
