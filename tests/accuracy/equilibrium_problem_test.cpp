@@ -39,7 +39,7 @@ struct Scene {
 
 }  // namespace
 
-TEST_CASE("the forces of a problem are those of network, foundation at rest and loads", "[rest_problem]") {
+TEST_CASE("the forces of a problem are those of network, foundation at rest and loads", "[equilibrium_problem]") {
     for (int seed = 1; seed <= cases(20); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -64,7 +64,7 @@ TEST_CASE("the forces of a problem are those of network, foundation at rest and 
     }
 }
 
-TEST_CASE("rounding of forces stays below what is said of it", "[rest_problem]") {
+TEST_CASE("rounding of forces stays below what is said of it", "[equilibrium_problem]") {
     for (int seed = 1; seed <= cases(20); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -88,7 +88,7 @@ TEST_CASE("rounding of forces stays below what is said of it", "[rest_problem]")
     }
 }
 
-TEST_CASE("nothing that is held is left in a projected force", "[rest_problem]") {
+TEST_CASE("nothing that is held is left in a projected force", "[equilibrium_problem]") {
     test::Random random(1);
     Scene scene(random);
     const PointAttachment<double> held{0, {0, 12, 14}, {0.5, 0.3, 0.2}, random.vector<double>()};
@@ -100,7 +100,7 @@ TEST_CASE("nothing that is held is left in a projected force", "[rest_problem]")
     CHECK(f.col(20).norm() > 0);
 }
 
-TEST_CASE("a reaction is shared out among the vertices it comes from", "[rest_problem]") {
+TEST_CASE("a reaction is shared out among the vertices it comes from", "[equilibrium_problem]") {
     test::Random random(1);
     Scene scene(random);
     const std::array<Index, 2> pinned{3, 4};
@@ -120,7 +120,7 @@ TEST_CASE("a reaction is shared out among the vertices it comes from", "[rest_pr
     CHECK(shares(load({0, 1, 2}, weights, target)) == std::vector<double>(42));
 }
 
-TEST_CASE("only some vertices may be left free", "[rest_problem]") {
+TEST_CASE("only some vertices may be left free", "[equilibrium_problem]") {
     test::Random random(1);
     Scene scene(random);
     REQUIRE(scene.assign(pull(5, point(scene.x, 5))) == ProblemStatus::valid);
@@ -133,7 +133,7 @@ TEST_CASE("only some vertices may be left free", "[rest_problem]") {
     CHECK(scene.problem.fix_all_but(std::array<Index, 2>{0, 14}) == ProblemStatus::unsupported);
 }
 
-TEST_CASE("a pinned vertex stays, and the last to hold a vertex decides", "[rest_problem]") {
+TEST_CASE("a pinned vertex stays, and the last to hold a vertex decides", "[equilibrium_problem]") {
     test::Random random(1);
     Scene scene(random);
     const Vector3<double> one(1, 2, 3), two(4, 5, 6);
@@ -142,7 +142,7 @@ TEST_CASE("a pinned vertex stays, and the last to hold a vertex decides", "[rest
     CHECK(scene.problem.centre().col(7) == two);
 }
 
-TEST_CASE("another membrane's numbers are refused", "[rest_problem]") {
+TEST_CASE("another membrane's numbers are refused", "[equilibrium_problem]") {
     test::Random random(1);
     Scene scene(random);
     const auto other = icosphere<double>({.radius = 1, .subdivisions = 2});

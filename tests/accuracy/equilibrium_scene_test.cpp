@@ -55,7 +55,7 @@ static_assert(StaticConstraint<Clamp> && !StaticConstraint<int>);
 
 }  // namespace
 
-TEST_CASE("held vertices have their targets, pinned ones stay", "[rest_scene]") {
+TEST_CASE("held vertices have their targets, pinned ones stay", "[equilibrium_scene]") {
     const auto held = scene_of(pull(1, target));
     CHECK(held.fixed(1));
     CHECK(!held.fixed(0));
@@ -78,7 +78,7 @@ TEST_CASE("held vertices have their targets, pinned ones stay", "[rest_scene]") 
     CHECK(pins.goals(1).targets.col(2) == target);
 }
 
-TEST_CASE("held and loaded points, and constraints of one's own", "[rest_scene]") {
+TEST_CASE("held and loaded points, and constraints of one's own", "[equilibrium_scene]") {
     const Grasp<float> grasp{.triangle = 0, .corners = corners, .barycentric = middle.cast<float>()};
     const auto held = scene_of(pull(Tool<float>{.position = target.cast<float>()}, grasp));
     REQUIRE(held.point_attachments().size() == 1);
@@ -97,7 +97,7 @@ TEST_CASE("held and loaded points, and constraints of one's own", "[rest_scene]"
     CHECK(own.goals(1).targets.col(1) == target);
 }
 
-TEST_CASE("a tool that presses, and its exit displacement", "[rest_scene]") {
+TEST_CASE("a tool that presses, and its exit displacement", "[equilibrium_scene]") {
     const Tool<double> tool{.position = {0, 0, 0.1}};
     CHECK(scene_of(press(tool, Contact<double>::none())).tools().empty());
     auto contact = contact_above();
@@ -111,7 +111,7 @@ TEST_CASE("a tool that presses, and its exit displacement", "[rest_scene]") {
     CHECK(scene_of(press(tool, contact)).tools()[0].exit_displacement.isZero(0));
 }
 
-TEST_CASE("targets, loads and tools come on in parts", "[rest_scene]") {
+TEST_CASE("targets, loads and tools come on in parts", "[equilibrium_scene]") {
     auto all = scene_of(pull(0, target));
     describe(load(corners, middle, target), all);
     describe(pull(Tool<double>{.position = target}, Grasp<double>{0, corners, middle, target, {}}), all);
@@ -127,7 +127,7 @@ TEST_CASE("targets, loads and tools come on in parts", "[rest_scene]") {
     CHECK(end.tools[0].position == Vector3<double>(0, 0, 0.1));
 }
 
-TEST_CASE("a scene refuses what is not valid", "[rest_scene]") {
+TEST_CASE("a scene refuses what is not valid", "[equilibrium_scene]") {
     const auto refused = [](const auto& constraint) { return refusal([&] { scene_of(constraint); }); };
     CHECK(refused(pull(4, target)) == "equilibrium: constraint 5 names vertex 4, expected 0 to 3");
     CHECK(refused(pull(-1, target)) == "equilibrium: constraint 5 names vertex -1, expected 0 to 3");
@@ -160,7 +160,7 @@ TEST_CASE("a scene refuses what is not valid", "[rest_scene]") {
     CHECK(refused(press(Tool<double>{}, contact)) == "equilibrium: constraint 5 names vertex -1, expected 0 to 3");
 }
 
-TEST_CASE("equilibrium refuses options out of their range", "[rest_scene]") {
+TEST_CASE("equilibrium refuses options out of their range", "[equilibrium_scene]") {
     const auto refused = [](const EquilibriumOptions& options) { return refusal([&] { options.check(); }); };
     CHECK(refused({}) == "");
     CHECK(refused({.increments = 0}) == "equilibrium: increments must be at least 1, got 0");

@@ -41,7 +41,7 @@ struct Scene {
 
 }  // namespace
 
-TEST_CASE("stiffness times a displacement is the change of the forces", "[linearised]") {
+TEST_CASE("stiffness times a displacement is the change of the forces", "[stiffness_operator]") {
     for (int seed = 1; seed <= cases(20); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -58,7 +58,7 @@ TEST_CASE("stiffness times a displacement is the change of the forces", "[linear
     }
 }
 
-TEST_CASE("conjugate gradients find the displacement that balances a force", "[linearised]") {
+TEST_CASE("conjugate gradients find the displacement that balances a force", "[stiffness_operator]") {
     for (int seed = 1; seed <= cases(40); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -85,7 +85,7 @@ TEST_CASE("conjugate gradients find the displacement that balances a force", "[l
     }
 }
 
-TEST_CASE("a direction in which the energy does not grow is seen", "[linearised]") {
+TEST_CASE("a direction in which the energy does not grow is seen", "[stiffness_operator]") {
     test::Random random(1);
     Scene scene(random, 0.1, 0);
     scene.x *= 0.5;  // all springs are pressed together

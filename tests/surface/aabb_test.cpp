@@ -27,7 +27,7 @@ Aabb<S> random_box(Random& random) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[box]", float, double) {
+TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[aabb]", float, double) {
     using S = TestType;
     Aabb<S> box;
     CHECK((box.low.eigen().array() > box.high.eigen().array()).all());
@@ -49,14 +49,14 @@ TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[box]", flo
     CHECK(around.high == Vector3<S>(2, 6, 0));
 }
 
-TEST_CASE("the longest axis is the first of the longest", "[box]") {
+TEST_CASE("the longest axis is the first of the longest", "[aabb]") {
     CHECK(major_axis(Aabb<double>{{0, 0, 0}, {1, 1, 1}}) == 0);
     CHECK(major_axis(Aabb<double>{{0, 0, 0}, {1, 2, 2}}) == 1);
     CHECK(major_axis(Aabb<double>{{0, 0, 0}, {2, 1, 2}}) == 0);
     CHECK(major_axis(Aabb<double>{{0, 0, -1}, {1, 1, 1}}) == 2);
 }
 
-TEST_CASE("boxes overlap when no axis separates them, borders included", "[box]") {
+TEST_CASE("boxes overlap when no axis separates them, borders included", "[aabb]") {
     const Aabb<double> box{{0, 0, 0}, {1, 2, 3}};
     CHECK(overlap(box, {{1, 2, 3}, {4, 4, 4}}));
     CHECK(overlap(box, {{0.5, 0.5, 0.5}, {0.6, 0.6, 0.6}}));
@@ -71,7 +71,7 @@ TEST_CASE("boxes overlap when no axis separates them, borders included", "[box]"
     CHECK_FALSE(overlap(box, Aabb<double>{}));
 }
 
-TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther than its farthest corner", "[box]",
+TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther than its farthest corner", "[aabb]",
                    float, double) {
     using S = TestType;
     for (int seed = 1; seed <= cases(2000); ++seed) {
@@ -93,7 +93,7 @@ TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther t
     CHECK(squared_distance(Aabb<S>{}, Vector3<S>(0, 0, 0)) == std::numeric_limits<S>::infinity());
 }
 
-TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[box]", float, double) {
+TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[aabb]", float, double) {
     using S = TestType;
     int touching = 0, missing = 0;
     for (int seed = 1; seed <= cases(20'000); ++seed) {
@@ -135,7 +135,7 @@ TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[box]", floa
     CHECK(missing > cases(3000));
 }
 
-TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[box][lanes]", float, double) {
+TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[aabb][lanes]", float, double) {
     using S = TestType;
     using Wide = Lanes<S>;
     for (int seed = 1; seed <= cases(2000); ++seed) {
@@ -174,7 +174,7 @@ TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[box][la
     }
 }
 
-TEST_CASE("boxes lie within others, overlap, or have a gap between them", "[box]") {
+TEST_CASE("boxes lie within others, overlap, or have a gap between them", "[aabb]") {
     const auto inside = [](const Aabb<double>& a, const Aabb<double>& b) {
         bool all = true;
         for (Index k = 0; k < 3; ++k) all &= a.low[k] <= b.low[k] && b.high[k] <= a.high[k];

@@ -48,7 +48,7 @@ concept FoundationModel = Real<Scalar> &&
 namespace detail {
 
 template <class Volume, class Scalar>
-consteval bool check_volume_model() noexcept {
+consteval bool check_foundation_model() noexcept {
     static_assert(
         FoundationModel<Volume, Scalar>,
         "FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) "
@@ -60,7 +60,7 @@ consteval bool check_volume_model() noexcept {
 
 /// A `FoundationModel`: if a type does not satisfy it, the error names the missing requirement.
 template <class Volume, class Scalar>
-concept CheckedFoundationModel = detail::check_volume_model<Volume, Scalar>();
+concept CheckedFoundationModel = detail::check_foundation_model<Volume, Scalar>();
 
 /// No body under the membrane: no force, at no cost.
 struct NoFoundation {
