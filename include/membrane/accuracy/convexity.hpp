@@ -13,8 +13,8 @@
 
 /// A lower bound of the convexity of a membrane's energy in a whole neighbourhood of a state.
 ///
-///     membrane::BlockConvexity convexity(problem);                  // offline
-///     const double mu = convexity.eigenvalue_bound(problem, 1e-5);            // [N/m]; <= 0 if not shown to be convex
+///     membrane::BlockConvexity convexity(problem);                            // offline
+///     const double mu = convexity.eigenvalue_bound(problem, 1e-5);  // [N/m]; <= 0 if not shown to be convex
 namespace membrane {
 
 /// Computes a lower bound of the smallest eigenvalue of the stiffness over all states in which each free vertex is

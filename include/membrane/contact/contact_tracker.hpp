@@ -544,7 +544,7 @@ void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span
     }
 }
 
-// The listed: the near triangles and `rings` rings around them. The triangles of a vertex form one fan: if not all
+// The candidates: the near triangles and `rings` rings around them. The triangles of a vertex form one fan: if not all
 // are near, one that is near shares a side with one that is not. So the first ring expands only near triangles with a
 // side neighbour that is not near.
 template <Real Scalar>

@@ -10,7 +10,7 @@ namespace membrane {
 /// and one atomic exchange swaps it with the middle slot.
 ///
 ///     TripleBuffer<Pose> poses;
-///     poses.back() = pose;  poses.publish();          // one thread
+///     poses.back() = pose;  poses.publish();             // one thread
 ///     if (poses.acquire()) draw(poses.front());          // another thread
 ///
 /// Neither copyable nor movable: two threads refer to it.

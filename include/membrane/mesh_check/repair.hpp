@@ -24,7 +24,7 @@
 /// Repairs that need no guess, each only on request.
 ///
 ///     const auto repaired = membrane::repair(x, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true});
-///     std::cout << to_string(repaired.report);                        // welded 12 vertices, turned 3 triangles
+///     std::cout << to_string(repaired.report);                      // welded 12 vertices, turned 3 triangles
 ///     const membrane::TriangleMesh mesh(repaired.positions, repaired.triangles);
 namespace membrane {
 
