@@ -391,13 +391,13 @@ TEST_CASE("what makes no sense is refused") {
         return refusal([&] { (void)scene.choose(wanted, experiment); });
     };
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    CHECK(refused({}) == "choose_settings: either a force_error or a time must be wanted, got 0 and 0 s");
+    CHECK(refused({}) == "choose_settings: either a force_error or a time must be required, got 0 and 0 s");
     CHECK(refused({.force_error = 0.1, .time = 0.2}) ==
-          "choose_settings: either a force_error or a time must be wanted, got 0.1 and 0.2 s");
+          "choose_settings: either a force_error or a time must be required, got 0.1 and 0.2 s");
     CHECK(refused({.force_error = -1}) ==
-          "choose_settings: the wanted force_error must be finite and positive, got -1");
+          "choose_settings: the required force_error must be finite and positive, got -1");
     CHECK_THAT(refused({.force_error = nan}), ContainsSubstring("force_error must be finite and positive, got"));
-    CHECK(refused({.time = -2}) == "choose_settings: the wanted time must be finite and positive [s], got -2");
+    CHECK(refused({.time = -2}) == "choose_settings: the required time must be finite and positive [s], got -2");
 
     const Requirement percent{.force_error = 0.01};
     CHECK(refused(percent, {.layers = {}}) == "choose_settings: layers must hold a number to try, got none");

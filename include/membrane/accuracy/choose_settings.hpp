@@ -82,12 +82,12 @@ inline constexpr std::string_view choose_name = "choose_settings";
 
 inline void check(const Requirement& requirement) {
     if ((requirement.force_error != 0) == (requirement.time != 0)) {
-        refuse(choose_name, "either a force_error or a time must be wanted, got ", requirement.force_error, " and ",
+        refuse(choose_name, "either a force_error or a time must be required, got ", requirement.force_error, " and ",
                requirement.time, " s");
     }
     const double number = requirement.time != 0 ? requirement.time : requirement.force_error;
     if (is_finite(number) && number > 0) return;
-    refuse(choose_name, "the wanted ", requirement.time != 0 ? "time" : "force_error", " must be finite and positive",
+    refuse(choose_name, "the required ", requirement.time != 0 ? "time" : "force_error", " must be finite and positive",
            requirement.time != 0 ? " [s]" : "", ", got ", number);
 }
 
