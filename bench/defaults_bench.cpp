@@ -31,7 +31,7 @@ void add(const std::string& name, Play play) {
     constexpr int repetitions = 3;
     const auto run = [play, min_time = std::numeric_limits<double>::infinity()](benchmark::State& state) mutable {
         for (auto _ : state) {
-            membrane::Outcome outcome = play();
+            membrane::TrialResult outcome = play();
             outcome.time = min_time = std::min(min_time, outcome.time);
             record(state, outcome);
         }

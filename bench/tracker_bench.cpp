@@ -25,7 +25,7 @@ void tree(benchmark::State& state, const Path& path) {
         touched.clear();
         benchmark::DoNotOptimize(loop.tree.closest_point(loop.x, loop.tool.position));
         loop.tree.overlap_capsule(loop.x, loop.tool.position, loop.tool.position + loop.tool.axis,
-                                  loop.contact.detection_distance, [&](Index f) { touched.push(f); });
+                                  loop.contact.detection_distance, [&](Index f) { touched.try_push_back(f); });
     };
     for (auto _ : state) {
         loop.frame();

@@ -44,7 +44,7 @@ double& stable_part(const Setting& setting) {
 }
 
 template <Real Scalar>
-membrane::Outcome play_by(const Setting& setting) {
+membrane::TrialResult play_by(const Setting& setting) {
     const auto options = options_of<Scalar>(setting);
     if (setting.rule == "published") return play_published<Scalar>(setting.place, options, stable_part(setting));
     if (setting.rule == "safe") return play<Scalar>(setting.place, options, membrane::SafeStep{});

@@ -41,13 +41,13 @@ struct FirstHit {
     static Vector3 end(const Vector3& q) { return (1 - range / membrane::norm(q)) * q; }
     static double by_tree(const Tree& tree, const Loop& loop, const Vector3& q) {
         const auto hit = tree.first_hit(loop.x, q, end(q));
-        return hit.triangle == membrane::no_index ? 2 : hit.along;
+        return hit.triangle == membrane::no_index ? 2 : hit.fraction;
     }
     static double of_all(const Loop& loop, const Vector3& q) {
         double along = 2;
         for (const auto& corners : loop.mesh.triangles().colwise()) {
             const auto hit = membrane::first_hit(membrane::triangle_at(loop.x, corners), q, end(q));
-            if (hit) along = std::min(along, hit->along);
+            if (hit) along = std::min(along, hit->fraction);
         }
         return along;
     }

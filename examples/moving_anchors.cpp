@@ -9,7 +9,7 @@
 #include <Eigen/Geometry>
 
 #include <membrane/membrane.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 
 #include "support/specimen.hpp"
 

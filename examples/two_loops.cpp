@@ -48,18 +48,18 @@ void touch(const membrane::TriangleMesh<double>& mesh, double dt, Loops& loops) 
     auto tracker = membrane::ContactTracker(mesh);
     auto x = mesh.positions();
     auto hand = membrane::SimulatedHand<double>({.mass = 0.1, .damping = 2, .stiffness = 300});
-    hand.place(loops.wanted.read().value.position);
+    hand.reset_to(loops.wanted.read().value.position);
     for (double due = now(); !loops.over; due = next(due, dt)) {
         const double begin = now();
         const auto& wanted = loops.wanted.read();
         auto tool = wanted.value;
-        hand.aim(tool.position + wanted.age(begin) * tool.velocity, tool.velocity);
+        hand.set_target(tool.position + wanted.age(begin) * tool.velocity, tool.velocity);
         tool.position = hand.position();
         tool.velocity = hand.velocity();
         const auto contact = tracker.update(tree, x, tool);
         const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
         tree.refit(x, report.moved);
-        hand.move(report.total_reaction(), dt);
+        hand.advance(report.total_reaction(), dt);
         loops.moved.publish(report.moved, x, now());
         loops.ticks.push_back(now() - begin);
         if (now() > due + dt) ++loops.missed;

@@ -102,7 +102,7 @@ struct StrokeScene {
     membrane::TriangleMesh<Scalar> mesh;
     membrane::MassSpringNetwork<Scalar, membrane::LinearSpring> network;
     membrane::VirtualVolumeSprings<Scalar> volume;
-    membrane::Stroke<Scalar> stroke;
+    membrane::ToolTrajectory<Scalar> stroke;
 };
 
 /// The equilibria of every sixth tick: in `put_down`, the last tick of each press. Computed once.
@@ -119,18 +119,18 @@ struct StrokeScene {
 }
 
 template <Real Scalar, class Rule>
-[[nodiscard]] membrane::Outcome play(const Place& place, const membrane::SolverOptions<Scalar>& options,
-                                     const Rule& rule, double mass = 1) {
+[[nodiscard]] membrane::TrialResult play(const Place& place, const membrane::SolverOptions<Scalar>& options,
+                                         const Rule& rule, double mass = 1) {
     const StrokeScene<Scalar> scene(place, mass);
-    return trial(scene.mesh, scene.network, scene.volume, scene.stroke, references_of(place), options, rule,
-                 ProcessorSeconds{});
+    return run_trial(scene.mesh, scene.network, scene.volume, scene.stroke, references_of(place), options, rule,
+                     ProcessorSeconds{});
 }
 
 /// By (4), with the lightest mass that is stable in the whole scene: reduces `part`, dt^2 stiffness / mass, from 0.5 in
 /// steps of 0.01 until it is.
 template <Real Scalar>
-[[nodiscard]] membrane::Outcome play_published(const Place& place, const membrane::SolverOptions<Scalar>& options,
-                                               double& part) {
+[[nodiscard]] membrane::TrialResult play_published(const Place& place, const membrane::SolverOptions<Scalar>& options,
+                                                   double& part) {
     for (;; part -= 0.01) {
         const auto outcome = play<Scalar>(place, options, membrane::MassStep{}, tick * tick * stiffness / part);
         if (outcome.advanced || part < 0.02) return outcome;
@@ -138,7 +138,7 @@ template <Real Scalar>
 }
 
 /// Sets the benchmark's iteration time to that of a tick, and its counters to the errors.
-inline void record(benchmark::State& state, const membrane::Outcome& outcome) {
+inline void record(benchmark::State& state, const membrane::TrialResult& outcome) {
     require(outcome.advanced, "no step may be refused");
     state.SetIterationTime(outcome.time);
     state.counters["force_error"] = outcome.force_error;

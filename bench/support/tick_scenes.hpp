@@ -10,7 +10,7 @@
 #include <Eigen/Geometry>
 
 #include <membrane/model/bending.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/model/tissue.hpp>
 #include <membrane/model/triangular_springs.hpp>
 

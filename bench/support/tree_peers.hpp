@@ -49,7 +49,7 @@ class Ours {
     }
     [[nodiscard]] double first_hit(const Vector3& p, const Vector3& q) const {
         const auto hit = tree_.first_hit(x_, p.cast<Scalar>(), q.cast<Scalar>());
-        return hit.triangle == membrane::no_index ? 2 : hit.along;
+        return hit.triangle == membrane::no_index ? 2 : hit.fraction;
     }
     void refit(const Points& x) {
         x_ = x.cast<Scalar>();

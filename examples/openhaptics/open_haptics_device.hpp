@@ -274,7 +274,7 @@ typename OpenHapticsDevice<Hd>::Force OpenHapticsDevice<Hd>::compute_force(const
     if (held) force = Force::Constant(none);
     if (!held) warning_ = nullptr;
     force = limiter_(force, tool.time, solves_);
-    report_.count(limiter_.acted(), held);
+    report_.count(limiter_.active_limits(), held);
     return force;
 }
 

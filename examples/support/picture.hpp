@@ -72,7 +72,7 @@ struct Facet {
 inline bool over(const membrane::Tool<double>& tool, const membrane::Triangle<double>& triangle, const Vector3d& eye) {
     const Vector3d end = tool.position + tool.axis;
     const auto pair = membrane::closest_to_segment<double>(triangle, tool.position, end);
-    const Vector3d on_tool = tool.position + pair.along * tool.axis;
+    const Vector3d on_tool = tool.position + pair.fraction * tool.axis;
     return (pair.on_triangle.point - on_tool).dot(eye - pair.on_triangle.point) > 0;
 }
 

@@ -57,7 +57,7 @@ struct BlockMatrix {
 
 }  // namespace
 
-TEST_CASE("definite just above the smallest eigenvalue, and never below", "[block_factors]") {
+TEST_CASE("definite just above the smallest eigenvalue, and never below", "[block_cholesky]") {
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -79,7 +79,7 @@ TEST_CASE("definite just above the smallest eigenvalue, and never below", "[bloc
     }
 }
 
-TEST_CASE("matrices that are only just not definite are not taken for it", "[block_factors]") {
+TEST_CASE("matrices that are only just not definite are not taken for it", "[block_cholesky]") {
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));

@@ -50,7 +50,7 @@ struct CountedPress : ToolContact<double> {
 
 /// A history of a user's own.
 struct CountedStroke {
-    Stroke<double> stroke;
+    ToolTrajectory<double> stroke;
 
     Index ticks() const { return stroke.ticks(); }
     double dt() const { return stroke.dt(); }
@@ -108,7 +108,7 @@ struct Scene {
             for (int t = 1; t <= ticks_along; ++t) go(place + height * normal + step * t * along);
             go(above);
         }
-        return {Stroke(mesh, tools, 1e-3)};
+        return {ToolTrajectory(mesh, tools, 1e-3)};
     }
 
     static constexpr double stiffness = 40;
@@ -124,7 +124,7 @@ struct Scene {
         Point point, normal, along;
     };
 
-    /// Somewhere on the surface, and a way along it that does not come near a border.
+    /// Somewhere on the surface, and a path along it that does not come near a border.
     Place place_on(Random& random, double length) const {
         for (;;) {
             const Index f = random.index(mesh.triangle_count());
@@ -146,9 +146,9 @@ struct Judge {
         equilibria(scene.mesh, scene.network, scene.foundation, stroke, tick_stride);
 
     static constexpr Index tick_stride = 2;  // most of the error is in few ticks, where the tool sets on or turns
-    Outcome operator()(const SolverOptions<double>& options) const {
-        return trial(scene.mesh, scene.network, scene.foundation, stroke, references, options, BlockStep{},
-                     WorkClock{});
+    TrialResult operator()(const SolverOptions<double>& options) const {
+        return run_trial(scene.mesh, scene.network, scene.foundation, stroke, references, options, BlockStep{},
+                         WorkClock{});
     }
 
     /// Whether any setting of the experiment takes less than `time` and is off by no more than `error`: all are tried
@@ -162,7 +162,7 @@ struct Judge {
     }
 
     /// Whether any setting with the most sweeps of all is off by no more than `error`.
-    bool any_with_most_sweeps(double error) const {
+    bool any_with_max_sweeps(double error) const {
         return any([&](const SolverOptions<double>& setting, bool&) {
             return setting.sweeps == GridSearchOptions<double>{}.sweeps.back() && (*this)(setting).force_error <= error;
         });
@@ -173,10 +173,10 @@ struct Judge {
     bool any(Found found) const {
         const GridSearchOptions<double> all;
         for (const Index layers : all.layers) {
-            for (const Index visits : all.contact_iterations) {
+            for (const Index iterations : all.contact_iterations) {
                 bool go_on = true;
                 for (std::size_t i = 0; i < all.sweeps.size() && go_on; ++i) {
-                    if (found({.layers = layers, .sweeps = all.sweeps[i], .contact_iterations = visits}, go_on))
+                    if (found({.layers = layers, .sweeps = all.sweeps[i], .contact_iterations = iterations}, go_on))
                         return true;
                 }
             }
@@ -197,7 +197,7 @@ struct KnownOutcomes {
           e(random.number(0.2, 2.0)),
           f(random.number(0.2, 2.0)) {}
 
-    Outcome of(const SolverOptions<double>& o) const {
+    TrialResult of(const SolverOptions<double>& o) const {
         return {
             .force_error =
                 std::exp(-a * o.sweeps) + std::exp(-b * o.layers) + 0.1 * std::exp(-c * o.contact_iterations),
@@ -210,9 +210,9 @@ struct KnownOutcomes {
         std::vector<SolverOptions<double>> kept;
         for (const Index layers : all.layers) {
             for (const Index sweeps : all.sweeps) {
-                for (const Index visits : all.contact_iterations) {
+                for (const Index iterations : all.contact_iterations) {
                     const SolverOptions<double> options{
-                        .layers = layers, .sweeps = sweeps, .contact_iterations = visits};
+                        .layers = layers, .sweeps = sweeps, .contact_iterations = iterations};
                     if (keeps(of(options))) kept.push_back(options);
                 }
             }
@@ -223,8 +223,8 @@ struct KnownOutcomes {
     }
 };
 
-bool by_time(const Outcome& p, const Outcome& q) { return p.time < q.time; }
-bool by_error(const Outcome& p, const Outcome& q) { return p.force_error < q.force_error; }
+bool by_time(const TrialResult& p, const TrialResult& q) { return p.time < q.time; }
+bool by_error(const TrialResult& p, const TrialResult& q) { return p.force_error < q.force_error; }
 
 void check_same(const ChosenSettings<double>& choice, const SolverOptions<double>& expected) {
     CHECK(choice.options.layers == expected.layers);
@@ -244,7 +244,7 @@ struct SmallScene {
             tools.push_back({.position = {0, 5e-5 * t, height - 5e-5 * std::min(t, 20) + 3e-3}, .radius = 3e-3});
         }
     }
-    CountedStroke stroke() const { return {Stroke(mesh, tools, 1e-3)}; }
+    CountedStroke stroke() const { return {ToolTrajectory(mesh, tools, 1e-3)}; }
     ChosenSettings<double> choose(const Requirement& wanted,
                                   const GridSearchOptions<double>& experiment = {.repetitions = 1}) const {
         return choose_settings(mesh, network, foundation, stroke(), wanted, experiment, BlockStep{}, WorkClock{});
@@ -253,9 +253,10 @@ struct SmallScene {
 
 }  // namespace
 
-// In five parts, for the time a long run takes. All together keep 95 %, 80 % of them cheaply; each has some room for chance.
+// In five parts, for the time a long run takes. All together keep 95 %, 80 % of them cheaply; each has some margin for
+// chance.
 TEST_CASE("a chosen setting keeps the wanted error on unseen strokes, at hardly more than it takes") {
-    int ticks_compared = 0, kept = 0, cheap = 0, out_of_reach = 0;
+    int ticks_compared = 0, kept = 0, cheap = 0, unattainable = 0;
     const int count = cases(5, 500);
     for (int seed = 1; seed <= 100 * count; seed += 100) {
         CAPTURE(seed);
@@ -273,17 +274,17 @@ TEST_CASE("a chosen setting keeps the wanted error on unseen strokes, at hardly 
             ++ticks_compared;
             ++kept;
             if (!unseen.any_within(error, outcome.time / 1.5)) ++cheap;
-        } else if (unseen.any_with_most_sweeps(error)) {
+        } else if (unseen.any_with_max_sweeps(error)) {
             ++ticks_compared;
         } else {
-            ++out_of_reach;
+            ++unattainable;
         }
     }
     WARN(count << " scenes, " << ticks_compared << " judged: " << kept << " keep the error, " << cheap
-               << " of these cheaply; " << out_of_reach << " out of reach of any setting");
+               << " of these cheaply; " << unattainable << " unattainable by any setting");
     CHECK(ticks_compared - kept <= std::max(0.07 * ticks_compared, 1.0));
     CHECK(ticks_compared - cheap <= std::max(0.25 * ticks_compared, 1.0));
-    CHECK(3 * (ticks_compared + 1) > count);  // the others are not met, and said so, or out of reach
+    CHECK(3 * (ticks_compared + 1) > count);  // the others are not met, and said so, or unattainable
 }
 
 TEST_CASE("of all settings the cheapest that keeps the error, the most accurate that keeps the time") {
@@ -301,7 +302,7 @@ TEST_CASE("of all settings the cheapest that keeps the error, the most accurate 
 
         const auto cheapest = choose_settings(GridSearchOptions<double>{}, {.force_error = error}, attempt);
         const double most = error / GridSearchOptions<double>{}.safety_factor;
-        const auto expected = known.best(by_time, [&](const Outcome& o) { return o.force_error <= most; });
+        const auto expected = known.best(by_time, [&](const TrialResult& o) { return o.force_error <= most; });
         CHECK(cheapest.satisfied == (expected.layers != no_index));
         CHECK(cheapest.satisfied == (cheapest.force_error <= most));
         if (cheapest.satisfied) check_same(cheapest, expected);
@@ -309,7 +310,7 @@ TEST_CASE("of all settings the cheapest that keeps the error, the most accurate 
         all_tried += tried;
 
         const auto finest = choose_settings(GridSearchOptions<double>{}, {.time = time}, attempt);
-        const auto in_time = known.best(by_error, [&](const Outcome& o) { return o.time <= time; });
+        const auto in_time = known.best(by_error, [&](const TrialResult& o) { return o.time <= time; });
         CHECK(finest.satisfied == (in_time.layers != no_index));
         CHECK(finest.satisfied == (finest.time <= time));
         if (finest.satisfied) CHECK(finest.force_error == known.of(in_time).force_error);
@@ -325,8 +326,8 @@ TEST_CASE("what is chosen is what the solver then does, in any tick") {
          {Requirement{.force_error = 0.02}, Requirement{.force_error = 2e-3}, Requirement{.time = 100e-6}}) {
         const auto choice = scene.choose(wanted);
         REQUIRE(choice.satisfied);
-        const auto outcome = trial(scene.mesh, scene.network, scene.foundation, scene.stroke(), references,
-                                   choice.options, BlockStep{}, WorkClock{});
+        const auto outcome = run_trial(scene.mesh, scene.network, scene.foundation, scene.stroke(), references,
+                                       choice.options, BlockStep{}, WorkClock{});
         CHECK(outcome.force_error == choice.force_error);
         CHECK(outcome.position_error == choice.position_error);
         CHECK(outcome.time == Approx(choice.time).epsilon(1e-6));
@@ -358,7 +359,7 @@ TEST_CASE("the shortest of several plays counts") {
 
 TEST_CASE("by default the clock is a real one, the options besides are kept") {
     const SmallScene scene;
-    const Stroke stroke(scene.mesh, scene.tools, 1e-3);
+    const ToolTrajectory stroke(scene.mesh, scene.tools, 1e-3);
     const auto choice = choose_settings(scene.mesh, scene.network, scene.foundation, stroke, {.force_error = 0.02},
                                         {.others = {.force_tolerance = 1e-7}});
     CHECK(choice.satisfied);
@@ -370,7 +371,7 @@ TEST_CASE("by default the clock is a real one, the options besides are kept") {
 TEST_CASE("another rule is tried as it is, one that diverges is never chosen") {
     const auto mesh = icosphere<double>({.radius = radius, .subdivisions = 1});
     const VirtualVolumeSprings<double> foundation(mesh, {.stiffness = 8.0});
-    const Stroke stroke(mesh, SmallScene().tools, 1e-3);
+    const ToolTrajectory stroke(mesh, SmallScene().tools, 1e-3);
     const MassSpringNetwork heavy(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 4e-4});
     const MassSpringNetwork light(mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 4e-7});
     const auto stable =
@@ -390,13 +391,13 @@ TEST_CASE("what makes no sense is refused") {
         return refusal([&] { (void)scene.choose(wanted, experiment); });
     };
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    CHECK(refused({}) == "choose_settings: either a force_error or a time must be wanted, got 0 and 0 s");
+    CHECK(refused({}) == "choose_settings: either a force_error or a time must be required, got 0 and 0 s");
     CHECK(refused({.force_error = 0.1, .time = 0.2}) ==
-          "choose_settings: either a force_error or a time must be wanted, got 0.1 and 0.2 s");
+          "choose_settings: either a force_error or a time must be required, got 0.1 and 0.2 s");
     CHECK(refused({.force_error = -1}) ==
-          "choose_settings: the wanted force_error must be finite and positive, got -1");
+          "choose_settings: the required force_error must be finite and positive, got -1");
     CHECK_THAT(refused({.force_error = nan}), ContainsSubstring("force_error must be finite and positive, got"));
-    CHECK(refused({.time = -2}) == "choose_settings: the wanted time must be finite and positive [s], got -2");
+    CHECK(refused({.time = -2}) == "choose_settings: the required time must be finite and positive [s], got -2");
 
     const Requirement percent{.force_error = 0.01};
     CHECK(refused(percent, {.layers = {}}) == "choose_settings: layers must hold a number to try, got none");

@@ -31,10 +31,10 @@ double farthest(const Points<double>& a, const Points<double>& b) { return (a - 
 
 /// A sphere of radius 1 with springs of 1 N/m, into which a tool is pressed by a solver that is given little time.
 struct Pressed {
-    Pressed(std::uint64_t seed, Index subdivisions, double backing_stiffness)
+    Pressed(std::uint64_t seed, Index subdivisions, double foundation_stiffness)
         : random(seed),
           mesh(icosphere({.radius = 1, .subdivisions = subdivisions})),
-          foundation(mesh, {.stiffness = backing_stiffness}) {
+          foundation(mesh, {.stiffness = foundation_stiffness}) {
         edge = 2.0 / (1 << subdivisions) * 0.6;
     }
 
@@ -81,22 +81,24 @@ struct Pressed {
     Vector3<double> force = Vector3<double>::Zero();
 };
 
-/// What `ContactBounds` is handed.
+/// What `ContactBounds` is membrane_bounds.
 struct Handed {
     explicit Handed(const Pressed& membrane)
         : problem(membrane.network), rest(membrane.rest_from(membrane.x)), scene(membrane.x, none(membrane)) {
-        (void)problem.take(membrane.x, membrane.network, membrane.foundation);
+        (void)problem.assign(membrane.x, membrane.network, membrane.foundation);
         describe(press(membrane.tool, membrane.contact), scene);
         force = Points<double>::Zero(3, membrane.x.cols());
         magnitude.resize(static_cast<std::size_t>(membrane.x.cols()));
         problem.forces(rest.x, force, magnitude);
-        places.take(problem, membrane.mesh.triangles(), rest.x, scene.tools(), rest.contacts);
+        places.assign(problem, membrane.mesh.triangles(), rest.x, scene.tools(), rest.contacts);
     }
 
     [[nodiscard]] static std::vector<unsigned char> none(const Pressed& membrane) {
         return std::vector<unsigned char>(static_cast<std::size_t>(membrane.x.cols()));
     }
-    [[nodiscard]] bool around(double displacement) { return places.around(problem, force, magnitude, displacement); }
+    [[nodiscard]] bool bound_softening(double displacement) {
+        return places.bound_softening(problem, force, magnitude, displacement);
+    }
 
     EquilibriumProblem problem;
     Equilibrium rest;
@@ -117,12 +119,12 @@ Points<double> state_outside(const Pressed& membrane, const Points<double>& y, d
             const auto triangle = triangle_at(x, corners);
             const Vector3<double> end = membrane.tool.position + membrane.tool.axis;
             const auto nearest = closest_to_segment(triangle, membrane.tool.position, end);
-            const Vector3<double> reach =
-                nearest.on_triangle.point - membrane.tool.position - nearest.along * membrane.tool.axis;
-            const double overlap = membrane.tool.radius - norm(reach);
+            const Vector3<double> separation =
+                nearest.on_triangle.point - membrane.tool.position - nearest.fraction * membrane.tool.axis;
+            const double overlap = membrane.tool.radius - norm(separation);
             deepest = std::max(deepest, overlap);
             if (overlap > 0) {
-                for (const Index v : corners) x.col(v) += (overlap + 1e-15) * reach.normalized();
+                for (const Index v : corners) x.col(v) += (overlap + 1e-15) * separation.normalized();
             }
         }
         if (deepest <= 0) break;
@@ -132,28 +134,28 @@ Points<double> state_outside(const Pressed& membrane, const Points<double>& y, d
 
 }  // namespace
 
-TEST_CASE("pressures do no more work on the way to any state than is said", "[error_bound]") {
+TEST_CASE("pressures do no more work towards any state than the bound says", "[error_bound]") {
     int compared = 0;
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);
         Pressed membrane(static_cast<std::uint64_t>(seed), 1 + static_cast<Index>(seed % 2), 1.0);
         membrane.press_somewhere(membrane.random.number(0.02, 0.2));
-        Handed handed(membrane);
+        Handed membrane_bounds(membrane);
         const double displacement = std::pow(10, membrane.random.number(-6.0, -2.0));
-        if (!handed.rest.converged || !handed.around(displacement)) continue;
+        if (!membrane_bounds.rest.converged || !membrane_bounds.bound_softening(displacement)) continue;
         for (int i = 0; i < 20; ++i) {
-            const Points<double> x = state_outside(membrane, handed.rest.x, displacement, membrane.random);
-            const Points<double> d = handed.rest.x - x;
+            const Points<double> x = state_outside(membrane, membrane_bounds.rest.x, displacement, membrane.random);
+            const Points<double> d = membrane_bounds.rest.x - x;
             if (d.colwise().norm().maxCoeff() > displacement) continue;
             ++compared;
-            double done = 0, allowed = handed.places.work();
-            for (const auto& touch : handed.rest.contacts) {
+            double done = 0, allowed = membrane_bounds.places.work();
+            for (const auto& touch : membrane_bounds.rest.contacts) {
                 for (std::size_t k = 0; k < 3; ++k) {
                     done += touch.multiplier * dot<double>(touch.gradient(k), point(d, touch.corners[k]));
                 }
             }
             for (Index v = 0; v < x.cols(); ++v) {
-                allowed += handed.places.softening(v) * squared_norm(point(d, v)) / 2;
+                allowed += membrane_bounds.places.softening(v) * squared_norm(point(d, v)) / 2;
             }
             REQUIRE(done <= allowed);
         }
@@ -167,45 +169,45 @@ TEST_CASE("pressures balance the membrane, and are borne near the tool only", "[
         CAPTURE(seed);
         Pressed membrane(static_cast<std::uint64_t>(seed), 2, 1.0);
         membrane.press_somewhere(0.1);
-        Handed handed(membrane);
-        if (!handed.rest.converged) continue;
-        Points<double> left = handed.force;
-        std::vector<double> magnitude = handed.magnitude;
-        handed.places.push(left, magnitude);
+        Handed membrane_bounds(membrane);
+        if (!membrane_bounds.rest.converged) continue;
+        Points<double> left = membrane_bounds.force;
+        std::vector<double> magnitude = membrane_bounds.magnitude;
+        membrane_bounds.places.add_force(left, magnitude);
         CHECK(left.cwiseAbs().maxCoeff() <= 1e-11);
         double before = 0;
         for (const double displacement : {1e-8, 1e-5, 1e-3}) {
-            if (!handed.around(displacement)) break;
+            if (!membrane_bounds.bound_softening(displacement)) break;
             ++found;
             double largest = 0;
             for (Index v = 0; v < left.cols(); ++v) {
-                const double soft = handed.places.softening(v);
+                const double soft = membrane_bounds.places.softening(v);
                 largest = std::max(largest, soft);
-                const double borne = norm(point(handed.force, v));
+                const double borne = norm(point(membrane_bounds.force, v));
                 CHECK(soft >= (borne > 1e-9 ? borne / membrane.tool.radius : 0));
                 const Vector3<double> axis = membrane.tool.position + 0.5 * membrane.tool.axis;
-                if (norm<double>(point(handed.rest.x, v) - axis) >
+                if (norm<double>(point(membrane_bounds.rest.x, v) - axis) >
                     norm(membrane.tool.axis) / 2 + membrane.tool.radius + 3 * membrane.edge) {
                     CHECK(soft == 0);
                 }
             }
             CHECK(largest > before);
             before = largest;
-            CHECK(handed.places.overlap() < 1e-12);
-            CHECK(handed.places.min_radius() < 1e-10);
-            CHECK(handed.places.work() < 1e-12);
+            CHECK(membrane_bounds.places.penetration() < 1e-12);
+            CHECK(membrane_bounds.places.min_radius() < 1e-10);
+            CHECK(membrane_bounds.places.work() < 1e-12);
             std::vector<double> weights(static_cast<std::size_t>(left.cols()), 0.0);
-            handed.places.share(0, weights);
+            membrane_bounds.places.share(0, weights);
             Vector3<double> reaction = Vector3<double>::Zero();
             for (Index v = 0; v < left.cols(); ++v) {
-                reaction += weights[static_cast<std::size_t>(v)] * point(handed.force, v);
+                reaction += weights[static_cast<std::size_t>(v)] * point(membrane_bounds.force, v);
             }
-            CHECK(norm<double>(reaction - handed.rest.reactions[0]) <= 1e-10);
+            CHECK(norm<double>(reaction - membrane_bounds.rest.reactions[0]) <= 1e-10);
         }
-        CHECK_FALSE(handed.around(membrane.tool.radius));
-        handed.places.clear();
-        CHECK(handed.around(membrane.tool.radius));
-        CHECK(handed.places.softening(0) == 0);
+        CHECK_FALSE(membrane_bounds.bound_softening(membrane.tool.radius));
+        membrane_bounds.places.clear();
+        CHECK(membrane_bounds.bound_softening(membrane.tool.radius));
+        CHECK(membrane_bounds.places.softening(0) == 0);
     }
     CHECK(found > cases(60));
 }
@@ -236,9 +238,9 @@ TEST_CASE("with a tool in contact the equilibrium is no farther than the bound",
             ErrorBound<FactoredConvexity> sharp(membrane.network);
             const auto pressing = press(membrane.tool, membrane.contact);
             const auto simple =
-                quick.of(rest, membrane.x, membrane.mesh, membrane.network, membrane.foundation, pressing);
+                quick.compute(rest, membrane.x, membrane.mesh, membrane.network, membrane.foundation, pressing);
             const auto error =
-                sharp.of(rest, membrane.x, membrane.mesh, membrane.network, membrane.foundation, pressing);
+                sharp.compute(rest, membrane.x, membrane.mesh, membrane.network, membrane.foundation, pressing);
             auto& count = counts[stiffness < 0.1 ? 0 : stiffness < 1 ? 1 : 2];
             ++count.all;
             count.quick += simple.certified();
@@ -298,7 +300,7 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     ErrorBound bound(membrane.network);
     const auto pressing = press(membrane.tool, membrane.contact);
     const auto of = [&](const Equilibrium& found, const auto&... constraints) {
-        return bound.of(found, membrane.x, membrane.mesh, membrane.network, membrane.foundation, constraints...);
+        return bound.compute(found, membrane.x, membrane.mesh, membrane.network, membrane.foundation, constraints...);
     };
     CHECK(of(rest, pressing).certified());
     CHECK_FALSE(of(rest, pressing, pressing).certified());
@@ -308,7 +310,7 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     CHECK_FALSE(of(rest, pressing, pull(membrane.contact.corners[0], held)).certified());
     CHECK(of(rest, pressing, PointAttachment<double>{0, {0, 1, 2}, {0.2, 0.3, 0.5}, held}).status ==
           BoundStatus::unsupported);
-    CHECK(bound.of(membrane.x, membrane.network, membrane.foundation, pressing).status == BoundStatus::contact);
+    CHECK(bound.compute(membrane.x, membrane.network, membrane.foundation, pressing).status == BoundStatus::contact);
 
     Equilibrium wrong = rest;
     wrong.x(0, 5) = std::numeric_limits<double>::quiet_NaN();
@@ -316,7 +318,7 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     wrong.x = rest.x.leftCols(7);
     CHECK(of(wrong, pressing).status == BoundStatus::invalid_input);
     const auto other = icosphere<double>({.radius = 1, .subdivisions = 1});
-    CHECK(bound.of(rest, membrane.x, other, membrane.network, membrane.foundation, pressing).status ==
+    CHECK(bound.compute(rest, membrane.x, other, membrane.network, membrane.foundation, pressing).status ==
           BoundStatus::invalid_input);
     wrong = rest;
     for (auto& touch : wrong.contacts) touch.multiplier *= 3;
@@ -326,6 +328,6 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     // Without tools it is the same bound as online, only found from where the equilibrium is known.
     const auto alone = equilibrium(membrane.x, membrane.mesh, membrane.network, membrane.foundation, {});
     const auto offline = of(alone);
-    const auto online = bound.of(membrane.x, membrane.network, membrane.foundation);
+    const auto online = bound.compute(membrane.x, membrane.network, membrane.foundation);
     CHECK(offline.certified() == online.certified());
 }

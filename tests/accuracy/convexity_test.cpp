@@ -27,7 +27,7 @@ TEST_CASE("blocks are even where one spring of many pushes", "[convexity]") {
                                     {.stiffness = 1.0, .rest_length = std::vector{1.1, 1.0, 1.1}});
     const VirtualVolumeSprings foundation(mesh, {.stiffness = 1.0});
     EquilibriumProblem problem(network);
-    REQUIRE(problem.take(x, network, foundation) == ProblemStatus::valid);
+    REQUIRE(problem.assign(x, network, foundation) == ProblemStatus::valid);
     BlockConvexity convexity(problem);
-    CHECK(convexity.around(problem, 0) == Approx(1 - 3 * 0.1).epsilon(1e-3));
+    CHECK(convexity.eigenvalue_bound(problem, 0) == Approx(1 - 3 * 0.1).epsilon(1e-3));
 }

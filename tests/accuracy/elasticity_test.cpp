@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
@@ -56,8 +56,8 @@ void check_derivatives(const Law& law, int seed) {
     double stiffest = 0;
     for (const auto& spring : network.springs()) {
         const double length = (x.col(spring.second) - x.col(spring.first)).norm();
-        const auto answer = law(SpringState<double>{spring.stiffness, spring.rest_length, length});
-        stiffest = std::max(stiffest, answer.stiffness);
+        const auto response = law(SpringState<double>{spring.stiffness, spring.rest_length, length});
+        stiffest = std::max(stiffest, response.stiffness);
     }
     CHECK(elasticity.largest_stiffness(here) == Approx(stiffest));
     CHECK(here.energy == Approx(network.energy(x)));
@@ -204,7 +204,7 @@ TEST_CASE("a foundation of one's own is asked wherever it is", "[elasticity]") {
     }
 }
 
-TEST_CASE("a foundation that is not alike in all directions gives way as its stiffness says", "[elasticity]") {
+TEST_CASE("a foundation that is not alike in all directions yields as its stiffness says", "[elasticity]") {
     test::Random random(1);
     const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 0.0});
@@ -218,7 +218,7 @@ TEST_CASE("a foundation that is not alike in all directions gives way as its sti
     Points<double> force = Points<double>::Zero(3, mesh.vertex_count());
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         force.col(v) = random.vector();
-        system.push(v, force.col(v));
+        system.add_force(v, force.col(v));
     }
     const Points<double> step = system.solve(7).step;
     const auto there = elasticity.at(mesh.positions() + step);

@@ -17,7 +17,7 @@ constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 constexpr std::array<Index, 3> corners{0, 1, 2};
 const Vector3<double> middle = Vector3<double>::Constant(1.0 / 3), target(1, 2, 3);
 
-/// Four vertices, the last one pinned; told by constraint 5.
+/// Four vertices, the last one pinned; described by constraint 5.
 EquilibriumScene scene() {
     EquilibriumScene scene(Points<double>::Zero(3, 4), {0, 0, 0, 1});
     scene.select_constraint(5);
@@ -48,20 +48,20 @@ struct Clamp {
     Index first, second;
 };
 void describe(const Clamp& clamp, EquilibriumScene& scene) {
-    scene.hold(clamp.first);
-    scene.hold(clamp.second, target);
+    scene.prescribe(clamp.first);
+    scene.prescribe(clamp.second, target);
 }
 static_assert(StaticConstraint<Clamp> && !StaticConstraint<int>);
 
 }  // namespace
 
-TEST_CASE("held vertices have their targets, pinned ones stay", "[rest_scene]") {
+TEST_CASE("held vertices have their targets, pinned ones stay", "[equilibrium_scene]") {
     const auto held = scene_of(pull(1, target));
     CHECK(held.fixed(1));
     CHECK(!held.fixed(0));
     CHECK(held.goals(1).targets.col(1) == target);
     CHECK(held.seeds() == std::vector<Index>{1});
-    CHECK(held.holds() == std::vector<std::pair<std::size_t, Index>>{{5, 1}});
+    CHECK(held.prescribed_vertices() == std::vector<std::pair<std::size_t, Index>>{{5, 1}});
 
     const auto pinned = scene_of(pull(3, target));
     CHECK(pinned.fixed(3));
@@ -71,14 +71,14 @@ TEST_CASE("held vertices have their targets, pinned ones stay", "[rest_scene]") 
     auto pins = scene_of(pin(vertices));
     CHECK((pins.fixed(0) && !pins.fixed(1) && pins.fixed(2)));
     CHECK(pins.seeds().empty());
-    CHECK(pins.holds().size() == 2);
+    CHECK(pins.prescribed_vertices().size() == 2);
 
     describe(pull(2, target), pins);  // the last one decides, but a pin has no wish of its own
     describe(pin(vertices), pins);
     CHECK(pins.goals(1).targets.col(2) == target);
 }
 
-TEST_CASE("held and loaded points, and constraints of one's own", "[rest_scene]") {
+TEST_CASE("held and loaded points, and constraints of one's own", "[equilibrium_scene]") {
     const Grasp<float> grasp{.triangle = 0, .corners = corners, .barycentric = middle.cast<float>()};
     const auto held = scene_of(pull(Tool<float>{.position = target.cast<float>()}, grasp));
     REQUIRE(held.point_attachments().size() == 1);
@@ -88,8 +88,8 @@ TEST_CASE("held and loaded points, and constraints of one's own", "[rest_scene]"
     CHECK(scene_of(pull(Tool<double>{}, Grasp<double>{})).point_attachments().empty());
 
     const auto loaded = scene_of(load(corners, middle, target));
-    REQUIRE(loaded.loaded_places().size() == 1);
-    CHECK(loaded.loaded_places()[0].force == target);
+    REQUIRE(loaded.loads().size() == 1);
+    CHECK(loaded.loads()[0].force == target);
     CHECK(loaded.seeds().size() == 3);
 
     const auto own = scene_of(Clamp{0, 1});
@@ -97,7 +97,7 @@ TEST_CASE("held and loaded points, and constraints of one's own", "[rest_scene]"
     CHECK(own.goals(1).targets.col(1) == target);
 }
 
-TEST_CASE("a tool that presses, and its way out", "[rest_scene]") {
+TEST_CASE("a tool that presses, and its exit displacement", "[equilibrium_scene]") {
     const Tool<double> tool{.position = {0, 0, 0.1}};
     CHECK(scene_of(press(tool, Contact<double>::none())).tools().empty());
     auto contact = contact_above();
@@ -111,7 +111,7 @@ TEST_CASE("a tool that presses, and its way out", "[rest_scene]") {
     CHECK(scene_of(press(tool, contact)).tools()[0].exit_displacement.isZero(0));
 }
 
-TEST_CASE("targets, loads and tools come on in parts", "[rest_scene]") {
+TEST_CASE("targets, loads and tools come on in parts", "[equilibrium_scene]") {
     auto all = scene_of(pull(0, target));
     describe(load(corners, middle, target), all);
     describe(pull(Tool<double>{.position = target}, Grasp<double>{0, corners, middle, target, {}}), all);
@@ -121,13 +121,13 @@ TEST_CASE("targets, loads and tools come on in parts", "[rest_scene]") {
     CHECK(end.targets.col(0) == target);
     CHECK((half.loads.rowwise().sum() - 0.5 * target).norm() < 1e-15);
     CHECK((end.loads.rowwise().sum() - target).norm() < 1e-15);
-    CHECK((half.places[0] - target).norm() < 1e-15);
-    CHECK(end.places[0] == 2 * target);
+    CHECK((half.attached_points[0] - target).norm() < 1e-15);
+    CHECK(end.attached_points[0] == 2 * target);
     CHECK((half.tools[0].position - Vector3<double>(0, 0, 0.2)).norm() < 1e-15);
     CHECK(end.tools[0].position == Vector3<double>(0, 0, 0.1));
 }
 
-TEST_CASE("a scene refuses what is not valid", "[rest_scene]") {
+TEST_CASE("a scene refuses what is not valid", "[equilibrium_scene]") {
     const auto refused = [](const auto& constraint) { return refusal([&] { scene_of(constraint); }); };
     CHECK(refused(pull(4, target)) == "equilibrium: constraint 5 names vertex 4, expected 0 to 3");
     CHECK(refused(pull(-1, target)) == "equilibrium: constraint 5 names vertex -1, expected 0 to 3");
@@ -160,7 +160,7 @@ TEST_CASE("a scene refuses what is not valid", "[rest_scene]") {
     CHECK(refused(press(Tool<double>{}, contact)) == "equilibrium: constraint 5 names vertex -1, expected 0 to 3");
 }
 
-TEST_CASE("equilibrium refuses options out of their range", "[rest_scene]") {
+TEST_CASE("equilibrium refuses options out of their range", "[equilibrium_scene]") {
     const auto refused = [](const EquilibriumOptions& options) { return refusal([&] { options.check(); }); };
     CHECK(refused({}) == "");
     CHECK(refused({.increments = 0}) == "equilibrium: increments must be at least 1, got 0");

@@ -32,7 +32,7 @@ struct Search {
 
 }  // namespace
 
-TEST_CASE("the search converges quadratically", "[rest_search]") {
+TEST_CASE("the search converges quadratically", "[equilibrium_solver]") {
     const Search search;
     std::vector<double> residuals;
     for (Index i = 1; i <= 20 && (residuals.empty() || residuals.back() > 1e-9); ++i) {
@@ -45,7 +45,7 @@ TEST_CASE("the search converges quadratically", "[rest_search]") {
     CHECK(last < 10 * before * before);
 }
 
-TEST_CASE("increments lead to the same place, each in few iterations", "[rest_search]") {
+TEST_CASE("increments lead to the same place, each in few iterations", "[equilibrium_solver]") {
     const Search search;
     const auto one = search.run({}), ten = search.run({.increments = 10});
     REQUIRE((one.converged && ten.converged));
@@ -55,7 +55,7 @@ TEST_CASE("increments lead to the same place, each in few iterations", "[rest_se
     CHECK(one.overlap == 0);
 }
 
-TEST_CASE("a looser tolerance takes fewer iterations and keeps its word", "[rest_search]") {
+TEST_CASE("a looser tolerance takes fewer iterations and keeps its word", "[equilibrium_solver]") {
     const Search search;
     const auto loose = search.run({.tolerance = 1e-2}), exact = search.run({});
     REQUIRE((loose.converged && exact.converged));
@@ -64,7 +64,7 @@ TEST_CASE("a looser tolerance takes fewer iterations and keeps its word", "[rest
     CHECK(loose.residual < 1e-2);
 }
 
-TEST_CASE("a search that begins at rest ends there", "[rest_search]") {
+TEST_CASE("a search that begins at rest ends there", "[equilibrium_solver]") {
     const Search search;
     const auto rest = search.run({}, 0);
     CHECK(rest.converged);

@@ -12,7 +12,7 @@
 
 #include <Eigen/Geometry>
 #include <membrane/contact/contact_tracker.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
 
@@ -24,7 +24,7 @@
 #include "support/random.hpp"
 #include "support/reference_table.hpp"
 #include "support/refusal.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 #include "support/spring_law_check.hpp"
 
 using namespace membrane;
@@ -150,7 +150,7 @@ struct Stroke {
         moved.position += part * displacement;
         return moved;
     }
-    /// How it touches in the end if the membrane does not give way.
+    /// How it touches in the end if the membrane does not yield.
     Contact<double> contact(const Sphere& sphere) const {
         AabbTree tree(sphere.mesh);
         ContactTracker tracker(sphere.mesh);
@@ -174,7 +174,7 @@ Stroke random_stroke(const Point& outward, bool is_capsule, Random& random) {
     return stroke;
 }
 
-/// The tests' own method, the tools brought in in small steps.
+/// The tests' own method, the tools moved in in small steps.
 test::PressedState newton_along(const Sphere& sphere, const std::vector<Stroke>& strokes) {
     double radius = 1;
     for (const auto& stroke : strokes) radius = std::min(radius, stroke.tool.radius);
@@ -224,7 +224,7 @@ template <class... Constraints>
 void check_solver(const Sphere& sphere, const Points<double>& start, const Constraints&... constraints) {
     QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 50, .force_tolerance = 1e-13});
     Points<double> x = start;
-    const auto report = test::settle(solver, x, 1e-3, sphere.network, sphere.foundation, constraints...);
+    const auto report = test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation, constraints...);
     REQUIRE(report.converged);
     const auto rest = equilibrium(start, sphere.mesh, sphere.network, sphere.foundation, {}, constraints...);
     REQUIRE(rest.converged);
@@ -248,7 +248,7 @@ struct Clamp {
     Point by;
 };
 void describe(const Clamp& clamp, EquilibriumScene& scene) {
-    for (const Index v : {clamp.first, clamp.second}) scene.hold(v, point(scene.goals(1).targets, v) + clamp.by);
+    for (const Index v : {clamp.first, clamp.second}) scene.prescribe(v, point(scene.goals(1).targets, v) + clamp.by);
 }
 
 }  // namespace
@@ -561,12 +561,12 @@ TEST_CASE("equilibrium of a scene of floats is that of the same numbers in doubl
             stiffness.push_back(constants.back());
         }
         const VirtualVolumeSprings foundation(mesh, {.stiffness = constants, .damping = 0.02F});
-        const VirtualVolumeSprings wide_backing(wide, {.stiffness = stiffness});
+        const VirtualVolumeSprings wide_foundation(wide, {.stiffness = stiffness});
         const Index v = random.index(mesh.vertex_count());
         const Vector3<float> target = 1.1F * mesh.positions().col(v);
         const auto rest = equilibrium(mesh.positions(), mesh, network, foundation, {}, pull(v, target));
         const auto expected =
-            equilibrium(wide.positions(), wide, wide_network, wide_backing, {}, pull(v, target.cast<double>()));
+            equilibrium(wide.positions(), wide, wide_network, wide_foundation, {}, pull(v, target.cast<double>()));
         REQUIRE(rest.converged);
         REQUIRE(expected.converged);
         CHECK((rest.x - expected.x).cwiseAbs().maxCoeff() < 1e-15);
@@ -574,7 +574,8 @@ TEST_CASE("equilibrium of a scene of floats is that of the same numbers in doubl
         for (Index w = 0; w < mesh.vertex_count(); ++w) {  // really in balance
             if (w == v) continue;
             const Point here = rest.x.col(w);
-            const auto force = wide_network.force_on(w, rest.x).force + wide_backing.force_on(w, here, here, 1.0).force;
+            const auto force =
+                wide_network.force_on(w, rest.x).force + wide_foundation.force_on(w, here, here, 1.0).force;
             REQUIRE(norm<double>(force) < 1e-14);
         }
     }

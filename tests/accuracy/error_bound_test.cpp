@@ -10,7 +10,7 @@
 #include <vector>
 
 #include <membrane/accuracy/factored_convexity.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
@@ -19,7 +19,7 @@
 #include "support/catch.hpp"
 #include "support/newton.hpp"
 #include "support/random.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 #include "support/sparse_newton.hpp"
 
 using namespace membrane;
@@ -139,10 +139,10 @@ void press_or_pull(Sphere& sphere, test::Random& random, Tallies& tallies) {
     if (!(off > 1e-9)) return;
     CAPTURE(held.foundation, held.depth, off, off / sphere.edge);
     const std::size_t decade = held.foundation < 0.1 ? 0 : held.foundation < 1 ? 1 : 2;
-    const auto quick = sphere.quick.of(held.x, sphere.network, foundation, pull(held.held, held.target));
+    const auto quick = sphere.quick.compute(held.x, sphere.network, foundation, pull(held.held, held.target));
     check_bound(quick, held, truth, tallies.quick[decade]);
     if (held.foundation >= 1 && off <= 0.005 * sphere.edge) CHECK(quick.certified());
-    const auto sharp = sphere.sharp.of(held.x, sphere.network, foundation, pull(held.held, held.target));
+    const auto sharp = sphere.sharp.compute(held.x, sphere.network, foundation, pull(held.held, held.target));
     check_bound(sharp, held, truth, tallies.sharp[decade]);
 }
 
@@ -201,7 +201,7 @@ TEST_CASE("which of several equilibria is never left open", "[error_bound]") {
         Points<double> x = mesh.positions();
         x(2, 0) = i * 0.005;
         CAPTURE(x(2, 0));
-        for (const auto& error : {quick.of(x, network, foundation), sharp.of(x, network, foundation)}) {
+        for (const auto& error : {quick.compute(x, network, foundation), sharp.compute(x, network, foundation)}) {
             if (!error.certified()) continue;
             ++certified;
             int within = 0;
@@ -223,7 +223,7 @@ TEST_CASE("between two equilibria of a dented sphere nothing is certified for th
     for (Index v = 0; v < dented.cols(); ++v) dented(2, v) = (std::min)(whole(2, v), 1.2 - whole(2, v));
     QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 50});
     solver.wake_all();
-    (void)test::settle_within(100, solver, dented, 1e-3, sphere.network, foundation);
+    (void)test::run_within(100, solver, dented, 1e-3, sphere.network, foundation);
     dented = sphere.still.equilibrium(dented).x;
     const double apart = farthest(whole, dented);
     REQUIRE(sphere.still.forces(dented).norm() < 1e-10);
@@ -231,7 +231,7 @@ TEST_CASE("between two equilibria of a dented sphere nothing is certified for th
     for (int i = 0; i <= 200; ++i) {
         const double part = i / 200.0;
         const Points<double> x = (1 - part) * whole + part * dented;
-        const auto error = sphere.sharp.of(x, sphere.network, foundation);
+        const auto error = sphere.sharp.compute(x, sphere.network, foundation);
         CAPTURE(part, static_cast<int>(error.status));
         CHECK((error.certified() || (part > 0 && part < 1)));
         if (!error.certified()) continue;
@@ -259,7 +259,7 @@ TEST_CASE("random crumpled states: where one equilibrium is proven, no start nea
         x = test::jittered(x, std::pow(10, random.number(-6.0, -1.5)), random);
         ++tried;
         ErrorBound<FactoredConvexity> bound(network);
-        const auto error = bound.of(x, network, foundation);
+        const auto error = bound.compute(x, network, foundation);
         if (!error.certified()) continue;
         ++certified;
         const auto rest = still.equilibrium(x);
@@ -303,7 +303,8 @@ TEST_CASE("bounds with pins, loads, several held vertices and anchors that moved
         }
         REQUIRE(report.status == StepStatus::advanced);
         ErrorBound bound(network);
-        const auto error = bound.of(x, network, moved, pin(pinned), load(corners, weights, force), pull(50, target));
+        const auto error =
+            bound.compute(x, network, moved, pin(pinned), load(corners, weights, force), pull(50, target));
         test::StillMembrane still(network, anchors, 1);
         for (const Index v : {pinned[0], pinned[1], 50}) still.fix(v);
         for (int k = 0; k < 3; ++k) still.load(corners[static_cast<std::size_t>(k)], weights[k] * force);
@@ -346,13 +347,13 @@ TEST_CASE("bounds with points of triangles held", "[error_bound]") {
         StepReport<double> report;
         for (int i = 0; i < 5; ++i) report = solver.step(x, 1e-3, network, foundation, one, two);
         ErrorBound<FactoredConvexity> bound(network);
-        const auto error = bound.of(x, network, foundation, one, two);
+        const auto error = bound.compute(x, network, foundation, one, two);
         if (!error.certified()) continue;
         ++certified;
         const auto place = [](const PointAttachment<double>& held) {
-            return test::HeldPlace{{held.corners.begin(), held.corners.end()},
-                                   {held.barycentric[0], held.barycentric[1], held.barycentric[2]},
-                                   held.target};
+            return test::AttachedPoint{{held.corners.begin(), held.corners.end()},
+                                       {held.barycentric[0], held.barycentric[1], held.barycentric[2]},
+                                       held.target};
         };
         const test::SmallMembrane<MassSpringNetwork<double, LinearSpring>> small{.network = network,
                                                                                  .anchors = mesh.positions(),
@@ -381,7 +382,7 @@ TEST_CASE("a membrane of floats", "[error_bound]") {
     StepReport<float> report;
     for (int i = 0; i < 3; ++i) report = solver.step(x, 1e-3F, network, foundation, pull(7, target));
     ErrorBound bound(network);
-    const auto error = bound.of(x, network, foundation, pull(7, target));
+    const auto error = bound.compute(x, network, foundation, pull(7, target));
     REQUIRE(error.certified());
     test::StillMembrane still(network, mesh.positions().cast<double>(), 20);
     still.fix(7);
@@ -397,14 +398,14 @@ TEST_CASE("at rest the bound is a matter of rounding", "[error_bound]") {
     const Sphere sphere(2);
     ErrorBound bound(sphere.network);
     const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = 1.0});
-    const auto error = bound.of(sphere.mesh.positions(), sphere.network, foundation);
+    const auto error = bound.compute(sphere.mesh.positions(), sphere.network, foundation);
     CHECK(error.certified());
     CHECK(error.position < 1e-12);
     CHECK(error.reactions.empty());
     // All that is held is where it is to be, and nothing else can move.
     std::vector<Index> all;
     for (Index v = 0; v < sphere.mesh.vertex_count(); ++v) all.push_back(v);
-    const auto held = bound.of(sphere.mesh.positions(), sphere.network, foundation, pin(all));
+    const auto held = bound.compute(sphere.mesh.positions(), sphere.network, foundation, pin(all));
     CHECK(held.certified());
     CHECK(held.position < 1e-12);
 }
@@ -414,7 +415,7 @@ TEST_CASE("a vertex that is not yet where it is held counts", "[error_bound]") {
     const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = 1.0});
     const Points<double>& x = sphere.mesh.positions();
     const Vector3<double> target = 1.01 * point(x, 5);
-    const auto error = sphere.quick.of(x, sphere.network, foundation, pull(5, target));
+    const auto error = sphere.quick.compute(x, sphere.network, foundation, pull(5, target));
     REQUIRE(error.certified());
     CHECK(error.position >= 0.01);
     CHECK(error.position <= 0.0101);
@@ -425,7 +426,7 @@ TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
     const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = 1.0});
     const Points<double> x = sphere.mesh.positions();
     const auto status = [&](const Points<double>& at, const auto&... constraints) {
-        const auto error = sphere.quick.of(at, sphere.network, foundation, constraints...);
+        const auto error = sphere.quick.compute(at, sphere.network, foundation, constraints...);
         if (!error.certified()) CHECK(error.position == std::numeric_limits<double>::infinity());
         return error.status;
     };
@@ -457,7 +458,7 @@ TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
           BoundStatus::unsupported);
     CHECK(status(x, PointAttachment<double>{}) == BoundStatus::certified);
 
-    const auto free = sphere.quick.of(x, sphere.network, NoFoundation{});
+    const auto free = sphere.quick.compute(x, sphere.network, NoFoundation{});
     CHECK(free.status == BoundStatus::not_convex);  // it may drift
 
     Contact<double> contact;
@@ -468,7 +469,7 @@ TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
     CHECK(status(x, press(Tool<double>{.radius = 0.1}, contact)) == BoundStatus::contact);
 
     ErrorBound hasty(sphere.network, {.cg_iterations = 1});
-    const auto far = hasty.of(x, sphere.network, foundation, pull(3, 1.3 * here));
+    const auto far = hasty.compute(x, sphere.network, foundation, pull(3, 1.3 * here));
     CHECK_FALSE(far.certified());
     CHECK(far.cg_iterations == 1);
     CHECK_THROWS_AS(ErrorBound(sphere.network, {.cg_iterations = 0}), InvalidInput);
@@ -479,13 +480,13 @@ TEST_CASE("a bound remembers nothing, and its copies are their own", "[error_bou
     const VirtualVolumeSprings foundation(sphere.mesh, {.stiffness = 1.0});
     const Points<double> x = sphere.mesh.positions();
     const Vector3<double> target = 1.02 * point(x, 5);
-    const auto first = sphere.quick.of(x, sphere.network, foundation, pull(5, target));
+    const auto first = sphere.quick.compute(x, sphere.network, foundation, pull(5, target));
     ErrorBound copy = sphere.quick;
-    (void)sphere.quick.of(x, sphere.network, foundation, pull(9, 0.9 * point(x, 9)), pin(std::array{1, 2}));
+    (void)sphere.quick.compute(x, sphere.network, foundation, pull(9, 0.9 * point(x, 9)), pin(std::array{1, 2}));
     for (auto* bound : {&copy, &sphere.quick}) {
-        const auto again = bound->of(x, sphere.network, foundation, pull(5, target));
+        const auto again = bound->compute(x, sphere.network, foundation, pull(5, target));
         CHECK(again.position == first.position);
         CHECK(again.reactions.size() == 1);
     }
-    CHECK(copy.of(x, sphere.network, foundation).reactions.data() != first.reactions.data());
+    CHECK(copy.compute(x, sphere.network, foundation).reactions.data() != first.reactions.data());
 }

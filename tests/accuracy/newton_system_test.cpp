@@ -57,7 +57,7 @@ struct Problem {
         system.open(prescribed);
         for (Index i = 0; i < 6; ++i) {
             for (Index j = 0; j <= i; ++j) system.add(i, j, H.block<3, 3>(3 * i, 3 * j));
-            system.push(i, F.segment<3>(3 * i));
+            system.add_force(i, F.segment<3>(3 * i));
         }
         for (const auto& row : rows) system.add(row);
         return system.solve(1);
@@ -134,9 +134,9 @@ TEST_CASE("a system that has nothing, or nothing free, has no step", "[newton_sy
     const Points<double> prescribed = Points<double>::Ones(3, 3);
     held.open(prescribed);
     held.add({{0, 1, 2}, {Vector3<double>(1, 0, 0), Vector3<double>(1, 0, 0), Vector3<double>(0, 0, 0)}, -1, false});
-    const auto answer = held.solve(1);
-    CHECK(answer.step == prescribed);
-    CHECK(answer.multipliers.isZero(0));
+    const auto result = held.solve(1);
+    CHECK(result.step == prescribed);
+    CHECK(result.multipliers.isZero(0));
 }
 
 TEST_CASE("rows that say the same share their multiplier", "[newton_system]") {
@@ -145,10 +145,10 @@ TEST_CASE("rows that say the same share their multiplier", "[newton_system]") {
     system.add(0, 0, 2 * Eigen::Matrix3d::Identity());
     const Vector3<double> up(0, 0, 1), none(0, 0, 0);
     for (int i = 0; i < 3; ++i) system.add({{0, 1, 2}, {up, none, none}, -0.5, false});
-    const auto answer = system.solve(2);
-    CHECK((answer.step.col(0) - Vector3<double>(0, 0, 0.5)).norm() < 1e-14);
-    CHECK(answer.multipliers.minCoeff() >= 0);
-    CHECK(answer.multipliers.sum() == Approx(1));
+    const auto result = system.solve(2);
+    CHECK((result.step.col(0) - Vector3<double>(0, 0, 0.5)).norm() < 1e-14);
+    CHECK(result.multipliers.minCoeff() >= 0);
+    CHECK(result.multipliers.sum() == Approx(1));
 }
 
 TEST_CASE("multipliers of random quadratic problems", "[newton_system]") {

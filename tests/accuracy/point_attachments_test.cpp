@@ -14,7 +14,7 @@ namespace {
 
 ConstraintTerm hold(const std::array<Index, 3>& corners, const Vector3<double>& weights,
                     const Vector3<double>& target) {
-    return ConstraintTerm::hold(corners, weights, target);
+    return ConstraintTerm::prescribe(corners, weights, target);
 }
 
 double off(const ConstraintTerm& place, const Points<double>& y) {
@@ -36,13 +36,13 @@ TEST_CASE("held points are put in their places, and what is projected leaves the
         CHECK(places.add(two));
         Points<double> y = test::jittered<double>(Points<double>::Zero(3, 9), 1, random);
         const double before = std::hypot(off(one, y) / one.weights.norm(), off(two, y) / two.weights.norm());
-        CHECK(places.slip(y) >= before);
-        CHECK(places.slip(y) <= before * (1 + 1e-6));
+        CHECK(places.violation(y) >= before);
+        CHECK(places.violation(y) <= before * (1 + 1e-6));
         const Points<double> start = y;
         places.project_positions(y);
-        CHECK((y - start).norm() == Approx(before));  // by the shortest way
+        CHECK((y - start).norm() == Approx(before));  // by the shortest displacement
         CHECK(off(one, y) + off(two, y) < 1e-14);
-        CHECK(places.slip(y) < 1e-13);
+        CHECK(places.violation(y) < 1e-13);
         Points<double> f = test::jittered<double>(Points<double>::Zero(3, 9), 1, random);
         const Points<double> whole = f;
         places.project(f);
@@ -70,7 +70,7 @@ TEST_CASE("places are independent where no corner that counts is held twice", "[
     CHECK_FALSE(independent({hold({0, 1, 1}, inside, target)}, 6));
 }
 
-TEST_CASE("there is room for as many places as a step has constraints", "[point_attachments]") {
+TEST_CASE("there is capacity for as many points as a step has constraints", "[point_attachments]") {
     PointAttachments places;
     for (Index i = 0; i < 16; ++i) CHECK(places.add(hold({3 * i, 3 * i + 1, 3 * i + 2}, {1, 0, 0}, {0, 0, 0})));
     CHECK_FALSE(places.add(hold({90, 91, 92}, {1, 0, 0}, {0, 0, 0})));

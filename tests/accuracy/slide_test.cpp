@@ -22,7 +22,7 @@ namespace {
 constexpr double ball = 0.01, tip = 1e-3, speed = 0.05;  // radii [m], of the tool [m/s]
 constexpr double stiffness = 100, damping = 0.5;         // of what is felt [N/m], [N s/m]
 
-/// A great circle from one vertex over another, at one height: faces, edges and vertices are all on the way.
+/// A great circle from one vertex over another, at one height: faces, edges and vertices all lie on the path.
 struct Path {
     Vector3<double> from, across;
     double height;         // of the tool's centre over the ball's [m]
@@ -68,7 +68,7 @@ struct Felt {
         outward /= ticks;
         along /= ticks;
     }
-    /// By how much the force is behind the way out of the ball, which turns evenly [s].
+    /// By how much the force lags behind the outward direction of the ball, which turns evenly [s].
     [[nodiscard]] double delay(const Path& path) const { return std::atan2(along, outward) / -path.turn(); }
 
   private:
@@ -83,7 +83,7 @@ struct Slide {
     bool as_asked = true;                            // in contact, and no limit has acted
 };
 
-/// Of what lies on the way.
+/// The edges and vertices on the path.
 class Crossings {
   public:
     void take(const Contact<double>& contact, const TriangleMesh<double>& mesh,

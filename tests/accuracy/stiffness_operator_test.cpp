@@ -27,8 +27,8 @@ struct Scene {
         : foundation(mesh, {.stiffness = volume}), x(test::jittered(mesh.positions(), amplitude, random)) {}
 
     template <class... Constraints>
-    void take(const Constraints&... constraints) {
-        REQUIRE(problem.take(x, network, foundation, constraints...) == ProblemStatus::valid);
+    void assign(const Constraints&... constraints) {
+        REQUIRE(problem.assign(x, network, foundation, constraints...) == ProblemStatus::valid);
         stiffness.at(problem, x);
     }
     Points<double> forces_at(const Points<double>& y) const {
@@ -41,12 +41,12 @@ struct Scene {
 
 }  // namespace
 
-TEST_CASE("stiffness times a way is how the forces change", "[linearised]") {
+TEST_CASE("stiffness times a displacement is the change of the forces", "[stiffness_operator]") {
     for (int seed = 1; seed <= cases(20); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
         Scene scene(random, 0.5, 0.2);
-        scene.take();
+        scene.assign();
         const Points<double> displacement = test::jittered<double>(Points<double>::Zero(3, 42), 1, random);
         const double h = 1e-5;
         const Points<double> expected =
@@ -58,13 +58,13 @@ TEST_CASE("stiffness times a way is how the forces change", "[linearised]") {
     }
 }
 
-TEST_CASE("conjugate gradients find the way that balances a force", "[linearised]") {
+TEST_CASE("conjugate gradients find the displacement that balances a force", "[stiffness_operator]") {
     for (int seed = 1; seed <= cases(40); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
         Scene scene(random, random.number(0.5, 3.0), 0.02);
         const PointAttachment<double> held{0, {0, 12, 14}, random.barycentric(), random.vector<double>()};
-        scene.take(held, pin(std::array{5, 6}));
+        scene.assign(held, pin(std::array{5, 6}));
         const Points<double> force = test::jittered<double>(Points<double>::Zero(3, 42), 1, random);
         Points<double> used = force, displacement = Points<double>::Zero(3, 42);
         const auto report =
@@ -72,9 +72,9 @@ TEST_CASE("conjugate gradients find the way that balances a force", "[linearised
         CHECK(report.convex);
         CHECK(report.converged);
         CHECK(report.iterations < 100);
-        Points<double> answer = displacement;
-        scene.stiffness.multiply(scene.problem, displacement, answer);
-        Points<double> left = force - answer, projected = displacement, whole = force;
+        Points<double> response = displacement;
+        scene.stiffness.multiply(scene.problem, displacement, response);
+        Points<double> left = force - response, projected = displacement, whole = force;
         scene.problem.project(left);
         scene.problem.project(projected);
         scene.problem.project(whole);
@@ -85,11 +85,11 @@ TEST_CASE("conjugate gradients find the way that balances a force", "[linearised
     }
 }
 
-TEST_CASE("a direction in which the energy does not grow is seen", "[linearised]") {
+TEST_CASE("a direction in which the energy does not grow is seen", "[stiffness_operator]") {
     test::Random random(1);
     Scene scene(random, 0.1, 0);
     scene.x *= 0.5;  // all springs are pressed together
-    scene.take();
+    scene.assign();
     Points<double> force = test::jittered<double>(Points<double>::Zero(3, 42), 1, random), displacement = 0 * force;
     const auto report =
         scene.stiffness.solve(scene.problem, force, displacement, {.tolerance = 1e-10, .iterations = 200});

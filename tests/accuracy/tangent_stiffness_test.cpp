@@ -67,8 +67,8 @@ TEST_CASE("the slope of a held vertex's reaction, all vertices free or some", "[
         const auto expected = by_differences(2e-8, [&](const Vector3<double>& displacement) {
             return Vector3<double>(still.forces(rest_at(target + displacement)).col(held));
         });
-        const auto found = all ? tangent.of(x, network, foundation, pull(held, target))
-                               : tangent.of(queue.vertices(), x, network, foundation, pull(held, target));
+        const auto found = all ? tangent.compute(x, network, foundation, pull(held, target))
+                               : tangent.compute(queue.vertices(), x, network, foundation, pull(held, target));
         REQUIRE(found.status == TangentStatus::found);
         CHECK((dense(found.stiffness) - expected).norm() < 1e-6 * expected.norm());
     }
@@ -89,7 +89,7 @@ TEST_CASE("the slope of a solver's reaction, over the vertices of its queue", "[
     const auto expected =
         by_differences(1e-6, [&](const Vector3<double>& displacement) { return reaction_at(target + displacement); });
     (void)reaction_at(target);
-    const auto found = tangent.of(solver.queue().vertices(), x, network, foundation, pull(7, target));
+    const auto found = tangent.compute(solver.queue().vertices(), x, network, foundation, pull(7, target));
     REQUIRE(found.status == TangentStatus::found);
     CHECK((dense(found.stiffness) - expected).norm() < 1e-5 * expected.norm());
 }
@@ -117,7 +117,7 @@ TEST_CASE("the slope of the reaction of a held point, and of pins", "[tangent_st
         const auto expected = by_differences(1e-4, [&](const Vector3<double>& displacement) {
             return Vector3<double>(-rest_at(held.target + displacement).holding[0]);
         });
-        const auto found = tangent.of(rest_at(held.target).x, network, foundation, held);
+        const auto found = tangent.compute(rest_at(held.target).x, network, foundation, held);
         REQUIRE(found.status == TangentStatus::found);
         CHECK((dense(found.stiffness) - expected).norm() < 1e-6 * expected.norm());
     }
@@ -130,7 +130,7 @@ TEST_CASE("the slope of the reaction of a held point, and of pins", "[tangent_st
         const Points<double> forces = still.forces(still.equilibrium(x).x);
         return Vector3<double>(forces.col(1) + forces.col(4));
     });
-    const auto found = tangent.of(mesh.positions(), network, foundation, pin(pins));
+    const auto found = tangent.compute(mesh.positions(), network, foundation, pin(pins));
     CHECK((dense(found.stiffness) - expected).norm() < 1e-6 * expected.norm());
 }
 
@@ -141,26 +141,28 @@ TEST_CASE("what has no slope is said, and why", "[tangent_stiffness]") {
     TangentStiffness tangent(network);
     const Points<double>& x = mesh.positions();
     const auto held = pull(7, point(x, 7));
-    CHECK(tangent.of(x, network, foundation, held).status == TangentStatus::found);
-    CHECK(tangent.of(0.5 * x, network, foundation, pull(7, 0.5 * point(x, 7))).status == TangentStatus::not_stable);
-    CHECK(tangent.of(std::numeric_limits<double>::infinity() * x, network, foundation, held).status ==
+    CHECK(tangent.compute(x, network, foundation, held).status == TangentStatus::found);
+    CHECK(tangent.compute(0.5 * x, network, foundation, pull(7, 0.5 * point(x, 7))).status ==
+          TangentStatus::not_stable);
+    CHECK(tangent.compute(std::numeric_limits<double>::infinity() * x, network, foundation, held).status ==
           TangentStatus::invalid_input);
-    CHECK(tangent.of(std::array<Index, 2>{1, 42}, x, network, foundation, held).status == TangentStatus::invalid_input);
-    CHECK(tangent.of(x, network, foundation, pull(42, point(x, 7))).status == TangentStatus::invalid_input);
+    CHECK(tangent.compute(std::array<Index, 2>{1, 42}, x, network, foundation, held).status ==
+          TangentStatus::invalid_input);
+    CHECK(tangent.compute(x, network, foundation, pull(42, point(x, 7))).status == TangentStatus::invalid_input);
     CHECK(tangent
-              .of(x, network, foundation, PointAttachment<double>{0, {0, 12, 14}, {0.5, 0.5, 0}, point(x, 0)},
-                  pin(std::array{12}))
+              .compute(x, network, foundation, PointAttachment<double>{0, {0, 12, 14}, {0.5, 0.5, 0}, point(x, 0)},
+                       pin(std::array{12}))
               .status == TangentStatus::unsupported);
-    const auto loaded = tangent.of(x, network, foundation, load({0, 1, 2}, Vector3<double>(1, 0, 0), point(x, 7)));
+    const auto loaded = tangent.compute(x, network, foundation, load({0, 1, 2}, Vector3<double>(1, 0, 0), point(x, 7)));
     CHECK(loaded.status == TangentStatus::found);
     CHECK(dense(loaded.stiffness).isZero(0));
     TangentStiffness hasty(network, {.iterations = 1});
-    CHECK(hasty.of(x, network, foundation, held).status == TangentStatus::not_converged);
+    CHECK(hasty.compute(x, network, foundation, held).status == TangentStatus::not_converged);
     CHECK_THROWS_AS(TangentStiffness(network, {.tolerance = 0}), InvalidInput);
     CHECK_THROWS_AS(TangentStiffness(network, {.iterations = 0}), InvalidInput);
     TangentStiffness copy = tangent;
-    CHECK(dense(copy.of(x, network, foundation, held).stiffness) ==
-          dense(tangent.of(x, network, foundation, held).stiffness));
+    CHECK(dense(copy.compute(x, network, foundation, held).stiffness) ==
+          dense(tangent.compute(x, network, foundation, held).stiffness));
 }
 
 TEST_CASE("with nothing else free the slope is the vertex's own stiffness", "[tangent_stiffness]") {
@@ -168,8 +170,8 @@ TEST_CASE("with nothing else free the slope is the vertex's own stiffness", "[ta
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0F});
     const VirtualVolumeSprings foundation(mesh, {.stiffness = 0.5F});
     TangentStiffness tangent(network);
-    const auto found = tangent.of(std::span<const Index>(), mesh.positions(), network, foundation,
-                                  pull(7, point(mesh.positions(), 7)));
+    const auto found = tangent.compute(std::span<const Index>(), mesh.positions(), network, foundation,
+                                       pull(7, point(mesh.positions(), 7)));
     REQUIRE(found.status == TangentStatus::found);
     Eigen::Matrix3d expected = 0.5 * Eigen::Matrix3d::Identity();
     for (const auto& end : network.springs_of(7)) {

@@ -1,6 +1,5 @@
-// SPDX-License-Identifier: MIT
-// A disc under tension on an elastic foundation, clamped at its rim, against the closed form: T w'' + T w' / r - c w + p = 0
-// is solved by Bessel functions of r / L, L = sqrt(T / c).
+// SPDX-License-Identifier: MIT A disc under tension on an elastic foundation, clamped at its rim, against the closed
+// form: T w'' + T w' / r - c w + p = 0 is solved by Bessel functions of r / L, L = sqrt(T / c).
 #include <cmath>
 #include <numbers>
 
@@ -16,7 +15,7 @@
 #include "support/catch.hpp"
 #include "support/meshes.hpp"
 #include "support/random.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -55,7 +54,7 @@ struct Disc {
     /// How far the disc goes down under these loads at its vertices, 3 x V [N].
     Eigen::VectorXd depth_under(const Points<double>& loads) const {
         using Loads = Elements<double, DeadLoad<double>>;
-        std::vector<Loads::Placed> all;
+        std::vector<Loads::Instance> all;
         for (Index v = 0; v < mesh.vertex_count(); ++v) all.push_back({{v}, {loads.col(v)}});
         const auto tissue = Tissue(springs, stretched, Loads(mesh, all));
         const auto rest = equilibrium(mesh.positions(), mesh, tissue, foundation, {});

@@ -46,13 +46,13 @@ struct Scene {
         for (int t = 0; t < 12; ++t) go(6e-4, -9e-4 + 1e-4 * t, true);
         for (int t = 0; t < 4; ++t) go(6e-4, 1e-3 + 1e-3 * t);
     }
-    Stroke<Scalar> stroke() const { return {mesh, tools, Scalar(dt)}; }
+    ToolTrajectory<Scalar> stroke() const { return {mesh, tools, Scalar(dt)}; }
     Index ticks() const { return static_cast<Index>(tools.size()); }
 
     template <class History, class Rule = BlockStep, class Clock = SteadySeconds>
-    Outcome play(const History& history, std::span<const ReferenceTick> references,
-                 const SolverOptions<Scalar>& options = {}, const Rule& rule = {}, const Clock& clock = {}) const {
-        return trial(mesh, network, foundation, history, references, options, rule, clock);
+    TrialResult play(const History& history, std::span<const ReferenceTick> references,
+                     const SolverOptions<Scalar>& options = {}, const Rule& rule = {}, const Clock& clock = {}) const {
+        return run_trial(mesh, network, foundation, history, references, options, rule, clock);
     }
 };
 
@@ -192,7 +192,7 @@ TEST_CASE("floats are set against the same equilibria") {
     CHECK(outcome.force_error > 0);
 }
 
-TEST_CASE("a history of one's own is played, and what loads and pins answer with does not count") {
+TEST_CASE("a history of one's own is played, and reactions of loads and pins do not count") {
     const Scene<double> scene;
     const Pinch pinch;
     const auto references = equilibria(scene.mesh, scene.network, scene.foundation, pinch);
@@ -213,7 +213,7 @@ TEST_CASE("a history of one's own is played, and what loads and pins answer with
     CHECK(unfelt.position_error > 0);
 }
 
-TEST_CASE("the time is that of the ticks in which a force is felt, by the clock handed in") {
+TEST_CASE("the time is that of the ticks in which a force is felt, by the given clock") {
     struct OneSecondEach {
         double* now;
         double operator()() const { return *now += 1; }
@@ -231,7 +231,7 @@ TEST_CASE("a step that is refused ends the trial") {
     const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), 10);
     CHECK(scene.play(scene.stroke(), references, {}, MassStep{}).advanced);
     const MassSpringNetwork light(scene.mesh, LinearSpring{}, {.stiffness = 40.0, .mass = 1e-7});
-    const auto outcome = trial(scene.mesh, light, scene.foundation, scene.stroke(), references, {}, MassStep{});
+    const auto outcome = run_trial(scene.mesh, light, scene.foundation, scene.stroke(), references, {}, MassStep{});
     CHECK_FALSE(outcome.advanced);
     CHECK(outcome.force_error == std::numeric_limits<double>::infinity());
     CHECK(outcome.time == std::numeric_limits<double>::infinity());
@@ -240,34 +240,36 @@ TEST_CASE("a step that is refused ends the trial") {
 TEST_CASE("a stroke or a trial that makes no sense is refused") {
     const Scene<double> scene;
     const std::vector<Tool<double>> one{{.position = {0, 0, 1}, .radius = 1e-3}};
-    CHECK(refusal([&] { Stroke(scene.mesh, {}, dt); }) == "Stroke: the history must have a tick, got 0");
-    CHECK(refusal([&] { Stroke(scene.mesh, one, 0); }) ==
-          "Stroke: dt of the history must be finite and positive [s], got 0");
+    CHECK(refusal([&] { ToolTrajectory(scene.mesh, {}, dt); }) ==
+          "ToolTrajectory: the history must have a tick, got 0");
+    CHECK(refusal([&] { ToolTrajectory(scene.mesh, one, 0); }) ==
+          "ToolTrajectory: dt of the history must be finite and positive [s], got 0");
     auto tools = scene.tools;
     tools[7].radius = -1;
-    CHECK(refusal([&] { Stroke(scene.mesh, tools, dt); }) ==
-          "Stroke: the tool of tick 7 must be finite, its radius not negative, got one that is not");
+    CHECK(refusal([&] { ToolTrajectory(scene.mesh, tools, dt); }) ==
+          "ToolTrajectory: the tool of tick 7 must be finite, its radius not negative, got one that is not");
 
-    const auto rests_of = [&](const auto& history, Index tick_stride = 1) {
+    const auto references_of = [&](const auto& history, Index tick_stride = 1) {
         return equilibria(scene.mesh, scene.network, scene.foundation, history, tick_stride);
     };
-    CHECK(refusal([&] { (void)rests_of(Odd{.count = 0}); }) == "equilibria: the history must have a tick, got 0");
-    CHECK(refusal([&] { (void)rests_of(Odd{.step = -1}); }) ==
+    CHECK(refusal([&] { (void)references_of(Odd{.count = 0}); }) == "equilibria: the history must have a tick, got 0");
+    CHECK(refusal([&] { (void)references_of(Odd{.step = -1}); }) ==
           "equilibria: dt of the history must be finite and positive [s], got -1");
-    CHECK(refusal([&] { (void)rests_of(Odd{}, 0); }) == "equilibria: tick_stride must be at least 1, got 0");
+    CHECK(refusal([&] { (void)references_of(Odd{}, 0); }) == "equilibria: tick_stride must be at least 1, got 0");
 
-    auto references = rests_of(Pinch{}, 5);
-    const std::string others = "trial: references must be of ticks of the history, one at least, in order, got others";
+    auto references = references_of(Pinch{}, 5);
+    const std::string others =
+        "run_trial: references must be of ticks of the history, one at least, in order, got others";
     CHECK(refusal([&] { (void)scene.play(Pinch{}, {}); }) == others);
     CHECK(refusal([&] { (void)scene.play(Pinch{.last = 12}, references); }) == others);
     CHECK(refusal([&] { (void)scene.play(Odd{.count = 0}, references); }) ==
-          "trial: the history must have a tick, got 0");
+          "run_trial: the history must have a tick, got 0");
     CHECK(refusal([&] { (void)scene.play(Pinch{}, references, {.sweeps = 0}); }) ==
           "QuasiStaticSolver: sweeps must be at least 1, got 0");
     references[1].reactions.pop_back();
     CHECK(refusal([&] { (void)scene.play(Pinch{}, references); }) ==
-          "trial: the reference of tick 9 must have 162 vertices and 3 reactions, got 162 and 2");
-    references = rests_of(Pinch{}, 5);
+          "run_trial: the reference of tick 9 must have 162 vertices and 3 reactions, got 162 and 2");
+    references = references_of(Pinch{}, 5);
     std::swap(references[0], references[1]);
     CHECK(refusal([&] { (void)scene.play(Pinch{}, references); }) == others);
 }

@@ -237,7 +237,7 @@ TEST_CASE("Stiffening is identifiable from deep presses and not from shallow one
         const auto exact = fit(table_of(stiffening, truth, depths(15, 1e-4)), start, stiffening);
         CHECK((exact.identifiable[0] && !exact.identifiable[1]));
     }
-    CHECK(identified <= tables / 20);  // noise that looks like stiffening: the intervals may miss as often
+    CHECK(identified <= tables / 20);  // noise that resembles stiffening: the intervals may miss as often
 }
 
 TEST_CASE("A constant without effect keeps its start value and is not identifiable") {
@@ -308,7 +308,7 @@ TEST_CASE("A fit gets by with a model that has no forces in places, and says so 
     CHECK(nowhere.evaluations == calls);
 }
 
-TEST_CASE("A fit that was stopped early tells nothing") {
+TEST_CASE("A fit that was stopped early determines no constant") {
     const auto found = fit(table_of(stiffening, {20, 0.5}, depths(12)), {2, 5}, stiffening, {.max_iterations = 1});
     CHECK_FALSE(found.converged);
     CHECK(found.identifiable == std::vector<bool>{false, false});

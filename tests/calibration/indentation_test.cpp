@@ -76,7 +76,7 @@ double distance_to(const TriangleMesh<double>& mesh, const Tool<double>& tool) {
 
 }  // namespace
 
-TEST_CASE("Depth begins where the tool on its way first touches") {
+TEST_CASE("Depth begins where the moving tool first touches") {
     Random random(1);
     const auto mesh = sphere(1);
     for (int i = 0; i < cases(40); ++i) {
@@ -182,7 +182,7 @@ class ByRatio {
   public:
     template <class Model>
     ByRatio(const Model& model, const std::vector<double>& at) {
-        for (int i = 0; i < count; ++i) per_backing_.push_back(model(std::vector{std::exp(node(i)), 1.0}, at));
+        for (int i = 0; i < count; ++i) per_foundation_.push_back(model(std::vector{std::exp(node(i)), 1.0}, at));
     }
 
     std::vector<double> operator()(Numbers c, Numbers at) const {
@@ -196,7 +196,7 @@ class ByRatio {
             const double weight = (i % 2 == 0 ? 1 : -1) * std::sin(angle) / (x - node(i));
             sum += weight;
             for (std::size_t d = 0; d < at.size(); ++d) {
-                weighted[d] += weight * c[1] * per_backing_[static_cast<std::size_t>(i)][d];
+                weighted[d] += weight * c[1] * per_foundation_[static_cast<std::size_t>(i)][d];
             }
         }
         for (std::size_t d = 0; d < at.size(); ++d) forces[d] = weighted[d] / sum;
@@ -209,7 +209,7 @@ class ByRatio {
     static double node(int i) {
         return (low + high) / 2 + (high - low) / 2 * std::cos(std::numbers::pi * (i + 0.5) / count);
     }
-    std::vector<std::vector<double>> per_backing_;
+    std::vector<std::vector<double>> per_foundation_;
 };
 
 }  // namespace

@@ -73,8 +73,8 @@ membrane::VertexState<S> bare_state(const SceneOf<membrane::NoFoundation>& scene
     state.stiffness += constraints.stiffness;
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : S(0);
     state.dt = scene.dt;
-    state.touched = scene.state.seeds.contains(v);
-    if (state.touched) {
+    state.constrained = scene.state.seeds.contains(v);
+    if (state.constrained) {
         state.contact_stiffness = scene.state.contact_stiffness(v);
         state.contact_normal = membrane::direction_or_zero(scene.state.constraint_force(v));
     }

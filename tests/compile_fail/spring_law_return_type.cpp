@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A law that answers with the tension alone.
+// A law that returns the tension alone.
 // expect: SpringLaw<.*Cubic
 // expect: (return-type-requirement|type constraint)
 #include <membrane/model/mass_spring_network.hpp>

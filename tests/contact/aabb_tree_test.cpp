@@ -54,7 +54,7 @@ struct Scene {
     }
     Triangle<S> triangle(Index f) const { return triangle_at(x, mesh.triangles().col(f)); }
 
-    /// Pushes a few vertices, or all, and follows in one of the ways that there are.
+    /// Pushes a few vertices, or all, and refits in one of the possible forms.
     void deform(Random& random) {
         const bool all = random.chance(0.2);
         moved.clear();
@@ -98,7 +98,7 @@ bool same_boxes(const AabbTree<S>& a, const AabbTree<S>& b) {
     return a.statistics().nodes == b.statistics().nodes;
 }
 
-/// What a query visits, ascending, each once.
+/// The triangles a query reports, ascending, each once.
 template <class Query>
 std::vector<Index> visited(Query query) {
     std::vector<Index> found;
@@ -244,7 +244,7 @@ TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tr
                                                   [&](const auto& t) { return test::meet(t, exact(from), exact(to)); });
             if ((hit.triangle == no_index) != all.empty()) FAIL_CHECK(all.size() << " are hit");
             if (hit.triangle == no_index || all.empty()) {
-                CHECK((hit.along == 1 || hit.triangle != no_index));
+                CHECK((hit.fraction == 1 || hit.triangle != no_index));
                 continue;
             }
             ++hits;
@@ -258,8 +258,9 @@ TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tr
             const Vector3<S> segment = to - from, normal = area_vector(triangle);
             const S slope = std::abs(dot(segment, normal)) / (norm(segment) * norm(normal));
             const S slack = 256 * std::numeric_limits<S>::epsilon() * scene.scale(from) / slope;
-            if (!(std::abs(hit.along - first) * norm(segment) <= slack)) FAIL_CHECK(hit.along << ", not " << first);
-            CHECK(norm<S>(point_at(triangle, hit.barycentric) - (from + hit.along * segment)) <= slack);
+            if (!(std::abs(hit.fraction - first) * norm(segment) <= slack))
+                FAIL_CHECK(hit.fraction << ", not " << first);
+            CHECK(norm<S>(point_at(triangle, hit.barycentric) - (from + hit.fraction * segment)) <= slack);
         }
     }
     CHECK(hits > cases(5000));
@@ -282,7 +283,7 @@ TEMPLATE_TEST_CASE("what touches only just, touches", "[tree]", float, double) {
         REQUIRE(six.size() == 6);
         const auto hit = tree.first_hit(x, above, below);
         CHECK(hit.triangle == six.front());
-        CHECK(hit.along == S(0.75));
+        CHECK(hit.fraction == S(0.75));
         CHECK(hit.barycentric.maxCoeff() == 1);
         CHECK(tree.first_hit(x, above, corner).triangle == six.front());
         CHECK(tree.first_hit(x, corner, above).triangle == six.front());
@@ -299,8 +300,8 @@ TEMPLATE_TEST_CASE("what touches only just, touches", "[tree]", float, double) {
 
         // In the plane: from outside it enters at the border, from inside it hits at once.
         const auto border = tree.first_hit(x, Vector3<S>(-8, S(0.5), 0), Vector3<S>(8, S(0.5), 0));
-        CHECK(border.along == Approx(0.25));
-        CHECK(tree.first_hit(x, Vector3<S>(S(0.3), S(0.1), 0), Vector3<S>(8, 0, 0)).along == 0);
+        CHECK(border.fraction == Approx(0.25));
+        CHECK(tree.first_hit(x, Vector3<S>(S(0.3), S(0.1), 0), Vector3<S>(8, 0, 0)).fraction == 0);
         CHECK(tree.first_hit(x, Vector3<S>(5, 5, 0), Vector3<S>(5, -5, 0)).triangle == no_index);
         CHECK(tree.closest_point(x, corner).squared_distance == 0);
         CHECK(tree.closest_point(x, above).squared_distance == 9);
@@ -341,7 +342,7 @@ TEMPLATE_TEST_CASE("a refit of what moved gives the bits of a refit of all", "[t
     }
 }
 
-TEST_CASE("a refit fits what it is told of, and nothing else", "[tree]") {
+TEST_CASE("a refit fits the vertices it is given, and nothing else", "[tree]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
     const AabbTree<double> before(mesh, {.balance_threshold = 4});
     auto tree = before;
@@ -357,7 +358,7 @@ TEST_CASE("a refit fits what it is told of, and nothing else", "[tree]") {
     CHECK(tree.box(0).high == x.rowwise().maxCoeff());
 }
 
-TEST_CASE("copies answer alike, and go their own ways", "[tree]") {
+TEST_CASE("copies give equal results, and are independent", "[tree]") {
     auto mesh = std::make_unique<TriangleMesh<double>>(icosphere({.radius = 1, .subdivisions = 2}));
     auto x = mesh->positions();
     auto original = std::make_unique<AabbTree<double>>(*mesh);
@@ -373,16 +374,16 @@ TEST_CASE("copies answer alike, and go their own ways", "[tree]") {
     CHECK(same_boxes(copy, *original));
     const auto queries = [&](const AabbTree<double>& tree) {
         Random same(7);
-        std::vector<double> answers;
+        std::vector<double> results;
         for (int i = 0; i < 100; ++i) {
             const auto q = same.vector<double>(-2, 2), p = same.vector<double>(-2, 2);
             const auto nearest = tree.closest_point(moved_x, q);
             const auto hit = tree.first_hit(moved_x, q, p);
-            answers.insert(answers.end(),
+            results.insert(results.end(),
                            {nearest.squared_distance, double(nearest.triangle), double(nearest.nodes_visited),
-                            hit.along, double(hit.triangle), double(hit.nodes_visited)});
+                            hit.fraction, double(hit.triangle), double(hit.nodes_visited)});
         }
-        return answers;
+        return results;
     };
     const auto expected = queries(*original);
     const auto elsewhere = std::move(*original);
@@ -404,7 +405,7 @@ TEMPLATE_TEST_CASE("an engine's buffer is searched in place", "[tree]", float, d
     CHECK(same_boxes(tree, same));
     const Vector3<S> q(S(0.3), S(1.2), S(-0.4));
     CHECK(tree.closest_point(x, q).point == same.closest_point(mesh.positions(), q).point);
-    CHECK(tree.first_hit(x, q, -q).along == same.first_hit(mesh.positions(), q, -q).along);
+    CHECK(tree.first_hit(x, q, -q).fraction == same.first_hit(mesh.positions(), q, -q).fraction);
 }
 
 TEST_CASE("each box holds those below it, the first the surface", "[tree]") {
@@ -418,7 +419,7 @@ TEST_CASE("each box holds those below it, the first the surface", "[tree]") {
         CHECK(tree.statistics().largest_leaf == expected.largest_leaf);
         for (Index i = 0; i < expected.nodes; ++i) {
             const auto& node = shape.nodes[static_cast<std::size_t>(i)];
-            Box<double> around;
+            Aabb<double> around;
             for (Index k = 0; k < node.count; ++k) {
                 const Index f = shape.triangles[static_cast<std::size_t>(node.first + k)];
                 around.include(bounds(triangle_at(mesh.positions(), mesh.triangles().col(f))));
@@ -482,7 +483,7 @@ TEST_CASE("distances and intersections are those of CGAL's tree", "[tree][cgal]"
     CHECK(hits > cases(1000));
 }
 
-TEST_CASE("a tree as deep as can be gives the same answers", "[tree]") {
+TEST_CASE("a tree as deep as can be gives the same results", "[tree]") {
     Points<double> x(3, 3 * 120);
     Triangles triangles(3, 120);
     for (Index f = 0; f < 120; ++f) {  // each half as large and half as far as the one before
@@ -532,7 +533,7 @@ TEST_CASE("a single triangle is a tree", "[tree]") {
     CHECK(tree.statistics().nodes == 1);
     CHECK(tree.closest_point(mesh.positions(), {1, 1, 1}).squared_distance == Approx(4.0 / 3));
     CHECK(tree.closest_point(mesh.positions(), {1, 1, 1}).nodes_visited == 2);  // around the surface, and the leaf
-    CHECK(tree.first_hit(mesh.positions(), {0, 0, 0}, {1, 1, 1}).along == Approx(1.0 / 3));
+    CHECK(tree.first_hit(mesh.positions(), {0, 0, 0}, {1, 1, 1}).fraction == Approx(1.0 / 3));
 }
 
 TEST_CASE("a threshold below 1 is refused by name", "[tree][bad]") {
@@ -565,7 +566,7 @@ TEMPLATE_TEST_CASE("a query that makes no sense finds nothing", "[tree][bad]", f
             CHECK(is_finite(nearest.point));
             for (const auto& hit : {tree.first_hit(x, q, good), tree.first_hit(x, good, q)}) {
                 CHECK(hit.triangle == no_index);
-                CHECK(hit.along == 1);
+                CHECK(hit.fraction == 1);
                 CHECK(hit.nodes_visited == 0);
             }
             CHECK(nothing([&](auto visit) { return tree.overlap_sphere(x, q, S(9), visit); }));

@@ -88,7 +88,7 @@ TEST_CASE("the tracker agrees with a search of the whole surface along random tr
         double height = random.number(0.5, 1.5);
         for (int tick = 0; tick < 20; ++tick) {
             over = (over + 0.1 * edge * displacement).normalized();
-            const Vector foot = 3 * over * (1 - tree.first_hit(x, 3 * over, Vector::Zero()).along);
+            const Vector foot = 3 * over * (1 - tree.first_hit(x, 3 * over, Vector::Zero()).fraction);
             height = std::clamp(height + random.number(-0.05, 0.05) * edge / tool.radius, 0.4, 1.6);
             tool.position = foot + height * tool.radius * over;
             const auto contact = tracker.update(tree, x, tool);
@@ -135,7 +135,7 @@ class Stroked {
         for (const Vector& place : places) {
             const Tool<double> tool{.position = place, .radius = radius};
             const auto contact = tracker.update(tree_, x, tool);
-            const auto report = solver.step(x, 1e-3, network_, backing_, press(tool, contact));
+            const auto report = solver.step(x, 1e-3, network_, foundation_, press(tool, contact));
             if (report.status != membrane::StepStatus::advanced) return false;
             tree_.refit(x, report.moved);
             if (!contact.touching()) continue;
@@ -150,14 +150,14 @@ class Stroked {
   private:
     TriangleMesh<double> mesh_;
     membrane::MassSpringNetwork<double, membrane::LinearSpring> network_{mesh_, {}, {.stiffness = 1.0}};
-    membrane::VirtualVolumeSprings<double> backing_{mesh_, {.stiffness = 0.3}};
+    membrane::VirtualVolumeSprings<double> foundation_{mesh_, {.stiffness = 0.3}};
     membrane::QuasiStaticSolver<double> fresh_solver_{network_, {.layers = 4, .sweeps = 4}};
     ContactTracker<double> fresh_tracker_{mesh_};
     AabbTree<double> tree_{mesh_};
 };
 
 /// From place to place, a tick for each `speed`, and two ticks at the end.
-std::vector<Vector> way_through(const std::vector<Vector>& places, double speed) {
+std::vector<Vector> path_through(const std::vector<Vector>& places, double speed) {
     std::vector<Vector> displacement{places.front()};
     for (std::size_t i = 1; i < places.size(); ++i) {
         const int ticks = std::min(20, static_cast<int>(std::ceil((places[i] - places[i - 1]).norm() / speed)));
@@ -190,7 +190,7 @@ TEST_CASE("a fast stroke leaves the tool on the side it came from") {
         do {
             to = random.vector();
         } while (to.norm() > 0.95 || to.dot(out) < 1 - deepest);
-        const auto displacement = way_through({(1.02 + radius) * out, to}, random_speed(random, 0.1 * edge, 4 * edge));
+        const auto displacement = path_through({(1.02 + radius) * out, to}, random_speed(random, 0.1 * edge, 4 * edge));
         if (sphere.stays_outside(displacement, radius)) continue;
         WARN("astray: seed " << seed << ", a tool of " << radius);
         ++astray;
@@ -209,12 +209,12 @@ TEST_CASE("a tool that strokes sideways in a dent stays on the side it came from
         const Vector in = (1 - random.number(0.0, 0.2)) * out, to = (1 - random.number(0.0, 0.2)) * beside;
         CAPTURE(seed, radius);
         REQUIRE(sphere.stays_outside(
-            way_through({(1.02 + radius) * out, in, to}, random_speed(random, 0.1 * edge, edge)), radius));
+            path_through({(1.02 + radius) * out, in, to}, random_speed(random, 0.1 * edge, edge)), radius));
     }
     REQUIRE(sphere.touching > cases(3'000, 50'000));
 }
 
-TEST_CASE("a tool that a surface has not given way to stays behind it, until it does") {
+TEST_CASE("a tool that a surface has not yielded to stays behind it, until it does") {
     const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
     const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = 1.0});
     const membrane::VirtualVolumeSprings foundation(mesh, {.stiffness = 0.3});
@@ -258,7 +258,7 @@ TEST_CASE("a contact begins, goes on and ends once, with the depth against the s
         } else if (gap < -1e-9) {
             REQUIRE(contact.touching());
             CHECK(std::abs(contact.gap - gap) < 1e-12);
-            CHECK(std::abs(contact.depth + gap) < 1e-12);  // nothing gives way here
+            CHECK(std::abs(contact.depth + gap) < 1e-12);  // nothing yields here
             CHECK(contact.normal.z() > 0.9);
             CHECK(std::abs(contact.normal.norm() - 1) < 1e-12);
         }
@@ -375,7 +375,7 @@ TEST_CASE("tracker options out of range are refused") {
 
 namespace {
 
-/// All contact points within the reach of `contact`, or of what it touches, found one by one.
+/// All contact points within the detection distance of `contact`, or of what it touches, found one by one.
 template <class S>
 std::vector<membrane::ContactPoint<S>> points_of(const TriangleMesh<S>& mesh, const Contact<S>& contact,
                                                  const Tool<S>& tool) {
@@ -437,7 +437,7 @@ TEMPLATE_TEST_CASE("the contact points are those of all triangles within reach, 
     CHECK(tunnelled > 0);
 }
 
-TEST_CASE("a contact with more points than there is room for says so, and is refused by a step") {
+TEST_CASE("a contact with more points than the capacity says so, and is refused by a step") {
     const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
     const AabbTree<double> tree(mesh);
     const membrane::MassSpringNetwork network(mesh, membrane::LinearSpring{}, {.stiffness = 1.0});

@@ -152,7 +152,7 @@ TEST_CASE("forceps are copied and moved with what they hold", "[grasp]") {
     STATIC_REQUIRE(noexcept(copy.update(contact, std::declval<const ConstPointsRef<double>&>(), tool)));
 }
 
-TEST_CASE("on a body that moves they turn with it, and the way is that on it", "[grasp]") {
+TEST_CASE("on a body that moves they turn with it, and the displacement is relative to it", "[grasp]") {
     for (int seed = 1; seed <= cases(50); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));

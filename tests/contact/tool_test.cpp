@@ -118,12 +118,12 @@ TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangl
         S least = std::numeric_limits<S>::infinity();
         int nearest_pair = -1;
         for (int pair = 0; pair < feature_pairs(tool); ++pair) {
-            const auto near = proximity(triangle, tool, pair);
+            const auto near = closest_points(triangle, tool, pair);
             REQUIRE((pair >= 2 || near));  // an end is always near something
             if (!near) continue;
             REQUIRE(near->barycentric.minCoeff() >= 0);
             REQUIRE(std::abs(near->barycentric.sum() - 1) <= 4 * std::numeric_limits<S>::epsilon());
-            // `reach` leads from the point of the triangle to the axis; to the pair's own end of it.
+            // `separation` runs from the point of the triangle to the axis; to the pair's own end of it.
             const Vector3<S> axis_point = point_at(triangle, near->barycentric) + near->separation;
             const Vector3<S> from_position = axis_point - tool.position;
             if (pair == 0) REQUIRE(norm(from_position) <= tolerance);
@@ -156,17 +156,17 @@ TEMPLATE_TEST_CASE("a shaft along a triangle, by hand", "[tool]", double, float)
     const Triangle<S> triangle{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}};
     // Across the corner, one unit above: both ends are beyond the edges, the axis over two of them.
     const Tool<S> shaft{.position = {-1, 1, 1}, .axis = {6, 0, 0}, .radius = S(0.5)};
-    CHECK(proximity(triangle, shaft, 0)->separation == Vector3<S>(-1, 0, 1));
-    CHECK(proximity(triangle, shaft, 1)->separation == Vector3<S>(1, 1, 1));
-    const auto over_hypotenuse = proximity(triangle, shaft, 3);
+    CHECK(closest_points(triangle, shaft, 0)->separation == Vector3<S>(-1, 0, 1));
+    CHECK(closest_points(triangle, shaft, 1)->separation == Vector3<S>(1, 1, 1));
+    const auto over_hypotenuse = closest_points(triangle, shaft, 3);
     REQUIRE(over_hypotenuse);
     CHECK((over_hypotenuse->barycentric - Vector3<S>(0, S(0.75), S(0.25))).norm() < S(1e-6));
     CHECK((over_hypotenuse->separation - Vector3<S>(0, 0, 1)).norm() < S(1e-6));
-    const auto over_side = proximity(triangle, shaft, 4);
+    const auto over_side = closest_points(triangle, shaft, 4);
     REQUIRE(over_side);
     CHECK((over_side->separation - Vector3<S>(0, 0, 1)).norm() < S(1e-6));
     // A sphere over the inside.
     const Tool<S> sphere{.position = {1, 1, 2}, .radius = S(0.5)};
-    CHECK(proximity(triangle, sphere, 0)->separation == Vector3<S>(0, 0, 2));
-    CHECK((proximity(triangle, sphere, 0)->barycentric - Vector3<S>(S(0.5), S(0.25), S(0.25))).norm() < S(1e-6));
+    CHECK(closest_points(triangle, sphere, 0)->separation == Vector3<S>(0, 0, 2));
+    CHECK((closest_points(triangle, sphere, 0)->barycentric - Vector3<S>(S(0.5), S(0.25), S(0.25))).norm() < S(1e-6));
 }

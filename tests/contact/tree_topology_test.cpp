@@ -117,7 +117,7 @@ TriangleMesh<double> separate(Index count, Place place) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("sets are split at the middle, or shared out evenly", "[tree_shape]", float, double) {
+TEMPLATE_TEST_CASE("sets are split at the middle, or shared out evenly", "[tree_topology]", float, double) {
     using S = TestType;
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);
@@ -127,7 +127,7 @@ TEMPLATE_TEST_CASE("sets are split at the middle, or shared out evenly", "[tree_
     }
 }
 
-TEST_CASE("a set below the threshold becomes two leaves of half the size", "[tree_shape]") {
+TEST_CASE("a set below the threshold becomes two leaves of half the size", "[tree_topology]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});  // 20 triangles
     const auto whole = statistics(tree_shape(mesh, 21));
     CHECK(whole.nodes == 3);
@@ -158,7 +158,7 @@ TEST_CASE("a set below the threshold becomes two leaves of half the size", "[tre
     CHECK(alone.mean_leaf == 1);
 }
 
-TEST_CASE("triangles that lie all in one place are halved", "[tree_shape]") {
+TEST_CASE("triangles that lie all in one place are halved", "[tree_topology]") {
     const Triangle<double> same{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     check_rule(separate(37, [&](Index) { return same; }), 1);
     check_rule(separate(37, [&](Index) { return same; }), 8);
@@ -167,7 +167,7 @@ TEST_CASE("triangles that lie all in one place are halved", "[tree_shape]") {
     CHECK(statistics(tree_shape(many, 16)).depth == 14);
 }
 
-TEST_CASE("no spacing of the triangles makes the tree too deep", "[tree_shape]") {
+TEST_CASE("no spacing of the triangles makes the tree too deep", "[tree_topology]") {
     const auto spaced = [](Index count, double ratio) {  // each split by position takes away a few triangles only
         return separate(count, [=](Index f) {
             const double x = std::pow(ratio, f);
@@ -184,7 +184,7 @@ TEST_CASE("no spacing of the triangles makes the tree too deep", "[tree_shape]")
     CHECK(slower.leaves == 100'000);
 }
 
-TEST_CASE("the numbers of the vertices do not matter", "[tree_shape]") {
+TEST_CASE("the numbers of the vertices do not matter", "[tree_topology]") {
     Random random(5);
     const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
     const auto number = test::random_order(mesh.vertex_count(), random);
@@ -200,7 +200,7 @@ TEST_CASE("the numbers of the vertices do not matter", "[tree_shape]") {
     }
 }
 
-TEST_CASE("a threshold below 1 is refused", "[tree_shape][bad]") {
+TEST_CASE("a threshold below 1 is refused", "[tree_topology][bad]") {
     const auto mesh = icosphere({.subdivisions = 0});
     CHECK(test::refusal([&] { (void)tree_shape(mesh, 0); }) == "AabbTree: balance_threshold must be at least 1, got 0");
     CHECK(test::refusal([&] { (void)tree_shape(mesh, -7); }) ==
@@ -235,7 +235,7 @@ void check_folded(const TreeTopology& shape) {
             CHECK(place != wide.nodes.end());
         }
         CHECK(triangles == below(shape, wide.nodes[n]));
-        if (end != children.end()) CHECK(only_leaves);  // there is room only where nothing more can be folded in
+        if (end != children.end()) CHECK(only_leaves);  // there is a free slot only where nothing more can be folded in
     }
     for (std::size_t i = 0; i < shape.nodes.size(); ++i) {
         if (shape.nodes[i].is_leaf()) CHECK(named.count(static_cast<Index>(i)) == 1);

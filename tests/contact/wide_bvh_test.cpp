@@ -20,7 +20,7 @@ using test::Random;
 namespace {
 
 template <class S>
-Box<S> box_of(const TriangleMesh<S>& mesh, Index f) {
+Aabb<S> box_of(const TriangleMesh<S>& mesh, Index f) {
     return bounds(triangle_at(mesh.positions(), mesh.triangles().col(f)));
 }
 
@@ -34,7 +34,7 @@ TEMPLATE_TEST_CASE("a search examines the triangles whose key is below the limit
         const auto mesh = test::random_surface<S>(random).mesh();
         const WideBvh<S> boxes(mesh, {.balance_threshold = 1 + random.index(20)});
         const Vector3<S> q = point(mesh.positions(), random.index(mesh.vertex_count())) + random.vector<S>();
-        const auto key = [&]<Number N>(const Box<N>& box) { return squared_distance(box, q); };
+        const auto key = [&]<Number N>(const Aabb<N>& box) { return squared_distance(box, q); };
         std::vector<S> keys;
         for (Index f = 0; f < mesh.triangle_count(); ++f) keys.push_back(key(box_of(mesh, f)));
         const S limit =
@@ -63,7 +63,7 @@ TEMPLATE_TEST_CASE("a limit that is lowered ends with the least key, soon", "[tr
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Vector3<S> q = random.vector<S>(-2, 2);
-        const auto key = [&]<Number N>(const Box<N>& box) { return squared_distance(box, q); };
+        const auto key = [&]<Number N>(const Aabb<N>& box) { return squared_distance(box, q); };
         S least = (std::numeric_limits<S>::max)(), expected = least;
         int examined = 0;
         (void)boxes.search(mesh.positions(), key, least, [&](Index f, const Triangle<S>& triangle) {
@@ -80,8 +80,8 @@ TEMPLATE_TEST_CASE("a limit that is lowered ends with the least key, soon", "[tr
 TEMPLATE_TEST_CASE("a query may have its own key of triangles", "[tree]", float, double) {
     using S = TestType;
     struct Key {
-        Lanes<S> operator()(const Box<Lanes<S>>&) const { return 0; }
-        S operator()(const Box<S>&) const { return 0; }
+        Lanes<S> operator()(const Aabb<Lanes<S>>&) const { return 0; }
+        S operator()(const Aabb<S>&) const { return 0; }
         Lanes<S> operator()(const Triangle<Lanes<S>>& triangles) const {
             return select(triangles.a[2] > 0, Lanes<S>(0), Lanes<S>(1));
         }
@@ -97,7 +97,7 @@ TEMPLATE_TEST_CASE("a query may have its own key of triangles", "[tree]", float,
 }
 
 // Nodes that are not full have places without a child.
-TEMPLATE_TEST_CASE("no key is reckoned with numbers that are none", "[tree][bad-input]", float, double) {
+TEMPLATE_TEST_CASE("no key is computed from numbers that are NaN", "[tree][bad-input]", float, double) {
     using S = TestType;
     const S far = std::sqrt((std::numeric_limits<S>::max)()) / 100;
     for (int seed = 1; seed <= cases(200); ++seed) {
@@ -110,7 +110,7 @@ TEMPLATE_TEST_CASE("no key is reckoned with numbers that are none", "[tree][bad-
         const test::FloatingPointTraps traps;
         boxes.refit(x);
         const Vector3<S> q = point(x, 0) - Vector3<S>::Constant(far / 2);
-        const auto key = [&]<Number N>(const Box<N>& box) { return squared_distance(box, q); };
+        const auto key = [&]<Number N>(const Aabb<N>& box) { return squared_distance(box, q); };
         (void)boxes.search(x, key, (std::numeric_limits<S>::max)(), [&](Index, const auto&) { ++examined; });
         CHECK(examined == mesh.triangle_count());
     }

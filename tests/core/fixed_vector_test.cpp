@@ -19,55 +19,55 @@ std::vector<Item> items_of(const FixedVector<Item>& list) {
 
 }  // namespace
 
-TEST_CASE("a list takes what it has room for, and says when it is full", "[core]") {
+TEST_CASE("a list takes as many items as its capacity, and says when it is full", "[core]") {
     FixedVector<int> list(3);
     CHECK(list.empty());
     for (int round = 0; round < 2; ++round) {
-        CHECK(list.push(5));
-        CHECK(list.push(7));
-        CHECK(list.push(5));
-        CHECK_FALSE(list.push(9));
+        CHECK(list.try_push_back(5));
+        CHECK(list.try_push_back(7));
+        CHECK(list.try_push_back(5));
+        CHECK_FALSE(list.try_push_back(9));
         CHECK(list.size() == 3);
         CHECK(items_of(list) == std::vector<int>{5, 7, 5});
         CHECK(list[1] == 7);
         list.clear();
         CHECK(list.empty());
     }
-    CHECK_FALSE(FixedVector<int>().push(1));
-    CHECK_FALSE(FixedVector<int>(0).push(1));
+    CHECK_FALSE(FixedVector<int>().try_push_back(1));
+    CHECK_FALSE(FixedVector<int>(0).try_push_back(1));
 }
 
 TEST_CASE("a list is cut to its first items", "[core]") {
     FixedVector<int> list(3);
-    for (const int item : {5, 7, 9}) list.push(item);
-    list.cut(3);
+    for (const int item : {5, 7, 9}) list.try_push_back(item);
+    list.truncate(3);
     CHECK(items_of(list) == std::vector<int>{5, 7, 9});
-    list.cut(1);
+    list.truncate(1);
     CHECK(items_of(list) == std::vector<int>{5});
-    list.push(8);
+    list.try_push_back(8);
     CHECK(items_of(list) == std::vector<int>{5, 8});
-    list.cut(0);
+    list.truncate(0);
     CHECK(list.empty());
 }
 
 TEST_CASE("items of a list can be changed in place", "[core]") {
     FixedVector<std::string> list(4);
-    list.push("a");
-    list.push("b");
+    list.try_push_back("a");
+    list.try_push_back("b");
     for (auto& item : list.items()) item += "!";
     CHECK(items_of(list) == std::vector<std::string>{"a!", "b!"});
 }
 
-TEST_CASE("a list never moves its items, and a copy keeps the room", "[core]") {
+TEST_CASE("a list never moves its items, and a copy keeps the capacity", "[core]") {
     FixedVector<int> list(100);
-    list.push(0);
+    list.try_push_back(0);
     const int* const first = list.items().data();
-    for (int i = 1; i < 50; ++i) list.push(i);
+    for (int i = 1; i < 50; ++i) list.try_push_back(i);
     CHECK(list.items().data() == first);
 
     FixedVector<int> copy = list;
-    for (int i = 50; i < 100; ++i) CHECK(copy.push(i));
-    CHECK_FALSE(copy.push(100));
+    for (int i = 50; i < 100; ++i) CHECK(copy.try_push_back(i));
+    CHECK_FALSE(copy.try_push_back(100));
     CHECK(list.size() == 50);
     const int* const place = copy.items().data();
     const FixedVector<int> moved = std::move(copy);
@@ -78,10 +78,10 @@ TEST_CASE("a list never moves its items, and a copy keeps the room", "[core]") {
 #ifndef NDEBUG
 TEST_CASE("an item beyond the end of a list is a broken precondition", "[core][bad]") {
     FixedVector<int> list(4);
-    list.push(1);
+    list.try_push_back(1);
     CHECK(test::in_child([&] { (void)list[1]; }).signal == SIGABRT);
-    CHECK(test::in_child([&] { list.cut(1); }).signal == 0);
-    CHECK(test::in_child([&] { list.cut(2); }).signal == SIGABRT);
+    CHECK(test::in_child([&] { list.truncate(1); }).signal == 0);
+    CHECK(test::in_child([&] { list.truncate(2); }).signal == SIGABRT);
     CHECK(test::in_child([&] { (void)list[0]; }).signal == 0);
 }
 #endif

@@ -70,7 +70,7 @@ TEST_CASE("sets are copied, moved and swapped with all they hold", "[core]") {
     first.clear();
     CHECK(copy.contains(7));
     IndexSet moved = std::move(copy);
-    for (const Index i : {0, 1, 3, 4, 6, 8}) CHECK(moved.insert(i));  // room for all has come along
+    for (const Index i : {0, 1, 3, 4, 6, 8}) CHECK(moved.insert(i));  // the capacity is kept
     CHECK(moved.count() == 9);
     std::swap(first, second);
     CHECK(items_of(first) == std::vector<Index>{8});
@@ -86,7 +86,7 @@ TEST_CASE("what happens online to a set throws nothing", "[core]") {
 }
 
 #ifndef NDEBUG
-TEST_CASE("an index that no set has room for is a broken precondition", "[core][bad]") {
+TEST_CASE("an index beyond the capacity of a set is a broken precondition", "[core][bad]") {
     IndexSet set(3);
     for (const Index wrong : {-1, 3, 1000}) {
         CAPTURE(wrong);

@@ -12,7 +12,7 @@
 
 using namespace membrane;
 
-TEST_CASE("the reader takes the newest slot, and the writer gets back what is nobody's", "[core]") {
+TEST_CASE("the reader takes the newest slot, and the writer gets back the slot without an owner", "[core]") {
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -26,7 +26,7 @@ TEST_CASE("the reader takes the newest slot, and the writer gets back what is no
                 if (taken != published) REQUIRE(buffer.back() == published);
                 published = i;
             } else {
-                REQUIRE(buffer.take() == (taken != published));
+                REQUIRE(buffer.acquire() == (taken != published));
                 taken = published;
             }
             REQUIRE(buffer.front() == taken);
@@ -35,11 +35,11 @@ TEST_CASE("the reader takes the newest slot, and the writer gets back what is no
     }
 }
 
-TEST_CASE("a triple buffer has room for any slot, keeps threads apart, and throws nothing", "[core]") {
+TEST_CASE("a triple buffer takes any slot type, keeps threads apart, and throws nothing", "[core]") {
     TripleBuffer<std::optional<int>> buffer;
     CHECK_FALSE(buffer.front().has_value());
-    CHECK_FALSE(buffer.take());
-    STATIC_REQUIRE(noexcept(buffer.publish())&& noexcept(buffer.take())&& noexcept(buffer.back()));
+    CHECK_FALSE(buffer.acquire());
+    STATIC_REQUIRE(noexcept(buffer.publish())&& noexcept(buffer.acquire())&& noexcept(buffer.back()));
     STATIC_REQUIRE_FALSE(std::is_copy_constructible_v<TripleBuffer<int>> ||
                          std::is_move_assignable_v<TripleBuffer<int>>);
     STATIC_REQUIRE(sizeof(TripleBuffer<int>) == std::size_t{6} * 64);

@@ -1,5 +1,5 @@
 # cmake -D program=FILE -D folder=DIR -P compare_traces.cmake: a press and its replay are the same to the bit, of other
-# recordings the first difference is told, and what is no recording is refused.
+# recordings the first difference is reported, and what is no recording is refused.
 file(REMOVE_RECURSE ${folder})
 function(compare)
     execute_process(COMMAND ${program} --out ${folder} ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)

@@ -1,5 +1,5 @@
 # cmake -D program=FILE -D data=DIR -D folder=DIR -P fit_constants.cmake: the example finds the constants that its table
-# was made with, 25 and 3 N/m, draws them, says what a short table does not tell, and refuses what is no table.
+# was made with, 25 and 3 N/m, draws them, says what a short table does not determine, and refuses what is no table.
 file(REMOVE_RECURSE ${folder})
 file(MAKE_DIRECTORY ${folder})
 execute_process(COMMAND ${program} --data ${data}/lens_indentation.csv --out ${folder}
@@ -28,7 +28,7 @@ endif()
 file(WRITE ${folder}/shallow.csv "1e-5,2.0e-5\n2e-5,4.1e-5\n\n# no more\n3e-5,6.1e-5\n")
 execute_process(COMMAND ${program} --data ${folder}/shallow.csv --out ${folder} RESULT_VARIABLE code OUTPUT_VARIABLE output)
 if(NOT code EQUAL 0 OR NOT output MATCHES " no\n")
-    message(FATAL_ERROR "a shallow table tells all, exit code ${code}:\n${output}")
+    message(FATAL_ERROR "a shallow table determines all constants, exit code ${code}:\n${output}")
 endif()
 
 file(WRITE ${folder}/empty.csv "")

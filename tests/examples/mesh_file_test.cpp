@@ -42,8 +42,8 @@ const auto files = [] {
     return all;
 }();
 
-/// What is read of a file with these bytes must be a surface of arrays that can be used, or one line that names the file.
-/// Returns that line without the name; empty for a surface.
+/// What is read of a file with these bytes must be a surface of arrays that can be used, or one line that names the
+/// file. Returns that line without the name; empty for a surface.
 std::string verdict(const std::string& name, const std::string& bytes) {
     static const Folder folder;
     const std::string file = folder.file(name, bytes);
@@ -299,7 +299,7 @@ TEST_CASE("OBJ may name faces before vertices, and opens no other file") {
     CHECK((message.empty() || message.find("line") != std::string::npos));
 
     const Folder folder;
-    REQUIRE(mkfifo((folder.path / "skin.mtl").c_str(), 0600) == 0);  // whoever opens it waits
+    REQUIRE(mkfifo((folder.path / "skin.mtl").c_str(), 0600) == 0);  // a reader that opens it waits
     const std::string file = folder.file("a.obj", "mtllib skin.mtl ../skin.mtl /etc/passwd\nusemtl skin\n" + text);
     const auto child = in_child([&] {
         alarm(5);
@@ -337,7 +337,7 @@ TEST_CASE("OFF has counts that agree with its body") {
     CHECK_THAT(verdict("a.off", fan + corners + '\n'), ContainsSubstring("line 100003: expected a polygon in at most"));
 }
 
-TEST_CASE("PLY may have its numbers in many ways") {
+TEST_CASE("PLY may have its numbers in many formats") {
     const std::string text = ply(solid);
     CHECK_THAT(verdict("a.ply", with(text, "double x", "double t")),
                ContainsSubstring("one property x of a vertex, got 0"));
@@ -356,11 +356,10 @@ TEST_CASE("PLY may have its numbers in many ways") {
         auto first = solid;
         for (const std::uint32_t bits :
              {0x3f80000aU, 0x3f800a0dU, 0x0a0a0a0aU, 0x0d0a0d0aU, 0x3f800020U, 0x3f80000dU}) {
-            CAPTURE(big_endian, bits);  // a body that begins with what looks like the end of a line
+            CAPTURE(big_endian, bits);  // a body that begins like the end of a line
             first.points(0, 0) = std::bit_cast<float>(bits);
             for (const char* end : {"\n", "\r\n", "\r"}) {
-                if (end == std::string("\r") && (big_endian ? bits >> 24 : bits & 0xff) == '\n')
-                    continue;  // nobody knows
+                if (end == std::string("\r") && (big_endian ? bits >> 24 : bits & 0xff) == '\n') continue;  // unknown
                 const std::string bytes = binary_ply(first, big_endian);
                 const std::size_t body = bytes.find("end_header\n") + 11;
                 const auto file = folder.file("b.ply", with_all(bytes.substr(0, body), "\n", end) + bytes.substr(body));

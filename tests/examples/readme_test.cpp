@@ -32,7 +32,7 @@
 // [/rest]
 
 // [moving]
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 // [/moving]
 
 // [handover]
@@ -200,7 +200,7 @@ TEST_CASE_METHOD(Touched, "the README's hand") {
     const auto rest = membrane::RestContact(mesh);
     device.write(limit(feel({tool, rest(contact, tool), report}), tool.time, steps));
     // [/rest]
-    CHECK(limit.acted().faded);  // it has only begun
+    CHECK(limit.active_limits().faded);  // it has only begun
 
     const auto force = device.force();
     std::stringstream file;
@@ -234,7 +234,7 @@ TEST_CASE_METHOD(AtRest, "the README's loop with limits and recorder replays to 
             const auto force = limit(feel({tool, smooth(contact), report}), tool.time, ++steps);
             device.write(force);
             if (recorder != nullptr) recorder->add(tool, force);
-            limited += limit.acted().any();
+            limited += limit.active_limits().any();
         }
         return limited;
     };
@@ -353,8 +353,8 @@ TEST_CASE_METHOD(Touched, "the README's bound") {
     const Eigen::Vector3d target = 1.01 * x.col(7);
     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
     // [bound]
-    auto bound = membrane::ErrorBound(network);                                      // once: allocates all it needs
-    const auto error = bound.of(x, network, foundation, membrane::pull(7, target));  // allocates nothing
+    auto bound = membrane::ErrorBound(network);  // once: allocates all it needs
+    const auto error = bound.compute(x, network, foundation, membrane::pull(7, target));  // allocates nothing
     if (error.certified()) {
         const double displacement = error.position;  // no vertex is farther off [m]
         const double force =
@@ -368,9 +368,9 @@ TEST_CASE_METHOD(Touched, "the README's bound") {
 TEST_CASE_METHOD(AtRest, "the README's settings") {
     const auto tools = stroke_of_ticks();
     // [settings]
-    const auto stroke = membrane::Stroke(mesh, tools, 1e-3);  // a tool for each tick of 1 ms
+    const auto trajectory = membrane::ToolTrajectory(mesh, tools, 1e-3);  // a tool for each tick of 1 ms
     const auto choice =
-        membrane::choose_settings(mesh, network, foundation, stroke, {.force_error = 0.05});  // or .time
+        membrane::choose_settings(mesh, network, foundation, trajectory, {.force_error = 0.05});  // or .time
     if (!choice.satisfied) std::puts("No setting is accurate enough. The nearest one:");
     std::printf("%g of the force, %g s\n", choice.force_error, choice.time);  // as measured in the trial
     auto solver = membrane::QuasiStaticSolver(network, choice.options);

@@ -70,7 +70,7 @@ TEST_CASE("the lens that comes with the examples is a membrane") {
     const auto lens = options.specimen(examples::stock_sphere());
     CHECK(lens.surface.points.cols() == 296);
     CHECK(lens.surface.triangles.cols() == 588);
-    CHECK(lens.size == Approx(4.48742e-3));  // the rim's 42 corners reach 4.5 mm along x, not along y
+    CHECK(lens.size == Approx(4.48742e-3));  // the rim's 42 corners are up to 4.5 mm off along x, not along y
     CHECK((lens.above(0) - Eigen::Vector3d(0, 0, 1.6e-3)).norm() < 1e-12);
     CHECK(lens.outward.z() == Approx(1));
     double volume = 0;

@@ -4,7 +4,7 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 
-TEMPLATE_TEST_CASE("under fast math, too, a wild number that is handed in comes to a safe outcome", "[fast_math][bad]",
+TEMPLATE_TEST_CASE("under fast math, too, a wild number in the input comes to a safe outcome", "[fast_math][bad]",
                    double, float) {
     for (int seed = 1; seed <= cases(2000, 40'000); ++seed) {
         CAPTURE(seed);

@@ -51,7 +51,7 @@ TEMPLATE_TEST_CASE("a tool sticks up to the cone, slips on it, and sticks again"
         CHECK(along(1e-4 * i) == Approx(-0.2).epsilon(1e-4));
         CHECK(feel.slips());
     }
-    for (int i = 39; i >= 1; --i) {  // back: the other way round from where it has slipped to, 2 mm
+    for (int i = 39; i >= 1; --i) {  // back: in the other sense from where it has slipped to, 2 mm
         CHECK(along(1e-4 * i) == Approx(-1e-2 * (i - 20)).margin(1e-4));
         CHECK_FALSE(feel.slips());
     }

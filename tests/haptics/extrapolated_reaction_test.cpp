@@ -63,7 +63,7 @@ TEST_CASE("nothing touched, nothing felt, and never no number", "[extrapolated][
     CHECK(feel(state) == Vector3<double>(0, 0, 0));
 }
 
-TEST_CASE("a solve in every tenth tick is felt to second order of the way", "[extrapolated]") {
+TEST_CASE("a solve in every tenth tick is felt to second order of the displacement", "[extrapolated]") {
     // A spring that stiffens; the tool goes in evenly.
     const auto force_at = [](double depth) { return 50 * depth + 2e4 * depth * depth; };
     ExtrapolatedReaction<double> feel;

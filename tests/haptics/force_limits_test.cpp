@@ -29,8 +29,8 @@ double size_of(const Vector3<S>& force) {
     return norm<double>(force.template cast<double>());
 }
 
-/// Whether a change from `before` to `after` is no larger than `most`, or straight towards zero. What a float is off by its
-/// own rounding is no change.
+/// Whether a change from `before` to `after` is no larger than `most`, or straight towards zero. What a float is off by
+/// its own rounding is no change.
 template <class S>
 bool within_slew(const Vector3<S>& before, const Vector3<S>& after, double most) {
     const Vector3<double> p = before.template cast<double>(), f = after.template cast<double>();
@@ -41,7 +41,7 @@ bool within_slew(const Vector3<S>& before, const Vector3<S>& after, double most)
 }
 
 /// Nothing but the device's peak.
-constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .max_state_age = infinity, .heating = false};
+constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .max_state_age = infinity, .thermal_limit = false};
 
 /// A limiter in its loop: a tick of 1 ms, a solve in each.
 template <class S>
@@ -58,9 +58,9 @@ struct Loop {
 
 /// A hand that taps and strokes, a solver that takes its time, and whatever can go wrong.
 template <class S>
-class Mishaps {
+class FaultInjector {
   public:
-    explicit Mishaps(std::uint64_t seed) : random_(seed) {}
+    explicit FaultInjector(std::uint64_t seed) : random_(seed) {}
 
     void tick() {
         if (left_ == 0) {
@@ -105,7 +105,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
     const LimitOptions options;
     const double slew = device.peak_force / options.rise_time;
     ForceLimiter limit(device, options);
-    Mishaps<S> scene(7);
+    FaultInjector<S> scene(7);
     Vector3<S> before = Vector3<S>::Zero();
     double clean_since = 0, last_solve = 0, last = 0, thermal_load = 0;
     std::uint64_t state = 0;
@@ -135,7 +135,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
         }
         if (scene.now - clean_since > 0.2) {
             ++whole;
-            if (felt != scene.force || limit.acted().any()) FAIL("not the policy's force at tick " << i);
+            if (felt != scene.force || limit.active_limits().any()) FAIL("not the policy's force at tick " << i);
         }
         before = felt;
     }
@@ -150,7 +150,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
     using S = TestType;
     const LimitOptions options;
     test::HapticLoop<S> loop(11);
-    test::Mishaps mishaps(5);
+    test::FaultInjector faults(5);
     const auto device = loop.limit.device();
     const double slew = device.peak_force / options.rise_time;
     Vector3<S> before = Vector3<S>::Zero(), asked_before = before;
@@ -159,8 +159,8 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
     long frozen = 0, whole = 0, pushed = 0;
     const int ticks = cases(8'000, 500'000);  // of each scalar
     for (int i = 0; i < ticks; ++i) {
-        const auto mishap = mishaps.next();
-        loop.tick(mishap);
+        const auto fault = faults.next();
+        loop.tick(fault);
         const double size = size_of(loop.felt), asked = size_of(loop.asked);
         const double may_change = slew * std::clamp(loop.now - last, 0.0, options.max_tick);
         if (!(is_finite(loop.felt) && size <= device.peak_force && within_slew(before, loop.felt, may_change))) {
@@ -174,11 +174,12 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
         // A policy that asks for more than the device bears, or for it too suddenly, is no fault, but is limited.
         const bool bearable =
             asked <= device.continuous_force && within_slew(asked_before, loop.asked, slew * loop.dt * (1 - 1e-5));
-        if (mishap.any() || loop.solves == solves || !bearable) clean_since = loop.now;
+        if (fault.any() || loop.solves == solves || !bearable) clean_since = loop.now;
         if (loop.now - clean_since > 0.2) {
             ++whole;
             pushed += asked > 0;
-            if (loop.felt != loop.asked || loop.limit.acted().any()) FAIL("not the policy's force at tick " << i);
+            if (loop.felt != loop.asked || loop.limit.active_limits().any())
+                FAIL("not the policy's force at tick " << i);
         }
         before = loop.felt;
         asked_before = loop.asked;
@@ -210,7 +211,7 @@ TEMPLATE_TEST_CASE("inside the limits a force passes with the same bits", "[limi
             if (size_of(next) > 1.7) next = S(0.5) * force;
             force = next;
             REQUIRE(loop.tick(force) == force);
-            REQUIRE_FALSE(loop.limit.acted().any());
+            REQUIRE_FALSE(loop.limit.active_limits().any());
         }
     }
     Loop<double> loop{ForceLimiter(device)};
@@ -264,7 +265,7 @@ TEST_CASE("a solver that stops at 1 kHz is felt no longer than 91 ms", "[limits]
         if (i <= 39) REQUIRE(felt == 0.5);
         if (i > 41) REQUIRE((felt < before || felt == 0));
         if (i >= 91) REQUIRE(felt == 0);
-        REQUIRE(loop.limit.acted().faded == (felt < 0.5));
+        REQUIRE(loop.limit.active_limits().faded == (felt < 0.5));
         before = felt;
     }
     int back = 0;
@@ -279,17 +280,17 @@ TEST_CASE("after a fault the force is zero at once, and comes back slowly", "[li
         const Vector3<double> force(0.5, 0, 0);
         for (int i = 0; i < 150; ++i) (void)loop.tick(force);
         CHECK(loop.tick(bad) == Vector3<double>(0, 0, 0));
-        CHECK(loop.limit.acted().fault);
+        CHECK(loop.limit.active_limits().fault);
         for (int i = 1; i <= 99; ++i) {
             const auto felt = loop.tick(force);
             REQUIRE(felt.x() == Approx(0.005 * i));
-            REQUIRE(loop.limit.share() == Approx(0.01 * i));
+            REQUIRE(loop.limit.gain() == Approx(0.01 * i));
         }
         (void)loop.tick(force);
         (void)loop.tick(force);
         CHECK(loop.tick(force) == force);
         CHECK(loop.limit(force, nan_value, 1) == Vector3<double>(0, 0, 0));  // a clock that is none
-        CHECK(loop.limit.acted().fault);
+        CHECK(loop.limit.active_limits().fault);
     }
 }
 
@@ -299,7 +300,7 @@ TEST_CASE("a fall straight to zero is not slowed, all else is, also in a gap", "
     CHECK(loop.tick({3, 0, 0}) == Vector3<double>(0, 0, 0));  // no time has passed
     for (int i = 1; i <= 18; ++i) {
         REQUIRE(loop.tick({3, 0, 0}).x() == Approx(0.165 * i));
-        REQUIRE(loop.limit.acted().slew);
+        REQUIRE(loop.limit.active_limits().slew);
     }
     CHECK(loop.tick({3, 0, 0}).x() == 3);
     CHECK(loop.tick({0.1, 0, 0}).x() == 0.1);
@@ -319,7 +320,7 @@ TEST_CASE("a force that turns about goes through zero", "[limits]") {
     for (int turn = 0; turn < 3; ++turn) {
         const double sign = turn % 2 == 0 ? -1 : 1;
         CHECK(loop.tick({0, 0, sign}) == Vector3<double>(0, 0, 0));
-        CHECK(loop.limit.acted().slew);
+        CHECK(loop.limit.active_limits().slew);
         for (int i = 1; i <= 6; ++i) REQUIRE(loop.tick({0, 0, sign}).z() == Approx(sign * 0.165 * i));
         REQUIRE(loop.tick({0, 0, sign}).z() == sign);
     }
@@ -335,7 +336,7 @@ TEMPLATE_TEST_CASE("however a force jumps and turns, its change is bounded but f
     for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        Loop<S> loop{ForceLimiter(devices::touch, {.soft_start = 0, .heating = false})};
+        Loop<S> loop{ForceLimiter(devices::touch, {.soft_start = 0, .thermal_limit = false})};
         Vector3<S> before = loop.tick(Vector3<S>::Zero());
         Vector3<S> asked = Vector3<S>::Zero();
         Vector3<S> axis = random.unit_vector<S>();
@@ -384,7 +385,7 @@ TEST_CASE("a solver that stops while the force turns fades all the same", "[limi
             loop.now += 1e-3;
             const double most = i <= 40 ? 3 : std::max(3 * (90 - i) / 50.0, 0.0) + 1e-9;
             REQUIRE(norm(loop.limit(Vector3<double>(3 * random.unit_vector()), loop.now, loop.solves)) <= most);
-            if (i >= 91) REQUIRE(loop.limit.share() == 0);
+            if (i >= 91) REQUIRE(loop.limit.gain() == 0);
         }
     }
 }
@@ -446,7 +447,7 @@ TEST_CASE("motors warm up as a first-order model does, and are not asked for mor
             REQUIRE(loop.limit.thermal_load() <= 1);
         }
         CHECK(least == Approx(strong.continuous_force).epsilon(0.02));
-        CHECK(loop.limit.acted().heat);
+        CHECK(loop.limit.active_limits().heat);
         CHECK(grain_size < 0.03 * strong.peak_force);  // down in small steps
     }
 }
@@ -483,9 +484,9 @@ TEST_CASE("in a gap motors warm up as the force that is held has them do", "[lim
         const double hottest = std::pow(device.peak_force / device.continuous_force, 2);
         for (const double gap : {0.04, 0.1, 0.2, 0.5, 2.0, 1e3}) {
             CAPTURE(device.name, gap);
-            for (int lead = 110; lead < 6000; lead += 65) {
+            for (int rest_ticks = 110; rest_ticks < 6000; rest_ticks += 65) {
                 Loop<double> loop{ForceLimiter(device)};
-                for (int i = 0; i < lead; ++i) (void)loop.tick({0, 0, device.peak_force});
+                for (int i = 0; i < rest_ticks; ++i) (void)loop.tick({0, 0, device.peak_force});
                 const double before = loop.limit.thermal_load();
                 const double held = loop.tick({0, 0, device.peak_force}).z() / device.continuous_force;
                 (void)loop.tick({0, 0, device.peak_force}, gap);
@@ -503,9 +504,9 @@ TEST_CASE("each limit can be taken off", "[limits]") {
     Loop<double> loop{ForceLimiter(devices::touch, only_peak)};
     CHECK(loop.tick({3.2, 0, 0}).x() == 3.2);
     CHECK(loop.tick({0, -3.2, 0}).y() == -3.2);
-    CHECK_FALSE(loop.limit.acted().any());
+    CHECK_FALSE(loop.limit.active_limits().any());
     CHECK(loop.tick({0, 0, 5}).z() == Approx(3.3));
-    CHECK(loop.limit.acted().peak);
+    CHECK(loop.limit.active_limits().peak);
     for (int i = 0; i < 20'000; ++i) REQUIRE(loop.limit(Vector3<double>(0, 3.2, 0), 1e-3 * i, 1).y() == 3.2);
     CHECK(loop.limit.thermal_load() > 1);  // it still counts
 }

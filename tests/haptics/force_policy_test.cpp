@@ -74,7 +74,7 @@ TEMPLATE_TEST_CASE("touching nothing and holding nothing there is no force", "[f
     CHECK(feel(state).z() == Approx(10));
 }
 
-TEMPLATE_TEST_CASE("pulling, the force runs against the way of what is held", "[force]", double, float) {
+TEMPLATE_TEST_CASE("pulling, the force opposes the displacement of the held point", "[force]", double, float) {
     using S = TestType;
     const SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
     for (int seed = 1; seed <= cases(300); ++seed) {

@@ -45,7 +45,8 @@ TEMPLATE_TEST_CASE("taking hold and letting go, the force does not jump", "[tran
                 jump = std::max(jump, norm<S>(law(state) - before));
             }
             const Vector3<S> force = feel(state);
-            // The law itself changes by 2e-3 N in a tick; the difference of the laws, 7 N at the most, comes in over 50.
+            // The law itself changes by 2e-3 N in a tick; the difference of the laws, 7 N at the most, comes in over
+            // 50.
             if (tick > 0) REQUIRE(norm<S>(force - last) < S(0.15));
             if (tick > changed + 51) {
                 REQUIRE(force == law(state));
@@ -83,8 +84,8 @@ TEST_CASE("at the change the force is what it was, half way it is between", "[tr
 
 namespace {
 
-/// A tool that touches a ball, takes hold while it slides, pulls, and lets go, pressed in or pulled out, on a smooth way;
-/// the seed says where, when, how far.
+/// A tool that touches a ball, takes hold while it slides, pulls, and lets go, pressed in or pulled out, on a smooth
+/// path; the seed says where, when, how far.
 struct Handling {
     explicit Handling(std::uint64_t seed) {
         Random random(seed);
@@ -97,7 +98,7 @@ struct Handling {
         turn = random.number(10.0, 20.0);
     }
     [[nodiscard]] Tool<double> tool(double time) const {
-        const double in = time < 0.1 ? std::sin(5 * pi * time) : std::cos(turn * (time - 0.1));  // and there it rests
+        const double in = time < 0.1 ? std::sin(5 * pi * time) : std::cos(turn * (time - 0.1));  // and there it stays
         const double along = time < 0.1 ? 0 : 1 - std::cos(turn * (time - 0.1) / 2);
         Tool<double> tool{.radius = 1e-3, .time = time, .grasping = time >= closes && time < opens};
         tool.position = (0.011 - depth * in) * out + sway * along * aside;
@@ -142,7 +143,8 @@ Handled handle(const Handling& displacement, const TriangleMesh<double>& mesh, c
         tree.refit(x, report.moved);
         const HapticState<double> state{tool, smooth(contact), report, grasp};
         const Vector3<double> force = feel(state), alone = bare(state);
-        // A touch that begins or ends by itself, where the membrane comes slower than the tool goes, is not the transition's.
+        // A touch that begins or ends by itself, where the membrane comes slower than the tool goes, is not the
+        // transition's.
         const bool by_itself = contact.phase == ContactPhase::began || contact.phase == ContactPhase::ended;
         if (tool.time > Handling::begin && (grasp.holding() || held || !by_itself)) {
             out.largest = std::max(out.largest, norm<double>(force - last));
@@ -184,7 +186,7 @@ TEST_CASE("jaws close and open on a membrane that is touched, pulled and let go:
             changes += found.changes;
             if (found.changes > 0 && found.difference > 0.05) CHECK(found.law_alone > 20 * found.largest);
         }
-        // A reaction jumps by what it differs by, and goes on to settle in the ticks after that.
+        // A reaction jumps by what it differs by, and goes on to converge in the ticks after that.
         const auto reaction = handle(displacement, mesh, ReactionForce{.scale = 5}, 0.1, 1e-3);
         CAPTURE(seed, reaction.largest, reaction.law_alone, reaction.difference);
         if (reaction.difference > 0.05) CHECK(reaction.law_alone > 8 * reaction.largest);

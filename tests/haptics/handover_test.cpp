@@ -59,8 +59,8 @@ struct Ticks {
     Random random{7};
 };
 
-/// `write(number)` for numbers up to `last` in one thread, `read(complete)` in another until it returns the last number;
-/// `complete` is that of a write that was over before.
+/// `write(number)` for numbers up to `last` in one thread, `read(complete)` in another until it returns the last
+/// number; `complete` is that of a write that was over before.
 template <class Write, class Read>
 void grain_size(std::uint64_t last, Write write, Read read) {
     std::atomic<std::uint64_t> complete{0};
@@ -139,17 +139,17 @@ TEMPLATE_TEST_CASE("all that has moved since the last read is read, and hardly m
             REQUIRE(news.age(static_cast<double>(ticks.number)) == static_cast<double>(ticks.number) / 2);
             for (const Index v : news.moved) shown.col(v) = news.x.col(v);
             REQUIRE(test::same_bits(shown, ticks.x));
-            const std::set<Index> told(news.moved.begin(), news.moved.end());
-            REQUIRE(told.size() == news.moved.size());
-            REQUIRE(std::includes(told.begin(), told.end(), since.begin(), since.end()));
-            REQUIRE(std::includes(and_before.begin(), and_before.end(), told.begin(), told.end()));
+            const std::set<Index> reported(news.moved.begin(), news.moved.end());
+            REQUIRE(reported.size() == news.moved.size());
+            REQUIRE(std::includes(reported.begin(), reported.end(), since.begin(), since.end()));
+            REQUIRE(std::includes(and_before.begin(), and_before.end(), reported.begin(), reported.end()));
             if (std::exchange(last, news.number) < news.number) and_before = std::exchange(since, {});
             REQUIRE(moved.read().moved.empty());
         }
     }
 }
 
-TEST_CASE("what moved long before does not pile up, at whatever rate one looks", "[handover]") {
+TEST_CASE("what moved long before does not pile up, at whatever rate it is read", "[handover]") {
     for (int every = 1; every <= 40; ++every) {
         CAPTURE(every);
         constexpr Index count = 10'000;
@@ -194,7 +194,7 @@ TEST_CASE("two threads share a membrane, and each snapshot is that of its tick",
     CHECK(seen > 1);
 }
 
-TEST_CASE("a membrane of no vertices is not handed over", "[handover][bad]") {
+TEST_CASE("a membrane of no vertices is not published", "[handover][bad]") {
     const std::string text = "MovedPoints: there must be at least 1 vertex, got ";
     CHECK(test::refusal([] { MovedPoints<double> none(0); }) == text + "0");
     CHECK(test::refusal([] { MovedPoints<float> none(-3); }) == text + "-3");

@@ -17,19 +17,19 @@ using examples::Answer;
 
 namespace {
 
-std::string told(HDerror error) {
+std::string trouble_of(HDerror error) {
     char code[8];
     std::snprintf(code, sizeof code, "0x%04x", error);
     return std::string("HD error ") + code + ": a fault";
 }
 
-/// Each of these errors in each call of a tick: the first, the second, and one long after the force is whole. `check` is
-/// called after that tick.
+/// Each of these errors in each call of a tick: the first, the second, and one long after the force is whole. `check`
+/// is called after that tick.
 template <std::size_t count, class Check>
 void for_each_failure(const std::array<HDerror, count>& errors, Check check) {
     for (std::size_t call = 0; call < in_tick.size(); ++call) {
         for (const HDerror error : errors) {
-            for (const int at : {1, 2, settled + 10}) {
+            for (const int at : {1, 2, start_up_ticks + 10}) {
                 CAPTURE(in_tick[call], call, error, at);
                 HdDouble hd;
                 OpenHaptics device;
@@ -58,7 +58,7 @@ TEST_CASE("an error that passes, in any call of any tick, takes the force for so
             REQUIRE(hd.force().norm() == Approx(0.01 * i * pushed.norm()));
         }
         CHECK(device.warning() == nullptr);
-        hd.run(settled - 100);
+        hd.run(start_up_ticks - 100);
         CHECK(hd.force() == pushed);
         const int ticks = static_cast<int>(hd.ticks());
         device.stop();
@@ -90,11 +90,11 @@ TEST_CASE("any other error, in any call of any tick, ends the run with no force"
                                     {of_force ? in_tick_withdrawn : in_tick, 1},
                                     {in_tick, of_force || of_end ? 1 : 0},
                                     {closing, 1}}));
-        CHECK(device.trouble() == told(error));
+        CHECK(device.trouble() == trouble_of(error));
 
         device.start(Push{});
         CHECK(device.trouble().empty());
-        hd.run(settled);
+        hd.run(start_up_ticks);
         CHECK(device.running());
         CHECK(hd.force() == pushed);
         device.stop();
@@ -103,7 +103,7 @@ TEST_CASE("any other error, in any call of any tick, ends the run with no force"
     for_each_failure(final_errors, check);
 }
 
-TEST_CASE("of several errors the worst is told, the last of those, and none is left", "[openhaptics]") {
+TEST_CASE("of several errors the worst is reported, the last of those, and none is left", "[openhaptics]") {
     HdDouble hd;
     OpenHaptics device;
     device.start(Push{});
@@ -113,21 +113,21 @@ TEST_CASE("of several errors the worst is told, the last of those, and none is l
     hd.run(5);
     device.stop();
     check_closed(hd);
-    CHECK(device.trouble() == told(HD_COMM_ERROR));
+    CHECK(device.trouble() == trouble_of(HD_COMM_ERROR));
 }
 
 TEST_CASE("errors that go on keep the force away until they end", "[openhaptics]") {
     HdDouble hd;
     OpenHaptics device;
     device.start(Push{});
-    hd.run(settled);
+    hd.run(start_up_ticks);
     for (int i = 0; i < 500; ++i) {
         hd.fail("hdEndFrame", hd.ticks() + 1, HD_WARM_MOTORS);
         hd.run(1);
         if (i > 0) REQUIRE(hd.force().isZero(0));
     }
     hd.run(1);
-    hd.run(settled);
+    hd.run(start_up_ticks);
     CHECK(hd.force() == pushed);
     device.stop();
     check_closed(hd);
@@ -138,18 +138,18 @@ TEST_CASE("a connection that is lost ends the run, and can be made again", "[ope
     HdDouble hd;
     OpenHaptics device;
     device.start(Push{});
-    hd.run(settled);
+    hd.run(start_up_ticks);
     hd.lose_connection(hd.ticks() + 1);
     hd.run(1);
     CHECK_FALSE(device.running());
     hd.run(5);
     device.stop();
     check_closed(hd);
-    CHECK(device.trouble() == told(HD_COMM_ERROR));
+    CHECK(device.trouble() == trouble_of(HD_COMM_ERROR));
     CHECK(start_refused(device) == "OpenHapticsDevice: cannot open the device: a fault");
     hd.connect();
     device.start(Push{});
-    hd.run(settled);
+    hd.run(start_up_ticks);
     CHECK(hd.force() == pushed);
     device.stop();
     check_closed(hd);
@@ -187,7 +187,7 @@ TEST_CASE("a step of the start that fails is named, and those before it are undo
             check_closed(hd);
 
             CHECK(start_refused(device) == "");  // the fault was one of the moment
-            hd.run(settled);
+            hd.run(start_up_ticks);
             CHECK(hd.force() == pushed);
             device.stop();
             check_closed(hd);
@@ -204,7 +204,7 @@ TEST_CASE("an error of any call while a device is stopped leaves no force", "[op
                 HdDouble hd;
                 OpenHaptics device;
                 device.start(Push{});
-                hd.run(settled);
+                hd.run(start_up_ticks);
                 CHECK(hd.force() == pushed);
                 if (silent) hd.fall_silent(hd.ticks() + 1);
                 hd.fail(stopping[call], hd.ticks() + 1, error, calls_before(stopping, call));
@@ -221,8 +221,8 @@ TEST_CASE("an error of any call while a device is stopped leaves no force", "[op
     }
 }
 
-TEST_CASE("a callback that throws ends in no force and is told", "[openhaptics]") {
-    for (const int at : {1, 2, settled + 10}) {
+TEST_CASE("a callback that throws ends in no force and is reported", "[openhaptics]") {
+    for (const int at : {1, 2, start_up_ticks + 10}) {
         for (const bool standard : {true, false}) {
             CAPTURE(at, standard);
             HdDouble hd;

@@ -24,7 +24,7 @@ namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .max_state_age = infinity, .heating = false};
+constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .max_state_age = infinity, .thermal_limit = false};
 
 /// Pushes up whatever goes below zero.
 struct Floor {
@@ -50,13 +50,14 @@ TEST_CASE("a device is opened, ticks and is closed in the right order, as often 
     CHECK(hd.calls().empty());
     device.start(Push{});
     CHECK(device.running());
-    hd.run(settled);
+    hd.run(start_up_ticks);
     CHECK(hd.force() == pushed);
     device.stop();
     CHECK_FALSE(device.running());
     check_closed(hd);
-    CHECK(names(hd) == in_turn({{opening, 1}, {in_tick, settled + 1}, {closing, 1}}));  // the last tick wrote zero
-    CHECK(device.report().ticks == settled + 1);
+    CHECK(names(hd) ==
+          in_turn({{opening, 1}, {in_tick, start_up_ticks + 1}, {closing, 1}}));  // the last tick wrote zero
+    CHECK(device.report().ticks == start_up_ticks + 1);
     CHECK(device.trouble().empty());
     hd.forget_calls();
     device.stop();
@@ -64,11 +65,11 @@ TEST_CASE("a device is opened, ticks and is closed in the right order, as often 
 
     device.start(Push{});
     CHECK_THAT(start_refused(device), ContainsSubstring("must be stopped to be started"));
-    hd.run(settled);
+    hd.run(start_up_ticks);
     CHECK(hd.force() == pushed);
     device.stop();
     check_closed(hd);
-    CHECK(device.report().ticks == settled + 1);
+    CHECK(device.report().ticks == start_up_ticks + 1);
 }
 
 TEST_CASE("a device that is destroyed leaves no force behind", "[openhaptics]") {
@@ -76,11 +77,11 @@ TEST_CASE("a device that is destroyed leaves no force behind", "[openhaptics]") 
     {
         OpenHaptics device;
         device.start(Push{});
-        hd.run(settled);
+        hd.run(start_up_ticks);
         CHECK(hd.force() == pushed);
     }
     check_closed(hd);
-    CHECK(names(hd) == in_turn({{opening, 1}, {in_tick, settled + 1}, {closing, 1}}));
+    CHECK(names(hd) == in_turn({{opening, 1}, {in_tick, start_up_ticks + 1}, {closing, 1}}));
 }
 
 TEST_CASE("a device is found by its name", "[openhaptics]") {
@@ -104,13 +105,13 @@ TEST_CASE("a device that falls silent is closed with no force", "[openhaptics]")
     HdDouble hd;
     OpenHaptics device;
     device.start(Push{});
-    hd.fall_silent(settled + 1);
-    hd.run(settled + 20);
+    hd.fall_silent(start_up_ticks + 1);
+    hd.run(start_up_ticks + 20);
     CHECK(hd.force() == pushed);  // the last one stays on, as on a real device
     device.stop();
     check_closed(hd);
     CHECK(names(hd) == in_turn({{opening, 1},
-                                {in_tick, settled},
+                                {in_tick, start_up_ticks},
                                 {{"hdStopScheduler"}, 1},
                                 {releasing, 1},
                                 {{"hdUnschedule", "hdDisableDevice"}, 1}}));
@@ -197,14 +198,14 @@ TEST_CASE("a force within the limits reaches the device bit for bit", "[openhapt
     OpenHaptics device({.profile = devices::phantom_desktop});
     Random random(3);
     Force displacement(0, 0, 1);
-    Answer answer{Force::Zero(), 0};
-    device.start([&](const Tool<double>&) { return answer; });
+    Answer result{Force::Zero(), 0};
+    device.start([&](const Tool<double>&) { return result; });
     for (int i = 0; i < 2000; ++i) {
         displacement += random.vector(-0.1, 0.1);  // turns, by less than the slew limit has
-        answer.force = (0.6 + 0.3 * std::sin(0.01 * i)) * displacement.normalized();
-        ++answer.solves;
+        result.force = (0.6 + 0.3 * std::sin(0.01 * i)) * displacement.normalized();
+        ++result.solves;
         hd.run(1);
-        if (i > settled) REQUIRE(same_bits(hd.force(), answer.force.eigen()));
+        if (i > start_up_ticks) REQUIRE(same_bits(hd.force(), result.force.eigen()));
     }
     device.stop();
     check_closed(hd);
@@ -242,14 +243,14 @@ TEST_CASE("the device's own word narrows its profile, never widens it", "[openha
 TEST_CASE("what is too much, too fast, too old or not a number is held back and reported", "[openhaptics]") {
     HdDouble hd({.hand = firm_hand()});
     OpenHaptics device;
-    Answer answer{pushed, 0};
+    Answer result{pushed, 0};
     bool frozen = false;
     device.start([&](const Tool<double>&) {
-        if (!frozen) ++answer.solves;
-        return answer;
+        if (!frozen) ++result.solves;
+        return result;
     });
     const auto run = [&](const Force& force, int ticks) {
-        answer.force = force;
+        result.force = force;
         hd.run(ticks);
         return hd.force().norm();
     };
@@ -265,7 +266,7 @@ TEST_CASE("what is too much, too fast, too old or not a number is held back and 
     CHECK(run(pushed, 38) == pushed.norm());
     CHECK(run(pushed, 62) == 0);  // 100 ms of the same solve
     frozen = false;
-    CHECK(run(pushed, settled) == pushed.norm());
+    CHECK(run(pushed, start_up_ticks) == pushed.norm());
     CHECK(device.running());
     device.stop();
     check_closed(hd);
@@ -278,7 +279,7 @@ TEST_CASE("what is too much, too fast, too old or not a number is held back and 
     CHECK(report.max_force == Approx(3.3));
     CHECK(device.trouble().empty());
 
-    device.start([&](const Tool<double>&) { return Answer{Force(0, 0, 3.3), ++answer.solves}; });
+    device.start([&](const Tool<double>&) { return Answer{Force(0, 0, 3.3), ++result.solves}; });
     hd.run(150);
     CHECK(hd.force().norm() < 1.5);  // motors have not cooled because of a new start
     device.stop();
@@ -316,17 +317,17 @@ TEST_CASE("a tool that is not a number is not passed on", "[openhaptics]") {
         REQUIRE(is_valid(tool));
         return Answer{pushed, static_cast<std::uint64_t>(++ticks)};
     });
-    hd.run(settled);
+    hd.run(start_up_ticks);
     const auto hand = hd.hand;
     hd.hand.position.y() = nan_value;
     hd.run(1);
     CHECK(hd.force().isZero(0));
     hd.run(2);
-    CHECK(ticks == settled);
+    CHECK(ticks == start_up_ticks);
     hd.hand = hand;
-    hd.run(settled);
+    hd.run(start_up_ticks);
     CHECK(hd.force() == pushed);
-    CHECK(ticks == 2 * settled);
+    CHECK(ticks == 2 * start_up_ticks);
     device.stop();
     check_closed(hd);
     CHECK(device.report().refused == 3);
@@ -376,10 +377,10 @@ TEST_CASE("ticks that come late or not at all are counted, and do no harm", "[op
     CHECK(device.report().late <= 3);
 }
 
-TEST_CASE("motors do not grow too warm, unless nobody heeds it, and then the device says so", "[openhaptics]") {
+TEST_CASE("motors do not grow too warm, unless the limit is off, and then the device reports it", "[openhaptics]") {
     for (const bool heed : {true, false}) {
         HdDouble hd({.hand = firm_hand()});
-        OpenHaptics device({.limits = {.heating = heed}});
+        OpenHaptics device({.limits = {.thermal_limit = heed}});
         std::uint64_t solves = 0;
         bool pushing = true;
         device.start([&](const Tool<double>&) { return Answer{Force(0, 0, pushing ? 2.0 : 0), ++solves}; });

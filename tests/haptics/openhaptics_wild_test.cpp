@@ -45,7 +45,7 @@ class Wild {
     void open();
     void choose();
     void fail_somewhere();
-    Answer answer(const Tool<double>& tool);
+    Answer result(const Tool<double>& tool);
 
     std::optional<OpenHaptics> device_{std::in_place};
     Random random_;
@@ -56,7 +56,7 @@ class Wild {
 
 void Wild::open() {
     if (!device_) device_.emplace();
-    device_->start([this](const Tool<double>& tool) { return answer(tool); });
+    device_->start([this](const Tool<double>& tool) { return result(tool); });
     hd.forget_calls();
     starts = true;
     fresh = hd.seconds();
@@ -103,7 +103,7 @@ void Wild::fail_somewhere() {
     too_late = in_tick[call] == "hdEndFrame";
 }
 
-Answer Wild::answer(const Tool<double>& tool) {
+Answer Wild::result(const Tool<double>& tool) {
     if (fault == Fault::thrown) throw std::runtime_error("thrown");
     if (fault != Fault::frozen && random_.chance(0.3)) {
         ++solves_;

@@ -29,7 +29,7 @@ DeviceProfile bare(double damping) {
     return {.name = "bare", .peak_force = 1e6, .continuous_force = 1e6, .stiffness = 1e9, .damping = damping};
 }
 
-/// A hand that wants to go its ways, over a membrane that is a wall of springs: soft where it is touched first, and
+/// A hand that follows its own paths over a membrane that is a wall of springs: soft where it is touched first, and
 /// nowhere stiffer than it says.
 struct Scene {
     explicit Scene(Random& random, bool stiffening)
@@ -103,7 +103,7 @@ struct Hand {
     }
 };
 
-/// Plays a loop of `policy`, answered `delay` ticks late.
+/// Plays a loop of `policy`, with forces `delay` ticks late.
 template <class Policy>
 Energies play(const Scene& scene, Policy policy, double tissue, const SampledLoop& loop, int ticks) {
     Energies energies{.port = PassivityObserver(scene.damping)};
@@ -168,7 +168,7 @@ TEST_CASE("random loops inside the check never give energy", "[passivity]") {
 }
 
 TEST_CASE("at 1.5 times the bound loops are active", "[passivity]") {
-    // A hand that throws a tool against a spring: what comes back is more than it brought.
+    // A hand that throws a tool against a spring: what comes back is more than it put in.
     const int loops = cases(300);
     for (int seed = 1; seed <= loops; ++seed) {
         CAPTURE(seed);
@@ -396,7 +396,7 @@ TEST_CASE("with less damping than the bound there is a walk that gains energy", 
     CHECK(spring.worst(2, 1.8, 60) < -1e-3);
 }
 
-TEST_CASE("a wall that ends is refused where it is answered late", "[passivity]") {
+TEST_CASE("a wall that ends is refused where its force comes late", "[passivity]") {
     const double stiffness = 100, end = 0.01, tick = 1e-3, off = 0.5e-3;
     for (int delay = 0; delay < 4; ++delay) {
         const SampledLoop wall{.stiffness = stiffness, .tick = tick, .delay = delay * tick, .off_potential = 0};
@@ -437,8 +437,8 @@ TEST_CASE("accepted at 0.9 of the bound, refused at 1.1, on every device", "[pas
     }
 }
 
-TEST_CASE("friction and a coarse position are counted rightly, whatever the way", "[passivity]") {
-    // Any way whatever, not only that of a hand: what the observer counts at the least is never negative.
+TEST_CASE("friction and a coarse position are counted rightly on any path", "[passivity]") {
+    // On any path, not only that of a hand: what the observer counts at the least is never negative.
     for (int seed = 1; seed <= cases(2000); ++seed) {
         Random random(static_cast<std::uint64_t>(seed));
         auto device = bare(random.number(0.0, 1.0));

@@ -123,7 +123,7 @@ TEST_CASE("a header that is not right is refused by name", "[recording][bad]") {
     CHECK(refused(header(1, 8, 0x80000000U, 0)) == name + "vertices must be at most 2147483647, got 2147483648");
     CHECK(refused("") == name + "the file must go on, but ends after 0 bytes, in the header");
     CHECK(refused("time,x,y,z\n0,0,0,0\n") == name + "byte 0 of a recording must be 137, got 116");
-    std::string as_text = good;  // line ends changed on the way
+    std::string as_text = good;  // line ends changed in transfer
     as_text.erase(5, 1);
     CHECK(refused(as_text) == name + "byte 5 of a recording must be 13, got 10");
     for (const std::size_t at : {16U, 20U, 27U, 28U, 31U}) {

@@ -114,14 +114,14 @@ TEMPLATE_TEST_CASE("a replay from reset gives the same forces to the bit", "[rec
     CHECK(differing(loop, recording) == 0);
     CHECK(test::same_bits(loop.x, end));
 
-    std::stringstream file;  // by way of a file, and with new parts
+    std::stringstream file;  // through a file, and with new parts
     write_recording(file, recording);
     Loop<S> other;
     CHECK(differing(other, read_recording<S>(file, other.mesh.vertex_count())) == 0);
     CHECK(test::same_bits(other.x, end));
 }
 
-TEST_CASE("a replay that is not the same run is told", "[recording]") {
+TEST_CASE("a replay that is not the same run is reported", "[recording]") {
     Loop<double> loop, softer;
     auto recording = recorded(loop, 2, 2000);
     softer.network = MassSpringNetwork(softer.mesh, LinearSpring{}, {.stiffness = 40 * (1 + 1e-15)});
@@ -159,7 +159,7 @@ TEMPLATE_TEST_CASE("a recorder keeps the first ticks and counts the others", "[r
     }
 }
 
-TEMPLATE_TEST_CASE("a replay hands out tools to the bit and compares forces", "[recording]", double, float) {
+TEMPLATE_TEST_CASE("a replay returns tools to the bit and compares forces", "[recording]", double, float) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -210,7 +210,7 @@ TEMPLATE_TEST_CASE("ticks are identical if all of their bits are", "[recording]"
     }
 }
 
-TEST_CASE("no room, no tick and no vertices are refused", "[recording][bad]") {
+TEST_CASE("no capacity, no tick and no vertices are refused", "[recording][bad]") {
     CHECK(test::refusal([] { Recorder<double> recorder(0, 1); }) == "Recorder: max_ticks must be positive, got 0");
     CHECK(test::refusal([] { Recorder<float> recorder(1, -1); }) ==
           "Recorder: vertex_count must not be negative, got -1");

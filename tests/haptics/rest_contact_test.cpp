@@ -100,7 +100,7 @@ TEMPLATE_TEST_CASE("depth and normal are distance to the surface at rest and its
             ++felt;
             REQUIRE(contact.depth == -contact.gap);
             REQUIRE(norm(contact.normal) == Approx(1).margin(1e-5));
-            // Straight to the nearest point and away from it the distance changes by the way.
+            // Straight to the nearest point and away from it the distance changes by the path length.
             const S height = S(radius) - contact.depth, displacement = S(-0.5) * height;
             const auto there = rest({}, ball_at<S>(p + displacement * contact.normal));
             REQUIRE(std::abs(there.depth - (contact.depth - displacement)) <= S(3) * rounding);

@@ -156,7 +156,7 @@ TEST_CASE("fields that are no finite numbers are refused with line and text", "[
     CHECK(refused("0,0,0,0\n1,0," + std::string(1, '\0') + ",0\n") != "");
     CHECK(refused("0,0,0,0\n1,0,2" + std::string(1, '\0') + "3,0\n") != "");
     CHECK(test::refusal([&] { (void)read<float>("0,1e39,0,0"); }) == no_number(1, "1e39"));
-    // What is too small to tell from zero is zero, or refused: not something else.
+    // What is too small to distinguish from zero is zero, or refused: not something else.
     const std::string tiny = "0,1e-999,0,0\n";
     if (refused(tiny).empty()) CHECK(read(tiny)[0].position.x() == 0);
 }

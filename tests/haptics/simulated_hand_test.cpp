@@ -38,7 +38,7 @@ struct RungeKutta {
     HandOptions options;
     Vector position, velocity, target, target_velocity;
 
-    void move(const Vector& force, double time, int steps) {
+    void advance(const Vector& force, double time, int steps) {
         const double h = time / steps;
         const auto acceleration = [&](const Vector& p, const Vector& v, double later) -> Vector {
             const Vector goal = target + later * target_velocity;
@@ -66,20 +66,20 @@ TEST_CASE("a hand moves as its equation says", "[hand]") {
         SimulatedHand<double> hand(options);
         SimulatedHand<float> coarse(options);
         const Vector start = random.vector();
-        hand.place(start);
-        coarse.place(start.cast<float>());
+        hand.reset_to(start);
+        coarse.reset_to(start.cast<float>());
         RungeKutta expected{options, start, Vector::Zero(), Vector::Zero(), Vector::Zero()};
         for (int i = 0; i < 5; ++i) {
             expected.target = random.vector();
             expected.target_velocity = random.vector();
-            hand.aim(expected.target, expected.target_velocity);
-            coarse.aim(expected.target.cast<float>(), expected.target_velocity.cast<float>());
+            hand.set_target(expected.target, expected.target_velocity);
+            coarse.set_target(expected.target.cast<float>(), expected.target_velocity.cast<float>());
             for (int j = 0; j < 2; ++j) {  // the target goes on in between
                 const Vector force = options.stiffness * random.vector();
                 const double time = random.number(1e-3, 0.02);
-                REQUIRE(hand.move(force, time));
-                REQUIRE(coarse.move(force.cast<float>(), static_cast<float>(time)));
-                expected.move(force, time, 1000);
+                REQUIRE(hand.advance(force, time));
+                REQUIRE(coarse.advance(force.cast<float>(), static_cast<float>(time)));
+                expected.advance(force, time, 1000);
             }
             REQUIRE(norm<double>(hand.position() - expected.position) < 1e-9);
             const double rate = std::sqrt(options.stiffness / options.mass);
@@ -96,18 +96,18 @@ TEST_CASE("any time step is stable, and many small ones come to where one large 
         const HandOptions options = random_options(random);
         SimulatedHand<double> large(options), small(options);
         const Vector target = random.vector(), velocity = random.vector(), force = random.vector(-10.0, 10.0);
-        for (auto* hand : {&large, &small}) hand->aim(target, velocity);
+        for (auto* hand : {&large, &small}) hand->set_target(target, velocity);
         constexpr int steps = 1000;
         const double time = std::pow(10.0, random.number(-4.0, 1.0));
-        REQUIRE(large.move(force, time));
-        for (int i = 0; i < steps; ++i) REQUIRE(small.move(force, time / steps));
+        REQUIRE(large.advance(force, time));
+        for (int i = 0; i < steps; ++i) REQUIRE(small.advance(force, time / steps));
         const double scale = 1 + norm(force) / options.stiffness + time;
         REQUIRE(norm<double>(large.position() - small.position()) < 1e-10 * scale);
         const double rate = std::sqrt(options.stiffness / options.mass);
         REQUIRE(norm<double>(large.velocity() - small.velocity()) < 1e-10 * scale * (1 + rate));
 
-        large.aim(target, Vector::Zero());
-        REQUIRE(large.move(force, 1e7));  // after which a damped one is where the force holds it
+        large.set_target(target, Vector::Zero());
+        REQUIRE(large.advance(force, 1e7));  // after which a damped one is where the force holds it
         if (options.damping == 0) continue;
         REQUIRE(norm<double>(large.position() - target - force / options.stiffness) < 1e-12 * scale);
         REQUIRE(norm(large.velocity()) < 1e-12);
@@ -118,18 +118,18 @@ TEST_CASE("an undamped hand swings for ever, in the time that mass and spring gi
     const HandOptions options{.mass = 0.2, .stiffness = 300};
     const double period = 2 * std::numbers::pi * std::sqrt(options.mass / options.stiffness);
     SimulatedHand<double> hand(options);
-    hand.place({0.01, 0, 0});
-    hand.aim({0, 0, 0}, {0, 0, 0});
-    REQUIRE(hand.move({0, 0, 0}, period / 4));
+    hand.reset_to({0.01, 0, 0});
+    hand.set_target({0, 0, 0}, {0, 0, 0});
+    REQUIRE(hand.advance({0, 0, 0}, period / 4));
     CHECK(std::abs(hand.position().x()) < 1e-16);
     CHECK(hand.velocity().x() == Approx(-0.01 * std::sqrt(options.stiffness / options.mass)));
-    for (int i = 0; i < cases(100'000); ++i) REQUIRE(hand.move({0, 0, 0}, 1e-3));
+    for (int i = 0; i < cases(100'000); ++i) REQUIRE(hand.advance({0, 0, 0}, 1e-3));
     const double energy =
         options.mass * squared_norm(hand.velocity()) + options.stiffness * squared_norm(hand.position());
     CHECK(energy == Approx(options.stiffness * 1e-4).epsilon(1e-9));
 }
 
-TEST_CASE("a hand without a force follows its script, and one that is pushed gives way", "[hand]") {
+TEST_CASE("a hand without a force follows its script, and one that is pushed yields", "[hand]") {
     const HandOptions options{.mass = 0.1, .damping = 2, .stiffness = 300};
     using Device = ScriptedDevice<double, SimulatedHand<double>>;
     Device device({{.time = 0, .position = {1, 0, 0}}, {.time = 4, .position = {1, 0, 0.04}, .grasping = true}},
@@ -144,7 +144,7 @@ TEST_CASE("a hand without a force follows its script, and one that is pushed giv
     for (int i = 1; i <= 4000; ++i) {
         const Vector force(0, 0, i < 2000 ? 0 : -3);
         device.write(force);
-        expected.move(force, 1e-3, 10);
+        expected.advance(force, 1e-3, 10);
         const auto tool = device.read(), script = firm.read();
         REQUIRE(norm<double>(tool.position - expected.position) < 1e-10);
         REQUIRE(norm<double>(tool.velocity - expected.velocity) < 1e-8);
@@ -167,13 +167,13 @@ TEST_CASE("a wall swings up at a desk where the theory of sampled loops says so"
                                   .damping = random.number(0.5, 5.0),
                                   .stiffness = random.number(10.0, 300.0)};
         const double tick = 1e-3, wall = options.damping / tick * std::pow(10.0, random.number(-1.0, 1.0));
-        // A tick as a matrix, from the answers of the equation: columns by position, by velocity, by force.
+        // A tick as a matrix, from the solutions of the equation: columns by position, by velocity, by force.
         Eigen::Matrix<double, 2, 3> by;
         for (int k = 0; k < 3; ++k) {
             RungeKutta hand{options, Vector::Zero(), Vector::Zero(), Vector::Zero(), Vector::Zero()};
             if (k == 0) hand.position.x() = 1;
             if (k == 1) hand.velocity.x() = 1;
-            hand.move({k == 2 ? 1.0 : 0.0, 0, 0}, tick, 100);
+            hand.advance({k == 2 ? 1.0 : 0.0, 0, 0}, tick, 100);
             by.col(k) << hand.position.x(), hand.velocity.x();
         }
         Eigen::Matrix2d loop = by.leftCols<2>();
@@ -203,23 +203,23 @@ TEST_CASE("a wall swings up at a desk where the theory of sampled loops says so"
 TEST_CASE("what is not a number does not move a hand", "[hand][bad]") {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
     SimulatedHand<double> hand({.mass = 0.1, .damping = 2, .stiffness = 300});
-    hand.place({1, 2, 3});
-    REQUIRE(hand.move({1, 0, 0}, 1e-3));
+    hand.reset_to({1, 2, 3});
+    REQUIRE(hand.advance({1, 0, 0}, 1e-3));
     const Vector position = hand.position(), velocity = hand.velocity();
     const auto stays = [&](const Vector& force, double dt) {
-        return !hand.move(force, dt) && hand.position() == position && hand.velocity() == velocity;
+        return !hand.advance(force, dt) && hand.position() == position && hand.velocity() == velocity;
     };
     for (const double bad : {nan, infinity, -infinity}) {
         CHECK(stays({0, bad, 0}, 1e-3));
         CHECK(stays({0, 0, 0}, bad));
     }
     CHECK(stays({0, 0, 0}, -1e-3));
-    CHECK(hand.move({0, 0, 0}, 0));
+    CHECK(hand.advance({0, 0, 0}, 0));
     CHECK(norm<double>(hand.position() - position) < 1e-15);
-    hand.aim({nan, 0, 0}, {0, 0, 0});
+    hand.set_target({nan, 0, 0}, {0, 0, 0});
     CHECK(stays({0, 0, 0}, 1e-3));
-    hand.aim({1, 2, 3}, {0, 0, 0});
-    CHECK(hand.move({0, 0, 0}, 1e-3));  // and it goes on
+    hand.set_target({1, 2, 3}, {0, 0, 0});
+    CHECK(hand.advance({0, 0, 0}, 1e-3));  // and it goes on
 }
 
 TEST_CASE("hands that cannot be are refused by name", "[hand][bad]") {
@@ -239,5 +239,5 @@ TEST_CASE("hands that cannot be are refused by name", "[hand][bad]") {
         CHECK(refused({.mass = 1, .damping = wrong, .stiffness = 1}) ==
               name + "damping must be finite and not negative [N s/m], got " + text);
     }
-    STATIC_REQUIRE(noexcept(std::declval<SimulatedHand<double>&>().move(std::declval<const Vector&>(), 1.0)));
+    STATIC_REQUIRE(noexcept(std::declval<SimulatedHand<double>&>().advance(std::declval<const Vector&>(), 1.0)));
 }

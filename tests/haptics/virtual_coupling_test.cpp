@@ -39,9 +39,9 @@ TEMPLATE_TEST_CASE("at rest two springs in a row are felt", "[coupling]", double
         VirtualCoupling<S> coupling({.stiffness = between, .damping = damping, .scale = scale});
         Tool<S> hand;
         Vector3<S> reaction = Vector3<S>::Zero();
-        (void)coupling.follow(hand, reaction, dt);
+        (void)coupling.update(hand, reaction, dt);
         hand.position.z() = S(-0.01);
-        for (int tick = 0; tick < 3000; ++tick) reaction = wall(coupling.follow(hand, reaction, dt), tissue);
+        for (int tick = 0; tick < 3000; ++tick) reaction = wall(coupling.update(hand, reaction, dt), tissue);
         const S felt = coupling.force().z();
         REQUIRE(static_cast<double>(felt) ==
                 Approx(static_cast<double>(S(0.01) * firm * between / (firm + between))).epsilon(1e-3));
@@ -58,7 +58,7 @@ TEST_CASE("a coupling that restarts is as a new one", "[coupling]") {
         for (int i = 0; i < 20; ++i) {
             Tool<double> hand;
             hand.position = 0.01 * displacement.vector();
-            const auto tool = coupling.follow(hand, displacement.vector(), 1e-3);
+            const auto tool = coupling.update(hand, displacement.vector(), 1e-3);
             for (const auto& v : {tool.position, tool.velocity, coupling.force()}) {
                 numbers.insert(numbers.end(), {v.x(), v.y(), v.z()});
             }
@@ -77,7 +77,7 @@ TEST_CASE("in free air without damping the tool is where the hand is", "[couplin
     for (int i = 0; i < 100; ++i) {
         Tool<double> hand;
         hand.position = random.vector();
-        const auto tool = coupling.follow(hand, {0, 0, 0}, 1e-3);
+        const auto tool = coupling.update(hand, {0, 0, 0}, 1e-3);
         CHECK(norm<double>(tool.position - hand.position) < 1e-12);
         CHECK(norm(coupling.force()) < 1e-9);
     }
@@ -95,7 +95,7 @@ TEST_CASE("however stiff the tissue, the coupling's stiffness decides whether th
         hand.position = {0, 0, 0.001};
         Vector3<double> reaction = Vector3<double>::Zero(), speed = Vector3<double>::Zero();
         for (int tick = 0; tick < 300; ++tick) {
-            reaction = wall(coupling.follow(hand, reaction, dt), firm / scale);
+            reaction = wall(coupling.update(hand, reaction, dt), firm / scale);
             observer.update(hand.position, coupling.force(), dt);
             if (random.chance(0.3)) speed = random.vector(-0.3, 0.3);
             if (std::abs(hand.position.z()) > 0.005) speed.z() = hand.position.z() > 0 ? -0.3 : 0.3;
@@ -110,14 +110,14 @@ TEST_CASE("however stiff the tissue, the coupling's stiffness decides whether th
 TEST_CASE("a coupling lets go of what is no number, and refuses what makes no sense", "[coupling][bad]") {
     VirtualCoupling<double> coupling({.stiffness = 300});
     Tool<double> hand;
-    (void)coupling.follow(hand, {0, 0, 0}, 1e-3);
+    (void)coupling.update(hand, {0, 0, 0}, 1e-3);
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    CHECK(coupling.follow(hand, {0, nan, 0}, 1e-3).position == hand.position);
+    CHECK(coupling.update(hand, {0, nan, 0}, 1e-3).position == hand.position);
     CHECK(coupling.force() == Vector3<double>(0, 0, 0));
-    (void)coupling.follow(hand, {0, 0, 0}, 1e-3);
-    CHECK(coupling.follow(hand, {0, 0, 1e308}, 1e-300).position == hand.position);
+    (void)coupling.update(hand, {0, 0, 0}, 1e-3);
+    CHECK(coupling.update(hand, {0, 0, 1e308}, 1e-300).position == hand.position);
     CHECK(is_finite(coupling.force()));
-    CHECK(is_finite(coupling.follow(hand, {0, 0, 0}, 0).position));
+    CHECK(is_finite(coupling.update(hand, {0, 0, 0}, 0).position));
     const auto refused = [](const CouplingOptions& options) {
         return test::refusal([&] { const VirtualCoupling<double> made(options); });
     };

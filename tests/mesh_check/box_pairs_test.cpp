@@ -16,9 +16,9 @@ TEST_CASE("boxes that overlap are those of a search through all pairs", "[mesh]"
     for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
-        std::vector<Box<double>> boxes(static_cast<std::size_t>(random.index(80)));
+        std::vector<Aabb<double>> boxes(static_cast<std::size_t>(random.index(80)));
         const double size = random.number(0.01, 0.5);
-        for (Box<double>& box : boxes) {
+        for (Aabb<double>& box : boxes) {
             Vector3<double> middle = random.vector<double>();
             if (random.chance(0.3))
                 middle = middle.eigen().array().round().matrix();  // many at one place, and touching
@@ -45,7 +45,7 @@ TEST_CASE("boxes that overlap are those of a search through all pairs", "[mesh]"
 TEST_CASE("the work for boxes side by side grows little faster than their number", "[mesh]") {
     std::int64_t used = 0;
     for (const Index side : {16, 64}) {
-        std::vector<Box<double>> boxes;
+        std::vector<Aabb<double>> boxes;
         for (Index i = 0; i < side * side; ++i) {
             boxes.emplace_back().include(Vector3<double>(i % side, i / side, 0));
             boxes.back().include(Vector3<double>(i % side + 1, i / side + 1, 0));

@@ -82,12 +82,12 @@ TEMPLATE_TEST_CASE("repair does nothing unasked", "[mesh]", double, float) {
         Random random(static_cast<std::uint64_t>(seed));
         const Surface<S> broken = broken_surface<S>(random);
         REQUIRE(same(repaired(broken, {}), broken));
-        REQUIRE(to_string(repaired(broken, {}).done) == "nothing");
-        // Where there is nothing to mend, all of it is nothing, too.
+        REQUIRE(to_string(repaired(broken, {}).report) == "nothing");
+        // Without a defect the repair changes nothing.
         const Surface<S> valid = test::random_surface<S>(random);
         const auto kept = repaired(valid, everything);
         REQUIRE(same(kept, valid));
-        REQUIRE(to_string(kept.done) == "nothing");
+        REQUIRE(to_string(kept.report) == "nothing");
         for (Index v = 0; v < valid.vertex_count(); ++v) REQUIRE(kept.vertices[static_cast<std::size_t>(v)] == v);
         for (Index f = 0; f < valid.triangle_count(); ++f) {
             REQUIRE(kept.source_triangles[static_cast<std::size_t>(f)] == f);
@@ -95,7 +95,7 @@ TEMPLATE_TEST_CASE("repair does nothing unasked", "[mesh]", double, float) {
     }
 }
 
-TEMPLATE_TEST_CASE("each kind that can be mended is, and nothing else", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("each kind that can be repaired is, and nothing else", "[mesh][bad]", double, float) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= cases(40) + 8; ++seed) {
@@ -110,27 +110,27 @@ TEMPLATE_TEST_CASE("each kind that can be mended is, and nothing else", "[mesh][
         bad.add(b, b, b);
         auto result = repaired(bad, {.drop_repeated = true});
         CHECK(same(result, given));
-        CHECK(to_string(result.done) == "dropped 2 triangles with a repeated vertex");
+        CHECK(to_string(result.report) == "dropped 2 triangles with a repeated vertex");
 
         bad = given;
         bad.add(b, c, a);
         bad.add(c, b, a);
         result = repaired(bad, {.drop_duplicates = true});
         CHECK(same(result, given));
-        CHECK(to_string(result.done) == "dropped 2 duplicate triangles");
+        CHECK(to_string(result.report) == "dropped 2 duplicate triangles");
 
         bad = given;
         bad.add(Vector3<S>(S(9) * random.vector<S>()));
         result = repaired(bad, {.drop_isolated = true});
         CHECK(same(result, given));
-        CHECK(to_string(result.done) == "dropped 1 isolated vertices");
+        CHECK(to_string(result.report) == "dropped 1 isolated vertices");
 
         bad = given;
         const Index d = bad.add(Vector3<S>(bad.x.col(a))), e = bad.add(Vector3<S>(bad.x.col(a)));
         bad.add(d, a, e);  // on one point
         result = repaired(bad, {.drop_zero_area = true, .drop_isolated = true});
         CHECK(same(result, given));
-        CHECK(to_string(result.done) == "dropped 1 triangles without area, dropped 2 isolated vertices");
+        CHECK(to_string(result.report) == "dropped 1 triangles without area, dropped 2 isolated vertices");
 
         // Every corner with a vertex of its own, as in files that know no indices.
         Surface<S> soup;
@@ -143,7 +143,7 @@ TEMPLATE_TEST_CASE("each kind that can be mended is, and nothing else", "[mesh][
         }
         const auto welded = repaired(soup, {.weld = 0.0});
         CHECK(welded.positions.cols() == given.vertex_count());
-        CHECK(welded.done.welded == soup.vertex_count() - given.vertex_count());
+        CHECK(welded.report.welded == soup.vertex_count() - given.vertex_count());
         CHECK(validate(welded.positions, welded.triangles).empty());
         for (Index g = 0; g < given.triangle_count(); ++g) {
             for (Index i = 0; i < 3; ++i) {
@@ -152,7 +152,7 @@ TEMPLATE_TEST_CASE("each kind that can be mended is, and nothing else", "[mesh][
         }
         const double tolerance = 1e-5 * static_cast<double>(given.x.cwiseAbs().maxCoeff());
         soup.x = test::jittered(soup.x, static_cast<S>(tolerance / 4), random);
-        CHECK(repaired(soup, {.weld = 0.0}).done.welded < soup.vertex_count() - given.vertex_count());
+        CHECK(repaired(soup, {.weld = 0.0}).report.welded < soup.vertex_count() - given.vertex_count());
         CHECK(repaired(soup, {.weld = tolerance}).positions.cols() == given.vertex_count());
         CHECK(repaired(soup, {.weld = 1e3}).positions.cols() == 1);
 
@@ -164,7 +164,7 @@ TEMPLATE_TEST_CASE("each kind that can be mended is, and nothing else", "[mesh][
             ++turned;
         }
         result = repaired(bad, {.orient = true});
-        CHECK(result.done.turned == turned);
+        CHECK(result.report.turned == turned);
         CHECK(validate(result.positions, result.triangles).valid());
         CHECK(validate(result.positions, result.triangles).facts.volume ==
               Approx(validate(given.x, given.triangles).facts.volume));
@@ -180,12 +180,12 @@ TEMPLATE_TEST_CASE("whole components are turned outward, and fans parted", "[mes
         Surface<S> ball = test::random_closed_surface<S>(random);
         ball.triangles.row(0).swap(ball.triangles.row(1));
         auto result = repaired(ball, {.flip_inward = true});
-        CHECK(result.done.flipped == ball.triangle_count());
+        CHECK(result.report.flipped == ball.triangle_count());
         CHECK(validate(result.positions, result.triangles).empty());
         for (Index f = 0; f < ball.triangle_count(); ++f) CHECK(result.triangles(0, f) == ball.triangles(0, f));
         // An open surface has no inside, and stays.
         ball.remove_triangle(0);
-        CHECK(repaired(ball, {.flip_inward = true}).done.flipped == 0);
+        CHECK(repaired(ball, {.flip_inward = true}).report.flipped == 0);
 
         Surface<S> joined = test::random_surface<S>(random);
         const Surface<S> other = test::random_surface<S>(random);
@@ -195,7 +195,7 @@ TEMPLATE_TEST_CASE("whole components are turned outward, and fans parted", "[mes
         for (Index& corner : joined.triangles.reshaped()) corner = corner == w ? v : corner;
         CHECK(validate(joined.x, joined.triangles).count(non_manifold_vertex) == 1);
         result = repaired(joined, {.split_vertices = true});
-        CHECK(result.done.split == 1);
+        CHECK(result.report.split == 1);
         CHECK(result.vertices.back() == v);
         CHECK(test::same_bits(Points<S>(result.positions.leftCols(joined.vertex_count())), joined.x));
         CHECK(validate(result.positions, result.triangles).valid());
@@ -257,7 +257,7 @@ TEMPLATE_TEST_CASE("triangles of a closed component are turned to face outward, 
             REQUIRE(same_turn(result.triangles.col(f), expected.col(f)));
         }
         for (std::size_t i = 0; i < closed.size(); ++i) turned += turned_of[i] == size_of[i] ? 0 : turned_of[i];
-        CHECK(result.done.turned == turned);
+        CHECK(result.report.turned == turned);
         const auto outward = repaired(bad, {.orient = true, .flip_inward = true});
         CHECK(validate(outward.positions, outward.triangles).facts.facing == Facing::outward);
         CHECK(validate(outward.positions, outward.triangles).count(MeshDefect::inward) == 0);
@@ -283,11 +283,11 @@ TEMPLATE_TEST_CASE("whatever is broken, repair comes back with what it says", "[
         const auto result = repaired(broken, options);
         const MeshReport before = validate(broken.x, broken.triangles);
         const MeshReport after = validate(result.positions, result.triangles);
-        INFO(to_string(before) << to_string(result.done) << "\n" << to_string(after));
+        INFO(to_string(before) << to_string(result.report) << "\n" << to_string(after));
         REQUIRE(result.vertices.size() == static_cast<std::size_t>(result.positions.cols()));
         REQUIRE(result.source_triangles.size() == static_cast<std::size_t>(result.triangles.cols()));
         REQUIRE(after.count(index_out_of_range) == 0);
-        if (options.weld && result.done.split == 0) REQUIRE(after.count(coincident_vertices) == 0);
+        if (options.weld && result.report.split == 0) REQUIRE(after.count(coincident_vertices) == 0);
         if (options.drop_repeated) REQUIRE(after.count(repeated_vertex) == 0);
         if (options.drop_zero_area && !options.weld) REQUIRE(after.count(zero_area) == 0);
         if (options.drop_duplicates) REQUIRE(after.count(duplicate_triangle) + after.count(double_sided_triangle) == 0);
@@ -298,10 +298,10 @@ TEMPLATE_TEST_CASE("whatever is broken, repair comes back with what it says", "[
             const Points<S> from = broken.x.col(result.vertices[v]);
             REQUIRE(test::same_bits(Points<S>(result.positions.col(static_cast<Index>(v))), from));
         }
-        const auto dropped = result.done.repeated + result.done.zero_area + result.done.duplicates;
+        const auto dropped = result.report.repeated + result.report.zero_area + result.report.duplicates;
         REQUIRE(result.triangles.cols() == broken.triangle_count() - dropped);
         REQUIRE(result.positions.cols() ==
-                broken.vertex_count() - result.done.welded - result.done.isolated + result.done.split);
+                broken.vertex_count() - result.report.welded - result.report.isolated + result.report.split);
     }
 }
 

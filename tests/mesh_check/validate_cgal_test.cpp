@@ -99,13 +99,13 @@ TEMPLATE_TEST_CASE("repeated, duplicate, isolated and coincident are those of CG
         soup = test::cgal_soup(surface.triangles);
         points = points_of(surface);
         CHECK(PMP::remove_isolated_points_in_polygon_soup(points, soup) == report.count(isolated_vertex));
-        if (report.count(coincident_vertices) > 0) continue;  // CGAL tells triangles apart by their points
+        if (report.count(coincident_vertices) > 0) continue;  // CGAL distinguishes triangles by their points
         soup = test::cgal_soup(surface.triangles);
         points = points_of(surface);
         const auto duplicates = PMP::merge_duplicate_polygons_in_polygon_soup(points, soup);
         CHECK(duplicates == report.count(duplicate_triangle) + report.count(double_sided_triangle));
         CHECK(duplicates == static_cast<std::size_t>(
-                                repair(surface.x, surface.triangles, {.drop_duplicates = true}).done.duplicates));
+                                repair(surface.x, surface.triangles, {.drop_duplicates = true}).report.duplicates));
     }
 }
 

@@ -168,7 +168,7 @@ TEMPLATE_TEST_CASE("shapes that are none are refused by validation as by the mes
           "validate: tolerance must be finite and not negative [m], got -1");
     CHECK(test::refusal([&] { (void)validate(t.x, t.triangles, {.max_findings_per_kind = 0}); }) ==
           "validate: max_findings_per_kind must be at least 1, got 0");
-    CHECK(test::refusal([&] { (void)validate(t.x, t.triangles, {.effort = -2}); }) ==
+    CHECK(test::refusal([&] { (void)validate(t.x, t.triangles, {.max_pairs_per_triangle = -2}); }) ==
           "validate: effort must not be negative, got -2");
     const std::vector<S> flat(t.x.data(), t.x.data() + 12);
     const std::vector<Index> flat_corners(t.triangles.data(), t.triangles.data() + 12);
@@ -526,14 +526,14 @@ TEMPLATE_TEST_CASE("garbage ends in a report", "[mesh][bad]", double, float) {
     }
 }
 
-TEMPLATE_TEST_CASE("a fan all pairs of which meet is looked at in part, and taken", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("a fan all pairs of which meet is tested in part, and taken", "[mesh]", double, float) {
     using S = TestType;
     for (int seed = 1; seed <= variants; ++seed) {  // row 40
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Surface<S> fan = test::shuffled(test::fan<S>(100'000 + random.index(1000)), random);
         fan.x = (random.rotation<S>() * fan.x).eval();
-        const MeshReport report = validate(fan.x, fan.triangles, {.effort = 0});
+        const MeshReport report = validate(fan.x, fan.triangles, {.max_pairs_per_triangle = 0});
         INFO(to_string(report));
         CHECK(report.empty());
         CHECK(!report.complete);
@@ -545,7 +545,7 @@ TEST_CASE("the work of validation is bounded", "[mesh]") {
     Random random(1);
     for (Index i = 0; i < cases(3000); ++i)
         add_triangle<double>(heap, random.vector(), random.vector(), random.vector());
-    const MeshReport report = validate(heap.x, heap.triangles, {.tolerance = 10, .effort = 10});
+    const MeshReport report = validate(heap.x, heap.triangles, {.tolerance = 10, .max_pairs_per_triangle = 10});
     CHECK(report.count(MeshDefect::self_intersection) == 100);
     CHECK(!report.complete);
     CHECK(validate(heap.x, heap.triangles, {.tolerance = 0.0, .max_findings_per_kind = 3}).findings.size() <= 6);

@@ -28,8 +28,8 @@ using Point = Vector3<double>;
 
 namespace {
 
-/// What a mesh must be beside valid. The bars for angles, edges and their mean are those of the sphere unless it is said
-/// why not.
+/// What a mesh must be beside valid. The bars for angles, edges and their mean are those of the sphere unless it is
+/// said why not.
 struct Bars {
     int euler = 2;
     double smallest_angle = 30, mean_smallest_angle = 50;  // degrees
@@ -46,7 +46,7 @@ void check_quality(const TriangleMesh<double>& mesh, double length, const Bars& 
     CHECK(std::abs(quality.mean_edge / length - 1) <= bars.off_length);
 }
 
-void check_soundness(const TriangleMesh<double>& mesh, int euler, bool closed) {
+void check_validity(const TriangleMesh<double>& mesh, int euler, bool closed) {
     const auto cgal = test::cgal_mesh(mesh);
     REQUIRE(cgal.is_valid());
     CHECK(static_cast<int>(cgal.number_of_vertices()) - static_cast<int>(cgal.number_of_edges()) +
@@ -77,7 +77,7 @@ void check_body(const Body& body, double length, const Bars& bars, double size =
         const double steepness = (std::max)(norm(gradient_at(body, p, 1e-6 * size)), 1.0);  // of a level set
         REQUIRE(std::abs(body(p)) <= 1e-9 * size * steepness);
     }
-    check_soundness(mesh, bars.euler, true);
+    check_validity(mesh, bars.euler, true);
     if (!bars.has_edges) check_facing(mesh, body, 1e-6 * size);
     check_quality(mesh, length, bars);
 }
@@ -94,7 +94,7 @@ void check_trimmed(const Trimmed<Body, Within>& surface, double length, const Ba
     for (const Index v : adjacency.border_vertices()) {
         REQUIRE(std::abs(surface.within(point(mesh.positions(), v))) <= 1e-9 * size);
     }
-    check_soundness(mesh, bars.euler, false);
+    check_validity(mesh, bars.euler, false);
     check_facing(mesh, surface.body, 1e-6 * size);
     check_quality(mesh, length, bars);
 }
@@ -188,14 +188,14 @@ TEST_CASE("the same call gives the same bits, and float ones are the double ones
     CHECK(rounded.triangles() == mesh.triangles());
 }
 
-TEST_CASE("edges follow a length by place, progress is told, few iterations are fewer", "[distmesh]") {
-    Index told = 0;
+TEST_CASE("edges follow a length by place, progress is reported, few iterations are fewer", "[distmesh]") {
+    Index reported = 0;
     const auto finer_above = [](const Point& p) { return p.z() > 0 ? 0.15 : 0.3; };
     const auto mesh = distmesh(Ball{}, {.edge_length = EdgeLength(finer_above),
                                         .iterations = 60,
-                                        .progress = [&](const RemeshProgress& now) { told = now.iteration; }});
-    CHECK(told > 40);
-    CHECK(told <= 60);
+                                        .progress = [&](const RemeshProgress& now) { reported = now.iteration; }});
+    CHECK(reported > 40);
+    CHECK(reported <= 60);
     int above = 0, below = 0;
     for (Index v = 0; v < mesh.vertex_count(); ++v) ++(mesh.positions()(2, v) > 0 ? above : below);
     CHECK(above > 2.5 * below);  // four to one, but for what is between

@@ -65,7 +65,7 @@ TEST_CASE("a border is where two balls meet: in the plane of their circle, at it
     }
 }
 
-TEST_CASE("where there is no way to the surface, none is found", "[level_surface]") {
+TEST_CASE("where no path to the surface exists, none is found", "[level_surface]") {
     const Bounds bounds{{-1, -1, -1}, {1, 1, 1}};
     const auto flat = [](const Point&) { return 1.0; };
     CHECK(!LevelSurface(flat, bounds).project({0, 0, 0}));

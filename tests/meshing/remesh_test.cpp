@@ -118,20 +118,20 @@ TEST_CASE("edges follow a length that depends on the place", "[remesh]") {
     CHECK(quality_of(mesh).smallest_angle > 30);
 }
 
-TEST_CASE("progress is told after each iteration, of as many vertices as there are", "[remesh]") {
+TEST_CASE("progress is reported after each iteration, of as many vertices as there are", "[remesh]") {
     const LevelSurface surface(Ball{}, around);
-    std::vector<RemeshProgress> told;
+    std::vector<RemeshProgress> reported;
     const auto mesh = remesh(icosphere({.radius = 1, .subdivisions = 2}), surface, 0.3, 40,
-                             [&](const RemeshProgress& now) { told.push_back(now); });
-    REQUIRE(told.size() > 2 * 40 / 3);
-    CHECK((told.size() == 40 || told.back().movement < 1e-3));
-    for (std::size_t i = 0; i < told.size(); ++i) {
-        CHECK(told[i].iteration == static_cast<Index>(i) + 1);
-        CHECK(told[i].iterations == 40);
-        CHECK(told[i].movement >= 0);
-        CHECK(told[i].movement <= 0.26);
+                             [&](const RemeshProgress& now) { reported.push_back(now); });
+    REQUIRE(reported.size() > 2 * 40 / 3);
+    CHECK((reported.size() == 40 || reported.back().movement < 1e-3));
+    for (std::size_t i = 0; i < reported.size(); ++i) {
+        CHECK(reported[i].iteration == static_cast<Index>(i) + 1);
+        CHECK(reported[i].iterations == 40);
+        CHECK(reported[i].movement >= 0);
+        CHECK(reported[i].movement <= 0.26);
     }
-    CHECK(told.back().vertices == mesh.vertex_count());
+    CHECK(reported.back().vertices == mesh.vertex_count());
 }
 
 TEST_CASE("it ends early at rest, and leaves a valid mesh as it is in no iterations", "[remesh]") {

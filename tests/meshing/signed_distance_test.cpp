@@ -42,17 +42,17 @@ double searched_distance(const Ellipsoid& body, const Point& p) {
                      Point(std::cos(u) * std::cos(v), std::cos(u) * std::sin(v), std::sin(u)).cwiseProduct(body.radii));
     };
     double best = std::numeric_limits<double>::infinity(), best_u = 0, best_v = 0;
-    double centre_u = 0, centre_v = 0, reach_u = std::numbers::pi / 2, reach_v = std::numbers::pi;
+    double centre_u = 0, centre_v = 0, range_u = std::numbers::pi / 2, range_v = std::numbers::pi;
     for (int level = 0; level < 25; ++level) {
         for (int i = -12; i <= 12; ++i) {
             for (int j = -12; j <= 12; ++j) {
-                const double u = centre_u + reach_u * i / 12, v = centre_v + reach_v * j / 12;
+                const double u = centre_u + range_u * i / 12, v = centre_v + range_v * j / 12;
                 const double distance = norm<double>(p - at(u, v));
                 if (distance < best) best = distance, best_u = u, best_v = v;
             }
         }
         centre_u = best_u, centre_v = best_v;
-        reach_u /= 3, reach_v /= 3;
+        range_u /= 3, range_v /= 3;
     }
     return best;
 }

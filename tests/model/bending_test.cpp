@@ -41,8 +41,8 @@ TriangleMesh<double> equilateral_sheet(Index rows, double angle) {
     return surface.mesh();
 }
 
-/// What the hinges store near the middle vertex, where each direction has as many, and the area that they stand for: a third
-/// of their triangles.
+/// What the hinges store near the middle vertex, where each direction has as many, and the area that they stand for: a
+/// third of their triangles.
 std::pair<double, double> energy_and_area(const Elements<double, Hinge<double>>& hinges, const Points<double>& x) {
     double energy = 0, area = 0;
     for (const auto& placed : hinges.all()) {
@@ -79,7 +79,7 @@ TEST_CASE("a hinge pulls with the derivative of its energy, however far it is fo
         const Hinge<double> hinge{.stiffness = k, .rest = angle + random.number(-0.3, 0.3)};
         test::check_element(hinge, x, 0.2 * size, k, random);
         const Hinge<double> at_rest{.stiffness = k, .rest = detail::Fold<double>(x).angle()};
-        test::check_second_derivative(at_rest, x, 0.2 * size, k);
+        test::check_hessian(at_rest, x, 0.2 * size, k);
     }
 }
 
@@ -99,7 +99,8 @@ TEST_CASE("hinges of equilateral triangles store what a plate does", "[bending]"
         REQUIRE(bent([](double, double) { return 0; }) == 0);
         const double cylinder = bent([&](double a, double) { return a * a / (2 * radius); });
         REQUIRE(cylinder * 2 * radius * radius / rigidity == Approx(1).epsilon(1e-4));
-        // A plate of Poisson ratio nu stores 2 (1 + nu) times as much as a bowl, 2 (1 - nu) times as a saddle: nu is -1/3.
+        // A plate of Poisson ratio nu stores 2 (1 + nu) times as much as a bowl, 2 (1 - nu) times as a saddle: nu is
+        // -1/3.
         const double bowl = bent([&](double a, double b) { return (a * a + b * b) / (2 * radius); });
         const double saddle = bent([&](double a, double b) { return (a * a - b * b) / (2 * radius); });
         REQUIRE(bowl / cylinder == Approx(2 * (1 - 1.0 / 3)).epsilon(1e-4));

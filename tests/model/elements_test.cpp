@@ -24,7 +24,7 @@ static_assert(Element<TriangularSpring<float>> && Element<TriangularSpring<doubl
 static_assert(Element<PressureLoad<float>> && Element<DeadLoad<double>>);
 static_assert(!Element<int> && !Element<CornerForce<double>>);
 
-TEST_CASE("each vertex is told of its elements, which corner it is and where the others are", "[elements]") {
+TEST_CASE("each vertex has its elements, which corner it is and where the others are", "[elements]") {
     for (int seed = 1; seed <= cases(50); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));

@@ -24,7 +24,7 @@
 using namespace membrane;
 using test::Random;
 
-// A law without numbers of its own takes no room.
+// A law without numbers of its own takes no memory.
 static_assert(sizeof(MassSpringNetwork<double, LinearSpring>) < sizeof(MassSpringNetwork<double, ExponentialSpring>));
 
 namespace {
@@ -320,7 +320,7 @@ MassSpringNetwork<double, LinearSpring> network_of(const TriangleMesh<double>& m
     return {mesh, LinearSpring{}, {.stiffness = 3.0}};
 }
 
-VirtualVolumeSprings<double> backing_of(const TriangleMesh<double>& mesh) { return {mesh, {.stiffness = 4.0}}; }
+VirtualVolumeSprings<double> foundation_of(const TriangleMesh<double>& mesh) { return {mesh, {.stiffness = 4.0}}; }
 
 }  // namespace
 
@@ -330,7 +330,7 @@ TEST_CASE("constants may be written in the midst of another initialiser", "[netw
     CHECK(scene.network.springs()[0].stiffness == 1.0);
     CHECK(scene.foundation.stiffness(0) == 2.0);
     CHECK(network_of(mesh).springs()[0].stiffness == 3.0);
-    CHECK(backing_of(mesh).stiffness(0) == 4.0);
+    CHECK(foundation_of(mesh).stiffness(0) == 4.0);
 }
 
 TEST_CASE("a network owns what it knows", "[network]") {
@@ -482,10 +482,10 @@ TEST_CASE("no spring is less stiff than the bound while its ends are near", "[ne
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Spring<double> spring{0, 1, random.number(0.1, 10.0), random.number(0.0, 2.0)};
-        const Vector3<double> reach = random.number(0.2, 2.0) * random.unit_vector();
-        const double displacement = std::pow(10, random.number(-6.0, 0.0)) * norm(reach);
-        CAPTURE(spring.stiffness, spring.rest_length, norm(reach), displacement);
-        const auto bound = min_stiffness(spring, reach, displacement);
+        const Vector3<double> edge_vector = random.number(0.2, 2.0) * random.unit_vector();
+        const double displacement = std::pow(10, random.number(-6.0, 0.0)) * norm(edge_vector);
+        CAPTURE(spring.stiffness, spring.rest_length, norm(edge_vector), displacement);
+        const auto bound = min_stiffness(spring, edge_vector, displacement);
         if (!bound) continue;
         ++known;
         const Eigen::Matrix3d along = bound->direction * bound->direction.transpose();
@@ -493,7 +493,7 @@ TEST_CASE("no spring is less stiff than the bound while its ends are near", "[ne
         for (int i = 0; i < 10; ++i) {
             const double part = i == 0 ? 1 : random.number();
             const Vector3<double> aside = i == 0 ? Vector3<double>(-bound->direction) : random.unit_vector();
-            const Vector3<double> there = reach + part * displacement * aside, u = there / norm(there);
+            const Vector3<double> there = edge_vector + part * displacement * aside, u = there / norm(there);
             const double q = spring.rest_length / norm(there);
             const Eigen::Matrix3d stiffness =
                 spring.stiffness * ((1 - q) * Eigen::Matrix3d::Identity() + q * u * u.transpose());
@@ -525,10 +525,10 @@ TEST_CASE("a spring is an element: force, blocks and changes are of one energy",
         const Vector3<double> there = here + rest * random.number(0.4, 1.4) * random.unit_vector();
         const double energy = 100 * k * rest * rest;
         test::check_element(spring, {here, there}, 0.1 * rest, energy, random);
-        test::check_second_derivative(spring, {here, there}, 0.1 * rest, energy);
+        test::check_hessian(spring, {here, there}, 0.1 * rest, energy);
         const Corners<double, 2> x{here, there};
-        const Vector3<double> reach = there - here;
-        for (const auto& [i, towards] : {std::pair(0, reach), std::pair(1, Vector3<double>(-reach))}) {
+        const Vector3<double> edge_vector = there - here;
+        for (const auto& [i, towards] : {std::pair(0, edge_vector), std::pair(1, Vector3<double>(-edge_vector))}) {
             const auto pull = spring.force_on(x, static_cast<std::size_t>(i));
             REQUIRE(pull.force == spring_force(law, towards, k, rest).force());
         }

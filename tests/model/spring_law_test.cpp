@@ -50,17 +50,17 @@ struct PullsAtRest {
 struct EnergyOfAnother {
     template <Real Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& s) const noexcept {
-        auto answer = LinearSpring{}(s);
-        answer.energy *= 2;
-        return answer;
+        auto response = LinearSpring{}(s);
+        response.energy *= 2;
+        return response;
     }
 };
 struct StiffnessOfAnother {
     template <Real Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& s) const noexcept {
-        auto answer = LinearSpring{}(s);
-        answer.stiffness *= 2;
-        return answer;
+        auto response = LinearSpring{}(s);
+        response.stiffness *= 2;
+        return response;
     }
 };
 struct Overflows {
@@ -103,11 +103,11 @@ TEMPLATE_TEST_CASE("a spring of tension only is linear while it is stretched, an
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
         const auto spring = random_spring<S>(random, 1);
-        const auto answer = TensionSpring{}(spring), linear = LinearSpring{}(spring);
+        const auto response = TensionSpring{}(spring), linear = LinearSpring{}(spring);
         const bool is_slack = spring.length < spring.rest_length;
-        REQUIRE(answer.tension == (is_slack ? 0 : linear.tension));
-        REQUIRE(answer.stiffness == (is_slack ? 0 : linear.stiffness));
-        REQUIRE(answer.energy == (is_slack ? 0 : linear.energy));
+        REQUIRE(response.tension == (is_slack ? 0 : linear.tension));
+        REQUIRE(response.stiffness == (is_slack ? 0 : linear.stiffness));
+        REQUIRE(response.energy == (is_slack ? 0 : linear.energy));
     }
     CHECK(TensionSpring{}(SpringState<S>{40, 2, 2}).stiffness == 40);
     const auto in_lanes = [](S length) {
@@ -200,21 +200,21 @@ TEMPLATE_TEST_CASE("an exponential spring of rest length zero has no strain and 
     CHECK(found.energy == 5);
 }
 
-TEMPLATE_TEST_CASE("wild lengths give finite answers", "[network]", double, float) {
+TEMPLATE_TEST_CASE("wild lengths give finite results", "[network]", double, float) {
     using S = TestType;
     const S largest = std::sqrt(std::numeric_limits<S>::max()) / S(1e6);
     const ExponentialSpring hardest{.stiffening = 50, .strain_limit = sizeof(S) == 4 ? 0.6 : 1.0};
     for (const S rest : {S(0), S(1e-6), S(1), S(1e6)}) {
         for (const S length : {std::numeric_limits<S>::denorm_min(), S(1e-12), S(1), S(1e6), largest / S(1e13)}) {
             CAPTURE(rest, length);
-            for (const auto& answer :
+            for (const auto& response :
                  {LinearSpring{}(SpringState<S>{1, rest, length}), ExponentialSpring{}(SpringState<S>{1, rest, length}),
                   hardest(SpringState<S>{1, rest, length})}) {
-                CHECK(is_finite(answer.tension));
-                CHECK(is_finite(answer.stiffness));
-                CHECK(is_finite(answer.energy));
-                CHECK(answer.stiffness >= 0);
-                CHECK(answer.energy >= 0);
+                CHECK(is_finite(response.tension));
+                CHECK(is_finite(response.stiffness));
+                CHECK(is_finite(response.energy));
+                CHECK(response.stiffness >= 0);
+                CHECK(response.energy >= 0);
             }
         }
     }

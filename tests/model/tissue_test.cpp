@@ -20,7 +20,7 @@
 #include "support/newton.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -142,7 +142,8 @@ TEST_CASE("steps of any rule bring a tissue to where Newton's method finds it at
         const auto check = [&](auto rule) {
             auto solver = QuasiStaticSolver(sphere.tissue, {.layers = unlimited, .sweeps = 16}, rule);
             Points<double> x = sphere.mesh.positions();
-            const auto report = test::settle(solver, x, 1e-3, sphere.tissue, sphere.foundation, pull(held, target));
+            const auto report =
+                test::run_to_equilibrium(solver, x, 1e-3, sphere.tissue, sphere.foundation, pull(held, target));
             REQUIRE(report.converged);
             REQUIRE((x - expected).colwise().norm().maxCoeff() < 1e-7);
             REQUIRE(norm<double>(report.reactions[0] - rest.reactions[0]) < 1e-5 * norm(rest.reactions[0]));

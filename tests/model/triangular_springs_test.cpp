@@ -73,8 +73,8 @@ double energy_of(const Elements<double, Each>& elements, const Points<double>& x
     return sum;
 }
 
-/// Stretched both ways and sheared, a sheet in the plane z = 0 pulls at no vertex but those of its border, with the stress
-/// of the continuum.
+/// Stretched in both directions and sheared, a sheet in the plane z = 0 pulls at no vertex but those of its border,
+/// with the stress of the continuum.
 void check_patch(const TriangleMesh<double>& mesh, Random& random) {
     const Material material = random_material(random);
     const auto springs = MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 0.0});
@@ -130,7 +130,7 @@ TEST_CASE("a triangular spring stores what a sheet of Saint Venant and Kirchhoff
         REQUIRE(element.mean_tension(now) == Approx(mean).epsilon(1e-9).margin(1e-9 * sheet));
 
         test::check_element(element, now, size, energy + sheet * size * size, random);
-        test::check_second_derivative(element, now, size, energy + sheet * size * size);
+        test::check_hessian(element, now, size, energy + sheet * size * size);
     }
 }
 

@@ -24,7 +24,7 @@ using namespace membrane;
 
 namespace {
 
-/// Keeps the compiler from leaving out what nobody looks at.
+/// Keeps the compiler from leaving out unused results.
 void used(const void* memory) {
     const void* volatile sink = memory;
     static_cast<void>(sink);
@@ -91,10 +91,10 @@ TEST_CASE("a million ticks allocate nothing", "[allocation]") {
 TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand allocate nothing, whatever goes wrong",
                    "[allocation]", double, float) {
     test::HapticLoop<TestType> loop(8);
-    test::Mishaps mishaps(9);
+    test::FaultInjector faults(9);
     const int ticks = cases(6'000, 500'000);  // of each scalar
     const long allocated = allocated_by([&] {
-        for (int i = 0; i < ticks; ++i) loop.tick(i % 2'000 < 1'000 ? test::Mishap() : mishaps.next());
+        for (int i = 0; i < ticks; ++i) loop.tick(i % 2'000 < 1'000 ? test::Fault() : faults.next());
     });
     CHECK(allocated == 0);
     CHECK(loop.x.allFinite());
@@ -151,9 +151,10 @@ TEMPLATE_TEST_CASE("nor do bounds of the error and slopes of the force", "[alloc
             const Vector3<S> target = point(loop.mesh.positions(), 7) * (1 + S(1e-4) * static_cast<S>(i % 200));
             const auto held = pull(7, target);
             const auto report = loop.solver.step(loop.x, S(1e-3), loop.network, loop.foundation, held);
-            certified += quick.of(loop.x, loop.network, loop.foundation, held).certified();
-            certified += sharp.of(loop.x, loop.network, loop.foundation, held).certified();
-            const auto feel = tangent.of(loop.solver.queue().vertices(), loop.x, loop.network, loop.foundation, held);
+            certified += quick.compute(loop.x, loop.network, loop.foundation, held).certified();
+            certified += sharp.compute(loop.x, loop.network, loop.foundation, held).certified();
+            const auto feel =
+                tangent.compute(loop.solver.queue().vertices(), loop.x, loop.network, loop.foundation, held);
             found += feel.status == TangentStatus::found;
             used(report.moved.data());
         }

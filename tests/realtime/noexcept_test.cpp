@@ -14,7 +14,7 @@
 #include <membrane/haptics/units.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 
 #include "support/catch.hpp"
@@ -26,8 +26,8 @@ using namespace membrane;
 
 namespace {
 
-// Eigen's own types may throw when they are copied (a matrix allocates), so `noexcept(call)` says no to a call that takes
-// one by value: here the type of the function is asked.
+// Eigen's own types may throw when they are copied (a matrix allocates), so `noexcept(call)` says no to a call that
+// takes one by value: here the type of the function is asked.
 template <class Function>
 constexpr bool is_noexcept = false;
 template <class Result, class Class, class... Arguments>
@@ -35,7 +35,7 @@ constexpr bool is_noexcept<Result (Class::*)(Arguments...) noexcept> = true;
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("surfaces are looked at without exceptions", "[noexcept]", double, float) {
+TEMPLATE_TEST_CASE("surfaces are queried without exceptions", "[noexcept]", double, float) {
     using S = TestType;
     static_cast<void>([](const Vector3<S>& p, S s, const Points<S>& points, const Triangle<S>& triangle) {
         static_assert(noexcept(dot(p, p))&& noexcept(squared_norm(p))&& noexcept(norm(p))&& noexcept(cross(p, p)));
@@ -105,9 +105,9 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
     });
     static_cast<void>([](ActiveVertices& active, const Network& network, std::span<const Index> vertices,
                          const SolverOptions<S>& options, bool (*is_balanced)(Index)) {
-        static_assert(noexcept(active.arrange(network, vertices, options))&& noexcept(active.vertices()));
+        static_assert(noexcept(active.begin_step(network, vertices, options))&& noexcept(active.vertices()));
         static_assert(noexcept(active.contact_layer())&& noexcept(active.queue()));
-        static_assert(noexcept(active.finish(network, is_balanced, {}))&& noexcept(active.clear()));
+        static_assert(noexcept(active.end_step(network, is_balanced, {}))&& noexcept(active.clear()));
         static_assert(noexcept(active.wake(0))&& noexcept(active.grow(network, options)));
         static_assert(noexcept(active.frontier())&& noexcept(active.colour_ends()));
     });
@@ -130,7 +130,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
         static_assert(noexcept(largest_squared_move(state, vertices)));
     });
     static_cast<void>([](Predictor<S, 4>& predictor, std::span<const DrivingInput<S>> inputs) {
-        static_assert(noexcept(predictor.extrapolation_factor(inputs))&& noexcept(predictor.forget()));
+        static_assert(noexcept(predictor.extrapolation_factor(inputs))&& noexcept(predictor.reset()));
     });
     static_cast<void>([](const Tool<S>& tool, const Contact<S>& contact, const Grasp<S>& grasp, const Vector3<S>& p,
                          const std::array<Index, 3>& corners, std::span<const Index> vertices) {
@@ -176,14 +176,15 @@ TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept
         static_assert(noexcept(friction(state))&& noexcept(friction.slips()));
         static_assert(noexcept(extrapolated(state))&& noexcept(extrapolated.solved(p, stiffness, p)));
         static_assert(noexcept(transition(state))&& noexcept(transition.in_transition()));
-        static_assert(noexcept(coupling.follow(state.tool, p, S(1)))&& noexcept(coupling(state)));
+        static_assert(noexcept(coupling.update(state.tool, p, S(1)))&& noexcept(coupling(state)));
         static_assert(noexcept(coupling.force())&& noexcept(coupling.reset()));
         static_assert(noexcept(smooth(state.contact))&& noexcept(smooth(state.contact, body)));
     });
     static_cast<void>([](ForceLimiter& limit, PassivityObserver& observer, Watchdog& watchdog, SoftStart& start,
                          MotorThermalModel& heat, const Vector3<S>& force) {
-        static_assert(noexcept(limit(force, 0.0, 1))&& noexcept(limit.acted())&& noexcept(limit.thermal_load()));
-        static_assert(noexcept(limit.share())&& noexcept(limit.device())&& noexcept(limit.reset()));
+        static_assert(
+            noexcept(limit(force, 0.0, 1))&& noexcept(limit.active_limits())&& noexcept(limit.thermal_load()));
+        static_assert(noexcept(limit.gain())&& noexcept(limit.device())&& noexcept(limit.reset()));
         static_assert(noexcept(observer.update(force, force, 1e-3))&& noexcept(observer.energy()));
         static_assert(noexcept(observer.energy_in())&& noexcept(observer.least())&& noexcept(observer.reset()));
         static_assert(noexcept(watchdog.update(1, 0.0))&& noexcept(start.update(1.0, 0.0)));
@@ -195,7 +196,7 @@ TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept
 TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", double, float) {
     using S = TestType;
     static_cast<void>([](SimulatedHand<S>& hand, ScriptedDevice<S, SimulatedHand<S>>& device, const Vector3<S>& p) {
-        static_assert(noexcept(hand.place(p))&& noexcept(hand.aim(p, p))&& noexcept(hand.move(p, S(1))));
+        static_assert(noexcept(hand.reset_to(p))&& noexcept(hand.set_target(p, p))&& noexcept(hand.advance(p, S(1))));
         static_assert(noexcept(hand.position())&& noexcept(hand.velocity()));
         static_assert(noexcept(device.running())&& noexcept(device.read())&& noexcept(device.write(p)));
     });

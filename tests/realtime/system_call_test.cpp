@@ -60,9 +60,9 @@ TEST_CASE("a million ticks do not call the system", "[system_call]") {
 TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand do not call the system, whatever goes wrong",
                    "[system_call]", double, float) {
     test::HapticLoop<TestType> loop(10);
-    test::Mishaps mishaps(11);
+    test::FaultInjector faults(11);
     const auto child = without_system_calls([&] {
-        for (int i = 0; i < cases(6'000, 500'000); ++i) loop.tick(i % 2'000 < 1'000 ? test::Mishap() : mishaps.next());
+        for (int i = 0; i < cases(6'000, 500'000); ++i) loop.tick(i % 2'000 < 1'000 ? test::Fault() : faults.next());
         if (!loop.x.allFinite() || !loop.drawn_right || loop.solves == 0) std::abort();
     });
     CHECK(child.signal == 0);

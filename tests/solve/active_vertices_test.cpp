@@ -43,32 +43,32 @@ struct Chain {
 
 }  // namespace
 
-TEST_CASE("visits go through the queue, then to what an earlier contact has left out of balance", "[active]") {
+TEST_CASE("updates go through the queue, then to what an earlier contact has left out of balance", "[active]") {
     const Chain chain;
     ActiveVertices active(12);
-    active.arrange(chain.network, List{1}, Options{.layers = 1});
+    active.begin_step(chain.network, List{1}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{1, 0, 2});
     CHECK(list_of(active.contact_layer()) == List{1});
     CHECK(list_of(active.vertices()) == List{1, 0, 2});
-    CHECK(active.finish(chain.network, balanced, {}));
+    CHECK(active.end_step(chain.network, balanced, {}));
 
     // The contact moves on: who was in the queue and is no longer is visited once more.
-    active.arrange(chain.network, List{4}, Options{.layers = 1});
+    active.begin_step(chain.network, List{4}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5, 1, 0, 2});
-    CHECK_FALSE(active.finish(chain.network, [](Index v) { return v != 2; }, {}));
-    active.arrange(chain.network, List{4}, Options{.layers = 1});
+    CHECK_FALSE(active.end_step(chain.network, [](Index v) { return v != 2; }, {}));
+    active.begin_step(chain.network, List{4}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5, 2});
-    CHECK_FALSE(active.finish(chain.network, balanced, List{2}));  // 3 is being visited, 1 is not
-    active.arrange(chain.network, List{4}, Options{.layers = 1});
+    CHECK_FALSE(active.end_step(chain.network, balanced, List{2}));  // 3 is being visited, 1 is not
+    active.begin_step(chain.network, List{4}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5, 1});
-    CHECK(active.finish(chain.network, balanced, {}));
+    CHECK(active.end_step(chain.network, balanced, {}));
 
     // Nothing left of the contact: once all is at rest there is nothing to do.
-    active.arrange(chain.network, List{}, Options{.layers = 1});
+    active.begin_step(chain.network, List{}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{4, 3, 5});
     CHECK(active.contact_layer().empty());
-    CHECK(active.finish(chain.network, balanced, {}));
-    active.arrange(chain.network, List{}, Options{.layers = 1});
+    CHECK(active.end_step(chain.network, balanced, {}));
+    active.begin_step(chain.network, List{}, Options{.layers = 1});
     CHECK(active.vertices().empty());
 }
 
@@ -77,11 +77,11 @@ TEST_CASE("in groups, what is beyond the queue is ordered so that no two that ar
     const Chain chain;
     ActiveVertices active(12);
     for (const Index v : {2, 3, 4, 5}) active.wake(v);
-    active.arrange(chain.network, List{0}, Options{.layers = 1});
+    active.begin_step(chain.network, List{0}, Options{.layers = 1});
     CHECK(list_of(active.vertices()) == List{0, 1, 2, 4, 3, 5});
     CHECK(std::ranges::equal(active.colour_ends(), std::vector<std::size_t>{4, 6}));
-    CHECK_FALSE(active.finish(chain.network, unbalanced, {}));
-    active.arrange(chain.network, List{0}, Options{.layers = 1, .order = UpdateOrder::breadth_first});
+    CHECK_FALSE(active.end_step(chain.network, unbalanced, {}));
+    active.begin_step(chain.network, List{0}, Options{.layers = 1, .order = UpdateOrder::breadth_first});
     CHECK(active.colour_ends().empty());
 }
 
@@ -89,9 +89,9 @@ TEST_CASE("beyond the layers no vertex wakes, however far the frontier moves", "
     const Chain chain;
     ActiveVertices active(12);
     for (int i = 0; i < 3; ++i) {
-        active.arrange(chain.network, List{0}, Options{.layers = 2});
+        active.begin_step(chain.network, List{0}, Options{.layers = 2});
         CHECK(list_of(active.vertices()) == List{0, 1, 2});
-        CHECK(active.finish(chain.network, balanced, List{0, 1, 2}));
+        CHECK(active.end_step(chain.network, balanced, List{0, 1, 2}));
     }
 }
 
@@ -100,19 +100,19 @@ TEST_CASE("who is woken is visited until balanced, and feels its neighbours from
     ActiveVertices active(12);
     active.wake(3);
     for (int i = 0; i < 3; ++i) {
-        active.arrange(chain.network, List{0}, Options{.layers = 0});
+        active.begin_step(chain.network, List{0}, Options{.layers = 0});
         CHECK(list_of(active.vertices()) == List{0, 3});
-        CHECK(active.finish(chain.network, [&](Index v) { return v != 3 || i == 2; }, {}) == (i == 2));
+        CHECK(active.end_step(chain.network, [&](Index v) { return v != 3 || i == 2; }, {}) == (i == 2));
     }
-    active.arrange(chain.network, List{2}, Options{.layers = 0});
-    CHECK_FALSE(active.finish(chain.network, balanced, List{2}));
-    active.arrange(chain.network, List{2}, Options{.layers = 0});
+    active.begin_step(chain.network, List{2}, Options{.layers = 0});
+    CHECK_FALSE(active.end_step(chain.network, balanced, List{2}));
+    active.begin_step(chain.network, List{2}, Options{.layers = 0});
     CHECK(list_of(active.vertices()) == List{2, 3});
 
     active.clear();
     CHECK(active.vertices().empty());
     CHECK(active.queue().vertices().empty());
-    active.arrange(chain.network, List{}, Options{});
+    active.begin_step(chain.network, List{}, Options{});
     CHECK(active.vertices().empty());
 }
 
@@ -120,14 +120,14 @@ TEST_CASE("a step that is not finished was never arranged", "[active]") {
     const Chain chain;
     ActiveVertices active(12);
     active.wake(5);
-    active.arrange(chain.network, List{0}, Options{.layers = 1});
-    CHECK_FALSE(active.finish(chain.network, unbalanced, {}));
+    active.begin_step(chain.network, List{0}, Options{.layers = 1});
+    CHECK_FALSE(active.end_step(chain.network, unbalanced, {}));
     ActiveVertices spared = active;
     for (const List& seeds : {List{3}, List{}, List{0}, List{0, 3}}) {
-        active.arrange(chain.network, seeds, Options{.layers = 1});
+        active.begin_step(chain.network, seeds, Options{.layers = 1});
         ActiveVertices other = active, like = spared;
-        other.arrange(chain.network, List{2}, Options{.layers = 1});
-        like.arrange(chain.network, List{2}, Options{.layers = 1});
+        other.begin_step(chain.network, List{2}, Options{.layers = 1});
+        like.begin_step(chain.network, List{2}, Options{.layers = 1});
         CHECK(list_of(other.vertices()) == list_of(like.vertices()));
         CHECK(list_of(other.queue().vertices()) == list_of(like.queue().vertices()));
     }
@@ -137,42 +137,42 @@ TEST_CASE("layers as needed: one after the other, and nothing stands still", "[a
     const Chain chain;
     const Options options{.layers = 3, .adaptive_layers = true};
     ActiveVertices active(12);
-    active.arrange(chain.network, List{1}, options);
+    active.begin_step(chain.network, List{1}, options);
     CHECK(list_of(active.vertices()) == List{1});
     CHECK(list_of(active.frontier()) == List{0, 2});
     active.grow(chain.network, options);
     CHECK(list_of(active.vertices()) == List{1, 0, 2});
     CHECK(list_of(active.frontier()) == List{3});
-    CHECK_FALSE(active.finish(
-        chain.network, [](Index v) { return v != 0; }, List{1, 0, 2}));  // all of them are looked at
+    CHECK_FALSE(active.end_step(
+        chain.network, [](Index v) { return v != 0; }, List{1, 0, 2}));  // all of them are evaluated
 
     // What was not in balance is visited, and the seed that is none any more; the layers begin anew.
-    active.arrange(chain.network, List{4}, options);
+    active.begin_step(chain.network, List{4}, options);
     CHECK(list_of(active.vertices()) == List{4, 0, 1});
     CHECK(list_of(active.frontier()) == List{3, 5});
-    CHECK_FALSE(active.finish(
+    CHECK_FALSE(active.end_step(
         chain.network, [](Index v) { return v != 5; }, List{1}));  // 2 has not been seen
     ActiveVertices spared = active;
-    active.arrange(chain.network, List{2}, options);
+    active.begin_step(chain.network, List{2}, options);
     active.grow(chain.network, options);
-    active.arrange(chain.network, List{}, options);
-    spared.arrange(chain.network, List{}, options);
+    active.begin_step(chain.network, List{}, options);
+    spared.begin_step(chain.network, List{}, options);
     CHECK(list_of(active.queue().vertices()) == list_of(spared.queue().vertices()));
     CHECK(list_of(active.vertices()) == List{5, 2, 4});
     CHECK(active.frontier().empty());
-    CHECK(active.finish(chain.network, balanced, {}));
+    CHECK(active.end_step(chain.network, balanced, {}));
 
     // Up to the threshold, and to the end of what the springs join.
     for (const Index layers : {0, 1, 2, 9}) {
         const Options few{.layers = layers, .adaptive_layers = true};
-        active.arrange(chain.network, List{0}, few);
+        active.begin_step(chain.network, List{0}, few);
         while (!active.frontier().empty()) active.grow(chain.network, few);
         CHECK(active.vertices().size() == static_cast<std::size_t>(std::min(layers, 5) + 1));
-        CHECK(active.finish(chain.network, balanced, {}));
+        CHECK(active.end_step(chain.network, balanced, {}));
     }
 }
 
-TEST_CASE("layers as needed: who there is no room for keeps a turn", "[active]") {
+TEST_CASE("layers as needed: a vertex beyond the capacity keeps a turn", "[active]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
     for (Index most = 1; most <= 600; most += 7) {
@@ -185,18 +185,18 @@ TEST_CASE("layers as needed: who there is no room for keeps a turn", "[active]")
         ActiveVertices active(162);
         std::set<Index> seen;
         for (int i = 0; i < 2000 && seen.size() < 162; ++i) {
-            active.arrange(network, List{3}, options);
+            active.begin_step(network, List{3}, options);
             while (!active.frontier().empty()) active.grow(network, options);
             REQUIRE(static_cast<Index>(active.vertices().size()) <= 1 + std::max((most - 2) / 4, 1));
             seen.insert(active.vertices().begin(), active.vertices().end());
-            REQUIRE_FALSE(active.finish(
+            REQUIRE_FALSE(active.end_step(
                 network, [&](Index v) { return i > 0 && v != 3; }, active.vertices()));
         }
         if (most >= 30) REQUIRE(seen.size() == 162);
     }
 }
 
-TEST_CASE("with little room layer 0 comes first, and those awake keep a turn", "[active]") {
+TEST_CASE("with little capacity layer 0 comes first, and those awake keep a turn", "[active]") {
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -211,23 +211,23 @@ TEST_CASE("with little room layer 0 comes first, and those awake keep a turn", "
         const Index own = static_cast<Index>(layer0.size()) * (options.sweeps * options.contact_iterations + 1);
         const Index spare = std::max((options.max_vertex_updates - own) / (options.sweeps + 1), 1);
         const std::size_t capacity = layer0.size() + static_cast<std::size_t>(spare);
-        active.arrange(network, seeds, options);
-        (void)active.finish(network, unbalanced, {});
+        active.begin_step(network, seeds, options);
+        (void)active.end_step(network, unbalanced, {});
         std::set<Index> left;
         while (left.size() < 20) left.insert(random.index(162));
         for (const Index v : left) active.wake(v);
 
         std::set<Index> seen;
         for (int i = 0; i < 200; ++i) {
-            active.arrange(network, seeds, options);
+            active.begin_step(network, seeds, options);
             REQUIRE(active.vertices().size() <= capacity);
             REQUIRE(active.vertices().size() >= std::min(capacity - capacity / 4, std::size_t(162)));
             REQUIRE(active.contact_layer().size() == layer0.size());
-            const auto visits = list_of(active.vertices());
-            REQUIRE(std::set<Index>(visits.begin(), visits.end()).size() == visits.size());
+            const auto updated = list_of(active.vertices());
+            REQUIRE(std::set<Index>(updated.begin(), updated.end()).size() == updated.size());
             for (const Index v : active.contact_layer()) REQUIRE(layer0.count(v) == 1);
-            seen.insert(visits.begin(), visits.end());
-            REQUIRE_FALSE(active.finish(network, unbalanced, {}));
+            seen.insert(updated.begin(), updated.end());
+            REQUIRE_FALSE(active.end_step(network, unbalanced, {}));
         }
         for (const Index v : left) REQUIRE(seen.count(v) == 1);
     }

@@ -14,7 +14,7 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -24,10 +24,10 @@ namespace {
 constexpr double radius = 0.01, stiffness = 40, dt = 1e-3;
 
 struct Membrane {
-    explicit Membrane(double backing_stiffness, Index subdivisions = 2)
+    explicit Membrane(double foundation_stiffness, Index subdivisions = 2)
         : mesh(icosphere({.radius = radius, .subdivisions = subdivisions})),
           network(mesh, LinearSpring{}, {.stiffness = stiffness}),
-          foundation(mesh, {.stiffness = backing_stiffness, .damping = 1e-3}) {}
+          foundation(mesh, {.stiffness = foundation_stiffness, .damping = 1e-3}) {}
 
     /// Largest force on any vertex but `held`, without damping [N].
     [[nodiscard]] double residual(const Points<double>& x, Index held = no_index) const {
@@ -98,32 +98,32 @@ TEST_CASE("with layers as needed a tool is pressed against as by the whole membr
         ContactTracker<double> tracker(membrane.mesh);
         Points<double> x = membrane.mesh.positions();
         StepReport<double> report;
-        Index visits = 0;
+        Index updates = 0;
         for (int tick = 1; tick <= 200; ++tick) {
             const double deep = 1.5e-3 * std::min(tick / 50.0, 1.0);
             const Tool<double> tool{.position = {0, 0, radius + 3e-3 - deep}, .radius = 3e-3, .time = tick * dt};
             const auto contact = tracker.update(tree, x, tool);
             report = solver.step(x, dt, membrane.network, membrane.foundation, press(tool, contact));
             tree.refit(x, report.moved);
-            visits += report.vertex_updates;
+            updates += report.vertex_updates;
         }
-        return std::pair(report.reactions[0], visits);
+        return std::pair(report.reactions[0], updates);
     };
-    const auto [exact, all_visits] = press_on({.layers = unlimited, .sweeps = 64});
+    const auto [exact, all_updates] = press_on({.layers = unlimited, .sweeps = 64});
     double before = 1;
-    Index visits_before = 0;
+    Index updates_before = 0;
     for (const double part : {1e-2, 1e-3, 1e-4}) {
         CAPTURE(part);
-        const auto [force, visits] = press_on(
+        const auto [force, updates] = press_on(
             {.layers = unlimited, .adaptive_layers = true, .sweeps = 64, .force_tolerance = part * norm(exact)});
         const double error = norm<double>(force - exact) / norm(exact);
         CHECK(error < 4 * part);
         CHECK(error < before);
-        CHECK(visits > visits_before);
+        CHECK(updates > updates_before);
         before = error;
-        visits_before = visits;
+        updates_before = updates;
     }
-    CHECK(visits_before < all_visits / 2);
+    CHECK(updates_before < all_updates / 2);
     CHECK(before < 1e-2);
 }
 
@@ -152,7 +152,7 @@ TEST_CASE("a membrane comes to rest however little time its steps have", "[solve
     }
 }
 
-TEST_CASE("what a limit of visits leaves out is the farthest, in colours too", "[solver][queue]") {
+TEST_CASE("what a limit of updates leaves out is the farthest, in colours too", "[solver][queue]") {
     const Membrane membrane(stiffness / 10, 3);
     const Index v = 5;
     const auto force = [&](UpdateOrder order, Index max_vertex_updates) {

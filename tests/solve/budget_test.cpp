@@ -22,8 +22,8 @@ using namespace membrane;
 using test::Random;
 using test::same_bits;
 
-// Whatever ends a step early, deadline or limit, and whatever it is combined with: the membrane stays near the tool, the
-// force near what it would be with all the time in the world, and the report tells what is left.
+// Whatever ends a step early, deadline or limit, and whatever it is combined with: the membrane stays near the tool,
+// the force near what it would be with all the time in the world, and the report says what is left.
 namespace {
 
 constexpr double radius = 0.01, dt = 1e-3;  // [m], [s]
@@ -36,16 +36,16 @@ struct Membrane {
     VirtualVolumeSprings<Scalar> foundation{mesh, {.stiffness = Scalar(8), .damping = Scalar(0.02)}};
 };
 
-/// What a step of a run may cost: parts of what it would cost without an end, and visits.
+/// What a step of a run may cost: parts of what it would cost without an end, and vertex updates.
 struct Budget {
-    double time;  // the deadline, as a part of a whole step's looks at the clock
+    double time;  // the deadline, as a part of the clock readings of a whole step
     Index max_vertex_updates;
 };
 
-/// Each look at it takes one unit of time; none is late before `end`.
+/// Each reading takes one unit of time; none is late before `end`.
 struct CountingClock {
-    double* looks;
-    double operator()() const { return *looks += 1; }
+    double* readings;
+    double operator()() const { return *readings += 1; }
 };
 
 /// Counts how often it is enforced.
@@ -60,24 +60,25 @@ struct CountedPress : ToolContact<Scalar> {
 
 enum class Path { press, hold, slide, turn_back, jerk };
 
-/// A ball on its way: into the membrane, then along `path`, then at rest.
+/// A ball in motion: into the membrane, then along `path`, then at rest.
 template <class Scalar>
 std::vector<Tool<Scalar>> tools(Path path, Random& random) {
     const Vector3<double> out = random.unit_vector();
     const Vector3<double> along = cross<double>(out, random.unit_vector()).normalized();
-    const double r = random.number(1e-3, 3e-3), depth = random.number(0.2e-3, 1.5e-3), pace = random.number(2e-5, 1e-4);
+    const double r = random.number(1e-3, 3e-3), depth = random.number(0.2e-3, 1.5e-3),
+                 speed = random.number(2e-5, 1e-4);
     std::vector<Tool<Scalar>> list;
     double angle = 0, below = -1e-4;
     const auto add = [&] {
         const Vector3<double> at = (radius + r - below) * (std::cos(angle) * out + std::sin(angle) * along);
         list.push_back({.position = at.cast<Scalar>(), .radius = Scalar(r), .time = Scalar(dt * double(list.size()))});
     };
-    for (; below < depth; below += path == Path::jerk ? 4 * pace : pace) add();
+    for (; below < depth; below += path == Path::jerk ? 4 * speed : speed) add();
     const int ticks = 40;
     for (int i = 0; i < ticks; ++i, add()) {
-        if (path == Path::slide) angle += pace / radius;
-        if (path == Path::turn_back) angle += (i < ticks / 2 ? pace : -pace) / radius;
-        if (path == Path::press) below += pace / 8;
+        if (path == Path::slide) angle += speed / radius;
+        if (path == Path::turn_back) angle += (i < ticks / 2 ? speed : -speed) / radius;
+        if (path == Path::press) below += speed / 8;
         if (path == Path::jerk && i % 10 == 5) angle += random.number(0.0, 0.3 * r) / radius;
     }
     return list;
@@ -89,21 +90,21 @@ struct Run {
     Run(const Membrane<Scalar>& scene, const SolverOptions<Scalar>& options, Rule rule)
         : membrane(scene), solver(scene.network, options, rule), tree(scene.mesh), tracker(scene.mesh) {}
 
-    /// A tick whose step has time for so many looks at the clock; returns how many it took.
-    double tick(const Tool<Scalar>& tool, double looks_left) {
+    /// A tick whose step has time for so many readings of the clock; returns how many it took.
+    double tick(const Tool<Scalar>& tool, double readings_left) {
         contact = tracker.update(tree, x, tool);
         depth = std::max(depth, double(contact.depth));
-        return step(tool, looks_left);
+        return step(tool, readings_left);
     }
-    double step(const Tool<Scalar>& tool, double looks_left) {
-        double looks = 0;
+    double step(const Tool<Scalar>& tool, double readings_left) {
+        double readings = 0;
         start = x;
         enforced = 0;
         const CountedPress<Scalar> presses{press(tool, contact), &enforced};
-        const Deadline deadline(CountingClock{&looks}, looks_left);
+        const Deadline deadline(CountingClock{&readings}, readings_left);
         report = solver.step_until(deadline, x, Scalar(dt), membrane.network, membrane.foundation, presses);
         tree.refit(x, report.moved);
-        return looks;
+        return readings;
     }
     double force() const { return double(norm(report.reactions[0])); }
     double farthest() const { return double((x - membrane.mesh.positions()).colwise().norm().maxCoeff()); }
@@ -126,8 +127,8 @@ struct Run {
     Contact<Scalar> contact;
     StepReport<Scalar> report;
     double depth = 0;
-    int enforced = 0;          // in the last step
-    bool looks_at_all = true;  // no limit of visits leaves out any of the queue
+    int enforced = 0;       // in the last step
+    bool reads_all = true;  // no limit of updates leaves out any of the queue
 };
 
 constexpr double no_end = 1e9;
@@ -156,7 +157,7 @@ void check_report(Run<Scalar, Rule>& run, Run<Scalar, Rule> before, const Tool<S
         beyond = std::max(beyond, double(norm<Scalar>(run.membrane.network.force_on(v, run.x).force + foundation)));
     }
     const double rounding = 1e4 * radius * double(std::numeric_limits<Scalar>::epsilon());
-    if (run.looks_at_all) REQUIRE(beyond <= double(report.residual) + rounding);
+    if (run.reads_all) REQUIRE(beyond <= double(report.residual) + rounding);
     if (report.converged) REQUIRE(double(report.residual) <= 1e-6 * (1 + 1e-6));
 }
 
@@ -192,17 +193,17 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
     Run<Scalar, Rule> cut(scene, options, rule);
 
     double largest = 0;
-    std::vector<double> looks, forces;
+    std::vector<double> readings, forces;
     for (const auto& tool : strokes) {
-        looks.push_back(whole.tick(tool, no_end));
+        readings.push_back(whole.tick(tool, no_end));
         REQUIRE(whole.report.status == StepStatus::advanced);
         forces.push_back(whole.force());
         largest = std::max(largest, whole.force());
     }
-    cut.looks_at_all = by_deadline && !options.adaptive_layers;
+    cut.reads_all = by_deadline && !options.adaptive_layers;
     for (std::size_t i = 0; i < strokes.size(); ++i) {
         const auto before = cut;
-        cut.tick(strokes[i], by_deadline ? part * looks[i] : no_end);
+        cut.tick(strokes[i], by_deadline ? part * readings[i] : no_end);
         REQUIRE(cut.report.status == StepStatus::advanced);
         check_report(cut, before, strokes[i]);
         const double motion = i == 0 ? 0 : double(norm<Scalar>(strokes[i].position - strokes[i - 1].position));
@@ -212,12 +213,13 @@ void check_run(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule) {
     }
     for (int i = 0; i < 20'000 && !whole.report.converged; ++i) whole.tick(strokes.back(), no_end);
     for (int i = 0; i < 20'000 && !cut.report.converged; ++i) {
-        cut.tick(strokes.back(), by_deadline ? part * looks.back() : no_end);
+        cut.tick(strokes.back(), by_deadline ? part * readings.back() : no_end);
     }
     constexpr double tolerance = 1e-2;
     CHECK(cut.report.converged);
     CHECK(whole.report.converged);
-    // Which vertices have ever been within a few layers depends on the contact of every tick, and so does where they rest.
+    // Which vertices have ever been within a few layers depends on the contact of every tick, and so does where they
+    // rest.
     if (options.layers != unlimited && !options.adaptive_layers) return;
     CHECK(cut.force() == Approx(whole.force()).epsilon(tolerance));
     CHECK(double((cut.x - whole.x).cwiseAbs().maxCoeff()) <= tolerance * whole.depth);
@@ -228,8 +230,8 @@ struct Errors {
     double predicted = 0, unpredicted = 0;
 };
 
-/// Steps with and without a prediction, and without one but with sweeps to the end, take the path tick by tick. With all
-/// layers: with fewer, where the membrane rests hangs on which vertices have ever been within them.
+/// Steps with and without a prediction, and without one but with sweeps to the end, take the path tick by tick. With
+/// all layers: with fewer, the equilibrium depends on which vertices have ever been within them.
 template <class Scalar, class Rule>
 void check_prediction(const Membrane<Scalar>& scene, std::uint64_t seed, Rule rule, Errors& sum) {
     CAPTURE(seed);

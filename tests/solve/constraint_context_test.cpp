@@ -12,7 +12,7 @@ using namespace membrane;
 
 namespace {
 
-/// Six points of which number 5 is pinned, and room for three contact points.
+/// Six points of which number 5 is pinned, and a capacity of three contact points.
 struct SixPoints {
     bool pinned(Index v) const { return v == pinned_vertex; }
 
@@ -53,7 +53,7 @@ TEST_CASE("what is moved is moved in the step, and the positions of the user sta
     const Points<double> before = scene.points;
     context.move(2, {1, 0, 0});
     context.move(2, {0, 1, 0});
-    context.place(4, {7, 8, 9});
+    context.set_position(4, {7, 8, 9});
     CHECK(norm<double>(context.position(2) - point(before, 2) - Vector3<double>(1, 1, 0)) < 1e-15);
     CHECK(context.position(4) == Vector3<double>(7, 8, 9));
     CHECK(context.start(4) == point(before, 4));
@@ -139,7 +139,7 @@ TEST_CASE("forces add up, and are taken back with the step", "[context]") {
     CHECK(scene.work.added_stiffness == std::vector<double>(7, 0.0));
 }
 
-TEST_CASE("a fixed vertex gives way to tools by force over stiffness, a free one does not", "[context]") {
+TEST_CASE("a fixed vertex yields to tools by force over stiffness, a free one does not", "[context]") {
     SixPoints scene;
     ConstraintContext<double> context(scene.x, scene.work, scene);
     for (const Index v : {1, 5}) context.set_support(v, 4);
@@ -207,7 +207,7 @@ TEST_CASE("each constraint finds the points it had in the step before, and no ot
     CHECK(context.cached_point(7, 0, 0) == nullptr);
 }
 
-TEST_CASE("points can be forgotten, and are refused where there is no room", "[context]") {
+TEST_CASE("points can be forgotten, and are refused beyond the capacity", "[context]") {
     SixPoints scene;
     ConstraintContext<double> context(scene.x, scene.work, scene);
     context.select_constraint(0);
@@ -222,7 +222,7 @@ TEST_CASE("points can be forgotten, and are refused where there is no room", "[c
     CHECK_FALSE(scene.work.full);
     context.begin_points();
     CHECK(context.cached_point(1, 0, 0) != nullptr);
-    scene.work.forget_points();
+    scene.work.reset_points();
     CHECK(context.cached_point(1, 0, 0) == nullptr);
 }
 
@@ -257,6 +257,6 @@ TEST_CASE("a state is copied with all it holds", "[context]") {
     REQUIRE(context.cached_point(7, 0, 0) != nullptr);
     CHECK(context.cached_point(7, 0, 0)->force.z() == -4);
     for (Index f = 0; f < 3; ++f) context.add_point(point_of(f, 0));
-    CHECK_FALSE(copy.full);  // the room has come along
+    CHECK_FALSE(copy.full);  // the capacity is copied too
     CHECK(copy.vertex_count() == 6);
 }

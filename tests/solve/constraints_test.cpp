@@ -17,7 +17,7 @@
 #include "support/catch.hpp"
 #include "support/meshes.hpp"
 #include "support/newton.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 #include "support/spring_law_check.hpp"
 
 using namespace membrane;
@@ -96,7 +96,7 @@ TEST_CASE("what a point of a triangle is held with is what Newton's method finds
             QuasiStaticSolver solver(membrane.network, to_the_end, SafeStep{.omega = 1.3});
             Points<double> x = membrane.mesh.positions();
             const auto held = pull(tool, grasp_of(membrane.mesh, f, weights));
-            const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation, held);
+            const auto report = test::run_to_equilibrium(solver, x, dt, membrane.network, membrane.foundation, held);
             REQUIRE(report.converged);
             REQUIRE(norm<double>(point_at(triangle_at(x, corners), weights) - target) < 1e-11);
 
@@ -122,9 +122,9 @@ TEST_CASE("a load comes to rest where Newton's method does", "[constraints]") {
 
             QuasiStaticSolver solver(membrane.network, to_the_end, SafeStep{.omega = 1.3});
             Points<double> x = membrane.mesh.positions();
-            const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation,
-                                             load(corners_of(membrane.mesh, f), weights, force),
-                                             load(corners_of(membrane.mesh, g), others, other));
+            const auto report = test::run_to_equilibrium(solver, x, dt, membrane.network, membrane.foundation,
+                                                         load(corners_of(membrane.mesh, f), weights, force),
+                                                         load(corners_of(membrane.mesh, g), others, other));
             REQUIRE(report.converged);
             REQUIRE(report.reactions[0] == -force);
             REQUIRE(report.reactions[1] == -other);
@@ -149,8 +149,8 @@ TEST_CASE("pins hold vertices where they are, and feel what is pulled elsewhere"
 
         QuasiStaticSolver solver(membrane.network, to_the_end, SafeStep{.omega = 1.3});
         Points<double> x = membrane.mesh.positions();
-        const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation, pin(pinned),
-                                         pull(pulled, target), pin({}));
+        const auto report = test::run_to_equilibrium(solver, x, dt, membrane.network, membrane.foundation, pin(pinned),
+                                                     pull(pulled, target), pin({}));
         REQUIRE(report.converged);
         REQUIRE(report.reactions.size() == 3);
         for (const Index v : pinned) REQUIRE(point(x, v) == point(membrane.mesh.positions(), v));
@@ -191,10 +191,11 @@ TEST_CASE("a vertex can be held by its place in a triangle, too", "[constraints]
         const Vector3<double> target = point(membrane.mesh.positions(), v) + 0.2 * random.vector();
         QuasiStaticSolver first(membrane.network, to_the_end), second(membrane.network, to_the_end);
         Points<double> x = membrane.mesh.positions(), y = x;
-        const auto by_vertex = test::settle(first, x, dt, membrane.network, membrane.foundation, pull(v, target));
-        const auto by_point =
-            test::settle(second, y, dt, membrane.network, membrane.foundation,
-                         pull(Tool<double>{.position = target}, grasp_of(membrane.mesh, f, Vector3<double>::Unit(k))));
+        const auto by_vertex =
+            test::run_to_equilibrium(first, x, dt, membrane.network, membrane.foundation, pull(v, target));
+        const auto by_point = test::run_to_equilibrium(
+            second, y, dt, membrane.network, membrane.foundation,
+            pull(Tool<double>{.position = target}, grasp_of(membrane.mesh, f, Vector3<double>::Unit(k))));
         REQUIRE((x - y).cwiseAbs().maxCoeff() < 1e-11);
         REQUIRE(norm<double>(by_vertex.reactions[0] - by_point.reactions[0]) < 1e-10);
     }
@@ -219,8 +220,8 @@ TEST_CASE("the network's own pins cannot be pulled away", "[constraints]") {
     const Small membrane(LinearSpring{}, random, pinned);
     QuasiStaticSolver solver(membrane.network, to_the_end);
     Points<double> x = membrane.mesh.positions();
-    const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation,
-                                     pull(7, Vector3<double>(2, 2, 2)), pin(pinned));
+    const auto report = test::run_to_equilibrium(solver, x, dt, membrane.network, membrane.foundation,
+                                                 pull(7, Vector3<double>(2, 2, 2)), pin(pinned));
     CHECK(report.converged);
     CHECK(same_bits(x, membrane.mesh.positions()));
 }
@@ -246,13 +247,14 @@ struct AtRest {
         for (int k = 0; k < 3; ++k) pushed.col(corners[static_cast<std::size_t>(k)]) += weights[k] * force;
     }
     template <class... Constraints>
-    StepReport<double> settle(const Constraints&... constraints) {
-        const auto report = test::settle(solver, x, dt, membrane.network, membrane.foundation, constraints...);
+    StepReport<double> run_to_equilibrium(const Constraints&... constraints) {
+        const auto report =
+            test::run_to_equilibrium(solver, x, dt, membrane.network, membrane.foundation, constraints...);
         REQUIRE(report.converged);
         return report;
     }
-    /// What acts from outside is in balance with the foundation, up to what is left unbalanced anywhere: also beyond the
-    /// layers that were free to move.
+    /// What acts from outside is in balance with the foundation, up to what is left unbalanced anywhere: also beyond
+    /// the layers that were free to move.
     void check_balance(const StepReport<double>& report) const {
         Vector3<double> reactions(0, 0, 0), sum(0, 0, 0);
         double residuals = 0, forces = 0;
@@ -288,7 +290,7 @@ TEST_CASE("at rest the reaction of a held vertex is the sum of the volume spring
         const Index v = scene.random.index(42);
         scene.held = {v};
         const Vector3<double> target = 1.2 * point(scene.x, v) + 0.1 * scene.random.vector();
-        scene.check_balance(scene.settle(pull(v, target)));
+        scene.check_balance(scene.run_to_equilibrium(pull(v, target)));
     });
 }
 
@@ -298,7 +300,7 @@ TEST_CASE("at rest the reaction of a held point is the sum of the volume springs
         const auto corners = corners_of(scene.membrane.mesh, f);
         const Vector3<double> weights = scene.random.barycentric();
         const Tool<double> tool{.position = 1.1 * point_at(triangle_at(scene.x, corners), weights)};
-        const auto report = scene.settle(pull(tool, grasp_of(scene.membrane.mesh, f, weights)));
+        const auto report = scene.run_to_equilibrium(pull(tool, grasp_of(scene.membrane.mesh, f, weights)));
         scene.push(corners, weights, -report.reactions[0]);
         scene.check_balance(report);
     });
@@ -309,7 +311,7 @@ TEST_CASE("at rest loads are the opposite of the sum of the volume springs", "[c
         const auto corners = corners_of(scene.membrane.mesh, scene.random.index(80));
         const Vector3<double> weights = scene.random.barycentric(), force = scene.random.vector();
         scene.push(corners, weights, force);
-        scene.check_balance(scene.settle(load(corners, weights, force)));
+        scene.check_balance(scene.run_to_equilibrium(load(corners, weights, force)));
     });
 }
 
@@ -327,8 +329,8 @@ TEST_CASE("at rest the reactions of pins, a vertex and a point add up to the vol
         const Vector3<double> weights = scene.random.barycentric();
         const Tool<double> tool{.position = 1.1 * point_at(triangle_at(scene.x, corners), weights)};
         const Vector3<double> target = 1.2 * point(scene.x, others[0]);
-        const auto report =
-            scene.settle(pin(pinned), pull(tool, grasp_of(scene.membrane.mesh, f, weights)), pull(others[0], target));
+        const auto report = scene.run_to_equilibrium(pin(pinned), pull(tool, grasp_of(scene.membrane.mesh, f, weights)),
+                                                     pull(others[0], target));
         scene.push(corners, weights, -report.reactions[1]);
         scene.check_balance(report);
     });
@@ -373,7 +375,8 @@ TEST_CASE("at rest a pressing tool carries the sum of the volume springs", "[con
     }
 }
 
-TEMPLATE_TEST_CASE("constraints that make no sense are told from others", "[constraints][bad]", double, float) {
+TEMPLATE_TEST_CASE("constraints that make no sense are distinguished from others", "[constraints][bad]", double,
+                   float) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const std::array<Index, 3> corners{0, 1, 2};
@@ -411,22 +414,22 @@ TEMPLATE_TEST_CASE("constraints that make no sense are told from others", "[cons
 
 namespace {
 
-/// Answers as it is told to, and counts what it is asked.
+/// Returns what its fields say, and counts its calls.
 struct Told {
     bool is_valid = true;
-    bool mends = false;
+    bool violated = false;
     double force = 0;
     Index* begun;
 
     bool valid() const noexcept { return is_valid; }
     void begin(ConstraintContext<double>&) const noexcept { ++*begun; }
-    bool enforce(ConstraintContext<double>&) const noexcept { return mends; }
+    bool enforce(ConstraintContext<double>&) const noexcept { return violated; }
     Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return {force, 0, 0}; }
 };
 
 }  // namespace
 
-TEST_CASE("a set of constraints is valid if all are, mends if any does, finite if all forces are") {
+TEST_CASE("a set of constraints is valid if all are, violated if any is, finite if all forces are") {
     StepState<double> work(1, 8);
     const Points<double> positions = Points<double>::Zero(3, 1);
     const ConstPointsRef<double> x = positions;

@@ -41,7 +41,7 @@ struct Patch {
         }
         for (Index f = 0; f < triangles; ++f) {
             for (int feature = 0; feature < feature_pairs(tool); ++feature) {
-                const auto nearest = proximity(triangle(f), tool, feature);
+                const auto nearest = closest_points(triangle(f), tool, feature);
                 if (!nearest) continue;
                 points.push_back({f, feature, corners(f), nearest->barycentric,
                                   direction<S>(nearest->separation, Vector3<S>::UnitZ()), Vector3<S>::Zero()});
@@ -79,7 +79,7 @@ void for_each_located(Patch<S>& patch, Act act) {
         detail::locate(patch.shape(), detail::corners_of(patch.state, pack), pack);
         for (std::size_t i = 0; i < pack.size; ++i) {
             const auto& point = patch.points[static_cast<std::size_t>(pack.point[i])];
-            act(pack, i, point, proximity(patch.triangle(point.triangle), patch.tool, point.feature));
+            act(pack, i, point, closest_points(patch.triangle(point.triangle), patch.tool, point.feature));
         }
     }
 }
@@ -174,7 +174,7 @@ TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by 
         for (const auto& point : patch.unpacked()) {
             const S force = -dot(point.force, point.normal);
             const S gap =
-                norm(proximity(patch.triangle(point.triangle), patch.tool, 0)->separation) - patch.tool.radius;
+                norm(closest_points(patch.triangle(point.triangle), patch.tool, 0)->separation) - patch.tool.radius;
             REQUIRE(force >= 0);
             REQUIRE(norm<S>(point.force + force * point.normal) <= slack);
             REQUIRE(gap >= -slack);
@@ -215,7 +215,7 @@ TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corn
                 REQUIRE(norm<S>(moved - by) <= slack * (1 + force));
             }
             const auto before = triangle_at(patch.x, point.corners);
-            const S gap = norm(proximity(before, patch.tool, 0)->separation) - patch.tool.radius;
+            const S gap = norm(closest_points(before, patch.tool, 0)->separation) - patch.tool.radius;
             REQUIRE(std::abs(force - std::max(-gap / compliance, S(0))) <= 100 * slack * (1 + force));
         }
         REQUIRE(std::abs(pass.largest - largest) <= slack * (1 + largest));
@@ -246,8 +246,8 @@ TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals",
             moves = push_out(patch.state, patch.shape(), patch.state.packs.items());
         for (const auto& point : patch.points) {
             const auto now = patch.triangle(point.triangle), before = triangle_at(patch.x, point.corners);
-            const bool was_inside = norm(proximity(before, patch.tool, 0)->separation) < patch.tool.radius - slack;
-            REQUIRE(norm(proximity(now, patch.tool, 0)->separation) >=
+            const bool was_inside = norm(closest_points(before, patch.tool, 0)->separation) < patch.tool.radius - slack;
+            REQUIRE(norm(closest_points(now, patch.tool, 0)->separation) >=
                     patch.tool.radius * (1 - 100 * slack) - 10 * slack);
             if (!was_inside) REQUIRE(norm<S>(now.a - before.a) <= slack);
         }

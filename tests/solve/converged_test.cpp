@@ -58,8 +58,8 @@ SolverOptions<double> random_options(Random& random) {
     return options;
 }
 
-/// A sphere, a capsule or a point that comes within 30 ticks, stays, goes along, and leaves: slowly, or in one tick. Some
-/// are forceps, which close and open meanwhile.
+/// A sphere, a capsule or a point that comes within 30 ticks, stays, goes along, and leaves: slowly, or in one tick.
+/// Some are forceps, which close and open meanwhile.
 struct Stroke {
     Stroke(const TriangleMesh<double>& mesh, Random& random) {
         const Vector3<double> target = point(mesh.positions(), random.index(mesh.vertex_count()));
@@ -95,17 +95,17 @@ struct Stroke {
 template <class IsFixed>
 double overlap(const TriangleMesh<double>& mesh, const Points<double>& x, const Tool<double>& tool, IsFixed is_fixed) {
     double nearest = std::numeric_limits<double>::infinity();
-    bool gives_way = false;
+    bool is_free = false;
     for (Index f = 0; f < mesh.triangle_count(); ++f) {
         const auto corners = mesh.triangles().col(f);
         for (int pair = 0; pair < feature_pairs(tool); ++pair) {
-            const auto found = proximity(triangle_at(x, corners), tool, pair);
+            const auto found = closest_points(triangle_at(x, corners), tool, pair);
             if (!found || norm(found->separation) >= nearest) continue;
             nearest = norm(found->separation);
-            gives_way = std::none_of(corners.begin(), corners.end(), is_fixed);
+            is_free = std::none_of(corners.begin(), corners.end(), is_fixed);
         }
     }
-    return gives_way ? tool.radius - nearest : 0;
+    return is_free ? tool.radius - nearest : 0;
 }
 
 /// One membrane under two tools, a load and a pin, each of which may be left out, and which leave or end.

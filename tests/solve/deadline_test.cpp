@@ -24,8 +24,8 @@ namespace {
 
 constexpr double radius = 0.01, stiffness = 40, dt = 1e-3;
 
-/// Time that passes only where work is done: with each look at the foundation of a vertex, of which a visit takes one, and
-/// with each turn of the tool's touches. No two take the same time, and some ticks are slower than others.
+/// Time that passes only where work is done: with each evaluation of the foundation of a vertex, of which a visit takes
+/// one, and with each turn of the tool's touches. No two take the same time, and some ticks are slower than others.
 struct WorkClock {
     explicit WorkClock(std::uint64_t seed) : random(seed) {}
 
@@ -84,7 +84,7 @@ struct LongEnforcement {
     [[nodiscard]] Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return -100 * force; }
 };
 
-/// A tool that never rests on a sphere whose steps have a deadline.
+/// A tool that always moves on a sphere whose steps have a deadline.
 struct Rush {
     Rush(std::uint64_t seed, Index subdivisions, const SolverOptions<double>& options)
         : random(seed),
@@ -124,7 +124,7 @@ struct Rush {
 
 }  // namespace
 
-TEST_CASE("a deadline is told in seconds, whatever the clock", "[deadline]") {
+TEST_CASE("a deadline is given in seconds, whatever the clock", "[deadline]") {
     CHECK(Deadline([] { return 2.5; }, 3.0).left() == 0.5);
     CHECK(Deadline([] { return 3.5F; }, 3.0F).left() == -0.5);
     CHECK(Deadline([] { return std::uint64_t(10); }, std::uint64_t(9)).left() == -1);
@@ -151,7 +151,7 @@ TEST_CASE("a step is over at its deadline, and has used the time", "[solver][dea
                   {.layers = unlimited, .adaptive_layers = random.chance(0.3), .sweeps = 1'000'000});
         const int ticks = cases(1000, 50'000);
         for (int tick = 0; tick < ticks; ++tick) {
-            const double time = random.number(600.0, 1500.0);  // visits
+            const double time = random.number(600.0, 1500.0);  // updates
             const double left = rush.tick(time);
             REQUIRE(rush.report.status == StepStatus::advanced);
             REQUIRE(-left <= 32);

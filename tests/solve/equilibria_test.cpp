@@ -7,13 +7,13 @@
 #include <numbers>
 #include <vector>
 
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/reference_table.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 
 using namespace membrane;
 using test::ReferenceRow;
@@ -76,8 +76,8 @@ struct Reference {
 /// The larger meshes are left to optimised builds.
 bool is_slow(const ReferenceRow& row) { return cases(20, 20) < 20 && row.integer("level") > 2; }
 
-/// Runs `check(solver)` with every rule and order of visits that is to find the same equilibria; on the larger meshes but
-/// in a long run, with the first.
+/// Runs `check(solver)` with every rule and order of updates that is to find the same equilibria; on the larger meshes
+/// but in a long run, with the first.
 template <class S, class Check>
 void with_each_rule(const Reference<S>& membrane, const SolverOptions<S>& options, Check check) {
     const auto ordered = [&](UpdateOrder order) {
@@ -120,7 +120,8 @@ TEST_CASE("one held vertex: every row of the reference", "[equilibria]") {
                 StepReport<double> report;
                 for (int i = 1; i <= increments; ++i) {
                     const auto target = membrane.raised(held, row.number("delta") * i / increments);
-                    report = test::settle(solver, x, dt, membrane.network, membrane.foundation, pull(held, target));
+                    report = test::run_to_equilibrium(solver, x, dt, membrane.network, membrane.foundation,
+                                                      pull(held, target));
                     REQUIRE(report.converged);
                 }
                 CHECK(report.residual < 1e-11);
@@ -175,9 +176,10 @@ TEST_CASE("mixed springs, two held vertices, anchors that moved: every row of th
                     const auto hold = [&](std::size_t n) {
                         return pull(vertices[n], membrane.raised(vertices[n], part * deltas[n]));
                     };
-                    if (held == 0) report = test::settle(solver, x, dt, membrane.network, volume);
-                    if (held == 1) report = test::settle(solver, x, dt, membrane.network, volume, hold(0));
-                    if (held == 2) report = test::settle(solver, x, dt, membrane.network, volume, hold(0), hold(1));
+                    if (held == 0) report = test::run_to_equilibrium(solver, x, dt, membrane.network, volume);
+                    if (held == 1) report = test::run_to_equilibrium(solver, x, dt, membrane.network, volume, hold(0));
+                    if (held == 2)
+                        report = test::run_to_equilibrium(solver, x, dt, membrane.network, volume, hold(0), hold(1));
                     REQUIRE(report.converged);
                 }
                 CHECK(report.residual < 1e-11);
@@ -204,7 +206,7 @@ TEST_CASE("the reference on a sphere of a centimetre, with springs of 40 N/m", "
         StepReport<double> report;
         for (int i = 1; i <= increments; ++i) {
             const auto target = membrane.raised(held, row.number("delta") * i / increments);
-            report = test::settle(solver, x, dt, membrane.network, membrane.foundation, pull(held, target));
+            report = test::run_to_equilibrium(solver, x, dt, membrane.network, membrane.foundation, pull(held, target));
             REQUIRE(report.converged);
         }
         const Vector3<double> outward = point(membrane.mesh.positions(), held) / radius;
@@ -227,8 +229,8 @@ TEST_CASE("the reference in float, as near as float comes", "[equilibria]") {
         StepReport<float> report;
         for (int i = 1; i <= increments; ++i) {
             const auto target = membrane.raised(held, row.number("delta") * i / increments);
-            report = test::settle(solver, x, static_cast<float>(dt), membrane.network, membrane.foundation,
-                                  pull(held, target));
+            report = test::run_to_equilibrium(solver, x, static_cast<float>(dt), membrane.network, membrane.foundation,
+                                              pull(held, target));
             REQUIRE(report.converged);
         }
         // A force that is negligible beside the others moves a vertex so far: 64 epsilon k / k_volume.

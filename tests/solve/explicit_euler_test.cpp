@@ -7,7 +7,7 @@
 #include <memory>
 #include <vector>
 
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
@@ -169,7 +169,7 @@ TEMPLATE_TEST_CASE("(2) and (3): the force changes the velocity, the new velocit
     }
 }
 
-TEST_CASE("free in space, momentum and the way of the middle are kept", "[euler]") {
+TEST_CASE("free in space, momentum and the velocity of the centre are kept", "[euler]") {
     Random random(4);
     const auto mesh = icosphere({.radius = 1, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 5.0, .mass = 0.2});

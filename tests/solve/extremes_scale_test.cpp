@@ -16,7 +16,7 @@
 #include "support/guarded_loop.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 
 // The same scene in other units, elsewhere, or in float is the same scene.
 
@@ -32,19 +32,19 @@ const TriangleMesh<S>& unit_sphere() {
     return mesh;
 }
 
-/// The units that a scene is told in, and where it is.
+/// The units that a scene is given in, and where it is.
 template <class S>
 struct Units {
     S stiffness = 1, size = 1;
     Vector3<S> origin = Vector3<S>::Zero();  ///< in sizes
 };
 
-/// Positions and forces, over the units that they are told in.
+/// Positions and forces, over the units that they are given in.
 template <class S>
 struct Outcome {
     Points<S> x;
     std::array<Vector3<S>, 4> reactions;
-    bool settled = true;
+    bool at_rest = true;
 
     double distance_to(const Outcome& other) const {
         return static_cast<double>((x - other.x).colwise().norm().maxCoeff());
@@ -84,7 +84,7 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
     };
     const Index held = random.index(42), loaded = random.index(80);
     const Vector3<S> target = point(sphere.positions(), held) + random.vector<S>(S(-0.1), S(0.1));
-    // A point is held on the same side, and the tool is on the other: what is held does not give way.
+    // A point is held on the same side, and the tool is on the other: a held point does not yield.
     const Vector3<S> weights(S(0.25), S(0.25), S(0.5));
     Index grasped = random.index(80);
     const auto middle = [&] { return point_at<S>(triangle_at(sphere.positions(), corners(grasped)), weights); };
@@ -110,24 +110,24 @@ Outcome<S> scene_of(int seed, const Units<S>& units) {
     Outcome<S> outcome{(loop.x / units.size).colwise() - units.origin.eigen(), {}};
     for (std::size_t i = 0; i < 4; ++i) outcome.reactions[i] = report.reactions[i] / k(units.size);
     // A tool at an edge may rock for good.
-    outcome.settled = !pressing || (loop.x - before).cwiseAbs().maxCoeff() <= 100 * rounding * units.size;
+    outcome.at_rest = !pressing || (loop.x - before).cwiseAbs().maxCoeff() <= 100 * rounding * units.size;
     return outcome;
 }
 
 /// How many scenes were compared, and how many of them had come to rest.
 struct Count {
-    int seen = 0, settled = 0, outliers = 0;
+    int seen = 0, at_rest = 0, outliers = 0;
 };
 
-/// The scene told in `units` is the one told in none.
+/// The scene in `units` is the one without units.
 template <class S, class Rule>
 void compare(int seed, const Units<S>& units, Count& count) {
     double tolerance = sizeof(S) == 4 ? 1e-4 : 1e-9;
     const auto expected = scene_of<S, Rule>(seed, {}), found = scene_of<S, Rule>(seed, units);
-    if (++count.seen; !(expected.settled && found.settled)) return;
-    ++count.settled;
-    // Where rounding decides whether a tolerance is met, iterations end earlier in one of the two: after ten ticks one scene
-    // in a hundred is farther apart.
+    if (++count.seen; !(expected.at_rest && found.at_rest)) return;
+    ++count.at_rest;
+    // Where rounding decides whether a tolerance is met, iterations end earlier in one of the two: after ten ticks one
+    // scene in a hundred is farther apart.
     if (sizeof(S) == 4 && found.distance_to(expected) >= tolerance) {
         ++count.outliers;
         tolerance *= 10;
@@ -159,7 +159,7 @@ TEMPLATE_TEST_CASE(
             default: compare<S, MassStep>(seed, units, count);
         }
     }
-    CHECK(count.settled >= 0.9 * count.seen);
+    CHECK(count.at_rest >= 0.9 * count.seen);
     CHECK(count.outliers <= 0.01 * count.seen);
 }
 
@@ -173,7 +173,7 @@ TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same 
         CAPTURE(units.size);
         compare<S, BlockStep>(seed, units, count);
     }
-    CHECK(count.settled >= 0.9 * count.seen);
+    CHECK(count.at_rest >= 0.9 * count.seen);
     CHECK(count.outliers <= 0.01 * count.seen);
 }
 
@@ -181,7 +181,7 @@ TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, a
                    "[extremes]", double, float) {
     using S = TestType;
     const double epsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
-    int refused = 0, accepted = 0, seen = 0, settled = 0;
+    int refused = 0, accepted = 0, seen = 0, at_rest = 0;
     for (int seed = 1; seed <= cases(120, 20'000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed) + 3'000'000);
@@ -203,13 +203,13 @@ TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, a
         const double spacing = epsilon * (1 + static_cast<double>(far));
         REQUIRE(100 * epsilon * static_cast<double>(far) < 1.1);
         const auto expected = scene_of<S, BlockStep>(seed, {}), found = scene_of<S, BlockStep>(seed, units);
-        if (++seen; !(expected.settled && found.settled)) continue;
-        ++settled;
+        if (++seen; !(expected.at_rest && found.at_rest)) continue;
+        ++at_rest;
         const double left = 2 * 1e-13 / 0.3;  // of both: the least negligible force against the softest foundation
         REQUIRE(found.distance_to(expected) < (sizeof(S) == 4 ? 100 : 1000) * spacing + left);
     }
     CHECK(accepted > 0);
-    CHECK(settled >= 0.9 * seen);
+    CHECK(at_rest >= 0.9 * seen);
     CHECK((refused > 0) == (sizeof(S) == 4));
 }
 
@@ -230,7 +230,7 @@ Outcome<S> run_scene(int scene, int seed) {
                         {.layers = unlimited, .sweeps = 4});
     const Vector3<S> from = random.unit_vector().cast<S>(), beside = S(0.3) * random.vector().cast<S>();
     Index held = random.index(162);
-    while (dot<S>(point(mesh.positions(), held), from) > 0) held = random.index(162);  // what is held does not give way
+    while (dot<S>(point(mesh.positions(), held), from) > 0) held = random.index(162);  // a held point does not yield
     const Vector3<S> target = point(mesh.positions(), held) + size * S(0.15) * random.vector().cast<S>();
     Tool<S> tool{.radius = size * (scene / 4 % 2 == 0 ? S(0.1) : S(0.3))};
     Outcome<S> outcome;

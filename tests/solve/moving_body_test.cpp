@@ -12,7 +12,7 @@
 #include <membrane/haptics/force_policy.hpp>
 #include <membrane/haptics/rest_contact.hpp>
 #include <membrane/haptics/smooth_contact.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/surface/shapes.hpp>
@@ -27,7 +27,7 @@ namespace {
 
 constexpr double radius = 0.01, dt = 1e-3;
 
-enum class Told { pose, anchors };
+enum class Input { pose, anchors };
 
 /// A membrane in the frame of its body, or in the world on a body that moves, and what one tick of it comes to.
 struct Membrane {
@@ -42,8 +42,8 @@ struct Membrane {
         report = solver.step(x, dt, network, foundation, press(tool, contact, grasp), membrane::pull(tool, grasp));
         end(tool, smooth(contact));
     }
-    void tick_on_body(const Tool<double>& tool, const RigidFrame<double>& pose, Told told) {
-        if (told == Told::pose) {
+    void tick_on_body(const Tool<double>& tool, const RigidFrame<double>& pose, Input input) {
+        if (input == Input::pose) {
             REQUIRE(body.move_to(pose, x));
         } else {
             Points<double> anchors = mesh.positions();
@@ -145,12 +145,12 @@ RigidFrame<double> smooth_motion(double time) {
 
 }  // namespace
 
-// What touches a vertex or an edge touches several triangles alike, and rounding decides which of them a solver begins with:
-// on its way to the equilibrium a step may differ by what it leaves undone, about 1e-6; at rest it may not.
+// What touches a vertex or an edge touches several triangles alike, and rounding decides which of them a solver begins
+// with: before the equilibrium a step may differ by what it leaves undone, about 1e-6; at rest it may not.
 TEST_CASE("a body that jumps with the tool on it: all forces as at rest", "[moving]") {
     for (const auto& scene : scenes) {
-        for (const Told told : {Told::pose, Told::anchors}) {
-            INFO(scene.name << ", told by " << (told == Told::pose ? "pose" : "anchors"));
+        for (const Input input : {Input::pose, Input::anchors}) {
+            INFO(scene.name << ", given by " << (input == Input::pose ? "pose" : "anchors"));
             test::Random random(7);
             Membrane rest(scene.mesh, scene.pins), moved(scene.mesh, scene.pins);
             RigidFrame<double> pose;
@@ -161,7 +161,7 @@ TEST_CASE("a body that jumps with the tool on it: all forces as at rest", "[movi
                 }
                 const auto tool = stroke_at(tick);
                 rest.tick(tool);
-                moved.tick_on_body(in_world(tool, pose), pose, told);
+                moved.tick_on_body(in_world(tool, pose), pose, input);
                 INFO(phases[tick / phase_ticks] << ", tick " << tick);
                 const Difference difference(rest, moved, pose);
                 const bool still = tick % phase_ticks == phase_ticks - 1;
@@ -169,8 +169,8 @@ TEST_CASE("a body that jumps with the tool on it: all forces as at rest", "[movi
                 REQUIRE(difference.force <= bound);
                 REQUIRE(difference.depth <= 1e-9);
                 REQUIRE(difference.positions <= bound);
-                // A jump has no velocity, but for a body that is told by anchors.
-                if (still || told == Told::pose) REQUIRE(difference.felt <= bound);
+                // A jump has no velocity, but for a body that is given by anchors.
+                if (still || input == Input::pose) REQUIRE(difference.felt <= bound);
                 REQUIRE(rest.contact.touching() == moved.contact.touching());
                 REQUIRE(rest.grasp.holding() == moved.grasp.holding());
                 if (still) REQUIRE(norm(rest.force) > 5e-3);
@@ -183,14 +183,14 @@ TEST_CASE("a body that jumps with the tool on it: all forces as at rest", "[movi
 
 TEST_CASE("a body that turns and shifts under forceps: all forces as at rest", "[moving]") {
     for (const auto& scene : scenes) {
-        for (const Told told : {Told::pose, Told::anchors}) {
-            INFO(scene.name << ", told by " << (told == Told::pose ? "pose" : "anchors"));
+        for (const Input input : {Input::pose, Input::anchors}) {
+            INFO(scene.name << ", given by " << (input == Input::pose ? "pose" : "anchors"));
             Membrane rest(scene.mesh, scene.pins), moved(scene.mesh, scene.pins);
             for (int tick = 0; tick < 4 * phase_ticks; ++tick) {
                 const auto pose = smooth_motion(tick * dt);
                 const auto tool = stroke_at(tick);
                 rest.tick(tool);
-                moved.tick_on_body(in_world(tool, pose), pose, told);
+                moved.tick_on_body(in_world(tool, pose), pose, input);
                 INFO(phases[tick / phase_ticks] << ", tick " << tick);
                 const Difference difference(rest, moved, pose);
                 const bool still = tick % phase_ticks == phase_ticks - 1;
@@ -198,7 +198,7 @@ TEST_CASE("a body that turns and shifts under forceps: all forces as at rest", "
                 REQUIRE(difference.force <= bound);
                 REQUIRE(difference.positions <= bound);
                 // Of anchors the velocity is the mean over the tick: half a tick times the acceleration off.
-                REQUIRE(difference.felt <= (told == Told::pose ? bound : 1e-2));
+                REQUIRE(difference.felt <= (input == Input::pose ? bound : 1e-2));
             }
         }
     }
@@ -211,7 +211,7 @@ TEST_CASE("a still tool on a body that moves feels the same, seen from the body 
         const auto pose = smooth_motion(tick * dt);
         const Tool<double> tool{.position = {0.3e-3, 0.5e-3, 0.0094}, .radius = 1e-3};
         inside.tick(to_body_frame(tool, pose));
-        outside.tick_on_body(tool, pose, Told::pose);
+        outside.tick_on_body(tool, pose, Input::pose);
         CAPTURE(tick);
         const Difference difference(inside, outside, pose);
         const double bound = tick == 600 ? 1e-9 : 1e-4;
@@ -249,7 +249,7 @@ TEST_CASE("a membrane goes with its body, pinned or not, at no visit where it is
         Membrane moved(scene.mesh, scene.pins, 6);
         const Tool<double> far{.position = {1, 1, 1}, .radius = 1e-3};
         for (int tick = 0; tick <= 100; ++tick) {
-            moved.tick_on_body(far, smooth_motion(5 * tick * dt), tick % 2 == 0 ? Told::pose : Told::anchors);
+            moved.tick_on_body(far, smooth_motion(5 * tick * dt), tick % 2 == 0 ? Input::pose : Input::anchors);
             REQUIRE(moved.report.vertex_updates == 0);
             REQUIRE(moved.x == moved.body.anchors());
         }
@@ -306,7 +306,7 @@ TEST_CASE("a refused step leaves the membrane where its body took it", "[moving]
             CHECK(moved.x == before);
         }
         pose.rotation = random.rotation();
-        moved.tick_on_body(in_world(stroke_at(tick), pose), pose, Told::pose);
+        moved.tick_on_body(in_world(stroke_at(tick), pose), pose, Input::pose);
         if (tick < phase_ticks - 1) continue;  // what was refused has no prediction after it
         CHECK(Difference(rest, moved, pose).force <= 1e-9);
     }
@@ -318,7 +318,7 @@ TEST_CASE("after reset on a moved body a solver is as new", "[moving]") {
     const Points<double> anchors = 1.02 * scene.mesh.positions();
     for (int tick = 0; tick < 30; ++tick) {
         const auto pose = smooth_motion(tick * dt);
-        used.tick_on_body(in_world(stroke_at(tick), pose), pose, Told::pose);
+        used.tick_on_body(in_world(stroke_at(tick), pose), pose, Input::pose);
     }
     REQUIRE(used.body.move_to(anchors, dt, used.x));
     QuasiStaticSolver<double> fresh(used.network, {.layers = 6, .sweeps = 4, .force_tolerance = 1e-13});

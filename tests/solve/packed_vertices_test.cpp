@@ -8,7 +8,7 @@
 #include <vector>
 
 #include <membrane/core/thread_pool.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
@@ -38,7 +38,7 @@ struct Opaque {
 static_assert(UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, VirtualVolumeSprings<double>>);
 static_assert(UpdatesInLanes<float, SafeStep, MassSpringNetwork<float, LinearSpring>, NoFoundation>);
 static_assert(UpdatesInLanes<float, MassStep, MassSpringNetwork<float, LinearSpring>,
-                             MovedVolume<VirtualVolumeSprings<float>, float>>);
+                             MovingFoundation<VirtualVolumeSprings<float>, float>>);
 static_assert(
     !UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Opaque<VirtualVolumeSprings<double>>>);
 static_assert(!UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, ExponentialSpring>, NoFoundation>);
@@ -176,7 +176,7 @@ TEMPLATE_TEST_CASE("it is all the same in what order an executor does its tasks,
     SECTION("as published") { check_same_shared_out<TestType>(MassStep{}); }
 }
 
-TEMPLATE_TEST_CASE("there are as many groups as there is room for, in packs", "[packed]", float, double) {
+TEMPLATE_TEST_CASE("there are as many groups as the capacity allows, in packs", "[packed]", float, double) {
     using S = TestType;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);

@@ -74,7 +74,7 @@ TEST_CASE("what the network of the step pins does not move, whatever went before
         QuasiStaticSolver solver(free, options_of(random));
         auto x = mesh.positions();
         const Index v = random.index(mesh.vertex_count());
-        for (int tick = 0; tick < 6; ++tick) {  // on its way, with something to predict
+        for (int tick = 0; tick < 6; ++tick) {  // in motion, with something to predict
             const Vector3<double> target = (1 + 0.02 * tick) * point(mesh.positions(), v);
             REQUIRE(solver.step(x, 1e-3, free, foundation, pull(v, target)).status == StepStatus::advanced);
         }

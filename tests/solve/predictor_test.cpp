@@ -56,7 +56,7 @@ struct Witness {
     Points<double>* seen;
 
     bool valid() const noexcept { return true; }
-    void hold(ConstraintContext<double>& context) const noexcept {
+    void prescribe(ConstraintContext<double>& context) const noexcept {
         for (Index v = 0; v < seen->cols(); ++v) seen->col(v) = context.position(v);
     }
     void begin(ConstraintContext<double>&) const noexcept {}
@@ -64,9 +64,9 @@ struct Witness {
     Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return Vector3<double>::Zero(); }
 };
 
-/// A vertex is led outward, 0.2 mm in a tick.
-struct Led {
-    explicit Led(const SolverOptions<double>& options = {}) : solver(membrane.network, options) {}
+/// A vertex is pulled outward, 0.2 mm in a tick.
+struct DrivenSphere {
+    explicit DrivenSphere(const SolverOptions<double>& options = {}) : solver(membrane.network, options) {}
 
     template <class... Others>
     StepReport<double> go_on(const Others&... others) {
@@ -94,13 +94,13 @@ TEST_CASE("nothing is expected before something has gone on for two steps") {
     CHECK(predictor.extrapolation_factor(Leads{at(1)}) == 0);
     CHECK(predictor.extrapolation_factor(Leads{at(2)}) == 0);
     CHECK(predictor.extrapolation_factor(Leads{at(3)}) == 1);
-    predictor.forget();
+    predictor.reset();
     CHECK(predictor.extrapolation_factor(Leads{at(4)}) == 0);
     CHECK(predictor.extrapolation_factor(Leads{at(5)}) == 0);
     CHECK(predictor.extrapolation_factor(Leads{at(6)}) == 1);
 }
 
-TEST_CASE("what is expected is how far the lead goes on along its last way, less what it turns") {
+TEST_CASE("the factor is how far the input repeats its last displacement, less its turn") {
     const auto expected = [](const DrivingInput<double>& next) {
         Predictor<double, 2> predictor;
         static_cast<void>(predictor.extrapolation_factor(Leads{at(1)}));
@@ -120,7 +120,7 @@ TEST_CASE("what is expected is how far the lead goes on along its last way, less
     CHECK(expected(std::nullopt) == 0);
 }
 
-TEST_CASE("of several leads the one that goes on least counts, those that stay do not") {
+TEST_CASE("of several inputs the one that goes on least counts, those that stay do not") {
     Predictor<double, 2> predictor;
     static_cast<void>(predictor.extrapolation_factor(Leads{at(1), at(1)}));
     static_cast<void>(predictor.extrapolation_factor(Leads{at(2), at(1)}));
@@ -135,7 +135,7 @@ TEST_CASE("of several leads the one that goes on least counts, those that stay d
     CHECK(predictor.extrapolation_factor(std::span<const DrivingInput<double>>()) == 0);
 }
 
-TEST_CASE("a way longer than the lead says lets one expect nothing, nor does the one after it") {
+TEST_CASE("after a displacement longer than the input's limit the factor is zero, and once more") {
     const auto expected = [](double first, double second) {
         Predictor<double, 1> predictor;
         const auto no_farther = [](double x) {
@@ -150,7 +150,7 @@ TEST_CASE("a way longer than the lead says lets one expect nothing, nor does the
     CHECK(expected(2.1, 2) == 0);
 }
 
-TEST_CASE("ways too small or too large for their square end in a part from 0 to 1") {
+TEST_CASE("displacements too small or too large for their square give a factor from 0 to 1") {
     const double tiny = std::numeric_limits<double>::denorm_min(), small = 1e-160, huge = 1e150;
     for (const double first : {tiny, small, 1.0, huge}) {
         for (const double second : {-huge, -1.0, -tiny, 0.0, tiny, small, 1.0, huge}) {
@@ -178,13 +178,13 @@ TEST_CASE("what converges by itself converges with the prediction") {
 
 TEST_CASE("a tool that slides on is felt with a third of the error, or less") {
     const Membrane membrane;
-    const Stroke<double> stroke(membrane.mesh, slide(90), dt);
+    const ToolTrajectory<double> stroke(membrane.mesh, slide(90), dt);
     const auto references = equilibria(membrane.mesh, membrane.network, membrane.foundation, stroke, 6);
     REQUIRE(references.size() == 15);
     const auto error = [&](Index sweeps, bool predict) {
         const SolverOptions<double> options{
             .layers = unlimited, .sweeps = sweeps, .contact_iterations = 4, .predict = predict};
-        return trial(membrane.mesh, membrane.network, membrane.foundation, stroke, references, options).force_error;
+        return run_trial(membrane.mesh, membrane.network, membrane.foundation, stroke, references, options).force_error;
     };
     for (const Index sweeps : {1, 2, 4}) {
         CAPTURE(sweeps);
@@ -192,46 +192,46 @@ TEST_CASE("a tool that slides on is felt with a third of the error, or less") {
     }
 }
 
-TEST_CASE("a step begins where its vertices were on their way to, if what leads goes on") {
-    Led led;
-    for (int tick = 0; tick < 3; ++tick) led.go_on();
-    const Points<double> before = led.x;
-    led.go_on();
-    const Points<double> displacement = led.x - before, there = led.x + displacement;
-    led.go_on();
-    CHECK(displacement.col(led.neighbour()).norm() > 1e-3 * radius);
-    CHECK((led.begin.rightCols(161) - there.rightCols(161)).norm() <= 1e-12 * radius);
+TEST_CASE("a step begins at extrapolated positions if the input goes on") {
+    DrivenSphere driven;
+    for (int tick = 0; tick < 3; ++tick) driven.go_on();
+    const Points<double> before = driven.x;
+    driven.go_on();
+    const Points<double> displacement = driven.x - before, there = driven.x + displacement;
+    driven.go_on();
+    CHECK(displacement.col(driven.neighbour()).norm() > 1e-3 * radius);
+    CHECK((driven.begin.rightCols(161) - there.rightCols(161)).norm() <= 1e-12 * radius);
 
-    const Points<double> last = led.x;
-    led.stay();
-    CHECK(same_bits(led.begin, last));
+    const Points<double> last = driven.x;
+    driven.stay();
+    CHECK(same_bits(driven.begin, last));
 }
 
-TEST_CASE("a vertex that is pinned on its way stays where it is") {
-    Led led;
-    for (int tick = 0; tick < 4; ++tick) led.go_on();
-    const Points<double> before = led.x;
-    const Index v = led.neighbour();
-    led.go_on(pin({&v, 1}));
-    CHECK(same_bits(point(led.x, v), point(before, v)));
-    CHECK_FALSE(same_bits(led.x, before));
+TEST_CASE("a vertex that is pinned in motion stays where it is") {
+    DrivenSphere driven;
+    for (int tick = 0; tick < 4; ++tick) driven.go_on();
+    const Points<double> before = driven.x;
+    const Index v = driven.neighbour();
+    driven.go_on(pin({&v, 1}));
+    CHECK(same_bits(point(driven.x, v), point(before, v)));
+    CHECK_FALSE(same_bits(driven.x, before));
 }
 
 TEST_CASE("a step that is refused is not predicted, nor the next one") {
-    Led led;
-    for (int tick = 0; tick < 4; ++tick) led.go_on();
-    const Points<double> before = led.x;
+    DrivenSphere driven;
+    for (int tick = 0; tick < 4; ++tick) driven.go_on();
+    const Points<double> before = driven.x;
     const Vector3<double> somewhere = Vector3<double>::Zero();
-    CHECK(led.go_on(pull(no_index, somewhere)).status == StepStatus::invalid_input);
-    CHECK(same_bits(led.x, before));
-    led.go_on();
-    CHECK(same_bits(led.begin, before));
+    CHECK(driven.go_on(pull(no_index, somewhere)).status == StepStatus::invalid_input);
+    CHECK(same_bits(driven.x, before));
+    driven.go_on();
+    CHECK(same_bits(driven.begin, before));
 }
 
 TEST_CASE("without the option nothing is predicted") {
-    Led led({.predict = false});
-    for (int tick = 0; tick < 4; ++tick) led.go_on();
-    const Points<double> before = led.x;
-    led.go_on();
-    CHECK(same_bits(led.begin, before));
+    DrivenSphere driven({.predict = false});
+    for (int tick = 0; tick < 4; ++tick) driven.go_on();
+    const Points<double> before = driven.x;
+    driven.go_on();
+    CHECK(same_bits(driven.begin, before));
 }

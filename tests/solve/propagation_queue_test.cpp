@@ -107,7 +107,7 @@ TEST_CASE("within a layer vertices stand in the order of arrival", "[queue]") {
         const auto vertices = queue.vertices();
         std::vector<std::size_t> place(static_cast<std::size_t>(network.vertex_count()), vertices.size());
         for (std::size_t i = 0; i < vertices.size(); ++i) place[static_cast<std::size_t>(vertices[i])] = i;
-        // Each was brought in by the first of its neighbours in the queue; who came first brought in first.
+        // Each was added by the first of its neighbours in the queue; the first in adds first.
         std::size_t last = 0;
         for (const Index v : vertices.subspan(queue.layer_count() > 0 ? queue.layer(0).size() : 0)) {
             std::size_t first = vertices.size();
@@ -149,7 +149,7 @@ TEST_CASE("a queue by hand", "[queue]") {
     CHECK(queue.vertices().empty());
     CHECK(queue.layer_count() == 0);
 
-    // PinnedVertices vertices are in nobody's way but stop the force.
+    // Pinned vertices obstruct no other vertex but stop the force.
     const MassSpringNetwork wall(mesh, LinearSpring{}, {.stiffness = 1.0, .pinned = {3, 4, 5}});
     queue.build(wall, std::vector<Index>{4, 1}, unlimited);
     CHECK(vertices(queue.vertices()) == std::vector<Index>{1, 0, 2});

@@ -21,7 +21,7 @@
 #include "support/child_process.hpp"
 #include "support/meshes.hpp"
 #include "support/refusal.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -29,7 +29,7 @@ using test::same_bits;
 
 namespace {
 
-// A rule that has nothing to remember takes no room.
+// A rule that has nothing to remember takes no memory.
 static_assert(sizeof(QuasiStaticSolver<double, MassStep>) + sizeof(double) ==
               sizeof(QuasiStaticSolver<double, SafeStep>));
 
@@ -105,7 +105,7 @@ TEST_CASE("one sweep moves a chain as (4) says, vertex by vertex in the queue's 
     CHECK(report.status == StepStatus::advanced);
     CHECK_FALSE(report.converged);
     CHECK(set_of(report.moved) == std::set<Index>{0, 1, 2, 3});
-    CHECK(report.vertex_updates == 3 + 4);  // the free three, and a last look at all four
+    CHECK(report.vertex_updates == 3 + 4);  // the free three, and the final residuals of all four
     // What is left: 0 - 1 is short by 0.3, 1 - 2 by 0.16, 2 - 3 by 0.024, and 3 - 4 by 0.016.
     CHECK(report.reactions[0].x() == Approx(-30 * (0.5 - d1)));
     CHECK(report.residual == Approx(std::max({30 * (0.5 - d1) - 20 * (d1 - d2), 20 * (d1 - d2) - 50 * (d2 - d3),
@@ -126,9 +126,9 @@ void sweep_by_hand(Points<S>& x, S dt, const Linear<S>& network, const Volume& v
             Vector3<S> force(0, 0, 0);
             S stiffness = 0;
             for (const auto& end : network.springs_of(v)) {
-                const Vector3<S> reach = point(x, end.other) - point(x, v);
-                const S length = norm(reach), tension = end.stiffness * (length - end.rest_length);
-                force += tension / length * reach;
+                const Vector3<S> edge = point(x, end.other) - point(x, v);
+                const S length = norm(edge), tension = end.stiffness * (length - end.rest_length);
+                force += tension / length * edge;
                 stiffness += std::max(end.stiffness, tension / length);
             }
             const auto foundation = volume.force_on(v, point(x, v), point(start, v), dt);
@@ -221,8 +221,8 @@ TEST_CASE("at rest nothing is visited and nothing moves", "[solver][queue]") {
     CHECK(untouched.residual == 0);
 
     const Vector3<double> target = sphere.raised(7, 0.2);
-    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation, pull(7, target)).converged);
-    // Held still, the queue is looked at and nothing moves.
+    REQUIRE(test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation, pull(7, target)).converged);
+    // Held still, the queue is evaluated and nothing moves.
     Points<double> before = x;
     for (int i = 0; i < 10; ++i) {
         const auto held = solver.step(x, 1e-3, sphere.network, sphere.foundation, pull(7, target));
@@ -233,7 +233,7 @@ TEST_CASE("at rest nothing is visited and nothing moves", "[solver][queue]") {
     }
     // Let go, it comes back to rest, and then costs nothing.
     CHECK_FALSE(solver.step(x, 1e-3, sphere.network, sphere.foundation).converged);
-    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
+    REQUIRE(test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
     CHECK(sphere.residual(x) <= sphere.network.force_tolerance());
     before = x;
     for (int i = 0; i < 10; ++i) {
@@ -245,7 +245,7 @@ TEST_CASE("at rest nothing is visited and nothing moves", "[solver][queue]") {
     }
 }
 
-TEST_CASE("what a moving seed leaves behind relaxes all the way", "[solver][queue]") {
+TEST_CASE("what a moving seed leaves behind relaxes completely", "[solver][queue]") {
     for (int seed = 1; seed <= cases(30); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -268,7 +268,7 @@ TEST_CASE("what a moving seed leaves behind relaxes all the way", "[solver][queu
             const auto ends = sphere.network.springs_of(v);
             v = ends[static_cast<std::size_t>(random.index(static_cast<Index>(ends.size())))].other;
         }
-        const auto report = test::settle(solver, x, 1e-3, sphere.network, sphere.foundation);
+        const auto report = test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation);
         REQUIRE(report.converged);
         // A vertex that no layer ever reached may have a little from each of its neighbours.
         REQUIRE(sphere.residual(x) <= 6 * sphere.network.force_tolerance());
@@ -286,17 +286,17 @@ TEST_CASE("a load or a held point that is taken away leaves nothing behind", "[s
     const auto check = [&](const auto& constraint) {
         QuasiStaticSolver solver(sphere.network, {.layers = 3, .sweeps = 4});
         Points<double> x = sphere.mesh.positions();
-        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation, constraint).converged);
+        REQUIRE(test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation, constraint).converged);
         REQUIRE((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() > 0.01);
         REQUIRE_FALSE(solver.step(x, 1e-3, sphere.network, sphere.foundation).converged);
-        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
+        REQUIRE(test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
         REQUIRE((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() < 1e-7);
     };
     check(load<double>(corners, weights, 0.2 * place));
     check(PointAttachment<double>{5, corners, weights, 1.2 * place});
 }
 
-TEST_CASE("a step visits no more than it may, and its seeds in any case", "[solver][queue]") {
+TEST_CASE("a step updates no more than it may, and its seeds in any case", "[solver][queue]") {
     for (int seed = 1; seed <= cases(50); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -328,10 +328,10 @@ TEST_CASE("what layer 0 is visited more often is taken off the rest", "[solver][
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Sphere<double> sphere;
-        const Index sweeps = 1 + random.index(5), visits = 1 + random.index(6), most = 1 + random.index(500);
+        const Index sweeps = 1 + random.index(5), iterations = 1 + random.index(6), most = 1 + random.index(500);
         QuasiStaticSolver solver(
             sphere.network,
-            {.layers = unlimited, .sweeps = sweeps, .contact_iterations = visits, .max_vertex_updates = most});
+            {.layers = unlimited, .sweeps = sweeps, .contact_iterations = iterations, .max_vertex_updates = most});
         Points<double> x = sphere.mesh.positions();
         const auto triangle = sphere.mesh.triangles().col(random.index(320));
         const std::array<Index, 3> corners{triangle[0], triangle[1], triangle[2]};
@@ -339,7 +339,7 @@ TEST_CASE("what layer 0 is visited more often is taken off the rest", "[solver][
             const auto report = solver.step(x, 1e-3, sphere.network, sphere.foundation,
                                             load<double>(corners, random.barycentric(), 0.1 * random.vector()));
             REQUIRE(report.status == StepStatus::advanced);
-            REQUIRE(report.vertex_updates <= std::max(most, 3 * (sweeps * visits + 1) + sweeps + 1));
+            REQUIRE(report.vertex_updates <= std::max(most, 3 * (sweeps * iterations + 1) + sweeps + 1));
         }
     }
 }
@@ -353,7 +353,7 @@ TEST_CASE("a step that may not visit all of its queue does not call it converged
         if (report.converged) REQUIRE(sphere.residual(x, {3}) <= sphere.network.force_tolerance());
     }
     // What it left undone is not forgotten when the seed goes.
-    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
+    REQUIRE(test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
     CHECK((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() < 1e-7);
 }
 
@@ -373,7 +373,7 @@ TEST_CASE("converged says that no vertex that may move is out of balance", "[sol
             if (report.converged) REQUIRE(residual <= sphere.network.force_tolerance());
         }
         const auto hold = pull(50, sphere.raised(50, 0.2));
-        REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation, hold).converged);
+        REQUIRE(test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation, hold).converged);
         for (int i = 0; i < 10; ++i) {
             REQUIRE(solver.step(x, 1e-3, sphere.network, sphere.foundation, hold).converged);
         }
@@ -385,13 +385,13 @@ TEST_CASE("vertices are woken by name, or all at once", "[solver]") {
     QuasiStaticSolver solver(sphere.network, {.layers = 0, .sweeps = 4});
     Points<double> x = sphere.mesh.positions();
     x.col(9) *= 1.1;
-    CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates == 0);  // nobody has told it
+    CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates == 0);  // it has not been woken
     const std::vector<Index> moved{9};
     solver.wake(moved);
     CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates > 0);
-    // Its neighbours were never looked at; to have them follow, wake them.
+    // Its neighbours were never evaluated; to have them follow, wake them.
     solver.wake_all();
-    REQUIRE(test::settle(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
+    REQUIRE(test::run_to_equilibrium(solver, x, 1e-3, sphere.network, sphere.foundation).converged);
     CHECK((x - sphere.mesh.positions()).cwiseAbs().maxCoeff() < 1e-7);
     x.col(9) *= 1.1;
     solver.wake_all();
@@ -409,7 +409,7 @@ TEST_CASE("what is remembered is a cache: to drop it changes no equilibrium", "[
                                        sphere.mesh.triangles()(2, 5)};
     const PointAttachment<double> held{
         5, corners, {0.2, 0.3, 0.5}, 1.2 * point_at(triangle_at(x, corners), {0.2, 0.3, 0.5})};
-    const auto report = test::settle(first, x, 1e-3, sphere.network, sphere.foundation, held);
+    const auto report = test::run_to_equilibrium(first, x, 1e-3, sphere.network, sphere.foundation, held);
     REQUIRE(report.converged);
     StepReport<double> other;
     for (int i = 0; i < 2000; ++i) {
@@ -449,9 +449,9 @@ TEST_CASE("a single vertex recovers in the time k_d / k_v, whatever the number o
     }
 }
 
-TEST_CASE("a whole membrane recovers in that time, too, and all the way", "[solver][damping]") {
-    // All vertices are off by the same way: no spring has anything to say. The damping of (5) leaves them free to turn
-    // about their anchors, so that within a tick the sweeps come near to this and no further.
+TEST_CASE("a whole membrane recovers in that time, too, and completely", "[solver][damping]") {
+    // All vertices are off by the same displacement: no spring has a tension. The damping of (5) leaves them free to
+    // turn about their anchors, so that within a tick the sweeps come near to this and no further.
     const double k = 8, d = 0.02, dt = 1e-3;
     const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
     const Linear<double> network(mesh, LinearSpring{}, {.stiffness = 1.0});
@@ -467,7 +467,7 @@ TEST_CASE("a whole membrane recovers in that time, too, and all the way", "[solv
         REQUIRE((x - (mesh.positions().colwise() + (expected * displacement).eigen())).cwiseAbs().maxCoeff() <
                 2e-3 * norm(displacement));
     }
-    const auto report = test::settle(solver, x, dt, network, foundation);
+    const auto report = test::run_to_equilibrium(solver, x, dt, network, foundation);
     REQUIRE(report.converged);
     CHECK((x - mesh.positions()).cwiseAbs().maxCoeff() < 1e-10);
 }
@@ -671,7 +671,7 @@ TEMPLATE_TEST_CASE("a rule that runs away is called unstable, and nothing has mo
           }) == StepStatus::unstable);
 }
 
-TEST_CASE("waking what is no vertex wakes nobody", "[solver][bad]") {
+TEST_CASE("waking what is no vertex wakes no vertex", "[solver][bad]") {
     const Sphere<double> sphere;
     QuasiStaticSolver solver(sphere.network);
     solver.wake(std::vector<Index>{-1, 162, std::numeric_limits<Index>::max(), std::numeric_limits<Index>::min()});
@@ -679,7 +679,7 @@ TEST_CASE("waking what is no vertex wakes nobody", "[solver][bad]") {
     CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates == 0);
 }
 
-TEMPLATE_TEST_CASE("more touches than there is room for are refused, and nothing has moved", "[solver][bad]", double,
+TEMPLATE_TEST_CASE("more contact points than the capacity are refused, and nothing has moved", "[solver][bad]", double,
                    float) {
     using S = TestType;
     const Sphere<S> sphere;
@@ -712,7 +712,7 @@ TEMPLATE_TEST_CASE("wild targets come to a safe outcome", "[solver][bad]", doubl
             if (report.status != StepStatus::advanced) REQUIRE(same_bits(x, before));
         }
         // Let go, it comes back: the foundation is half as stiff as a spring.
-        const auto report = test::settle(solver, x, S(0.1), sphere.network, sphere.foundation);
+        const auto report = test::run_to_equilibrium(solver, x, S(0.1), sphere.network, sphere.foundation);
         REQUIRE(report.status == StepStatus::advanced);
         REQUIRE(is_finite(x));
     }

@@ -18,7 +18,7 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 #include "support/traps.hpp"
 
 using namespace membrane;
@@ -47,7 +47,7 @@ struct Membrane {
 
     explicit Membrane(Index subdivisions) : mesh(icosphere({.radius = radius, .subdivisions = subdivisions})) {}
 
-    /// Plays `script`, and then lets the membrane come to rest. Returns the largest distance from the shape on the way
+    /// Plays `script`, and then lets the membrane come to rest. Returns the largest distance from the shape meanwhile
     /// and the one at the end [R].
     template <class Volume>
     std::pair<double, double> play(const std::vector<Waypoint<double>>& script, double tool_radius,
@@ -63,7 +63,7 @@ struct Membrane {
             tree.refit(x, report.moved);
             largest = std::max(largest, (x - mesh.positions()).colwise().norm().maxCoeff());
         }
-        REQUIRE(test::settle(solver, x, dt, network, volume).converged);
+        REQUIRE(test::run_to_equilibrium(solver, x, dt, network, volume).converged);
         return {largest / radius, distance_from_shape(x, mesh.positions()) / radius};
     }
 };
@@ -77,7 +77,8 @@ std::vector<Waypoint<double>> press_script(const Vector3<double>& from, double t
             {.time = 0.5, .position = (touching + 0.005) * from}};
 }
 
-/// Down onto the surface, which between its vertices lies lower than the sphere, closed there, a fifth of the radius up, and opened.
+/// Down onto the surface, which between its vertices lies lower than the sphere, closed there, a fifth of the radius
+/// up, and opened.
 std::vector<Waypoint<double>> pull_script(const Vector3<double>& from, double tool_radius) {
     const double touching = radius + tool_radius;
     return {{.time = 0, .position = (touching + 0.001) * from},
@@ -166,17 +167,17 @@ TEST_CASE("after a tool that jumps anywhere, the membrane comes back where its f
             for (const auto& reaction : report.reactions) REQUIRE(is_finite(reaction));
             membrane.tree.refit(x, report.moved);
         }
-        REQUIRE(test::settle(membrane.solver, x, dt, membrane.network, foundation).converged);
+        REQUIRE(test::run_to_equilibrium(membrane.solver, x, dt, membrane.network, foundation).converged);
         REQUIRE((x - membrane.mesh.positions()).cwiseAbs().maxCoeff() < 1e-6 * radius);
     }
 }
 
 TEST_CASE("a tool that jumps through the membrane drags it along with a force that soon is a membrane's",
           "[recovery]") {
-    for (const double backing_stiffness : {4.0, 8.0, 40.0}) {
-        CAPTURE(backing_stiffness);
+    for (const double foundation_stiffness : {4.0, 8.0, 40.0}) {
+        CAPTURE(foundation_stiffness);
         Membrane membrane(3);
-        const VirtualVolumeSprings foundation(membrane.mesh, {.stiffness = backing_stiffness, .damping = 0.02});
+        const VirtualVolumeSprings foundation(membrane.mesh, {.stiffness = foundation_stiffness, .damping = 0.02});
         Vector3<double> force;
         for (int tick = 0; tick < 50; ++tick) {
             Tool<double> tool{.position = {0, 0, 0.02}, .radius = 1e-3};
@@ -188,8 +189,8 @@ TEST_CASE("a tool that jumps through the membrane drags it along with a force th
             membrane.tree.refit(membrane.x, report.moved);
             force = report.reactions[0];
         }
-        // What springs and foundation of a hundred vertices can pull with over that way.
-        CHECK(norm(force) < 100 * (stiffness + backing_stiffness) * 0.032);
+        // What springs and foundation of a hundred vertices can pull with over that displacement.
+        CHECK(norm(force) < 100 * (stiffness + foundation_stiffness) * 0.032);
         CHECK((membrane.x - membrane.mesh.positions()).cwiseAbs().maxCoeff() < 2 * 0.032);
     }
 }

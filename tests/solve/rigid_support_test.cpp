@@ -16,13 +16,14 @@
 #include "support/catch.hpp"
 #include "support/random.hpp"
 
-// A tool on what is pinned or held, through tracker, tree and solver, with the constants of the README: lengths in metres.
+// A tool on what is pinned or held, through tracker, tree and solver, with the constants of the README: lengths in
+// metres.
 
 using namespace membrane;
 
 namespace {
 
-constexpr double spring = 40, backing_stiffness = 8;  // [N/m]
+constexpr double spring = 40, foundation_stiffness = 8;  // [N/m]
 
 /// A sheet of 20 mm and a tool above it. Who is fixed may be pinned in the network, held by `pin` or by `pull`.
 template <class S>
@@ -32,7 +33,7 @@ class Scene {
         : mesh_(sheet<S>({.width = S(0.02), .height = S(0.02), .columns = squares, .rows = squares})),
           pulled_(border(mesh_).front()),
           network_(mesh_, LinearSpring{}, {.stiffness = S(spring), .pinned = with_border(std::move(pinned))}),
-          backing_(mesh_, {.stiffness = S(backing_stiffness), .damping = S(0.02)}),
+          foundation_(mesh_, {.stiffness = S(foundation_stiffness), .damping = S(0.02)}),
           solver_(network_, options),
           tree_(mesh_),
           tracker_(mesh_),
@@ -59,13 +60,13 @@ class Scene {
         StepReport<S> report;
         if constexpr (sizeof(S) == 8) {
             if (hold_first_) {
-                report = solver_.step(x_, S(1e-3), network_, backing_, pull(pulled_, target), pin(held_), pressing);
+                report = solver_.step(x_, S(1e-3), network_, foundation_, pull(pulled_, target), pin(held_), pressing);
                 tree_.refit(x_, report.moved);
                 REQUIRE(report.status == StepStatus::advanced);
                 return report.reactions[2];
             }
         }
-        report = solver_.step(x_, S(1e-3), network_, backing_, pressing, pin(held_), pull(pulled_, target));
+        report = solver_.step(x_, S(1e-3), network_, foundation_, pressing, pin(held_), pull(pulled_, target));
         tree_.refit(x_, report.moved);
         REQUIRE(report.status == StepStatus::advanced);
         return report.reactions[0].template cast<double>();
@@ -81,7 +82,7 @@ class Scene {
     TriangleMesh<S> mesh_;
     Index pulled_;
     MassSpringNetwork<S, LinearSpring> network_;
-    VirtualVolumeSprings<S> backing_;
+    VirtualVolumeSprings<S> foundation_;
     QuasiStaticSolver<S> solver_;
     AabbTree<S> tree_;
     ContactTracker<S> tracker_;
@@ -108,7 +109,7 @@ struct Slide {
 
 struct Felt {
     double largest = 0, jump = 0, at_rest = 0, merit = 0;  // [N]
-    double pace = 0;                                       // of the tool [m]
+    double speed = 0;                                      // of the tool [m]
 };
 
 /// Straight in, along, and then still.
@@ -129,7 +130,7 @@ Felt feel(Scene<S>& scene, const Slide& slide) {
         const Vector3<double> force = scene.tick(tool);
         if (i > 0) {
             felt.jump = std::max(felt.jump, (force - last).norm());
-            felt.pace = std::max(felt.pace, (tool.position - last_position).norm());
+            felt.speed = std::max(felt.speed, (tool.position - last_position).norm());
         }
         felt.largest = std::max(felt.largest, force.norm());
         if (i >= in + along + still - candidates) {
@@ -143,11 +144,11 @@ Felt feel(Scene<S>& scene, const Slide& slide) {
 }
 
 /// The default stiffness of a fixed vertex inside a sheet, whose vertices have six springs.
-constexpr double default_stiffness = detail::support_factor * (6 * spring + backing_stiffness);
+constexpr double default_stiffness = detail::support_factor * (6 * spring + foundation_stiffness);
 
 /// No more than what a tick of motion does to a stiff contact, which bears on several vertices.
 void check(const Felt& felt) {
-    CHECK(felt.jump < 6 * default_stiffness * felt.pace);
+    CHECK(felt.jump < 6 * default_stiffness * felt.speed);
     CHECK(felt.merit <= 1e-3 * felt.at_rest);
     CHECK(felt.at_rest > 0);
 }
@@ -225,7 +226,7 @@ TEMPLATE_TEST_CASE("the force is continuous where a tool slides over a pinned ri
     }
 }
 
-TEST_CASE("nor does it jump over a pin, or a vertex that is held, in whatever order constraints are handed in") {
+TEST_CASE("nor does it jump over a pin, or a vertex that is held, in whatever order the constraints are given") {
     for (const Index squares : {10, 20}) {
         for (const double radius : {0.0, 0.0005, 0.002}) {
             for (const double depth : {0.00005, 0.0003}) {

@@ -82,7 +82,8 @@ bool grows(const Scene& scene, Points<double> x, Move move, int times) {
     return false;
 }
 
-/// The largest number below which `diverges(number)` does not hold, between half of `theory` and twice, to a thousandth.
+/// The largest number below which `diverges(number)` does not hold, between half of `theory` and twice, to a
+/// thousandth.
 template <class Diverges>
 double limit_near(double theory, Diverges diverges) {
     double low = theory / 2, high = 2 * theory;
@@ -180,7 +181,7 @@ TEST_CASE(
         }
         const double theory = 2 / largest;
         const Points<double> start = start_along(scene, displacement);
-        // By hand, without the solver's own look at the blocks.
+        // By hand, without the solver's own check of the blocks.
         const auto moves = [&](double compliance, Index first, Index last) {
             return [&scene, compliance, first, last](Points<double>& x) {
                 for (Index v = first; v <= last; ++v) x.col(v) += compliance * scene.force(v, x);

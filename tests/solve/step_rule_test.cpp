@@ -19,7 +19,7 @@
 #include "support/meshes.hpp"
 #include "support/orders.hpp"
 #include "support/refusal.hpp"
-#include "support/settle.hpp"
+#include "support/run_to_equilibrium.hpp"
 #include "support/spring_law_check.hpp"
 
 using namespace membrane;
@@ -42,11 +42,11 @@ TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", double, float) {
     // Where nothing pulls, nothing moves.
     CHECK(SafeStep{}.compliance(VertexState<S>{}) == 0);
     CHECK(BlockStep{}.compliance(VertexState<S>{}) * Vector3<S>(1, 2, 3) == Vector3<S>::Zero());
-    // Without relief a block is the same in all directions.
+    // Without a reduction of stiffness a block is the same in all directions.
     CHECK((BlockStep{.omega = 1.5}.compliance(vertex) * Vector3<S>(1, 2, 3) - Vector3<S>(1, 2, 3) * S(1.5) / 8).norm() <
           8 * std::numeric_limits<S>::epsilon());
-    // What a constraint acts on is not relaxed beyond what it answers.
-    vertex.touched = true;
+    // What a constraint acts on is not relaxed beyond its response.
+    vertex.constrained = true;
     CHECK(SafeStep{.omega = 1.5}.compliance(vertex) == S(1) / 8);
     CHECK(SafeStep{.omega = 0.5}.compliance(vertex) == S(0.5) / 8);
     STATIC_REQUIRE_FALSE(StepRule<int, S>);
@@ -64,7 +64,7 @@ TEMPLATE_TEST_CASE("a contact stiffens a block along its normal alone", "[rule]"
         vertex.force = random.vector(S(-1), S(1));
         for (int i = 0; i < 3; ++i)
             vertex.stiffness_reduction += outer<S>(vertex.stiffness / 4, random.unit_vector<S>());
-        vertex.touched = true;
+        vertex.constrained = true;
         const auto without = BlockStep{}.compliance(vertex);
         vertex.contact_stiffness = std::pow(S(10), random.number(S(-2), S(2)));
         vertex.stiffness += vertex.contact_stiffness;
@@ -180,7 +180,7 @@ void no_visit_raises_the_energy(const Rule& rule, const Law& law, int seed) {
         solver.wake(vertex);
         const auto report = solver.step(x, OddNetwork<Law>::dt, odd.network, odd.foundation);
         REQUIRE(report.status == StepStatus::advanced);
-        REQUIRE(report.vertex_updates == 2);  // one, and a last look
+        REQUIRE(report.vertex_updates == 2);  // one, and the final residual
         const auto before = odd.energy(vertex[0], from, start, none), after = odd.energy(vertex[0], x, start, none);
         REQUIRE(after.sum <= before.sum + 64 * std::numeric_limits<double>::epsilon() * before.size);
         for (Index v = 0; v < 12; ++v) {
@@ -214,7 +214,7 @@ TEST_CASE("no safe or block visit raises the energy, on springs that stiffen", "
     }
 }
 
-TEMPLATE_TEST_CASE("whole steps of safe visits never raise the energy", "[rule]", SafeStep, BlockStep) {
+TEMPLATE_TEST_CASE("whole steps of safe updates never raise the energy", "[rule]", SafeStep, BlockStep) {
     for (int seed = 1; seed <= cases(20); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -281,7 +281,7 @@ TEMPLATE_TEST_CASE("the rule as published converges up to its limit, and is refu
         QuasiStaticSolver solver(network, {.layers = unlimited, .sweeps = 10}, MassStep{});
         Points<S> x = start;
         solver.wake_all();
-        const auto report = test::settle(solver, x, dt, network, foundation);
+        const auto report = test::run_to_equilibrium(solver, x, dt, network, foundation);
         REQUIRE(report.status == StepStatus::advanced);
         REQUIRE(report.converged);
         REQUIRE((x - mesh.positions()).cwiseAbs().maxCoeff() <
@@ -311,15 +311,15 @@ TEST_CASE("beyond its limit the rule as published does diverge: the refusal is n
         return MassSpringNetwork(mesh, LinearSpring{},
                                  {.stiffness = 1.0, .mass = dt * dt / (part * limit), .pinned = {1, 2, 3, 4, 5, 6}});
     };
-    const auto largest_way = [&](double part) {  // by hand, without the solver's check
+    const auto largest_displacement = [&](double part) {  // by hand, without the solver's check
         const auto network = with_part(part);
         Points<double> x = mesh.positions();
         x.col(0) = Vector3<double>(1e-6, 0, 0);
         for (int i = 0; i < 3000; ++i) x.col(0) += dt * dt / network.mass(0) * network.force_on(0, x).force;
         return norm(point(x, 0));
     };
-    CHECK(largest_way(0.99) < 1e-9);
-    CHECK(largest_way(1.01) > 1e-3);
+    CHECK(largest_displacement(0.99) < 1e-9);
+    CHECK(largest_displacement(1.01) > 1e-3);
     for (const auto& [part, status] : {std::pair(0.99, StepStatus::advanced), {1.01, StepStatus::unstable}}) {
         CAPTURE(part);
         const auto network = with_part(part);
@@ -376,7 +376,7 @@ TEST_CASE("a rule of one's own finds the same equilibrium", "[rule]") {
     QuasiStaticSolver own(network, options, HalfStep{});
     QuasiStaticSolver stock(network, options);
     Points<double> x = mesh.positions(), y = x;
-    REQUIRE(test::settle(own, x, 0.1, network, foundation, pull(7, target)).converged);
-    REQUIRE(test::settle(stock, y, 0.1, network, foundation, pull(7, target)).converged);
+    REQUIRE(test::run_to_equilibrium(own, x, 0.1, network, foundation, pull(7, target)).converged);
+    REQUIRE(test::run_to_equilibrium(stock, y, 0.1, network, foundation, pull(7, target)).converged);
     CHECK((x - y).cwiseAbs().maxCoeff() < 1e-11);
 }

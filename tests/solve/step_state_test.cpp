@@ -103,11 +103,11 @@ TEST_CASE("previous points are found by their first corner, those of the last st
             const Index count = random.index(31);
             for (Index i = 0; i < count; ++i) {
                 const Index corner = random.index(vertices);
-                REQUIRE(state.points.push(point_at_corner(i, 0, corner)));
+                REQUIRE(state.points.try_push_back(point_at_corner(i, 0, corner)));
                 ++expected[static_cast<std::size_t>(corner)];
             }
             if (random.chance(0.3)) {
-                state.forget_points();
+                state.reset_points();
                 for (Index v = 0; v < vertices; ++v) REQUIRE(state.previous_at(v) == no_index);
             }
             state.end_step();
@@ -132,7 +132,7 @@ TEST_CASE("what is kept turns with the body", "[state]") {
     state.set_compliance(1, {1, 2, 3, 0, 0, 0}, 0.5);
     auto point = point_at_corner(0, 0, 1);
     point.force = {1, 0, 0};
-    REQUIRE(state.points.push(point));
+    REQUIRE(state.points.try_push_back(point));
     state.end_step();
     Eigen::Matrix3d quarter;  // about z: x to y
     quarter << 0, -1, 0, 1, 0, 0, 0, 0, 1;

@@ -105,7 +105,7 @@ TEST_CASE("corners become seeds unless one is no vertex") {
     CHECK(m.work.invalid);
 }
 
-TEST_CASE("a fixed corner gives way by its share of the force, and stays where it is") {
+TEST_CASE("a fixed corner yields by its share of the force, and stays where it is") {
     for (int seed = 1; seed <= cases(2000); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));

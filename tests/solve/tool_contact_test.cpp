@@ -64,8 +64,8 @@ class LoopOf {
         : mesh_(mesh),
           material_(material),
           network_(mesh, LinearSpring{}, {.stiffness = S(1), .pinned = material.pinned}),
-          backing_(mesh,
-                   {.stiffness = static_cast<S>(material.foundation), .damping = static_cast<S>(material.damping)}),
+          foundation_(mesh,
+                      {.stiffness = static_cast<S>(material.foundation), .damping = static_cast<S>(material.damping)}),
           solver_(network_, options),
           tree_(mesh),
           trackers_(2, ContactTracker(mesh)),
@@ -80,8 +80,8 @@ class LoopOf {
             cast[i].radius = static_cast<S>(tools[i].radius);
             contacts_[i] = trackers_[i].update(tree_, x_, cast[i]);
         }
-        report_ =
-            solver_.step(x_, S(1e-3), network_, backing_, press(cast[0], contacts_[0]), press(cast[1], contacts_[1]));
+        report_ = solver_.step(x_, S(1e-3), network_, foundation_, press(cast[0], contacts_[0]),
+                               press(cast[1], contacts_[1]));
         tree_.refit(x_, report_.moved);
         return report_;
     }
@@ -89,14 +89,14 @@ class LoopOf {
     const Points<S>& x() const { return x_; }
     const Contact<S>& contact() const { return contacts_.front(); }
     const MassSpringNetwork<S, LinearSpring>& network() const { return network_; }
-    const VirtualVolumeSprings<S>& foundation() const { return backing_; }
+    const VirtualVolumeSprings<S>& foundation() const { return foundation_; }
 
     /// Force of the membrane on tool `i`.
     Vector3<S> reaction(std::size_t i = 0) const { return report_.reactions[i]; }
 
     S energy() const {
         S sum = network_.energy(x_);
-        for (Index v = 0; v < mesh_.vertex_count(); ++v) sum += backing_.energy(v, point(x_, v));
+        for (Index v = 0; v < mesh_.vertex_count(); ++v) sum += foundation_.energy(v, point(x_, v));
         return sum;
     }
 
@@ -114,7 +114,7 @@ class LoopOf {
     TriangleMesh<S> mesh_;
     Material material_;
     MassSpringNetwork<S, LinearSpring> network_;
-    VirtualVolumeSprings<S> backing_;
+    VirtualVolumeSprings<S> foundation_;
     QuasiStaticSolver<S> solver_;
     AabbTree<S> tree_;
     std::vector<ContactTracker<S>> trackers_;
@@ -126,7 +126,7 @@ using Loop = LoopOf<double>;
 
 constexpr SolverOptions<double> exact{.layers = unlimited, .sweeps = 16, .force_tolerance = 1e-12};
 
-/// The same with each order of visits in turn.
+/// The same with each order of updates in turn.
 SolverOptions<double> exact_in_order_of(int seed) {
     auto options = exact;
     options.order = test::order_of(seed);
@@ -201,16 +201,16 @@ Stroke random_stroke(Over over, test::Random& random) {
     return stroke;
 }
 
-/// Whether two tools stay apart, so that the membrane has room between them.
+/// Whether two tools stay apart, so that the membrane has space between them.
 bool apart(const Stroke& a, const Stroke& b) {
     const auto distance = [&](double s, double t) {
         const Tool<double> tool = a.at(1), other = b.at(1);
         return (tool.position + s * tool.axis - other.position - t * other.axis).norm();
     };
-    const double reach = a.tool.radius + b.tool.radius + 0.3 * mean_edge(unit_sphere());
+    const double min_distance = a.tool.radius + b.tool.radius + 0.3 * mean_edge(unit_sphere());
     for (const double s : {0.0, 0.25, 0.5, 0.75, 1.0}) {
         for (const double t : {0.0, 0.25, 0.5, 0.75, 1.0}) {
-            if (distance(s, t) < reach) return false;
+            if (distance(s, t) < min_distance) return false;
         }
     }
     return true;
@@ -277,7 +277,7 @@ test::PressedState newton_beside(const test::PressedMembrane& membrane, const Po
     return test::at_rest(membrane, start, {.far = 0.15, .max_step = radius / 2});
 }
 
-/// Newton's method along a way of its own: from the untouched membrane, in small steps of the tools.
+/// Newton's method along its own path: from the untouched membrane, in small steps of the tools.
 test::PressedState newton_along(test::PressedMembrane membrane, const std::vector<Stroke>& strokes) {
     const double radius = smallest_radius(membrane);
     const double displacement = std::max(strokes.front().displacement.norm(), strokes.back().displacement.norm());
@@ -298,7 +298,7 @@ void check_forces(const Loop& loop, const test::PressedMembrane& pressed, const 
     }
 }
 
-/// The tools are free of the surface, which rests against them without friction, and feel what it feels.
+/// The tools are free of the surface, which touches them without friction, and feel what it feels.
 void check_contact(const Loop& loop, const test::PressedMembrane& pressed) {
     CHECK(largest_overlap(pressed, loop.x()) < 1e-9);
     check_forces(loop, pressed, test::features_near(pressed, loop.x(), 1e-8));
@@ -496,7 +496,7 @@ TEST_CASE("a sheet keeps the side from which it was touched first", "[press]") {
         Stroke stroke;
         stroke.tool.radius = over_border ? random.number(0.3, 0.7) : 0.02 * std::pow(30, random.number());
         const double depth = std::min(0.2, 0.05 + stroke.tool.radius / 2);
-        const double clearance = 0.9 - std::sqrt(2 * stroke.tool.radius * depth);  // no need for the rim to give way
+        const double clearance = 0.9 - std::sqrt(2 * stroke.tool.radius * depth);  // no need for the rim to yield
         stroke.tool.position = {random.number(-clearance, clearance),
                                 over_border ? 0.9 : random.number(-clearance, clearance),
                                 side * (stroke.tool.radius + 0.01)};
@@ -517,7 +517,7 @@ TEST_CASE("a sheet keeps the side from which it was touched first", "[press]") {
     }
 }
 
-TEST_CASE("a pinned rim does not give way, and the force stays finite", "[press]") {
+TEST_CASE("a pinned rim does not yield, and the force stays finite", "[press]") {
     const auto mesh = sheet<double>({.width = 2, .height = 2, .columns = 8, .rows = 8});
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);
@@ -537,7 +537,7 @@ TEST_CASE("a pinned rim does not give way, and the force stays finite", "[press]
             furthest = std::max(furthest, (loop.x() - mesh.positions()).cwiseAbs().maxCoeff());
         }
         CHECK(largest < 5);
-        CHECK(furthest < 1);  // beside the rim, little room for the tool takes a long way of the next vertex
+        CHECK(furthest < 1);  // beside the rim, little space for the tool takes a long displacement of the next vertex
         CHECK(began > 0);
         CHECK(ended == began);
         CHECK((loop.x() - mesh.positions()).cwiseAbs().maxCoeff() < 1e-6);
@@ -568,13 +568,14 @@ TEST_CASE("a tool that slides off a border has left", "[press]") {
     }
 }
 
-// A point of a small margin is a sphere much smaller than what vertices move by while a step balances them. Straight over a
-// vertex it rests in the bottom of a dent, against up to six triangles at once, each within a radius of the corner they share.
+// A point of a small margin is a sphere much smaller than what vertices move by while a step balances them. Straight
+// over a vertex it is in the bottom of a dent, against up to six triangles at once, each within a radius of the corner
+// they share.
 TEST_CASE("a point that stands still over a vertex feels a force that does", "[press]") {
     const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 2});
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
     const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0, .damping = 0.02});
-    int restless = 0;
+    int unsteady = 0;
     for (Index v = 0; v < mesh.vertex_count(); v += 28) {
         for (const double margin : {1e-3, 1e-4}) {
             QuasiStaticSolver solver(network, {.layers = 6, .sweeps = 2});
@@ -593,10 +594,10 @@ TEST_CASE("a point that stands still over a vertex feels a force that does", "[p
                 low = std::min(low, report.reactions[0].norm());
                 high = std::max(high, report.reactions[0].norm());
             }
-            if (!(high > 1e-3) || high - low > 1e-3 * high) ++restless;
+            if (!(high > 1e-3) || high - low > 1e-3 * high) ++unsteady;
         }
     }
-    CHECK(restless == 0);
+    CHECK(unsteady == 0);
 }
 
 TEST_CASE("the force rises with the depth and is the slope of the energy", "[press]") {

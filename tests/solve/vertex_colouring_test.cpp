@@ -15,7 +15,7 @@
 using namespace membrane;
 using test::Random;
 
-TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[groups]") {
+TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[vertex_colouring]") {
     for (int seed = 1; seed <= cases(500); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));

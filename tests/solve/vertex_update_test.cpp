@@ -73,13 +73,13 @@ TEST_CASE("the state of a vertex has all that pulls on it", "[update]") {
             REQUIRE(state.stiffness == Approx(stiffness));
             REQUIRE(state.mass == 0.5);
             REQUIRE(state.dt == 0.1);
-            REQUIRE_FALSE(state.touched);
+            REQUIRE_FALSE(state.constrained);
         }
         REQUIRE(state_of<Numbers>(step.scene, v).stiffness_reduction.trace() == 0);
         REQUIRE(state_of<Blocks>(step.scene, v).stiffness_reduction.trace() ==
                 step.network.majoriser(v, step.x).stiffness_reduction.trace());
         step.state.seeds.insert(v);
-        REQUIRE(state_of<Blocks>(step.scene, v).touched);
+        REQUIRE(state_of<Blocks>(step.scene, v).constrained);
 
         // What damping holds back is no rest.
         const Vector3<double> lasting =
@@ -98,7 +98,7 @@ TEST_CASE("a displacement on which springs stiffen is halved until the energy do
             const Vector3<double> pull = total_force(step.scene, v).force;
             const Vector3<double> displacement = step.random.number(0.0, 0.5) * direction<double>(pull, pull);
             const Vector3<double> found = backtracked<BlockStep>(step.scene, v, displacement);
-            const auto others = others_on(step.scene, v);
+            const auto others = non_network_force(step.scene, v);
             const auto energy = [&](const Vector3<double>& by) {
                 return step.network.energy_change(v, by, step.x).change - dot<double>(others.force, by) +
                        others.stiffness * squared_norm(by) / 2;
@@ -127,7 +127,7 @@ TEST_CASE("a step diverges beyond two over the curvature", "[update]") {
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
         MidStep<LinearSpring> step(static_cast<std::uint64_t>(seed));
-        const double others = others_on(step.scene, step.v).stiffness;
+        const double others = non_network_force(step.scene, step.v).stiffness;
         const double limit = 2 / (largest_eigenvalue_at<double>(step.network, step.v, step.x) + others);
         REQUIRE_FALSE(diverges(step.scene, step.v, 0.999 * limit));
         REQUIRE(diverges(step.scene, step.v, 1.001 * limit));

@@ -98,7 +98,7 @@ TriangleMesh<double> cube() {
 struct Stroke {
     Tool<double> tool;
     Point start, in = Point::Zero(), slide = Point::Zero(), out = Point::Zero();
-    bool turns_back = false;  // withdrawn by the way it came
+    bool turns_back = false;  // withdrawn along the path it came
     bool grasps = false;
     int pressed = 0, slides = 0, slid = 0, leaves = 0, gone = 0;  // ticks
 
@@ -124,8 +124,8 @@ bool overlaps(const Scene& scene, const Tool<double>& tool) {
     return any;
 }
 
-/// Up to two edges deep, at 10 mm/s to 1 m/s, withdrawn by 20 mm at 10 mm/s or up to all in one tick. It may begin on the
-/// other side of a crease, and then it leads through the membrane on the way out.
+/// Up to two edges deep, at 10 mm/s to 1 m/s, withdrawn by 20 mm at 10 mm/s or up to all in one tick. It may begin on
+/// the other side of a crease, and then it passes through the membrane on withdrawal.
 Stroke any_stroke(const Scene& scene, test::Random& random) {
     const auto& x = scene.mesh.positions();
     Stroke stroke;
@@ -174,12 +174,12 @@ Stroke any_stroke(const Scene& scene, test::Random& random) {
 
 /// One that does not.
 Stroke random_stroke(const Scene& scene, test::Random& random) {
-    const auto leads_through = [&](const Stroke& stroke) {
+    const auto passes_through = [&](const Stroke& stroke) {
         const Point from = stroke.tool.position, to = from + stroke.out;
         return scene.tree.first_hit(scene.mesh.positions(), from, to).triangle != no_index;
     };
     Stroke stroke = any_stroke(scene, random);
-    while (leads_through(stroke)) stroke = any_stroke(scene, random);
+    while (passes_through(stroke)) stroke = any_stroke(scene, random);
     return stroke;
 }
 
@@ -212,8 +212,8 @@ Stroke thin_shaft_stroke(const Scene& scene, test::Random& random) {
     return stroke;
 }
 
-/// Up to two edges deep into a sheet, dragged at 10 to 50 mm/s to where it is beside it, and out: a shaft that is upright,
-/// leans or lies, with its tip first.
+/// Up to two edges deep into a sheet, dragged at 10 to 50 mm/s to where it is beside it, and out: a shaft that is
+/// upright, leans or lies, with its tip first.
 Stroke dragged_over_border(test::Random& random) {
     Stroke stroke;
     stroke.tool.radius = random.number(0.3e-3, 1.5e-3);
@@ -250,7 +250,8 @@ bool axis_is_outside(const Scene& scene, const Tool<double>& tool) {
 
 Scene free_sheet() { return Scene(sheet<double>({.width = 0.02, .height = 0.02, .columns = 20, .rows = 20}), false); }
 
-/// What a shaft leaves that is dragged over the border of a free sheet: its longest edge ever, and whether it comes back.
+/// What a shaft leaves that is dragged over the border of a free sheet: its longest edge ever, and whether it comes
+/// back.
 struct Dragged {
     double longest = 0;  // [m]
     bool comes_back = false;
@@ -269,8 +270,8 @@ Dragged drag_over_border(Scene scene, int seed) {
     return left;
 }
 
-/// What comes of a thin shaft in a closed surface: whether that is at rest, with the shaft outside, within a second, and
-/// comes back without it.
+/// What comes of a thin shaft in a closed surface: whether that is at rest, with the shaft outside, within a second,
+/// and comes back without it.
 struct Pierced {
     bool converged = false, outside = false, comes_back = false;
 };
@@ -310,9 +311,9 @@ TEST_CASE("after any stroke of any tool over creases, rims and coarse meshes the
     }
 }
 
-// Where nothing holds the border, a tool that slides off it may touch from the other side next, and lifts the membrane as
-// it is withdrawn. That is no failure to come back, and so it is lowered again, until it neither touches from there nor
-// overlaps the membrane at rest.
+// Where nothing holds the border, a tool that slides off it may touch from the other side next, and lifts the membrane
+// as it is withdrawn. That is no failure to come back, and so it is lowered again, until it neither touches from there
+// nor overlaps the membrane at rest.
 TEST_CASE("a membrane with a free border comes back from what has gone round it", "[withdrawal]") {
     const std::vector<Scene> scenes{Scene(square(), false), Scene(folded_square(-0.7), false),
                                     Scene(folded_square(0.7), false),
@@ -339,7 +340,7 @@ TEST_CASE("a membrane with a free border comes back from what has gone round it"
     }
 }
 
-// Most slide off and draw no edge out by much. One in thirty catches on a border that has given way: it is taken to have
+// Most slide off and draw no edge out by much. One in thirty catches on a border that has yielded: it is taken to have
 // gone through it, and pulls a corner along.
 TEST_CASE("a shaft dragged slowly over a free border slides off, and the membrane comes back", "[withdrawal]") {
     const Scene fresh = free_sheet();

@@ -8,7 +8,7 @@
 
 #include <malloc.h>
 
-#include <Eigen/Core>  // brings in headers of the compiler that declare these functions their own way
+#include <Eigen/Core>  // brings in headers of the compiler that declare these functions differently
 
 /// Counts what a program allocates, however it does so: Eigen calls malloc itself, `operator new` ends in malloc, and
 /// the functions here take the place of the C library's (glibc). To be included in one file of the program.

@@ -9,8 +9,9 @@
 
 #include <membrane/surface/triangle.hpp>
 
-/// The same questions as `mesh/triangle.hpp` and the tree answer, by other means and one triangle after the other. Works
-/// for any number type that Eigen takes: `long double` for accuracy, 64-bit integers where an answer must be exact.
+/// The same queries as those of `surface/triangle.hpp` and the tree, by other means and one triangle after the other.
+/// Works for any number type that Eigen takes: `long double` for accuracy, 64-bit integers where a result must be
+/// exact.
 ///
 ///     const auto triangle = test::brute_triangle<long double>(membrane::triangle_at(x, corners));
 ///     CHECK(test::squared_distance(triangle, q) == Approx(...));

@@ -32,19 +32,21 @@ Eigen::Vector3d nearest_weights(const Eigen::Matrix3d& corners, const Eigen::Vec
 }
 
 Eigen::Vector2d nearest_along(const Eigen::Vector3d& p, const Eigen::Vector3d& displacement, const Eigen::Vector3d& q,
-                              const Eigen::Vector3d& other_way) {
+                              const Eigen::Vector3d& other_segment) {
     const auto clamped = [](double along) { return std::clamp(along, 0.0, 1.0); };
     std::vector<Eigen::Vector2d> candidates;
     for (const double end : {0.0, 1.0}) {
-        candidates.emplace_back(end, clamped((p + end * displacement - q).dot(other_way) / other_way.squaredNorm()));
-        candidates.emplace_back(clamped((q + end * other_way - p).dot(displacement) / displacement.squaredNorm()), end);
+        candidates.emplace_back(end,
+                                clamped((p + end * displacement - q).dot(other_segment) / other_segment.squaredNorm()));
+        candidates.emplace_back(clamped((q + end * other_segment - p).dot(displacement) / displacement.squaredNorm()),
+                                end);
     }
     Eigen::Matrix<double, 3, 2> displacements;
-    displacements << displacement, -other_way;
+    displacements << displacement, -other_segment;
     const Eigen::Vector2d inside = displacements.colPivHouseholderQr().solve(q - p);
     if (inside.minCoeff() > 0 && inside.maxCoeff() < 1) candidates.push_back(inside);
     const auto distance = [&](const Eigen::Vector2d& at) {
-        return (p + at[0] * displacement - q - at[1] * other_way).norm();
+        return (p + at[0] * displacement - q - at[1] * other_segment).norm();
     };
     return *std::min_element(candidates.begin(), candidates.end(),
                              [&](const auto& a, const auto& b) { return distance(a) < distance(b); });
@@ -88,8 +90,8 @@ std::vector<Eigen::Index> coordinates_of(const std::vector<Eigen::Index>& vertic
 Eigen::VectorXd PressedMembrane::forces(const Eigen::Matrix3Xd& x) const {
     Eigen::Matrix3Xd sum = foundation * (anchors - x);
     for (const auto& spring : springs) {
-        const Eigen::Vector3d reach = x.col(spring.second) - x.col(spring.first);
-        const Eigen::Vector3d pull = spring.stiffness * (1 - spring.rest_length / reach.norm()) * reach;
+        const Eigen::Vector3d edge = x.col(spring.second) - x.col(spring.first);
+        const Eigen::Vector3d pull = spring.stiffness * (1 - spring.rest_length / edge.norm()) * edge;
         sum.col(spring.first) += pull;
         sum.col(spring.second) -= pull;
     }
@@ -151,7 +153,8 @@ Eigen::MatrixXd gap_curvature(const PressedMembrane& membrane, const Eigen::Matr
     const auto count = static_cast<Eigen::Index>(feature.vertices.size());
     const Eigen::Index slides = count - 1 + (feature.part == 2 ? 1 : 0);
     const Eigen::Vector3d normal = feature.normal();
-    const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - normal * normal.transpose()) / feature.reach.norm();
+    const Eigen::Matrix3d across =
+        (Eigen::Matrix3d::Identity() - normal * normal.transpose()) / feature.separation.norm();
     const auto weights = Eigen::Map<const Eigen::VectorXd>(feature.weights.data(), count);
 
     Eigen::MatrixXd displacements(3, slides),
@@ -191,7 +194,7 @@ Eigen::VectorXd smallest_non_negative(const Eigen::MatrixXd& W, const Eigen::Vec
             }
             y(free) = now + step * (best - now);
             if (step == 1) break;
-            // At least one has come to zero on the way: it is bound from now on.
+            // At least one has come to zero before the end: it is bound from now on.
             const auto bound = [&](Eigen::Index i) { return y[i] <= 1e-14 * y.maxCoeff(); };
             for (const Eigen::Index i : free) y[i] = bound(i) ? 0 : y[i];
             std::erase_if(free, bound);
@@ -237,10 +240,10 @@ PressedState at_rest(const PressedMembrane& membrane, const Eigen::Matrix3Xd& st
             F[row] = 0;
         }
         const auto factors = factors_of(H, membrane.foundation);
-        const Eigen::MatrixXd answers = factors.solve(J.transpose());
+        const Eigen::MatrixXd responses = factors.solve(J.transpose());
         const Eigen::VectorXd alone = factors.solve(F);
-        const Eigen::VectorXd pressures = smallest_non_negative(J * answers, gaps + J * alone);
-        const Eigen::Matrix3Xd displacement = (alone + answers * pressures).reshaped(3, state.x.cols());
+        const Eigen::VectorXd pressures = smallest_non_negative(J * responses, gaps + J * alone);
+        const Eigen::Matrix3Xd displacement = (alone + responses * pressures).reshaped(3, state.x.cols());
 
         const double length = displacement.colwise().norm().maxCoeff();
         state.x += std::min(1.0, options.max_step / length) * displacement;

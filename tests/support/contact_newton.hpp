@@ -11,9 +11,9 @@
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Where a membrane of linear springs rests on tools, found in another way than the solver's: all vertices at once, by
-/// Newton's method, each feature of the surface near a tool being an inequality with a curvature of its own (sequential
-/// quadratic programming [Nocedal06] 18). Dense, and with its own geometry.
+/// Where a membrane of linear springs is at equilibrium on tools, by another method than the solver's: all vertices at
+/// once, by Newton's method, each feature of the surface near a tool being an inequality with a curvature of its own
+/// (sequential quadratic programming [Nocedal06] 18). Dense, and with its own geometry.
 ///
 ///     const test::PressedMembrane membrane{mesh.triangles(), springs, mesh.positions(), 0.3, {tool}};
 ///     const auto rest = test::at_rest(membrane, start, {.far = edge / 2, .max_step = tool.radius / 2});
@@ -28,11 +28,11 @@ struct Feature {
     int part;                            // of the tool: 0 one end, 1 the other, 2 the axis between them
     std::vector<Eigen::Index> vertices;  // one, two or three
     std::vector<double> weights;         // above zero, sum 1
-    Eigen::Vector3d reach;               // from the surface to the tool's axis
+    Eigen::Vector3d separation;          // from the surface to the tool's axis
     double radius;
 
-    double gap() const { return reach.norm() - radius; }
-    Eigen::Vector3d normal() const { return reach.normalized(); }
+    double gap() const { return separation.norm() - radius; }
+    Eigen::Vector3d normal() const { return separation.normalized(); }
 
     using Name = std::tuple<std::size_t, int, std::vector<Eigen::Index>>;
     Name name() const { return {tool, part, vertices}; }
@@ -41,9 +41,10 @@ struct Feature {
 /// Weights of the point of a triangle (corners in columns) that is nearest to `q`.
 Eigen::Vector3d nearest_weights(const Eigen::Matrix3d& corners, const Eigen::Vector3d& q);
 
-/// How far along, 0 to 1, the segments from `p` by `displacement` and from `q` by `other_way` are nearest to one another.
+/// How far along, 0 to 1, the segments from `p` by `displacement` and from `q` by `other_segment` are nearest to one
+/// another.
 Eigen::Vector2d nearest_along(const Eigen::Vector3d& p, const Eigen::Vector3d& displacement, const Eigen::Vector3d& q,
-                              const Eigen::Vector3d& other_way);
+                              const Eigen::Vector3d& other_segment);
 
 /// Distance of a triangle (corners in columns) from the tool's axis.
 double distance_from_axis(const Tool& tool, const Eigen::Matrix3d& corners);
@@ -98,7 +99,7 @@ Eigen::MatrixXd gap_curvature(const PressedMembrane& membrane, const Eigen::Matr
 Eigen::VectorXd smallest_non_negative(const Eigen::MatrixXd& W, const Eigen::VectorXd& q);
 
 struct NewtonOptions {
-    double far;       // what is at most this far from a tool is looked at [m]
+    double far;       // what is at most this far from a tool is evaluated [m]
     double max_step;  // of a vertex [m]
     int max_steps = 60;
 };

@@ -34,9 +34,9 @@ void bounds_hold_nearby(double share) {
         const Index held = 8 + random.index(30);
         const double radius = std::pow(10, random.number(-6.0, -1.5));
         EquilibriumProblem problem(network);
-        REQUIRE(problem.take(x, network, foundation, pull(held, point(x, held))) == ProblemStatus::valid);
+        REQUIRE(problem.assign(x, network, foundation, pull(held, point(x, held))) == ProblemStatus::valid);
         Model model(problem);
-        const double bound = model.around(problem, radius);
+        const double bound = model.eigenvalue_bound(problem, radius);
         CAPTURE(stiffness, radius, bound);
         if (!(bound > 0)) continue;
         ++convex;

@@ -16,8 +16,8 @@
 
 namespace test {
 
-/// Force, change of energy and curvature of an element against differences of its energy, which vary over ways of `size`
-/// [m] by some `energy` [J].
+/// Force, change of energy and curvature of an element against differences of its energy, which vary over displacements
+/// of `size` [m] by some `energy` [J].
 template <class E>
 void check_element(const E& element, const membrane::Corners<double, E::corner_count>& x, double size, double energy,
                    Random& random) {
@@ -48,8 +48,7 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
 
 /// The exact second derivative, by differences of the forces.
 template <class E>
-void check_second_derivative(const E& element, const membrane::Corners<double, E::corner_count>& x, double size,
-                             double energy) {
+void check_hessian(const E& element, const membrane::Corners<double, E::corner_count>& x, double size, double energy) {
     const double h = 1e-5 * size;
     for (std::size_t i = 0; i < E::corner_count; ++i) {
         for (std::size_t j = 0; j < E::corner_count; ++j) {
@@ -66,7 +65,8 @@ void check_second_derivative(const E& element, const membrane::Corners<double, E
     }
 }
 
-/// Several elements at once against each of them alone, to the bit; `in_lanes(elements)` is their constants side by side.
+/// A pack of elements at once against each of them alone, to the bit; `in_lanes(elements)` is their constants side by
+/// side.
 template <class E, class InLanes>
 void check_lanes(const std::array<E, membrane::Lanes<double>::count>& elements,
                  const std::array<membrane::Corners<double, E::corner_count>, membrane::Lanes<double>::count>& x,

@@ -25,12 +25,12 @@
 /// The complete loop of a hand, and what can go wrong in it.
 ///
 ///     test::HapticLoop<double> loop(seed);
-///     test::Mishaps mishaps(seed);
-///     for (int i = 0; i < 1'000'000; ++i) loop.tick(mishaps.next());
+///     test::FaultInjector faults(seed);
+///     for (int i = 0; i < 1'000'000; ++i) loop.tick(faults.next());
 namespace test {
 
 /// What goes wrong in a tick: nothing.
-struct Mishap {
+struct Fault {
     membrane::Vector3<double> tip = membrane::Vector3<double>::Zero();    ///< off where the hand is [m]
     membrane::Vector3<double> force = membrane::Vector3<double>::Zero();  ///< more than was asked for [N]
     bool frozen = false;                                                  ///< the solver has not come to an end
@@ -41,8 +41,8 @@ struct Mishap {
     }
 };
 
-/// A device with a hand, in millimetres and in a frame of its own; contact and solver; every policy, each in its turn; the
-/// limits; an observer; a recorder; both sides of the hand-over.
+/// A device with a hand, in millimetres and in a frame of its own; contact and solver; every policy, each in its turn;
+/// the limits; an observer; a recorder; both sides of the hand-over.
 template <membrane::Real S>
 struct HapticLoop {
     using V = membrane::Vector3<S>;
@@ -54,12 +54,12 @@ struct HapticLoop {
           device(at_desk(busy_script<S>(seed, 40)), {.tick = dt, .radius = 1e-3},
                  membrane::SimulatedHand<S>({.mass = 0.1, .damping = 4, .stiffness = 300})) {}
 
-    void tick(const Mishap& mishap = {}) noexcept {
+    void tick(const Fault& fault = {}) noexcept {
         if (!device.running()) device.reset();
-        now += dt + mishap.late;
-        const auto hand = in_scene(device.read(), mishap);
-        if (!mishap.frozen) simulate(policy == 3 ? coupling.follow(hand, reaction, S(dt)) : hand);
-        asked += mishap.force.cast<S>();
+        now += dt + fault.late;
+        const auto hand = in_scene(device.read(), fault);
+        if (!fault.frozen) simulate(policy == 3 ? coupling.update(hand, reaction, S(dt)) : hand);
+        asked += fault.force.cast<S>();
         felt = limit(asked, now, solves);
         observer.update(hand.position, felt, dt);
         if (recorder.missed() > 100) recorder.clear();
@@ -124,12 +124,12 @@ struct HapticLoop {
         return script;
     }
 
-    [[nodiscard]] membrane::Tool<S> in_scene(const membrane::Tool<S>& at_desk, const Mishap& mishap) const noexcept {
+    [[nodiscard]] membrane::Tool<S> in_scene(const membrane::Tool<S>& at_desk, const Fault& fault) const noexcept {
         const auto there =
             scale.to_scene(in_millimetres(membrane::Metres(at_desk.position.template cast<double>())),
                            in_millimetres(membrane::MetresPerSecond(at_desk.velocity.template cast<double>())));
         auto tool = at_desk;
-        tool.position = (there.position + mishap.tip).template cast<S>();
+        tool.position = (there.position + fault.tip).template cast<S>();
         tool.velocity = there.velocity.template cast<S>();
         return tool;
     }
@@ -171,11 +171,11 @@ struct HapticLoop {
 
 /// A device that sends what is no number or jumps about, policies gone wild, a solver that hangs, ticks that are lost:
 /// now and then, one after the other, with quiet times between.
-class Mishaps {
+class FaultInjector {
   public:
-    explicit Mishaps(std::uint64_t seed) : random_(seed) {}
+    explicit FaultInjector(std::uint64_t seed) : random_(seed) {}
 
-    [[nodiscard]] Mishap next() noexcept {
+    [[nodiscard]] Fault next() noexcept {
         if (left_ == 0) {
             kind_ = kind_ == 0 ? 1 + random_.index(7) : 0;
             left_ = kind_ == 0   ? 300 + random_.index(1500)
@@ -185,15 +185,15 @@ class Mishaps {
         --left_;
         constexpr double none = std::numeric_limits<double>::quiet_NaN(),
                          infinity = std::numeric_limits<double>::infinity();
-        Mishap mishap;
-        if (kind_ == 1) mishap.tip[random_.index(3)] = random_.chance(0.5) ? none : -infinity;
-        if (kind_ == 2) mishap.tip = 0.05 * random_.vector<double>();
-        if (kind_ == 3) mishap.force = 1e6 * random_.unit_vector();
-        if (kind_ == 4) mishap.force[random_.index(3)] = none;
-        if (kind_ == 5) mishap.force[random_.index(3)] = infinity;
-        mishap.frozen = kind_ == 6;
-        mishap.late = kind_ == 7 ? 0.05 : 0;
-        return mishap;
+        Fault fault;
+        if (kind_ == 1) fault.tip[random_.index(3)] = random_.chance(0.5) ? none : -infinity;
+        if (kind_ == 2) fault.tip = 0.05 * random_.vector<double>();
+        if (kind_ == 3) fault.force = 1e6 * random_.unit_vector();
+        if (kind_ == 4) fault.force[random_.index(3)] = none;
+        if (kind_ == 5) fault.force[random_.index(3)] = infinity;
+        fault.frozen = kind_ == 6;
+        fault.late = kind_ == 7 ? 0.05 : 0;
+        return fault;
     }
 
   private:

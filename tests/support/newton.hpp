@@ -10,7 +10,7 @@
 #include <membrane/core/types.hpp>
 #include <membrane/model/spring_law.hpp>
 
-/// The equilibrium of a small membrane found in another way than the solver's: all free vertices at once, by Newton's
+/// The equilibrium of a small membrane by another method than the solver's: all free vertices at once, by Newton's
 /// method with a dense Jacobian from differences. Forces are summed here, from energies that the network does not see.
 namespace test {
 
@@ -18,12 +18,12 @@ namespace test {
 Eigen::VectorXd newton(const std::function<Eigen::VectorXd(const Eigen::VectorXd&)>& residual, Eigen::VectorXd x);
 
 /// A point of the membrane, as weights of its vertices, and where it is held or what pulls on it.
-struct HeldPlace {
+struct AttachedPoint {
     std::vector<membrane::Index> vertices;
     std::vector<double> weights;
     Eigen::Vector3d target;
 };
-struct LoadedPlace {
+struct AppliedLoad {
     std::vector<membrane::Index> vertices;
     std::vector<double> weights;
     Eigen::Vector3d force;
@@ -36,8 +36,8 @@ struct SmallMembrane {
     membrane::Points<double> anchors;
     double volume_stiffness = 0;
     std::vector<membrane::Index> fixed = {};
-    std::vector<HeldPlace> held = {};
-    std::vector<LoadedPlace> loads = {};
+    std::vector<AttachedPoint> held = {};
+    std::vector<AppliedLoad> loads = {};
 
     struct Equilibrium {
         membrane::Points<double> x;
@@ -85,11 +85,11 @@ struct SmallMembrane {
     membrane::Points<double> forces_at(const Equilibrium& state) const {
         membrane::Points<double> forces = volume_stiffness * (anchors - state.x);
         for (const auto& s : network.springs()) {
-            const Eigen::Vector3d reach = state.x.col(s.second) - state.x.col(s.first);
-            const double length = reach.stableNorm();
-            const auto answer = network.law()(membrane::SpringState<double>{s.stiffness, s.rest_length, length});
-            forces.col(s.first) += answer.tension / length * reach;
-            forces.col(s.second) -= answer.tension / length * reach;
+            const Eigen::Vector3d edge = state.x.col(s.second) - state.x.col(s.first);
+            const double length = edge.stableNorm();
+            const auto response = network.law()(membrane::SpringState<double>{s.stiffness, s.rest_length, length});
+            forces.col(s.first) += response.tension / length * edge;
+            forces.col(s.second) -= response.tension / length * edge;
         }
         for (const auto& load : loads) {
             for (std::size_t k = 0; k < load.vertices.size(); ++k) {

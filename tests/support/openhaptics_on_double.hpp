@@ -35,7 +35,7 @@ using Force = membrane::Vector3<double>;
 
 /// The same force always, of a solver that never stops; whole after so many ticks.
 inline const Force pushed(0.25, -0.5, 0.125);
-inline constexpr int settled = 103;
+inline constexpr int start_up_ticks = 103;
 struct Push {
     examples::Answer operator()(const membrane::Tool<double>&) { return {pushed, ++solves}; }
     std::uint64_t solves = 0;
@@ -90,8 +90,8 @@ inline Names names(const HdDouble& hd) {
     return result;
 }
 
-/// Closed, at no force, by the rules, and with no call from outside of the device's own thread but to open and to close:
-/// to take the force away, where that thread has not, only when it is at an end.
+/// Closed, at no force, by the rules, and with no call from outside of the device's own thread but to open and to
+/// close: to take the force away, where that thread has not, only when it is at an end.
 inline void check_closed(const HdDouble& hd) {
     CHECK(hd.violations() == std::vector<std::string>{});
     CHECK_FALSE(hd.open());

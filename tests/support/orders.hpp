@@ -8,7 +8,7 @@
 
 namespace test {
 
-/// An order of visits for each seed, all of them in turn: what holds in one must hold in every one.
+/// An order of updates for each seed, all of them in turn: what holds in one must hold in every one.
 ///
 ///     QuasiStaticSolver solver(network, {.order = test::order_of(seed)});
 [[nodiscard]] inline membrane::UpdateOrder order_of(int seed) {

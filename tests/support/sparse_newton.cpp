@@ -10,11 +10,11 @@ namespace test {
 membrane::Points<double> StillMembrane::forces(const membrane::Points<double>& x) const {
     membrane::Points<double> sum = load_;
     for (Eigen::Index v = 0; v < x.cols(); ++v) {
-        sum.col(v) += backing_[static_cast<std::size_t>(v)] * (anchors_.col(v) - x.col(v));
+        sum.col(v) += foundation_[static_cast<std::size_t>(v)] * (anchors_.col(v) - x.col(v));
     }
     for (const auto& s : springs_) {
-        const Eigen::Vector3d reach = x.col(s.second) - x.col(s.first);
-        const Eigen::Vector3d pull = s.stiffness * (reach - s.rest_length * reach.normalized());
+        const Eigen::Vector3d edge = x.col(s.second) - x.col(s.first);
+        const Eigen::Vector3d pull = s.stiffness * (edge - s.rest_length * edge.normalized());
         sum.col(s.first) += pull;
         sum.col(s.second) -= pull;
     }
@@ -33,13 +33,13 @@ Eigen::SparseMatrix<double> StillMembrane::stiffness(const membrane::Points<doub
     };
     for (Eigen::Index v = 0; v < x.cols(); ++v) {
         for (int k = 0; k < 3; ++k) {
-            const double own = backing_[static_cast<std::size_t>(v)];
+            const double own = foundation_[static_cast<std::size_t>(v)];
             entries.emplace_back(3 * v + k, 3 * v + k, is_fixed(v) ? 1 : own);
         }
     }
     for (const auto& s : springs_) {
-        const Eigen::Vector3d reach = x.col(s.second) - x.col(s.first), u = reach.normalized();
-        const double q = s.rest_length / reach.norm();
+        const Eigen::Vector3d edge = x.col(s.second) - x.col(s.first), u = edge.normalized();
+        const double q = s.rest_length / edge.norm();
         const Eigen::Matrix3d block = s.stiffness * ((1 - q) * Eigen::Matrix3d::Identity() + q * u * u.transpose());
         add(s.first, s.first, block);
         add(s.second, s.second, block);

@@ -9,7 +9,7 @@
 
 #include <membrane/model/mass_spring_network.hpp>
 
-/// Where linear springs and a foundation balance, found in another way than the library's: all free vertices at once, by
+/// Where linear springs and a foundation balance, by another method than the library's: all free vertices at once, by
 /// Newton's method with sparse factors. Forces and stiffness are summed here.
 namespace test {
 
@@ -22,10 +22,10 @@ class StillMembrane {
   public:
     template <class Network>
     StillMembrane(const Network& network, const membrane::Points<double>& anchors, double foundation)
-        : backing_(static_cast<std::size_t>(anchors.cols()), foundation),
+        : foundation_(static_cast<std::size_t>(anchors.cols()), foundation),
           anchors_(anchors),
           load_(membrane::Points<double>::Zero(3, anchors.cols())),
-          fixed_(backing_.size(), 0) {
+          fixed_(foundation_.size(), 0) {
         for (const auto& s : network.springs()) {
             springs_.push_back(
                 {s.first, s.second, static_cast<double>(s.stiffness), static_cast<double>(s.rest_length)});
@@ -37,8 +37,8 @@ class StillMembrane {
 
     void fix(membrane::Index v) { fixed_[static_cast<std::size_t>(v)] = 1; }
     void release(membrane::Index v) { fixed_[static_cast<std::size_t>(v)] = 0; }
-    void back(double foundation) { std::fill(backing_.begin(), backing_.end(), foundation); }
-    void back(membrane::Index v, double foundation) { backing_[static_cast<std::size_t>(v)] = foundation; }
+    void back(double foundation) { std::fill(foundation_.begin(), foundation_.end(), foundation); }
+    void back(membrane::Index v, double foundation) { foundation_[static_cast<std::size_t>(v)] = foundation; }
     void load(membrane::Index v, const Eigen::Vector3d& force) { load_.col(v) += force; }
 
     /// Springs, foundation and loads on every vertex.
@@ -52,14 +52,14 @@ class StillMembrane {
         bool stable;  // a minimum, as far as the factors say
     };
 
-    /// Where Newton's method leads from `x`; nothing is said if it does not converge. Fixed vertices stay.
+    /// Where Newton's method ends from `x`; nothing is said if it does not converge. Fixed vertices stay.
     Rest equilibrium(membrane::Points<double> x);
 
   private:
     bool is_fixed(Eigen::Index v) const { return fixed_[static_cast<std::size_t>(v)] != 0; }
 
     std::vector<membrane::Spring<double>> springs_;
-    std::vector<double> backing_;
+    std::vector<double> foundation_;
     membrane::Points<double> anchors_, load_;
     std::vector<unsigned char> fixed_;
     Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factors_;

@@ -6,7 +6,7 @@
 #include <seccomp.h>
 
 /// From here on, a process that calls the system is killed, by SIGSYS; only its end is allowed. For child processes:
-/// there is no way back.
+/// there is no return.
 ///
 ///     const auto child = test::in_child([] { test::forbid_system_calls(); solver.step(...); });
 ///     CHECK(child.signal == 0);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-// Clang takes it that nobody looks: it divides what is in no use, the fourth of four lanes that hold three numbers.
+// Clang assumes that no trap is set: it divides what is in no use, the fourth of four lanes that hold three numbers.
 #if defined(__GLIBC__) && !defined(__clang__)
 #define TEST_HAS_TRAPS
 #include <fenv.h>

@@ -6,7 +6,7 @@
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/model/foundation_layer.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/surface/moving_body.hpp>
 
 // What most programs here are made of, compiled once, in a library: a file that includes this first leaves it to the
@@ -67,7 +67,7 @@ using Springs = membrane::MassSpringNetwork<Scalar, membrane::LinearSpring>;
     MEMBRANE_USUAL_SOLVER(PREFIX, SCALAR, SafeStep);                                                             \
     MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep, membrane::NoFoundation);                                      \
     MEMBRANE_USUAL_STEP(PREFIX, SCALAR, BlockStep,                                                               \
-                        membrane::MovedVolume<membrane::VirtualVolumeSprings<SCALAR>, SCALAR>)
+                        membrane::MovingFoundation<membrane::VirtualVolumeSprings<SCALAR>, SCALAR>)
 
 MEMBRANE_USUAL_TYPES(extern template, double);
 MEMBRANE_USUAL_TYPES(extern template, float);

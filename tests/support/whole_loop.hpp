@@ -6,7 +6,7 @@
 #include <vector>
 
 #include <membrane/membrane.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/explicit_euler.hpp>
 
 #include "support/random.hpp"
@@ -31,16 +31,16 @@ std::vector<membrane::Waypoint<S>> busy_script(std::uint64_t seed, int rounds) {
         const auto there = random.unit_vector();
         const membrane::Vector3<double> beside =
             membrane::direction<double>(there + 0.3 * random.vector<double>(), there);
-        const double depth = random.number(0.0, 0.002), hurry = random.chance(0.1) ? 0.002 : 0.05;
+        const double depth = random.number(0.0, 0.002), speed = random.chance(0.1) ? 0.002 : 0.05;
         go(0.013 * there, 0.05);
-        go((0.0105 - depth) * there, hurry);   // press
-        go((0.0105 - depth) * beside, hurry);  // slide
-        go(0.013 * beside, hurry);
-        go(0.0102 * beside, hurry);
+        go((0.0105 - depth) * there, speed);   // press
+        go((0.0105 - depth) * beside, speed);  // slide
+        go(0.013 * beside, speed);
+        go(0.0102 * beside, speed);
         go(0.0102 * beside, 0.005, true);  // grasp
-        go(0.012 * beside, hurry, true);   // pull
-        go(0.012 * there, hurry);          // let go
-        if (random.chance(0.05)) go(-0.015 * there, hurry);
+        go(0.012 * beside, speed, true);   // pull
+        go(0.012 * there, speed);          // let go
+        if (random.chance(0.05)) go(-0.015 * there, speed);
         go(0.014 * there, 0.3);
     }
     return script;

@@ -9,7 +9,7 @@
 #include <limits>
 
 #include <membrane/membrane.hpp>
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 
 #include "support/bits.hpp"
 #include "support/catch.hpp"
@@ -21,7 +21,7 @@
 ///     for (int seed = 1; seed <= cases(1000); ++seed) test::hand_in_wild_number<double>(seed);
 namespace test {
 
-/// A number that is none, or at an end of the range; or, to be told from those, an ordinary one.
+/// A number that is none, or at an end of the range; or, to be distinguished from those, an ordinary one.
 template <membrane::Real S>
 S wild_number(Random& random) {
     using Limits = std::numeric_limits<S>;
@@ -40,7 +40,7 @@ S wild_number(Random& random) {
     return numbers[static_cast<std::size_t>(random.index(12))];
 }
 
-/// All that is handed in during a tick.
+/// All inputs of a tick.
 template <membrane::Real S>
 struct Tick {
     S dt = S(1e-3);
@@ -52,9 +52,9 @@ struct Tick {
     membrane::PointAttachment<S> held;
 };
 
-/// A loop of all parts runs a few ticks, one of them with one wild number among what is handed in. Whatever that was,
-/// either all comes out finite, or the step is refused by name with the positions bit for bit as they were; and after what
-/// was refused the next ticks go on as if it had not been.
+/// A loop of all parts runs a few ticks, one of them with one wild number in the input. Whatever that was, either all
+/// comes out finite, or the step is refused by name with the positions bit for bit as they were; and after what was
+/// refused the next ticks go on as if it had not been.
 template <membrane::Real S>
 void hand_in_wild_number(int seed) {
     using namespace membrane;
@@ -117,7 +117,7 @@ void hand_in_wild_number(int seed) {
         bool touching = false, moved = false;
         {
 #ifndef __FAST_MATH__
-            // What is no number is looked at before it is refused, and squares of what is too large overflow.
+            // What is no number is evaluated before it is refused, and squares of what is too large overflow.
             const FloatingPointTraps traps(FloatingPointTraps::only_division);
 #endif
             if (which == 11 && seed % 2 == 0) tree.refit(now.x);
@@ -146,9 +146,9 @@ void hand_in_wild_number(int seed) {
         REQUIRE(is_finite(normals.values()));
         REQUIRE(is_finite(report.total_reaction()));
         if (report.status != StepStatus::advanced) REQUIRE(same_bits(now.x, before));
-        // What every step looks at is refused by name.
-        const bool looked_at = which >= 0 && (which <= 10 || (which >= 14 && touching));
-        if (looked_at && !is_finite(wild)) {
+        // What every step checks is refused by name.
+        const bool is_checked = which >= 0 && (which <= 10 || (which >= 14 && touching));
+        if (is_checked && !is_finite(wild)) {
             REQUIRE(report.status == (which == 0 ? StepStatus::bad_time_step : StepStatus::invalid_input));
         }
         // At the end, too, unless the membrane has been taken to where no mesh may be.
@@ -160,7 +160,7 @@ void hand_in_wild_number(int seed) {
             normals.update(x);
         } else if (report.status == StepStatus::advanced || moved) {
             x = now.x;
-            tame = tame && which < 0;  // what is wild and yet a number may be far out of the way by now
+            tame = tame && which < 0;  // what is wild and yet a number may be far off by now
         }
     }
 }

@@ -65,7 +65,7 @@ TEST_CASE("every edge is visited once, with all its sides", "[mesh]") {
 
 TEST_CASE("no triangles have no half-edges", "[mesh]") {
     CHECK(half_edges(Triangles(3, 0)).empty());
-    int visits = 0;
-    for_each_edge({}, [&](std::span<const HalfEdge>) { ++visits; });
-    CHECK(visits == 0);
+    int calls = 0;
+    for_each_edge({}, [&](std::span<const HalfEdge>) { ++calls; });
+    CHECK(calls == 0);
 }

@@ -44,7 +44,7 @@ double misfit(const Points<double>& rest, const Points<double>& now, const Rigid
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("told by a pose or by the anchors, the body is in the same place", "[body]", double, float) {
+TEMPLATE_TEST_CASE("given by a pose or by the anchors, the body is in the same place", "[body]", double, float) {
     using S = TestType;
     const S tolerance = 64 * std::numeric_limits<S>::epsilon();
     for (int seed = 1; seed <= cases(60); ++seed) {

@@ -348,7 +348,7 @@ TEMPLATE_TEST_CASE("pseudo-normals of face, edge and corner", "[normals]", doubl
     CHECK(at(0, 1, 0, 0) == Vector3<S>(0, 0, 0));
 }
 
-TEST_CASE("the pseudo-normal at the nearest point tells inside from outside as CGAL does", "[normals][cgal]") {
+TEST_CASE("the pseudo-normal at the nearest point distinguishes inside from outside as CGAL does", "[normals][cgal]") {
     int at_face = 0, at_edge = 0, at_corner = 0;
     for (int seed = 1; seed <= cases(40); ++seed) {
         CAPTURE(seed);

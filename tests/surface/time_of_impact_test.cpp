@@ -24,7 +24,7 @@ TEST_CASE("a triangle that moves as a whole passes where and when a line says") 
         test::Random random(static_cast<std::uint64_t>(seed));
         const Triangle<double> from{random.vector(), random.vector(), random.vector()};
         const Vector3<double> displacement = 2 * random.vector(), q = random.vector();
-        // From the triangle's own view the point moves the other way, in a straight line.
+        // From the triangle's own view the point moves in the opposite direction, in a straight line.
         const auto hit = membrane::first_hit<double>(from, q, q - displacement);
         const double time = membrane::time_of_impact<double>(from, moved(from, displacement), q);
         const double margin = hit ? hit->barycentric.minCoeff() : 1;
@@ -33,8 +33,8 @@ TEST_CASE("a triangle that moves as a whole passes where and when a line says") 
         if (hit) {
             ++passings;
             REQUIRE(time < 1);
-            REQUIRE(std::abs(time - hit->along) < 1e-6);
-            REQUIRE(time <= hit->along + 1e-12);
+            REQUIRE(std::abs(time - hit->fraction) < 1e-6);
+            REQUIRE(time <= hit->fraction + 1e-12);
         } else if (time < 1) {
             const auto at = moved(from, time * displacement);
             REQUIRE(membrane::closest_point<double>(at, q).barycentric.minCoeff() < 1e-3);

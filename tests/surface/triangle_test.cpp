@@ -259,7 +259,7 @@ TEMPLATE_TEST_CASE("where the origin is does not matter beyond the rounding of t
         CHECK(here.barycentric == there.barycentric);
         CHECK(here.squared_distance == there.squared_distance);
         const auto pair = closest_to_segment(t, p, q), far_pair = closest_to_segment<S>(far, p + away, q + away);
-        CHECK(pair.along == far_pair.along);
+        CHECK(pair.fraction == far_pair.fraction);
         CHECK(pair.on_triangle.squared_distance == far_pair.on_triangle.squared_distance);
         CHECK(first_hit(t, p, q).has_value() == first_hit<S>(far, p + away, q + away).has_value());
     }
@@ -278,9 +278,9 @@ TEMPLATE_TEST_CASE("segment and triangle come nearest where a search finds them"
         if (seed % 11 == 0) q = p;
         const auto found = closest_to_segment(t, p, q);
         check_weights(found.on_triangle, t);
-        CHECK((found.along >= 0 && found.along <= 1));
+        CHECK((found.fraction >= 0 && found.fraction <= 1));
         const S scale = extent<S>(t, {p, q});
-        const test::Vector<Long> at = exact(p) + static_cast<Long>(found.along) * (exact(q) - exact(p));
+        const test::Vector<Long> at = exact(p) + static_cast<Long>(found.fraction) * (exact(q) - exact(p));
         const auto distance = std::sqrt(static_cast<Long>(found.on_triangle.squared_distance));
         const Vector3<S> normal = area_vector(t);
         const Long sine = 2 * norm(normal) / (norm<S>(t.b - t.a) * norm<S>(t.c - t.a));
@@ -293,7 +293,7 @@ TEMPLATE_TEST_CASE("segment and triangle come nearest where a search finds them"
             std::sqrt(test::squared_distance_by_search(test::brute_triangle<Long>(t), exact(p), exact(q)));
         CHECK(std::abs(distance - least) <= slack);
         if (distance == 0) ++crossing;
-        if (distance > 0 && found.along > 0 && found.along < 1) ++inner;
+        if (distance > 0 && found.fraction > 0 && found.fraction < 1) ++inner;
     }
     CHECK(crossing > cases(600));
     CHECK(inner > cases(300));
@@ -344,16 +344,16 @@ TEMPLATE_TEST_CASE("on a grid, hits are exactly those of integer arithmetic", "[
         if (hit.has_value() != expected) FAIL_CHECK("seed " << seed << ": expected " << expected);
         if (!hit || !expected) continue;
         ++hits;
-        const Vector3<S> at = from.template cast<S>() + hit->along * (to - from).template cast<S>();
+        const Vector3<S> at = from.template cast<S>() + hit->fraction * (to - from).template cast<S>();
         const auto where = point_at(triangle, hit->barycentric);
-        const bool inside = (hit->barycentric.eigen().array() >= 0).all() && hit->along >= 0 && hit->along <= 1;
-        if (!inside || norm<S>(at - where) > 2048 * epsilon<S>) FAIL_CHECK("seed " << seed << ": " << hit->along);
+        const bool inside = (hit->barycentric.eigen().array() >= 0).all() && hit->fraction >= 0 && hit->fraction <= 1;
+        if (!inside || norm<S>(at - where) > 2048 * epsilon<S>) FAIL_CHECK("seed " << seed << ": " << hit->fraction);
         if (test::volume(t.a, t.b, t.c, from) != 0 || test::volume(t.a, t.b, t.c, to) != 0) continue;
         ++in_plane;  // nothing of the segment before the hit belongs to the triangle
         const test::Vector<Long> earlier =
-            from.template cast<Long>() + (hit->along - 1e-4L) * (to - from).template cast<Long>();
+            from.template cast<Long>() + (hit->fraction - 1e-4L) * (to - from).template cast<Long>();
         const auto grown = test::brute_triangle<Long>(triangle);
-        if (hit->along > 0 && test::squared_distance<Long>(grown, earlier) < 1e-12L) FAIL_CHECK("seed " << seed);
+        if (hit->fraction > 0 && test::squared_distance<Long>(grown, earlier) < 1e-12L) FAIL_CHECK("seed " << seed);
     }
     CHECK(hits > cases(30'000));
     CHECK(in_plane > cases(10'000));
@@ -385,8 +385,8 @@ TEMPLATE_TEST_CASE("hits in general position are those of signed volumes", "[tri
         const Vector3<S> normal = area_vector(t);
         const S slope = std::abs(dot<S>(normal, to - from)) / (norm(normal) * norm<S>(to - from));
         const S slack = 64 * epsilon<S> / slope;
-        const bool same = turned && back && std::abs(turned->along - hit->along) <= slack &&
-                          std::abs(1 - back->along - hit->along) <= slack;
+        const bool same = turned && back && std::abs(turned->fraction - hit->fraction) <= slack &&
+                          std::abs(1 - back->fraction - hit->fraction) <= slack;
         if (!same) FAIL_CHECK("seed " << seed);
     }
     CHECK(hits > cases(5000));
@@ -493,8 +493,8 @@ TEMPLATE_TEST_CASE("no finite number gives a NaN, and no number a crash", "[tria
         bool valid = (point.barycentric.eigen().array() >= 0).all() && !std::isnan(point.squared_distance);
         valid &=
             (pair.on_triangle.barycentric.eigen().array() >= 0).all() && !std::isnan(pair.on_triangle.squared_distance);
-        valid &= pair.along >= 0 && pair.along <= 1;
-        if (hit) valid &= (hit->barycentric.eigen().array() >= 0).all() && hit->along >= 0 && hit->along <= 1;
+        valid &= pair.fraction >= 0 && pair.fraction <= 1;
+        if (hit) valid &= (hit->barycentric.eigen().array() >= 0).all() && hit->fraction >= 0 && hit->fraction <= 1;
         valid &= std::isinf(point.squared_distance) || !point.point.eigen().hasNaN();
         if (all_finite) valid &= !point.point.eigen().hasNaN() && !pair.on_triangle.point.eigen().hasNaN();
         if (!valid) FAIL_CHECK("seed " << seed);

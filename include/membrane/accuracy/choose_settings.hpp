@@ -15,15 +15,15 @@
 /// Finds by experiment how many layers and sweeps a network needs under a given load.
 ///
 ///     #include <membrane/accuracy/choose_settings.hpp>
-///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: one tool for each tick
-///     const auto choice = membrane::choose_settings(mesh, network, foundation, stroke, {.force_error = 0.01});
-///     if (!choice.satisfied) ...                                              // no setting of the grid is sufficient
+///     const auto trajectory = membrane::ToolTrajectory(mesh, tools, 1e-3);  // recorded: one tool for each tick
+///     const auto choice = membrane::choose_settings(mesh, network, foundation, trajectory, {.force_error = 0.01});
+///     if (!choice.satisfied) ...                                               // no setting of the grid is sufficient
 ///     auto solver = membrane::QuasiStaticSolver(network, choice.options);
 namespace membrane {
 
 /// The requirement: exactly one of the two.
 struct Requirement {
-    double force_error = 0;  ///< upper bound, see `Outcome`; the cheapest setting within it is chosen
+    double force_error = 0;  ///< upper bound, see `TrialResult`; the cheapest setting within it is chosen
     double time = 0;         ///< upper bound, of a tick [s]; the most accurate setting within it is chosen
 };
 
@@ -44,7 +44,7 @@ struct GridSearchOptions {
 
 /// The chosen setting, with its measured cost and error.
 template <Real Scalar>
-struct ChosenSettings : Outcome {
+struct ChosenSettings : TrialResult {
     SolverOptions<Scalar> options;
     bool satisfied = false;  ///< the requirement is met; if not, this setting came closest
 };
@@ -61,8 +61,9 @@ struct ChosenSettings : Outcome {
 /// required time has no safety factor.
 ///
 /// @throws InvalidInput for a required error or time that is not positive, neither or both of them, an option out of
-/// its range, a history without a felt force or without an equilibrium, and for arguments that `trial` and `equilibria`
-/// refuse. Offline. Cost: an `equilibrium` for each compared tick, and about 30 to 300 runs of the history.
+/// its range, a history without a felt force or without an equilibrium, and for arguments that `run_trial` and
+/// `equilibria` refuse. Offline. Cost: an `equilibrium` for each compared tick, and about 30 to 300 runs of the
+/// history.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] ChosenSettings<Scalar> choose_settings(
@@ -70,7 +71,7 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
     const Requirement& requirement, const std::type_identity_t<GridSearchOptions<Scalar>>& experiment = {},
     const Rule& rule = {}, const Clock& clock = {});
 
-/// The best setting by a user-defined trial: `attempt(options)` returns the `Outcome` of these options.
+/// The best setting by a user-defined trial: `attempt(options)` returns the `TrialResult` of these options.
 template <Real Scalar, class Attempt>
 [[nodiscard]] ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experiment,
                                                      const Requirement& requirement, Attempt attempt);
@@ -81,12 +82,12 @@ inline constexpr std::string_view choose_name = "choose_settings";
 
 inline void check(const Requirement& requirement) {
     if ((requirement.force_error != 0) == (requirement.time != 0)) {
-        refuse(choose_name, "either a force_error or a time must be wanted, got ", requirement.force_error, " and ",
+        refuse(choose_name, "either a force_error or a time must be required, got ", requirement.force_error, " and ",
                requirement.time, " s");
     }
     const double number = requirement.time != 0 ? requirement.time : requirement.force_error;
     if (is_finite(number) && number > 0) return;
-    refuse(choose_name, "the wanted ", requirement.time != 0 ? "time" : "force_error", " must be finite and positive",
+    refuse(choose_name, "the required ", requirement.time != 0 ? "time" : "force_error", " must be finite and positive",
            requirement.time != 0 ? " [s]" : "", ", got ", number);
 }
 
@@ -141,8 +142,8 @@ class Search {
                });
     }
 
-    void add(const SolverOptions<Scalar>& setting, const Outcome& outcome) {
-        ChosenSettings<Scalar> now{outcome, setting, false};
+    void add(const SolverOptions<Scalar>& setting, const TrialResult& result) {
+        ChosenSettings<Scalar> now{result, setting, false};
         now.satisfied = now.advanced && (time_required_ ? now.time <= max_time_ : now.force_error <= max_error_);
         if (tried_.empty() || is_better(now, best_)) best_ = now;
         if (!time_required_ && now.satisfied) max_time_ = best_.time;
@@ -229,12 +230,12 @@ ChosenSettings<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const N
         refuse(detail::choose_name, "the history must have a tick with a force that is felt, got none in equilibrium");
     }
     return choose_settings(experiment, requirement, [&](const SolverOptions<Scalar>& options) {
-        auto outcome = trial(mesh, network, volume, history, references, options, rule, clock);
-        for (Index play = 1; play < experiment.repetitions && outcome.advanced; ++play) {
-            const double time = trial(mesh, network, volume, history, references, options, rule, clock).time;
-            outcome.time = (std::min)(outcome.time, time);
+        auto result = run_trial(mesh, network, volume, history, references, options, rule, clock);
+        for (Index play = 1; play < experiment.repetitions && result.advanced; ++play) {
+            const double time = run_trial(mesh, network, volume, history, references, options, rule, clock).time;
+            result.time = (std::min)(result.time, time);
         }
-        return outcome;
+        return result;
     });
 }
 

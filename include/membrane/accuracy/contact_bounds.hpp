@@ -17,23 +17,15 @@
 /// stiffness.
 ///
 ///     membrane::ContactBounds pressed(problem);
-///     pressed.take(problem, triangles, y, scene.tools(), rest.contacts);
-///     if (pressed.around(problem, force, magnitude, displacement)) ... pressed.softening(v) ...
+///     pressed.assign(problem, triangles, y, scene.tools(), rest.contacts);
+///     if (pressed.bound_softening(problem, force, magnitude, displacement)) ... pressed.softening(v) ...
 namespace membrane {
 
 /// Bounds for tools in contact that hold at all states whose vertices are within `max_displacement` of y.
 ///
-/// A tool of radius R keeps each point p of the surface, a mean of three corners with weights b, at least R away from
-/// each point c of its axis: h = |p - c| - R >= 0. Each h is a convex function of the corners. At distance d, its
-/// second derivative is at most 1/d times the squared displacement of p, which is at most the mean of the squared
-/// displacements of the corners. So a multiplier l reduces the second derivative of the energy by at most l/d times
-/// that mean: all of them together reduce the stiffness, at each vertex, by the multipliers on its corners over d.
-///
-/// Bound of the multipliers at a vertex: let u be the unit vector between the closest points of axis and triangle at y,
-/// g their distance. As both are convex, no pair of points is closer along u. So if a pair has the distance R in the
-/// neighbourhood, the cosine of its direction with u is at least (g - max_displacement) / R. In equilibrium the contact
-/// forces on a vertex balance its springs and foundation. If their directions are within an angle a of a common middle,
-/// the sum of their magnitudes is at most that force over cos a.
+/// Contact forces reduce the stiffness, at each vertex, by at most the multipliers on its corners over the distance
+/// from the axis. At a vertex, the sum of the multipliers is at most the force of springs and foundation over the
+/// cosine of the largest angle between a contact direction and their middle. Derivation: README.md in this folder.
 class ContactBounds {
   public:
     /// Cost: O(V) memory.
@@ -46,15 +38,15 @@ class ContactBounds {
     /// Takes the tools of a scene, and the contact points whose forces approximately balance the membrane at `y` (3 x V
     /// [m]). Offline.
     /// @pre the contact points are of these tools
-    void take(const EquilibriumProblem& problem, const Triangles& triangles, const Points<double>& y,
-              std::span<const ScenePress> tools, std::span<const ToolPoint> contacts);
+    void assign(const EquilibriumProblem& problem, const Triangles& triangles, const Points<double>& y,
+                std::span<const ScenePress> tools, std::span<const ToolPoint> contacts);
 
     /// Computes the bounds below for all states within `max_displacement` [m] of y, where the membrane acts on its
     /// vertices with `force`, a sum of terms of this `magnitude` [N]. False if a tool may touch a vertex that is fixed
     /// or that another tool may touch, or if the tool is too small or the displacement too large to bound the contact
     /// directions.
-    bool around(const EquilibriumProblem& problem, const Points<double>& force, std::span<const double> magnitude,
-                double max_displacement) noexcept;
+    bool bound_softening(const EquilibriumProblem& problem, const Points<double>& force,
+                         std::span<const double> magnitude, double max_displacement) noexcept;
 
     /// Upper bound of the reduction of stiffness by contact forces at vertex `v` [N/m].
     [[nodiscard]] double softening(Index v) const noexcept { return marks_[at(v)].softening; }
@@ -66,11 +58,11 @@ class ContactBounds {
     }
 
     /// Upper bound of the penetration of a tool at y, rounding included [m].
-    [[nodiscard]] double overlap() const noexcept { return overlap_; }
+    [[nodiscard]] double penetration() const noexcept { return penetration_; }
 
     /// Upper bound of the residual work at y: contact forces times their gaps, plus the work of contact forces across
     /// penetrations [J].
-    [[nodiscard]] double work() const noexcept { return work_ + max_normal_force_ * overlap_; }
+    [[nodiscard]] double work() const noexcept { return work_ + max_normal_force_ * penetration_; }
 
     /// A ball around y with at least this radius contains a state without penetration, with clearance [m].
     [[nodiscard]] double min_radius() const noexcept { return 4 * clearance_; }
@@ -79,7 +71,7 @@ class ContactBounds {
     [[nodiscard]] double max_radius() const noexcept { return max_radius_; }
 
     /// Adds the contact forces to the forces on the vertices [N], and to their magnitudes.
-    void push(Points<double>& force, std::vector<double>& magnitude) const noexcept;
+    void add_force(Points<double>& force, std::vector<double>& magnitude) const noexcept;
 
   private:
     static constexpr std::size_t none = (std::numeric_limits<std::size_t>::max)();
@@ -113,8 +105,8 @@ class ContactBounds {
     std::vector<Near> near_;
     std::vector<ToolPoint> contacts_;
     std::vector<Mark> marks_;
-    std::vector<double> borne_, stiffness_;         // of vertices: multipliers at y [N], stiffness bound [N/m]
-    double overlap_ = 0, work_ = 0, rounding_ = 0;  // at y
+    std::vector<double> borne_, stiffness_;             // of vertices: multipliers at y [N], stiffness bound [N/m]
+    double penetration_ = 0, work_ = 0, rounding_ = 0;  // at y
     double max_normal_force_ = 0, clearance_ = 0, max_radius_ = std::numeric_limits<double>::infinity();
 };
 
@@ -123,12 +115,13 @@ inline void ContactBounds::clear() noexcept {
     near_.clear();
     contacts_.clear();
     std::fill(marks_.begin(), marks_.end(), Mark{});
-    overlap_ = work_ = rounding_ = max_normal_force_ = clearance_ = 0;
+    penetration_ = work_ = rounding_ = max_normal_force_ = clearance_ = 0;
     max_radius_ = std::numeric_limits<double>::infinity();
 }
 
-inline void ContactBounds::take(const EquilibriumProblem& problem, const Triangles& triangles, const Points<double>& y,
-                                std::span<const ScenePress> tools, std::span<const ToolPoint> contacts) {
+inline void ContactBounds::assign(const EquilibriumProblem& problem, const Triangles& triangles,
+                                  const Points<double>& y, std::span<const ScenePress> tools,
+                                  std::span<const ToolPoint> contacts) {
     clear();
     for (std::size_t i = 0; i < tools.size(); ++i) {
         radii_.push_back(tools[i].tool.radius);
@@ -159,7 +152,7 @@ inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, 
         const auto triangle = triangle_at(y, corners);
         if (detail::is_far(triangle, tool, 1.25 * tool.radius)) continue;
         const auto nearest = closest_to_segment(triangle, tool.position, end);
-        const Vector3<double> separation = nearest.on_triangle.point - tool.position - nearest.along * tool.axis;
+        const Vector3<double> separation = nearest.on_triangle.point - tool.position - nearest.fraction * tool.axis;
         const Vector3<double> u = direction<double>(separation, Vector3<double>::Zero());
         const Wide wide_u = wide(u), axis = wide(tool.axis);
         long double distance = std::numeric_limits<long double>::infinity(), size = axis.norm() + tool.radius;
@@ -171,7 +164,7 @@ inline void ContactBounds::find_near(std::size_t i, const Triangles& triangles, 
         distance = (distance - (std::max)(wide_u.dot(axis), 0.0L)) / (std::max)(wide_u.norm(), 0.5L);
         constexpr long double rounding = 16 * std::numeric_limits<long double>::epsilon();
         rounding_ = (std::max)(rounding_, static_cast<double>(rounding * size));
-        overlap_ = (std::max)(overlap_, static_cast<double>(tool.radius - distance + rounding * size));
+        penetration_ = (std::max)(penetration_, static_cast<double>(tool.radius - distance + rounding * size));
         near_.push_back({i, {corners[0], corners[1], corners[2]}, u, static_cast<double>(distance)});
     }
 }
@@ -198,8 +191,8 @@ inline Vector3<double> ContactBounds::take_contact(const ToolPoint& contact, con
     return direction<double>(separation.cast<double>(), contact.normal);
 }
 
-inline bool ContactBounds::around(const EquilibriumProblem& problem, const Points<double>& force,
-                                  std::span<const double> magnitude, double max_displacement) noexcept {
+inline bool ContactBounds::bound_softening(const EquilibriumProblem& problem, const Points<double>& force,
+                                           std::span<const double> magnitude, double max_displacement) noexcept {
     if (radii_.empty()) return true;
     max_displacement =
         (1 + 1e-9) * max_displacement + rounding_ + 1e-15 * *std::max_element(radii_.begin(), radii_.end());
@@ -213,7 +206,7 @@ inline bool ContactBounds::around(const EquilibriumProblem& problem, const Point
         const double max_force =
             norm(point(force, v)) + problem.rounding() * magnitude[at(v)] + stiffness_[at(v)] * max_displacement;
         const double borne = (std::max)(borne_[at(v)], max_force / mark.cosine);
-        const double min_distance = radii_[mark.tool] - 2 * max_displacement - overlap_;
+        const double min_distance = radii_[mark.tool] - 2 * max_displacement - penetration_;
         if (!(min_distance > radii_[mark.tool] / 4)) return false;
         mark.softening = (1 + 1e-9) * borne / min_distance;
         max_normal_force_ += (1 + 1e-9) * borne;
@@ -221,7 +214,7 @@ inline bool ContactBounds::around(const EquilibriumProblem& problem, const Point
         min_cosine = (std::min)(min_cosine, mark.cosine);
         count += 1;
     }
-    clearance_ = overlap_ * std::sqrt(count) / min_cosine;
+    clearance_ = penetration_ * std::sqrt(count) / min_cosine;
     return clearance_ <= max_displacement;
 }
 
@@ -263,7 +256,7 @@ inline bool ContactBounds::narrow(double max_displacement) noexcept {
     return true;
 }
 
-inline void ContactBounds::push(Points<double>& force, std::vector<double>& magnitude) const noexcept {
+inline void ContactBounds::add_force(Points<double>& force, std::vector<double>& magnitude) const noexcept {
     for (const auto& contact : contacts_) {
         for (std::size_t k = 0; k < 3; ++k) {
             const Index v = contact.corners[k];

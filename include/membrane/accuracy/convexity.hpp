@@ -13,8 +13,8 @@
 
 /// A lower bound of the convexity of a membrane's energy in a whole neighbourhood of a state.
 ///
-///     membrane::BlockConvexity convexity(problem);                  // offline
-///     const double mu = convexity.around(problem, 1e-5);            // [N/m]; <= 0 if not shown to be convex
+///     membrane::BlockConvexity convexity(problem);                            // offline
+///     const double mu = convexity.eigenvalue_bound(problem, 1e-5);  // [N/m]; <= 0 if not shown to be convex
 namespace membrane {
 
 /// Computes a lower bound of the smallest eigenvalue of the stiffness over all states in which each free vertex is
@@ -24,7 +24,7 @@ namespace membrane {
 template <class Model>
 concept ConvexityModel = std::copyable<Model> && std::constructible_from<Model, const EquilibriumProblem&> &&
     requires(Model& model, const EquilibriumProblem& problem, double radius) {
-    { model.around(problem, radius) }
+    { model.eigenvalue_bound(problem, radius) }
     noexcept->std::same_as<double>;
 };
 
@@ -35,8 +35,9 @@ consteval bool check_convexity_model() noexcept {
     static_assert(std::copyable<Model>, "ConvexityModel: must be copyable");
     static_assert(std::constructible_from<Model, const EquilibriumProblem&>,
                   "ConvexityModel: must have a constructor from const EquilibriumProblem&");
-    static_assert(ConvexityModel<Model>,
-                  "ConvexityModel: around(const EquilibriumProblem&, double radius) noexcept must return double");
+    static_assert(
+        ConvexityModel<Model>,
+        "ConvexityModel: eigenvalue_bound(const EquilibriumProblem&, double radius) noexcept must return double");
     return ConvexityModel<Model>;
 }
 
@@ -60,7 +61,7 @@ class BlockConvexity {
     explicit BlockConvexity(const EquilibriumProblem& problem);
 
     /// Online. Cost: O(V + springs) for each of at most 24 rounds.
-    [[nodiscard]] double around(const EquilibriumProblem& problem, double radius) noexcept;
+    [[nodiscard]] double eigenvalue_bound(const EquilibriumProblem& problem, double radius) noexcept;
 
   private:
     struct Push {  // of a spring between free vertices
@@ -75,11 +76,11 @@ class BlockConvexity {
 
     std::vector<Push> pushes_;
     std::size_t push_count_ = 0;
-    std::vector<Symmetric3<double>> own_;     // of each vertex: foundation and springs to fixed vertices
-    std::vector<Symmetric3<double>> blocks_;  // of each vertex: minus its block
-    std::vector<double> own_sizes_, sizes_;   // of each vertex: sum of the magnitudes in its block
-    std::vector<double> weights_, least_;     // of each vertex: w, its smallest eigenvalue
-    double most_ = 0;                         // largest stiffness of the foundation [N/m]
+    std::vector<Symmetric3<double>> own_;            // of each vertex: foundation and springs to fixed vertices
+    std::vector<Symmetric3<double>> blocks_;         // of each vertex: minus its block
+    std::vector<double> own_sizes_, sizes_;          // of each vertex: sum of the magnitudes in its block
+    std::vector<double> weights_, min_eigenvalues_;  // of each vertex: w, its smallest eigenvalue
+    double max_foundation_ = 0;                      // largest stiffness of the foundation [N/m]
 };
 static_assert(ConvexityModel<BlockConvexity>);
 
@@ -90,9 +91,9 @@ inline BlockConvexity::BlockConvexity(const EquilibriumProblem& problem)
       own_sizes_(own_.size()),
       sizes_(own_.size()),
       weights_(own_.size()),
-      least_(own_.size()) {}
+      min_eigenvalues_(own_.size()) {}
 
-inline double BlockConvexity::around(const EquilibriumProblem& problem, double radius) noexcept {
+inline double BlockConvexity::eigenvalue_bound(const EquilibriumProblem& problem, double radius) noexcept {
     if (!gather(problem, radius)) return -std::numeric_limits<double>::infinity();
     std::fill(weights_.begin(), weights_.end(), 1.0);
     double best = sum_up(problem);
@@ -108,11 +109,11 @@ inline double BlockConvexity::around(const EquilibriumProblem& problem, double r
 // False if a spring may become too short to bound its stiffness.
 inline bool BlockConvexity::gather(const EquilibriumProblem& problem, double radius) noexcept {
     push_count_ = 0;
-    most_ = 0;
+    max_foundation_ = 0;
     for (Index v = 0; v < problem.vertex_count(); ++v) {
         own_[static_cast<std::size_t>(v)] = diagonal3(problem.support(v));
         own_sizes_[static_cast<std::size_t>(v)] = 3 * (problem.foundation(v) + std::abs(problem.support(v)));
-        most_ = (std::max)(most_, problem.foundation(v));
+        max_foundation_ = (std::max)(max_foundation_, problem.foundation(v));
     }
     for (const auto& spring : problem.springs()) {
         const int ends = problem.free_ends(spring);
@@ -149,8 +150,8 @@ inline double BlockConvexity::sum_up(const EquilibriumProblem& problem) noexcept
     }
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t v = 0; v < own_.size(); ++v) {
-        least_[v] = -largest_eigenvalue(blocks_[v]) - rounding * sizes_[v];
-        if (!problem.fixed(static_cast<Index>(v))) least = (std::min)(least, least_[v]);
+        min_eigenvalues_[v] = -largest_eigenvalue(blocks_[v]) - rounding * sizes_[v];
+        if (!problem.fixed(static_cast<Index>(v))) least = (std::min)(least, min_eigenvalues_[v]);
     }
     return least;
 }
@@ -159,7 +160,7 @@ inline double BlockConvexity::sum_up(const EquilibriumProblem& problem) noexcept
 inline void BlockConvexity::balance(double least) noexcept {
     constexpr double smallest = 0.05;
     for (std::size_t v = 0; v < own_.size(); ++v) {
-        const double part = (most_ - least_[v]) / (most_ - least);
+        const double part = (max_foundation_ - min_eigenvalues_[v]) / (max_foundation_ - least);
         weights_[v] *= part > smallest ? (std::min)(part, 1.0) : smallest;
     }
 }

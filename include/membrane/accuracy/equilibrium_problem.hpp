@@ -17,7 +17,7 @@
 /// The balance of forces on a membrane of linear springs.
 ///
 ///     membrane::EquilibriumProblem problem(network);                                            // offline
-///     if (problem.take(x, network, foundation, membrane::pull(7, target)) != ProblemStatus::valid) ...
+///     if (problem.assign(x, network, foundation, membrane::pull(7, target)) != ProblemStatus::valid) ...
 ///     problem.forces(problem.centre(), force, magnitude);                                // [N]
 namespace membrane {
 
@@ -25,8 +25,8 @@ namespace membrane {
 template <class Volume>
 concept LinearFoundation = std::same_as<Volume, NoFoundation> || std::same_as<Volume, VirtualVolumeSprings<float>> ||
                            std::same_as<Volume, VirtualVolumeSprings<double>> || std::same_as < Volume,
-        MovedVolume < VirtualVolumeSprings<float>,
-float >> || std::same_as<Volume, MovedVolume<VirtualVolumeSprings<double>, double>>;
+        MovingFoundation < VirtualVolumeSprings<float>,
+float >> || std::same_as<Volume, MovingFoundation<VirtualVolumeSprings<double>, double>>;
 
 enum class ProblemStatus {
     valid,
@@ -45,9 +45,9 @@ class EquilibriumProblem {
 
     /// Takes the membrane at `x` (3 x V [m]) and its constraints. Online. Cost: O(V + springs).
     template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
-    [[nodiscard]] ProblemStatus take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                     const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                     const Constraints&... constraints) noexcept;
+    [[nodiscard]] ProblemStatus assign(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                       const Constraints&... constraints) noexcept;
 
     /// Also fixes all vertices that are not in `free`. Online. Cost: O(V).
     [[nodiscard]] ProblemStatus fix_all_but(std::span<const Index> free) noexcept;
@@ -56,7 +56,7 @@ class EquilibriumProblem {
     [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
     [[nodiscard]] double foundation(Index v) const noexcept { return foundation_[at(v)].stiffness; }
 
-    /// The stiffness of the foundation minus the softening set since the last `take` [N/m].
+    /// The stiffness of the foundation minus the softening set since the last `assign` [N/m].
     [[nodiscard]] double support(Index v) const noexcept { return foundation(v) - softening_[at(v)]; }
     void soften(Index v, double by) noexcept { softening_[at(v)] = by; }
 
@@ -65,7 +65,7 @@ class EquilibriumProblem {
         return (fixed(spring.first) ? 0 : 1) + (fixed(spring.second) ? 0 : 1);
     }
 
-    /// The x of the last `take`, and x with prescribed vertices at their targets [m].
+    /// The x of the last `assign`, and x with prescribed vertices at their targets [m].
     [[nodiscard]] const Points<double>& given() const noexcept { return given_; }
     [[nodiscard]] const Points<double>& centre() const noexcept { return centre_; }
 
@@ -79,7 +79,7 @@ class EquilibriumProblem {
     void project(Points<double>& f) const noexcept;
 
     /// The attached points and their targets.
-    [[nodiscard]] const PointAttachments& places() const noexcept { return places_; }
+    [[nodiscard]] const PointAttachments& attachments() const noexcept { return attachments_; }
 
     /// Adds to `weights` (V) the share of the force on each vertex in the reaction of `term`; nothing for a load or a
     /// tool.
@@ -105,9 +105,9 @@ class EquilibriumProblem {
     std::vector<double> softening_;
     std::vector<unsigned char> fixed_;  // bits: by network, constraint, caller
     Points<double> load_, given_, centre_;
-    PointAttachments places_;
+    PointAttachments attachments_;
     double rounding_ = 0;
-    bool touched_ = false;  // by a tool
+    bool has_contact_ = false;  // by a tool
 };
 
 template <Real Scalar, class Law>
@@ -131,9 +131,9 @@ EquilibriumProblem::EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& net
 }
 
 template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
-ProblemStatus EquilibriumProblem::take(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                       const Constraints&... constraints) noexcept {
+ProblemStatus EquilibriumProblem::assign(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                         const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                         const Constraints&... constraints) noexcept {
     if (x.cols() != vertex_count() || network.vertex_count() != vertex_count()) return ProblemStatus::invalid_input;
     if (network.springs().size() != springs_.size()) return ProblemStatus::invalid_input;
     take_springs(network.springs());
@@ -142,14 +142,14 @@ ProblemStatus EquilibriumProblem::take(const std::type_identity_t<ConstPointsRef
         given_.col(v) = centre_.col(v) = point(x, v).template cast<double>();
     }
     load_.setZero();
-    places_.clear();
+    attachments_.clear();
     std::fill(softening_.begin(), softening_.end(), 0.0);
-    touched_ = false;
+    has_contact_ = false;
     if (!take_foundation<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::invalid_input;
     ProblemStatus status = ProblemStatus::valid;
     ((status = status == ProblemStatus::valid ? take_constraint(constraints) : status), ...);
     if (status == ProblemStatus::valid) status = check_places();
-    return status == ProblemStatus::valid && touched_ ? ProblemStatus::contact : status;
+    return status == ProblemStatus::valid && has_contact_ ? ProblemStatus::contact : status;
 }
 
 template <class Springs>
@@ -190,7 +190,7 @@ ProblemStatus EquilibriumProblem::take_constraint(const C& constraint) noexcept 
 inline ProblemStatus EquilibriumProblem::take_term(const ConstraintTerm& term) noexcept {
     using Kind = ConstraintTerm::Kind;
     if (term.kind == Kind::press) {
-        touched_ |= term.contact.touching();
+        has_contact_ |= term.contact.touching();
         return ProblemStatus::valid;
     }
     for (const Index v : term.corners) {
@@ -198,14 +198,14 @@ inline ProblemStatus EquilibriumProblem::take_term(const ConstraintTerm& term) n
     }
     const Index v = term.corners[0];
     switch (term.kind) {
-        case Kind::hold_vertex:
+        case Kind::prescribe_vertex:
             if ((fixed_[at(v)] & by_network) == 0) centre_.col(v) = term.target;
             [[fallthrough]];
         case Kind::pin: fix(v, by_constraint); return ProblemStatus::valid;
         case Kind::load:
             for (std::size_t k = 0; k < 3; ++k) load_.col(term.corners[k]) += term.weight(k) * term.force;
             return ProblemStatus::valid;
-        default: return places_.add(term) ? ProblemStatus::valid : ProblemStatus::unsupported;
+        default: return attachments_.add(term) ? ProblemStatus::valid : ProblemStatus::unsupported;
     }
 }
 
@@ -219,7 +219,7 @@ inline ProblemStatus EquilibriumProblem::fix_all_but(std::span<const Index> free
 }
 
 inline ProblemStatus EquilibriumProblem::check_places() const noexcept {
-    const bool independent = places_.independent([&](Index v) { return fixed(v); });
+    const bool independent = attachments_.independent([&](Index v) { return fixed(v); });
     return independent ? ProblemStatus::valid : ProblemStatus::unsupported;
 }
 
@@ -244,11 +244,11 @@ inline void EquilibriumProblem::project(Points<double>& f) const noexcept {
     for (Index v = 0; v < vertex_count(); ++v) {
         if (fixed(v)) f.col(v).setZero();
     }
-    places_.project(f);
+    attachments_.project(f);
 }
 
 inline void EquilibriumProblem::share(const ConstraintTerm& term, std::vector<double>& weights) noexcept {
-    if (!term.holds()) return;
+    if (!term.prescribes()) return;
     for (std::size_t k = 0; k < 3; ++k) weights[at(term.corners[k])] += term.share(k);
 }
 

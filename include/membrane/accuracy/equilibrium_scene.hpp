@@ -13,7 +13,9 @@
 /// The constraints of a membrane in equilibrium, described by those of a step or by user-defined ones: see
 /// `ConstraintTerm`, or
 ///
-///     void describe(const Clamp& clamp, membrane::EquilibriumScene& scene) { scene.hold(clamp.vertex, clamp.target); }
+///     void describe(const Clamp& clamp, membrane::EquilibriumScene& scene) {
+///         scene.prescribe(clamp.vertex, clamp.target);
+///     }
 namespace membrane {
 
 struct EquilibriumOptions {
@@ -48,10 +50,10 @@ struct ScenePress {
 
 /// Targets, loads and tools of one increment.
 struct LoadStep {
-    Points<double> targets;               ///< of fixed vertices; for the others, the start positions, 3 x V [m]
-    Points<double> loads;                 ///< on each vertex, 3 x V [N]
-    std::vector<Vector3<double>> places;  ///< targets of the attached points [m]
-    std::vector<Tool<double>> tools;      ///< that are in contact
+    Points<double> targets;  ///< of fixed vertices; for the others, the start positions, 3 x V [m]
+    Points<double> loads;    ///< on each vertex, 3 x V [N]
+    std::vector<Vector3<double>> attached_points;  ///< targets of the attached points [m]
+    std::vector<Tool<double>> tools;               ///< that are in contact
 };
 
 /// The constraints of one membrane, in double. All input is checked.
@@ -61,18 +63,19 @@ class EquilibriumScene {
   public:
     /// The membrane is at `start` (3 x V [m]); `pinned[v]` is not 0 if vertex `v` never moves.
     EquilibriumScene(Points<double> start, std::vector<unsigned char> pinned)
-        : start_(std::move(start)), targets_(start_), pinned_(std::move(pinned)), held_(pinned_.size(), 0) {}
+        : start_(std::move(start)), targets_(start_), pinned_(std::move(pinned)), prescribed_(pinned_.size(), 0) {}
 
     // For `describe`.
 
-    /// A pinned vertex stays at its start, regardless of its target. If several terms hold a vertex, the target of the
+    /// A pinned vertex stays at its start, regardless of its target. If several terms prescribe a vertex, the target of the
     /// last one counts. A tool without contact is ignored.
     void add(const ConstraintTerm& term);
 
-    void hold(Index v, const Vector3<double>& target) { add(ConstraintTerm::hold(v, target)); }
-    void hold(Index v) { add(ConstraintTerm::pin(v)); }
-    void hold(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& target) {
-        add(ConstraintTerm::hold(corners, barycentric, target));
+    void prescribe(Index v, const Vector3<double>& target) { add(ConstraintTerm::prescribe(v, target)); }
+    void prescribe(Index v) { add(ConstraintTerm::pin(v)); }
+    void prescribe(const std::array<Index, 3>& corners, const Vector3<double>& barycentric,
+                   const Vector3<double>& target) {
+        add(ConstraintTerm::prescribe(corners, barycentric, target));
     }
     void load(const std::array<Index, 3>& corners, const Vector3<double>& barycentric, const Vector3<double>& force) {
         add(ConstraintTerm::load(corners, barycentric, force));
@@ -85,7 +88,7 @@ class EquilibriumScene {
     void select_constraint(std::size_t constraint) noexcept { constraint_ = constraint; }
 
     [[nodiscard]] bool fixed(Index v) const noexcept {
-        return pinned_[static_cast<std::size_t>(v)] != 0 || held_[static_cast<std::size_t>(v)] != 0;
+        return pinned_[static_cast<std::size_t>(v)] != 0 || prescribed_[static_cast<std::size_t>(v)] != 0;
     }
 
     /// Targets and loads at `part` (0 to 1) of the change from the start, and tools at this part of their entry from
@@ -93,16 +96,18 @@ class EquilibriumScene {
     [[nodiscard]] LoadStep goals(double part) const;
 
     /// Constraint and vertex of each term that fixes a vertex.
-    [[nodiscard]] const std::vector<std::pair<std::size_t, Index>>& holds() const noexcept { return holds_; }
+    [[nodiscard]] const std::vector<std::pair<std::size_t, Index>>& prescribed_vertices() const noexcept {
+        return prescribed_vertices_;
+    }
     [[nodiscard]] const std::vector<ConstraintTerm>& point_attachments() const noexcept { return attachments_; }
-    [[nodiscard]] const std::vector<ConstraintTerm>& loaded_places() const noexcept { return loads_; }
+    [[nodiscard]] const std::vector<ConstraintTerm>& loads() const noexcept { return loads_; }
     [[nodiscard]] const std::vector<ScenePress>& tools() const noexcept { return tools_; }
 
     /// Vertices to which a force is applied.
     [[nodiscard]] const std::vector<Index>& seeds() const noexcept { return seeds_; }
 
   private:
-    void hold_vertex(const ConstraintTerm& term);
+    void prescribe_vertex(const ConstraintTerm& term);
     void act_on_point(const ConstraintTerm& term);
     void press(const ConstraintTerm& term);
     void check(Index v) const;
@@ -110,8 +115,8 @@ class EquilibriumScene {
     void check(const Vector3<double>& vector, std::string_view what, std::string_view unit) const;
 
     Points<double> start_, targets_;
-    std::vector<unsigned char> pinned_, held_;
-    std::vector<std::pair<std::size_t, Index>> holds_;
+    std::vector<unsigned char> pinned_, prescribed_;
+    std::vector<std::pair<std::size_t, Index>> prescribed_vertices_;
     std::vector<ConstraintTerm> attachments_, loads_;
     std::vector<ScenePress> tools_;
     std::vector<Index> seeds_;
@@ -186,19 +191,19 @@ inline void EquilibriumScene::check(const Vector3<double>& vector, std::string_v
 inline void EquilibriumScene::add(const ConstraintTerm& term) {
     switch (term.kind) {
         case ConstraintTerm::Kind::pin:
-        case ConstraintTerm::Kind::hold_vertex: return hold_vertex(term);
-        case ConstraintTerm::Kind::hold_point:
+        case ConstraintTerm::Kind::prescribe_vertex: return prescribe_vertex(term);
+        case ConstraintTerm::Kind::prescribe_point:
         case ConstraintTerm::Kind::load: return act_on_point(term);
         case ConstraintTerm::Kind::press: return press(term);
     }
 }
 
-inline void EquilibriumScene::hold_vertex(const ConstraintTerm& term) {
+inline void EquilibriumScene::prescribe_vertex(const ConstraintTerm& term) {
     const Index v = term.corners[0];
     check(v);
     check(term.target, "target", "m");
-    held_[static_cast<std::size_t>(v)] = 1;
-    holds_.emplace_back(constraint_, v);
+    prescribed_[static_cast<std::size_t>(v)] = 1;
+    prescribed_vertices_.emplace_back(constraint_, v);
     if (term.kind == ConstraintTerm::Kind::pin) return;
     seeds_.push_back(v);
     if (pinned_[static_cast<std::size_t>(v)] == 0) targets_.col(v) = term.target;
@@ -253,7 +258,7 @@ inline LoadStep EquilibriumScene::goals(double part) const {
         }
     }
     for (const auto& term : attachments_) {
-        goals.places.push_back(interpolated(term.point_in(start_), term.target));
+        goals.attached_points.push_back(interpolated(term.point_in(start_), term.target));
     }
     for (const auto& pressing : tools_) {
         goals.tools.push_back(pressing.tool);

@@ -158,7 +158,7 @@ Points<double> EquilibriumSolver<ElasticModel>::newton_step() {
     system_.open(goals_.targets - x);
     elasticity_.add_stiffness(here_.elastic, system_);
     const Points<double> forces = applied(here_);
-    for (Index v = 0; v < forces.cols(); ++v) system_.push(v, forces.col(v));
+    for (Index v = 0; v < forces.cols(); ++v) system_.add_force(v, forces.col(v));
     stiffness_ = elasticity_.largest_stiffness(here_.elastic);
     add_rows();
     const auto solution = system_.solve(stiffness_);
@@ -294,8 +294,8 @@ template <class ElasticModel>
 std::vector<Vector3<double>> EquilibriumSolver<ElasticModel>::reactions(std::size_t count) const {
     std::vector<Vector3<double>> sums(count, Vector3<double>::Zero());
     const Points<double> forces = unbalanced(here_);
-    for (const auto& [constraint, v] : scene_.holds()) sums[constraint] += forces.col(v);
-    for (const auto& term : scene_.loaded_places()) sums[term.constraint] -= term.force;
+    for (const auto& [constraint, v] : scene_.prescribed_vertices()) sums[constraint] += forces.col(v);
+    for (const auto& term : scene_.loads()) sums[term.constraint] -= term.force;
     for (std::size_t i = 0; i < attachment_forces_.size(); ++i)
         sums[scene_.point_attachments()[i].constraint] -= attachment_forces_[i];
     for (const auto& point : here_.contacts)
@@ -314,7 +314,7 @@ bool EquilibriumSolver<ElasticModel>::can_move(const std::array<Index, 3>& corne
 
 template <class ElasticModel>
 Vector3<double> EquilibriumSolver<ElasticModel>::off_target(std::size_t i) const noexcept {
-    return scene_.point_attachments()[i].point_in(here_.elastic.x) - goals_.places[i];
+    return scene_.point_attachments()[i].point_in(here_.elastic.x) - goals_.attached_points[i];
 }
 
 }  // namespace membrane

@@ -19,7 +19,7 @@
 ///
 ///     membrane::ErrorBound bound(network);                                          // offline: allocates all it needs
 ///     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
-///     const auto error = bound.of(x, network, foundation, membrane::pull(7, target));
+///     const auto error = bound.compute(x, network, foundation, membrane::pull(7, target));
 ///     if (error.certified()) {
 ///         error.position                                                            // no vertex is farther off [m]
 ///         error.reactions[0].max_distance_to(report.reactions[0])                   // error bound of a force [N]
@@ -27,7 +27,7 @@
 ///
 /// With a tool in contact, from an equilibrium computed by Newton's method:
 ///     const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
-///     const auto error = bound.of(rest, x, mesh, network, foundation, press(tool, contact));
+///     const auto error = bound.compute(rest, x, mesh, network, foundation, press(tool, contact));
 namespace membrane {
 
 struct ErrorBoundOptions {
@@ -40,31 +40,11 @@ struct ErrorBoundOptions {
 /// Proves an upper bound of the distance of a membrane of linear springs from equilibrium. The state may come from any
 /// solver, which may have moved all of its vertices or only some: the equilibrium is that of all free vertices.
 ///
-/// Let E be the energy of springs, foundation and loads, x the state (with fixed vertices and attached points at their
-/// targets), and C all states whose free vertices are within rho of x: a convex set. If the stiffness has no eigenvalue
-/// below mu > 0 on C, as `Convexity` shows, then (grad E(a) - grad E(b)) . (a - b) >= mu |a - b|^2 for a and b in C, so
-/// C has at most one equilibrium. Take any y, its residual forces r = -grad E(y), and the ball B around it of radius e
-/// = |r| / mu. If B lies in C, then on its surface grad E(z) . (z - y) >= mu e^2 - |r| e = 0. The minimum of E in B is
-/// therefore an equilibrium: on the surface its gradient, if not zero, would point straight inwards, and the product
-/// would be negative. So C has exactly one equilibrium x*, and |x* - y| <= e. None of its vertices is farther from x
-/// than max |y_v - x_v| + e; if that is at most rho, B lies in C and the proof is complete.
-///
-/// y comes from Newton's method, started at x, with conjugate gradients (inexact, [Dembo82]): near the equilibrium e is
-/// small compared with the distance, and the bound hardly larger than the distance. The proof does not depend on that:
-/// it uses y and its forces as computed, with rounding. Point attachments restrict C to a plane, on which the proof
-/// holds for the projected forces.
-///
-/// A reaction q changes by at most the sum of k |w_i - w_j| over the springs at each free vertex, where w is the share
-/// of each vertex in q and no spring is stiffer than k in C. So q(x*) is within sqrt(sum of squares of these) e of
-/// q(y).
-///
-/// If tools press, y and the contact forces are those of an equilibrium computed before, r is the residual with them,
-/// and mu a bound of the stiffness minus the reduction by contact forces. Beyond that, contact forces change the energy
-/// by work across gaps and penetrations, at most some w (`ContactBounds`): mu |x - y|^2 <= |r| |x - y| + w for an
-/// equilibrium x in C, and two in C are equal. The minimum of E outside the tools within a ball B in C around y is one:
-/// if it were on the surface, a force would hold it there, which only adds to the left side; so e, the radius, is where
-/// both sides are equal. (The increase of contact forces by this force is outweighed too while e is below the smallest
-/// distance from the axis times the smallest cosine, and above the displacement that clears the penetrations.)
+/// The bound is e = |r| / mu: r are the residual forces of a state y near `x`, and no eigenvalue of the stiffness is
+/// below mu > 0 around it, as `Convexity` shows. y comes from Newton's method with conjugate gradients (inexact,
+/// [Dembo82]), so that near the equilibrium the bound is hardly larger than the distance. With tools, y is an
+/// equilibrium computed before, and `ContactBounds` bounds the work of the contact forces. Proof: README.md in this
+/// folder.
 ///
 /// Rounding is that of IEEE double: with -ffast-math this is no proof. The equilibrium has no damping forces. A
 /// reaction in a step's report may include some; its distance from the equilibrium's reaction is bounded all the same.
@@ -81,23 +61,23 @@ class ErrorBound {
     /// Bounds the error of the state `x` (3 x V [m]) under the constraints of a step. Online. Cost: O(V + springs) for
     /// each CG iteration, and the cost of `Convexity`, usually two or three times.
     template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar>... Constraints>
-    [[nodiscard]] ErrorReport of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                 const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                 const Constraints&... constraints) noexcept;
+    [[nodiscard]] ErrorReport compute(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                      const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                      const Constraints&... constraints) noexcept;
 
     /// Bounds the error with tools in contact; `rest` is the equilibrium under these constraints. No tool may touch a
     /// fixed or prescribed vertex, nor a vertex that another tool may touch, and there may be no point attachment.
     /// @throws InvalidInput for a constraint that is not valid. Offline.
     template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
-    [[nodiscard]] ErrorReport of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                 const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
-                                 const Volume& volume, const Constraints&... constraints);
+    [[nodiscard]] ErrorReport compute(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                      const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
+                                      const Volume& volume, const Constraints&... constraints);
 
   private:
     static constexpr std::size_t max_constraints = StepState<double>::max_constraints;
     static constexpr int max_attempts = 4;
 
-    void open(std::size_t constraint_count) noexcept;
+    void begin(std::size_t constraint_count) noexcept;
     template <class... Constraints>
     [[nodiscard]] ErrorReport report(const Constraints&... constraints) noexcept;
     void locate() noexcept;
@@ -150,11 +130,11 @@ ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network,
 
 template <CheckedConvexityModel Convexity>
 template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar>... Constraints>
-ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                      const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                      const Constraints&... constraints) noexcept {
-    open(sizeof...(Constraints));
-    switch (problem_.take(x, network, volume, constraints...)) {
+ErrorReport ErrorBound<Convexity>::compute(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                           const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                           const Constraints&... constraints) noexcept {
+    begin(sizeof...(Constraints));
+    switch (problem_.assign(x, network, volume, constraints...)) {
         case ProblemStatus::valid: locate(); break;
         case ProblemStatus::contact: error_.status = BoundStatus::contact; return error_;
         case ProblemStatus::unsupported: error_.status = BoundStatus::unsupported; return error_;
@@ -165,14 +145,16 @@ ErrorReport ErrorBound<Convexity>::of(const std::type_identity_t<ConstPointsRef<
 
 template <CheckedConvexityModel Convexity>
 template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
-ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                      const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,
-                                      const Volume& volume, const Constraints&... constraints) {
-    open(sizeof...(Constraints));
-    const ProblemStatus status = problem_.take(x, network, volume, constraints...);
+ErrorReport ErrorBound<Convexity>::compute(const Equilibrium& rest,
+                                           const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                           const TriangleMesh<Scalar>& mesh,
+                                           const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                           const Constraints&... constraints) {
+    begin(sizeof...(Constraints));
+    const ProblemStatus status = problem_.assign(x, network, volume, constraints...);
     if (rest.x.cols() != x.cols() || mesh.vertex_count() != x.cols() || !is_finite(rest.x)) return error_;
     if (status == ProblemStatus::invalid_input) return error_;
-    if (status == ProblemStatus::unsupported || !problem_.places().empty()) {
+    if (status == ProblemStatus::unsupported || !problem_.attachments().empty()) {
         error_.status = BoundStatus::unsupported;
         return error_;
     }
@@ -182,7 +164,7 @@ ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_i
         if (touch.tool >= scene.tools().size()) return error_;
     }
     y_ = rest.x;
-    pressed_.take(problem_, mesh.triangles(), y_, scene.tools(), rest.contacts);
+    pressed_.assign(problem_, mesh.triangles(), y_, scene.tools(), rest.contacts);
     evaluate_residuals();
     error_.estimate = distance_;
     enclose();
@@ -190,7 +172,7 @@ ErrorReport ErrorBound<Convexity>::of(const Equilibrium& rest, const std::type_i
 }
 
 template <CheckedConvexityModel Convexity>
-void ErrorBound<Convexity>::open(std::size_t constraint_count) noexcept {
+void ErrorBound<Convexity>::begin(std::size_t constraint_count) noexcept {
     error_ = {};
     reactions_.fill({});
     error_.reactions = {reactions_.data(), constraint_count};
@@ -212,7 +194,7 @@ ErrorReport ErrorBound<Convexity>::report(const Constraints&... constraints) noe
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::locate() noexcept {
     y_ = problem_.centre();
-    problem_.places().project_positions(y_);
+    problem_.attachments().project_positions(y_);
     evaluate_residuals();
     error_.status = BoundStatus::not_converged;
     for (double before = std::numeric_limits<double>::infinity(); unbalanced_ < before / 2;) {
@@ -235,7 +217,7 @@ void ErrorBound<Convexity>::locate() noexcept {
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::enclose() noexcept {
     error_.status = BoundStatus::not_converged;
-    if (radius_ < 0 && !convex_within(1.05 * distance_ + pressed_.overlap())) {
+    if (radius_ < 0 && !convex_within(1.05 * distance_ + pressed_.penetration())) {
         error_.status = BoundStatus::not_convex;
         return;
     }
@@ -256,7 +238,7 @@ bool ErrorBound<Convexity>::refine() noexcept {
                          {.tolerance = 1e-2, .iterations = options_.cg_iterations - error_.cg_iterations});
     error_.cg_iterations += report.iterations;
     y_ += displacement_;
-    problem_.places().project_positions(y_);
+    problem_.attachments().project_positions(y_);
     return report.convex;
 }
 
@@ -265,7 +247,7 @@ template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::evaluate_residuals() noexcept {
     problem_.forces(y_, force_, magnitude_);
     rest_ = force_;
-    pressed_.push(rest_, magnitude_);
+    pressed_.add_force(rest_, magnitude_);
     problem_.project(rest_);
     double rounding = 0, farthest = 0;
     for (Index v = 0; v < problem_.vertex_count(); ++v) {
@@ -282,9 +264,9 @@ template <CheckedConvexityModel Convexity>
 bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
     radius_ = radius;
     error_.convexity = -std::numeric_limits<double>::infinity();
-    if (!pressed_.around(problem_, force_, magnitude_, distance_ + radius)) return false;
+    if (!pressed_.bound_softening(problem_, force_, magnitude_, distance_ + radius)) return false;
     for (Index v = 0; v < problem_.vertex_count(); ++v) problem_.soften(v, pressed_.softening(v));
-    error_.convexity = convexity_.around(problem_, radius * (1 + 1e-12));
+    error_.convexity = convexity_.eigenvalue_bound(problem_, radius * (1 + 1e-12));
     return error_.convexity > 0;
 }
 
@@ -292,11 +274,11 @@ bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
 // state with all points at their targets.
 template <CheckedConvexityModel Convexity>
 double ErrorBound<Convexity>::enclosure() const noexcept {
-    const double slip = problem_.places().slip(y_);
+    const double violation = problem_.attachments().violation(y_);
     const double mu = error_.convexity;
-    const double half = (unbalanced_ + (slip > 0 ? stiffness_.largest() * slip : 0.0)) / (2 * mu);
+    const double half = (unbalanced_ + (violation > 0 ? stiffness_.largest() * violation : 0.0)) / (2 * mu);
     const double radius = half + std::sqrt(half * half + pressed_.work() / mu);
-    return (1 + 1e-9) * ((std::max)(radius, pressed_.min_radius()) + slip);
+    return (1 + 1e-9) * ((std::max)(radius, pressed_.min_radius()) + violation);
 }
 
 // A spring between vertices with shares a and b adds (a - b) times its change of force.
@@ -311,7 +293,7 @@ ForceEnclosure ErrorBound<Convexity>::enclose_reaction(const C& constraint, std:
         const bool presses = term.kind == ConstraintTerm::Kind::press && term.contact.touching();
         if (presses) pressed_.share(tool++, weights_);
         problem_.share(term, weights_);
-        varies |= presses || term.holds();
+        varies |= presses || term.prescribes();
     });
     if (!varies) return result;
     for (std::size_t v = 0; v < weights_.size(); ++v)

@@ -8,7 +8,7 @@
 
 /// The bound of the distance of a membrane from equilibrium.
 ///
-///     const membrane::ErrorReport error = bound.of(x, network, foundation, membrane::pull(7, target));
+///     const membrane::ErrorReport error = bound.compute(x, network, foundation, membrane::pull(7, target));
 ///     if (error.certified()) error.position; error.reactions[0].max_distance_to(report.reactions[0]);   // [m], [N]
 namespace membrane {
 

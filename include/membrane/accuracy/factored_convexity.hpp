@@ -24,7 +24,7 @@ class FactoredConvexity {
         : factors_(problem.vertex_count(), problem.springs()) {}
 
     /// Online. Cost for a mesh: O(V^1.5), up to five times.
-    [[nodiscard]] double around(const EquilibriumProblem& problem, double radius) noexcept;
+    [[nodiscard]] double eigenvalue_bound(const EquilibriumProblem& problem, double radius) noexcept;
 
   private:
     bool gather(const EquilibriumProblem& problem, double radius) noexcept;
@@ -34,7 +34,7 @@ class FactoredConvexity {
 };
 static_assert(ConvexityModel<FactoredConvexity>);
 
-inline double FactoredConvexity::around(const EquilibriumProblem& problem, double radius) noexcept {
+inline double FactoredConvexity::eigenvalue_bound(const EquilibriumProblem& problem, double radius) noexcept {
     constexpr double none = -std::numeric_limits<double>::infinity();
     if (!gather(problem, radius)) return none;
     for (const double part : {0.5, 0.125, 0.01, 1e-4}) {

@@ -16,7 +16,7 @@
 ///
 ///     NewtonSystem system(fixed);                                  // fixed[v]: vertex v takes a prescribed step
 ///     system.open(prescribed);
-///     system.add(v, w, block);  system.push(v, force);  system.add({corners, gradients, gap, false});
+///     system.add(v, w, block);  system.add_force(v, force);  system.add({corners, gradients, gap, false});
 ///     const auto& [step, multipliers] = system.solve(stiffness);
 namespace membrane {
 
@@ -49,7 +49,7 @@ class NewtonSystem {
     void add(Index i, Index j, const Eigen::Matrix3d& block);
 
     /// Adds to F.
-    void push(Index v, const Vector3<double>& force);
+    void add_force(Index v, const Vector3<double>& force);
 
     void add(const ConstraintRow& row);
 
@@ -122,7 +122,7 @@ inline void NewtonSystem::put(Index i, Index j, const Eigen::Matrix3d& block) {
     }
 }
 
-inline void NewtonSystem::push(Index v, const Vector3<double>& force) {
+inline void NewtonSystem::add_force(Index v, const Vector3<double>& force) {
     if (is_free(v)) force_.segment<3>(at(v)) += force;
 }
 
@@ -130,7 +130,7 @@ inline void NewtonSystem::add(const ConstraintRow& row) {
     rows_.push_back(row);
     for (std::size_t k = 0; k < 3; ++k) {
         const Vector3<double> stiff = row.stiffening * row.gradient[k];
-        push(row.vertices[k], -row.value * stiff);
+        add_force(row.vertices[k], -row.value * stiff);
         for (std::size_t l = 0; l <= k; ++l) {
             add(row.vertices[k], row.vertices[l], stiff * row.gradient[l].transpose());
         }

@@ -13,16 +13,16 @@ namespace membrane {
 
 /// Points of triangles attached to targets: each point is the weighted sum of three corners.
 ///
-///     membrane::PointAttachments places;
-///     places.add(membrane::ConstraintTerm::hold(corners, weights, target));
-///     places.project_positions(y);             // every point is at its target
-///     places.project(displacement);            // and stays there if y moves by this
+///     membrane::PointAttachments attachments;
+///     attachments.add(membrane::ConstraintTerm::prescribe(corners, weights, target));
+///     attachments.project_positions(y);             // every point is at its target
+///     attachments.project(displacement);            // and stays there if y moves by this
 class PointAttachments {
   public:
     /// Adds a point. False if there are 16 already.
     bool add(const ConstraintTerm& term) noexcept {
-        if (count_ == places_.size()) return false;
-        places_[count_++] = term;
+        if (count_ == terms_.size()) return false;
+        terms_[count_++] = term;
         return true;
     }
     void clear() noexcept { count_ = 0; }
@@ -39,15 +39,15 @@ class PointAttachments {
     void project_positions(Points<double>& y) const noexcept;
 
     /// Upper bound of the distance to the nearest state with all points at their targets, rounding included [m].
-    [[nodiscard]] double slip(const Points<double>& y) const noexcept;
+    [[nodiscard]] double violation(const Points<double>& y) const noexcept;
 
   private:
-    [[nodiscard]] std::span<const ConstraintTerm> places() const noexcept { return {places_.data(), count_}; }
+    [[nodiscard]] std::span<const ConstraintTerm> terms() const noexcept { return {terms_.data(), count_}; }
     static void shift(const ConstraintTerm& term, const Vector3<double>& displacement, Points<double>& y) noexcept {
         for (std::size_t k = 0; k < 3; ++k) y.col(term.corners[k]) += term.share(k) * displacement;
     }
 
-    std::array<ConstraintTerm, 16> places_{};
+    std::array<ConstraintTerm, 16> terms_{};
     std::size_t count_ = 0;
 };
 
@@ -55,14 +55,14 @@ template <class IsFixed>
 bool PointAttachments::independent(IsFixed fixed) const noexcept {
     const auto owners = [&](Index v) {
         int count = 0;
-        for (const auto& term : places()) {
+        for (const auto& term : terms()) {
             for (std::size_t k = 0; k < 3; ++k) {
                 if (term.corners[k] == v && term.weight(k) != 0) ++count;
             }
         }
         return count;
     };
-    for (const auto& term : places()) {
+    for (const auto& term : terms()) {
         for (const Index v : term.corners) {
             if (owners(v) + (fixed(v) ? 1 : 0) > 1 && owners(v) > 0) return false;
         }
@@ -71,16 +71,16 @@ bool PointAttachments::independent(IsFixed fixed) const noexcept {
 }
 
 inline void PointAttachments::project(Points<double>& f) const noexcept {
-    for (const auto& term : places()) shift(term, -term.point_in(f), f);
+    for (const auto& term : terms()) shift(term, -term.point_in(f), f);
 }
 
 inline void PointAttachments::project_positions(Points<double>& y) const noexcept {
-    for (const auto& term : places()) shift(term, term.target - term.point_in(y), y);
+    for (const auto& term : terms()) shift(term, term.target - term.point_in(y), y);
 }
 
-inline double PointAttachments::slip(const Points<double>& y) const noexcept {
+inline double PointAttachments::violation(const Points<double>& y) const noexcept {
     double squares = 0;
-    for (const auto& term : places()) {
+    for (const auto& term : terms()) {
         double size = norm(term.target);
         for (std::size_t k = 0; k < 3; ++k) size += std::abs(term.weight(k)) * norm(point(y, term.corners[k]));
         const double left =

@@ -12,7 +12,7 @@
 /// The stiffness that a membrane presents to a constraint that holds it.
 ///
 ///     membrane::TangentStiffness tangent(network);                                  // offline: allocates all it needs
-///     const auto feel = tangent.of(solver.queue().vertices(), x, network, foundation, membrane::pull(7, target));
+///     const auto feel = tangent.compute(solver.queue().vertices(), x, network, foundation, membrane::pull(7, target));
 ///     if (feel.status == TangentStatus::found) largest_eigenvalue(feel.stiffness);  // [N/m]
 namespace membrane {
 
@@ -41,9 +41,9 @@ struct TangentReport {
 
 /// The derivative of a reaction by a rigid displacement d of the vertices that its constraint holds (a vertex, a point
 /// of a triangle, pins), while the free vertices follow in equilibrium: T = H_hh - H_hf H_ff^-1 H_fh. H is the Hessian
-/// of the energy at the state, f are the free vertices, h the held ones (the Schur complement; in statics, condensation
-/// [Guyan65]). At an equilibrium T is the derivative of the force by the displacement; elsewhere its error depends on
-/// the distance from an equilibrium.
+/// of the energy at the state, f are the free vertices, h the prescribed ones (the Schur complement; in statics,
+/// condensation [Guyan65]). At an equilibrium T is the derivative of the force by the displacement; elsewhere its error
+/// depends on the distance from an equilibrium.
 ///
 /// Calls are independent of each other. One thread at a time for each instance.
 class TangentStiffness {
@@ -52,24 +52,27 @@ class TangentStiffness {
     template <Real Scalar, class Law>
     explicit TangentStiffness(const MassSpringNetwork<Scalar, Law>& network, const TangentOptions& options = {});
 
-    /// The stiffness at `held`, one of the constraints of a step (pins name each vertex once). The other constraints do
-    /// not move; all vertices that no constraint fixes are free. Damping is left out. Online. Cost: O(V + springs) for
-    /// each iteration.
-    template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
-    [[nodiscard]] TangentReport of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                   const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                   const Held& held, const Others&... others) noexcept;
+    /// The stiffness at `prescribed`, one of the constraints of a step (pins name each vertex once). The other
+    /// constraints do not move; all vertices that no constraint fixes are free. Damping is left out. Online. Cost: O(V
+    /// + springs) for each iteration.
+    template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Prescribed,
+              Constraint<Scalar>... Others>
+    [[nodiscard]] TangentReport compute(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                        const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                        const Prescribed& prescribed, const Others&... others) noexcept;
 
     /// The stiffness with only the vertices in `free` free, as in a solver with this queue.
-    template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
-    [[nodiscard]] TangentReport of(std::span<const Index> free, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                   const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                   const Held& held, const Others&... others) noexcept;
+    template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Prescribed,
+              Constraint<Scalar>... Others>
+    [[nodiscard]] TangentReport compute(std::span<const Index> free,
+                                        const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                        const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                        const Prescribed& prescribed, const Others&... others) noexcept;
 
   private:
     [[nodiscard]] static TangentStatus status_of(ProblemStatus status) noexcept;
-    template <class Held>
-    [[nodiscard]] TangentReport condense(ProblemStatus status, const Held& held) noexcept;
+    template <class Prescribed>
+    [[nodiscard]] TangentReport condense(ProblemStatus status, const Prescribed& prescribed) noexcept;
     [[nodiscard]] Vector3<double> stiffness_column(int direction) noexcept;
 
     TangentOptions options_;
@@ -98,19 +101,20 @@ TangentStiffness::TangentStiffness(const MassSpringNetwork<Scalar, Law>& network
       displacement_(shift_),
       shares_(static_cast<std::size_t>(network.vertex_count())) {}
 
-template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
-TangentReport TangentStiffness::of(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                   const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                   const Held& held, const Others&... others) noexcept {
-    return condense(problem_.take(x, network, volume, held, others...), held);
+template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Prescribed, Constraint<Scalar>... Others>
+TangentReport TangentStiffness::compute(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                        const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                        const Prescribed& prescribed, const Others&... others) noexcept {
+    return condense(problem_.assign(x, network, volume, prescribed, others...), prescribed);
 }
 
-template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Held, Constraint<Scalar>... Others>
-TangentReport TangentStiffness::of(std::span<const Index> free, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
-                                   const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
-                                   const Held& held, const Others&... others) noexcept {
-    const auto status = problem_.take(x, network, volume, held, others...);
-    return condense(status == ProblemStatus::valid ? problem_.fix_all_but(free) : status, held);
+template <Real Scalar, class Law, LinearFoundation Volume, Constraint<Scalar> Prescribed, Constraint<Scalar>... Others>
+TangentReport TangentStiffness::compute(std::span<const Index> free,
+                                        const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                        const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
+                                        const Prescribed& prescribed, const Others&... others) noexcept {
+    const auto status = problem_.assign(x, network, volume, prescribed, others...);
+    return condense(status == ProblemStatus::valid ? problem_.fix_all_but(free) : status, prescribed);
 }
 
 inline TangentStatus TangentStiffness::status_of(ProblemStatus status) noexcept {
@@ -122,14 +126,14 @@ inline TangentStatus TangentStiffness::status_of(ProblemStatus status) noexcept 
     }
 }
 
-template <class Held>
-TangentReport TangentStiffness::condense(ProblemStatus status, const Held& held) noexcept {
+template <class Prescribed>
+TangentReport TangentStiffness::condense(ProblemStatus status, const Prescribed& prescribed) noexcept {
     report_ = {};
     report_.status = status_of(status);
     if (report_.status != TangentStatus::found) return report_;
     stiffness_.at(problem_, problem_.centre());
     std::fill(shares_.begin(), shares_.end(), 0.0);
-    for_each_term(held, [&](const ConstraintTerm& term) { problem_.share(term, shares_); });
+    for_each_term(prescribed, [&](const ConstraintTerm& term) { problem_.share(term, shares_); });
     const Vector3<double> x = stiffness_column(0), y = stiffness_column(1), z = stiffness_column(2);
     report_.stiffness = {x[0], y[1], z[2], (x[1] + y[0]) / 2, (x[2] + z[0]) / 2, (y[2] + z[1]) / 2};
     return report_;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include <membrane/contact/contact_point.hpp>
-#include <membrane/surface/box.hpp>
+#include <membrane/surface/aabb.hpp>
 
 /// The contact points of tools with a whole surface, and the derivatives of their gaps.
 ///
@@ -66,7 +66,7 @@ namespace detail {
 
 /// Whether bounding boxes show that no point of the triangle is closer to the tool's axis than `far`.
 [[nodiscard]] inline bool is_far(const Triangle<double>& t, const Tool<double>& tool, double far) noexcept {
-    Box<double> axis{tool.position, tool.position};
+    Aabb<double> axis{tool.position, tool.position};
     axis.include(tool.position + tool.axis);
     return gap_between(bounds(t), axis) > far;
 }

@@ -23,11 +23,12 @@
 /// Cost and error of a solver setting in a recorded scene.
 ///
 ///     #include <membrane/accuracy/trial.hpp>
-///     const auto stroke = membrane::Stroke(mesh, tools, 1e-3);                // recorded: one tool for each tick
-///     const auto references = membrane::equilibria(mesh, network, foundation, stroke);
-///     const auto outcome = membrane::trial(mesh, network, foundation, stroke, references, {.layers = 6, .sweeps = 2});
-///     outcome.force_error;                                                    // relative to the force
-///     outcome.time;                                                           // of a tick [s]
+///     const auto trajectory = membrane::ToolTrajectory(mesh, tools, 1e-3);  // recorded: one tool for each tick
+///     const auto references = membrane::equilibria(mesh, network, foundation, trajectory);
+///     const auto result =
+///         membrane::run_trial(mesh, network, foundation, trajectory, references, {.layers = 6, .sweeps = 2});
+///     result.force_error;                                                   // relative to the force
+///     result.time;                                                          // of a tick [s]
 namespace membrane {
 
 namespace detail {
@@ -82,12 +83,12 @@ concept CheckedLoadHistory = detail::check_load_history<History, Scalar>();
 
 /// A tool that presses, slides, grasps and pulls along a recorded trajectory.
 template <Real Scalar>
-class Stroke {
+class ToolTrajectory {
   public:
     /// A tool for each tick of `dt` [s], in the coordinates of the mesh.
     /// @throws InvalidInput for no tools, one that is not valid, or a `dt` that is not finite and positive
-    Stroke(const TriangleMesh<Scalar>& mesh, const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
-           std::type_identity_t<Scalar> dt);
+    ToolTrajectory(const TriangleMesh<Scalar>& mesh, const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
+                   std::type_identity_t<Scalar> dt);
 
     [[nodiscard]] Index ticks() const noexcept { return static_cast<Index>(tools_.size()); }
     [[nodiscard]] Scalar dt() const noexcept { return dt_; }
@@ -103,7 +104,7 @@ class Stroke {
     ContactTracker<Scalar> tracker_;
     Grasper<Scalar> grasper_;
 };
-static_assert(LoadHistory<Stroke<float>, float> && LoadHistory<Stroke<double>, double>);
+static_assert(LoadHistory<ToolTrajectory<float>, float> && LoadHistory<ToolTrajectory<double>, double>);
 
 /// The equilibrium in one tick, with its reactions.
 struct ReferenceTick {
@@ -124,7 +125,7 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
                                                     const Volume& volume, History history, Index tick_stride = 1);
 
 /// Cost and error of a setting. A force is felt if its constraint is not made of loads and pins only.
-struct Outcome {
+struct TrialResult {
     double force_error = 0;     ///< root mean square over the ticks, relative to the root mean square of the force
     double position_error = 0;  ///< largest error of a vertex, root mean square over the ticks [m]
     double time = 0;            ///< mean of contact and step, over ticks with a felt force [s]
@@ -145,9 +146,10 @@ struct SteadySeconds {
 /// @throws InvalidInput for options that the solver refuses, and for `references` of another scene. Offline.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
-[[nodiscard]] Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
-                            History history, std::span<const ReferenceTick> references,
-                            const SolverOptions<Scalar>& options, const Rule& rule = {}, const Clock& clock = {});
+[[nodiscard]] TrialResult run_trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
+                                    History history, std::span<const ReferenceTick> references,
+                                    const SolverOptions<Scalar>& options, const Rule& rule = {},
+                                    const Clock& clock = {});
 
 namespace detail {
 
@@ -193,7 +195,7 @@ struct TrialSums {
     void compare(const ReferenceTick& reference, const Constraints& constraints, const Reactions& reactions,
                  const Positions& x) {
         if (reference.x.cols() != x.cols() || reference.reactions.size() != reactions.size()) {
-            refuse("trial", "the reference of tick ", reference.tick, " must have ", x.cols(), " vertices and ",
+            refuse("run_trial", "the reference of tick ", reference.tick, " must have ", x.cols(), " vertices and ",
                    reactions.size(), " reactions, got ", reference.x.cols(), " and ", reference.reactions.size());
         }
         errors += sum_of_felt(constraints, [&](std::size_t i) {
@@ -204,8 +206,8 @@ struct TrialSums {
         ++ticks_compared;
     }
 
-    [[nodiscard]] Outcome outcome(Index layers) const {
-        const auto part = [](double sum, double of) { return sum == 0 ? 0.0 : sum / of; };
+    [[nodiscard]] TrialResult result(Index layers) const {
+        const auto part = [](double sum, double count) { return sum == 0 ? 0.0 : sum / count; };
         return {.force_error = std::sqrt(part(errors, squares)),
                 .position_error = std::sqrt(part(position_errors, ticks_compared)),
                 .time = part(time, felt),
@@ -217,21 +219,21 @@ struct TrialSums {
 }  // namespace detail
 
 template <Real Scalar>
-Stroke<Scalar>::Stroke(const TriangleMesh<Scalar>& mesh,
-                       const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
-                       std::type_identity_t<Scalar> dt)
+ToolTrajectory<Scalar>::ToolTrajectory(const TriangleMesh<Scalar>& mesh,
+                                       const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
+                                       std::type_identity_t<Scalar> dt)
     : tools_(tools.begin(), tools.end()), dt_(dt), tree_(mesh), tracker_(mesh), grasper_(mesh) {
-    detail::check_history<Scalar>("Stroke", *this);
+    detail::check_history<Scalar>("ToolTrajectory", *this);
     for (std::size_t tick = 0; tick < tools_.size(); ++tick) {
         if (!is_valid(tools_[tick])) {
-            refuse("Stroke", "the tool of tick ", tick,
+            refuse("ToolTrajectory", "the tool of tick ", tick,
                    " must be finite, its radius not negative, got one that is not");
         }
     }
 }
 
 template <Real Scalar>
-std::tuple<ToolContact<Scalar>, PointAttachment<Scalar>> Stroke<Scalar>::operator()(
+std::tuple<ToolContact<Scalar>, PointAttachment<Scalar>> ToolTrajectory<Scalar>::operator()(
     Index tick, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
     const auto& tool = tools_[static_cast<std::size_t>(tick)];
     tree_.refit(x, moved);
@@ -272,10 +274,10 @@ std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Ne
 
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule, class Clock>
-Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume, History history,
-              std::span<const ReferenceTick> references, const SolverOptions<Scalar>& options, const Rule& rule,
-              const Clock& clock) {
-    detail::check_history<Scalar>("trial", history);
+TrialResult run_trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume, History history,
+                      std::span<const ReferenceTick> references, const SolverOptions<Scalar>& options, const Rule& rule,
+                      const Clock& clock) {
+    detail::check_history<Scalar>("run_trial", history);
     QuasiStaticSolver<Scalar, Rule> solver(network, options, rule);
     Points<Scalar> x = mesh.positions();
     std::vector<Index> moved;
@@ -303,9 +305,9 @@ Outcome trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Vo
         sums.compare(*reference++, constraints, report.reactions, x);
     }
     if (sums.ticks_compared == 0 || reference != references.end()) {
-        refuse("trial", "references must be of ticks of the history, one at least, in order, got others");
+        refuse("run_trial", "references must be of ticks of the history, one at least, in order, got others");
     }
-    return sums.outcome(layers);
+    return sums.result(layers);
 }
 
 }  // namespace membrane

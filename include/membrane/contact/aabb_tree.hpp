@@ -6,7 +6,7 @@
 #include <utility>
 
 #include <membrane/contact/wide_bvh.hpp>
-#include <membrane/surface/box.hpp>
+#include <membrane/surface/aabb.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
@@ -30,8 +30,8 @@ struct SurfacePoint {
 /// The first intersection of a segment with the surface.
 template <Real Scalar>
 struct SurfaceHit {
-    Index triangle;  ///< `no_index`: no intersection.
-    Scalar along;    ///< 0 at the segment's start, 1 at its end.
+    Index triangle;   ///< `no_index`: no intersection.
+    Scalar fraction;  ///< 0 at the segment's start, 1 at its end.
     Vector3<Scalar> barycentric;
     Index nodes_visited;
 };
@@ -92,7 +92,7 @@ class AabbTree {
 
     /// The box around all triangles below a node of `tree_shape`; node 0: around the surface.
     /// @pre 0 <= `node` < `statistics().nodes` (asserted)
-    [[nodiscard]] Box<Scalar> box(Index node) const noexcept { return boxes_.box(node); }
+    [[nodiscard]] Aabb<Scalar> box(Index node) const noexcept { return boxes_.box(node); }
 
   private:
     WideBvh<Scalar> boxes_;
@@ -110,7 +110,7 @@ struct SegmentKey {
     const Vector3<Scalar>&from, &to;
 
     template <Number N>
-    [[nodiscard]] N operator()(const Box<N>& box) const noexcept {
+    [[nodiscard]] N operator()(const Aabb<N>& box) const noexcept {
         return probe.entry(box);
     }
     template <Number N>
@@ -128,7 +128,7 @@ SurfacePoint<Scalar> AabbTree<Scalar>::closest_point(const ConstPointsRef<Scalar
     using Limits = std::numeric_limits<Scalar>;
     SurfacePoint<Scalar> best{no_index, {0, 0, 0}, {0, 0, 0}, (Limits::max)(), 0};
     if (!is_finite(q)) return best;
-    const auto distance_to = [&]<Number N>(const Box<N>& box) { return squared_distance(box, q); };
+    const auto distance_to = [&]<Number N>(const Aabb<N>& box) { return squared_distance(box, q); };
     best.nodes_visited =
         boxes_.search(x, distance_to, best.squared_distance, [&](Index f, const Triangle<Scalar>& triangle) {
             const auto found = membrane::closest_point(triangle, q);
@@ -149,10 +149,10 @@ SurfaceHit<Scalar> AabbTree<Scalar>::first_hit(const ConstPointsRef<Scalar>& x, 
     const auto examine = [&](Index f, const Triangle<Scalar>& triangle) {
         const auto hit = membrane::first_hit(triangle, from, to);
         if (!hit) return;
-        const bool tie = hit->along == best.along && (best.triangle == no_index || f < best.triangle);
-        if (!(hit->along < best.along || tie)) return;
-        best = {f, hit->along, hit->barycentric, 0};
-        limit = best.along + epsilon;
+        const bool tie = hit->fraction == best.fraction && (best.triangle == no_index || f < best.triangle);
+        if (!(hit->fraction < best.fraction || tie)) return;
+        best = {f, hit->fraction, hit->barycentric, 0};
+        limit = best.fraction + epsilon;
     };
     best.nodes_visited = boxes_.search(x, detail::SegmentKey<Scalar>{probe, from, to}, limit, examine);
     return best;
@@ -167,7 +167,7 @@ Index AabbTree<Scalar>::overlap_sphere(const ConstPointsRef<Scalar>& x, const Ve
     const Scalar limit = radius * radius;
     const Scalar beyond = limit * (1 + 16 * Limits::epsilon()) + (Limits::min)();
     return boxes_.search(
-        x, [&]<Number N>(const Box<N>& box) { return squared_distance(box, centre); }, beyond,
+        x, [&]<Number N>(const Aabb<N>& box) { return squared_distance(box, centre); }, beyond,
         [&](Index f, const Triangle<Scalar>& triangle) {
             if (membrane::closest_point(triangle, centre).squared_distance <= limit) visit(f);
         });
@@ -178,9 +178,9 @@ template <class Visit>
 Index AabbTree<Scalar>::overlap_box(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& low,
                                     const Vector3<Scalar>& high, Visit&& visit) const noexcept {
     if (!is_finite(low) || !is_finite(high) || !at_most(low, high)) return 0;
-    const Box<Scalar> asked{low, high};
+    const Aabb<Scalar> asked{low, high};
     return boxes_.search(
-        x, [&]<Number N>(const Box<N>& box) { return select<N>(overlap(box, asked), 0, 1); }, Scalar(1),
+        x, [&]<Number N>(const Aabb<N>& box) { return select<N>(overlap(box, asked), 0, 1); }, Scalar(1),
         [&](Index f, const Triangle<Scalar>& triangle) {
             if (touches_box(triangle, low, high)) visit(f);
         });
@@ -193,7 +193,7 @@ Index AabbTree<Scalar>::overlap_capsule(const ConstPointsRef<Scalar>& x, const V
     if (!is_finite(p) || !is_finite(q) || !is_finite(radius) || !(radius >= 0)) return 0;
     const CapsuleQuery<Scalar> probe(p, q, radius, boxes_.surface());
     return boxes_.search(
-        x, [&]<Number N>(const Box<N>& box) { return probe.entry(box); }, probe.never,
+        x, [&]<Number N>(const Aabb<N>& box) { return probe.entry(box); }, probe.never,
         [&](Index f, const Triangle<Scalar>& triangle) {
             const auto nearest = closest_to_segment(triangle, p, q);
             if (nearest.on_triangle.squared_distance <= radius * radius) visit(f);

@@ -38,7 +38,7 @@ struct Contact {
     Scalar side = 1;   ///< of the tool: 1 if triangles run counter-clockwise seen from it, else -1
     Scalar gap = 0;    ///< signed distance of the tool from the present surface [m]; negative in penetration
     Scalar depth = 0;  ///< indentation of the tool below the surface without the tool [m], >= 0
-    Scalar detection_distance = 0;  ///< triangles this near to the axis count as touched [m]
+    Scalar detection_distance = 0;  ///< triangles this near to the axis are listed as `triangles` [m]
     Scalar radius = 0;  ///< of the tool [m]; a point tool counts as a small sphere, see `TrackerOptions::margin`
     Vector3<Scalar> previous_axis_point =
         Vector3<Scalar>::Zero();                              ///< `axis_point` in the last tick, off the surface [m]

@@ -33,7 +33,7 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
     auto nearest = surface.nearest(x, f, tool);
     Contact<Scalar> contact;
     contact.side = side;
-    contact.axis_point = tool.position + nearest.along * tool.axis;
+    contact.axis_point = tool.position + nearest.fraction * tool.axis;
     Vector3<Scalar> outward = direction<Scalar>(area_vector(triangle), Vector3<Scalar>::Zero());
     if (nearest.on_triangle.squared_distance == 0 && feature_pairs(tool) > 1) {
         // The shaft passes through the triangle: the gap is that of its lower end.

@@ -35,7 +35,7 @@ template <Real Scalar>
                                                                 const Triangle<Scalar>& triangle,
                                                                 const Tool<Scalar>& tool, int feature,
                                                                 Scalar radius) noexcept {
-    const auto nearest = proximity(triangle, tool, feature);
+    const auto nearest = closest_points(triangle, tool, feature);
     if (!nearest) return std::nullopt;
     ContactPoint<Scalar> point{f, feature, corners, nearest->barycentric};
     point.normal = direction(nearest->separation, Vector3<Scalar>::Zero());

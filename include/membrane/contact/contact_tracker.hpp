@@ -28,12 +28,12 @@ template <Real Scalar>
 class MovingBody;  // of moving_body.hpp
 
 struct TrackerOptions {
-    double margin = 0.01;              ///< triangles this near count as touched; a point has this radius [mean edges]
+    double margin = 0.01;              ///< triangles this near are in contact; a point has this radius [mean edges]
     Index full_query_interval = 128;   ///< ticks in contact between tree queries for further folds in contact
     Index max_contact_points = 16384;  ///< capacity for contact points; determines memory, not time
 };
 
-/// Without contact, queries the tree. In contact, tests the triangles touched in the last tick and their neighbours
+/// Without contact, queries the tree. In contact, tests the contact triangles of the last tick and their neighbours
 /// [Liu07] 2.3: the cost depends on the contact area, not on the size of the mesh.
 ///
 /// Beyond the paper: the search floods every triangle within the detection distance. If the reference point of the tool
@@ -64,7 +64,7 @@ class ContactTracker {
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
 
-    /// Number of tree queries for touched triangles during contact, since construction.
+    /// Number of tree queries for contact triangles during contact, since construction.
     [[nodiscard]] Index full_query_count() const noexcept { return full_query_count_; }
 
     /// Drops contact and tool: from here on the tracker equals a new one, bit for bit.
@@ -113,7 +113,7 @@ class ContactTracker {
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
     void find_points(const Scene& scene, Contact<Scalar>& contact) noexcept;
     template <class List>
-    void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> touched,
+    void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                const List& list) const noexcept;
     void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
@@ -317,7 +317,7 @@ bool ContactTracker<Scalar>::sweep_test(const Scene& scene, Contact<Scalar>& con
         auto passed = contact_where_passed(surface_, scene.x, hit.triangle, hit.barycentric, from, now, side);
         if (std::abs(passed.gap) <= detail::rounding_at(now)) return false;  // it ends on the surface
         if (passed.gap > 0) {
-            if (hit.along < negligible_part) return false;  // it leaves the surface it was on
+            if (hit.fraction < negligible_part) return false;  // it leaves the surface it was on
             if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from))
                 return false;                // it leaves the inside
             passed.normal = -passed.normal;  // a crease, or the other side of an open surface
@@ -416,11 +416,11 @@ std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene
         const auto other = surface_.triangle(scene.x, g);
         if (!(inward * climb(other) > 0)) continue;
         const auto there = hit_in(other);
-        const Scalar length = there ? inward * (there->along - here->along) : Scalar(0);
+        const Scalar length = there ? inward * (there->fraction - here->fraction) : Scalar(0);
         if (length > 0) inside = (std::min)(inside, length);
     }
     if (inside > 1) return std::nullopt;
-    return tool.position + (here->along + inward * inside / 2) * tool.axis;
+    return tool.position + (here->fraction + inward * inside / 2) * tool.axis;
 }
 
 // Whether `q` is behind the surface, not outside in a crease. An open surface has no inside: `q` is behind it if the
@@ -489,7 +489,7 @@ void ContactTracker<Scalar>::complete(const Scene& scene, Contact<Scalar>& conta
     rebound_ticks_ = contact.tunnelled ? ticks_after_tunnelling : (std::max)(rebound_ticks_ - 1, 0);
     collect_candidates(rebound_ticks_ > 0 ? candidate_rings_after_tunnelling : candidate_rings);
     listed_.clear();
-    for (const Index f : candidates_.items()) listed_.push({f, surface_.corners(f)});
+    for (const Index f : candidates_.items()) listed_.try_push_back({f, surface_.corners(f)});
     contact.closed = surface_.closed();
     contact.radius = scene.radius;
     contact.detection_distance = scene.detection_distance;
@@ -505,7 +505,7 @@ void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& co
     points_.clear();
     const auto list = [&](const ContactPoint<Scalar>& point) {
         if (!contact.tunnelled && point.gap + scene.radius > scene.detection_distance) return;
-        if (!points_.push(point)) contact.has_all_points = false;
+        if (!points_.try_push_back(point)) contact.has_all_points = false;
     };
     const int features = feature_pairs(scene.tool);
     if (features == 1) return find_points_of_sphere(scene, contact.triangles, list);
@@ -521,22 +521,22 @@ void ContactTracker<Scalar>::find_points(const Scene& scene, Contact<Scalar>& co
 // The contact points of a sphere, several triangles at a time.
 template <Real Scalar>
 template <class List>
-void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> touched,
+void ContactTracker<Scalar>::find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                                    const List& list) const noexcept {
     using Wide = Lanes<Scalar>;
     const Vector3<Scalar>& centre = scene.tool.position;
     std::array<Index, Wide::count> triangles;
-    for (std::size_t first = 0; first < touched.size(); first += triangles.size()) {
+    for (std::size_t first = 0; first < listed.size(); first += triangles.size()) {
         for (std::size_t i = 0; i < triangles.size(); ++i) {
-            triangles[i] = touched[(std::min)(first + i, touched.size() - 1)].triangle;
+            triangles[i] = listed[(std::min)(first + i, listed.size() - 1)].triangle;
         }
         const auto nearest = surface_.closest_points(scene.x, triangles, centre);
         const Vector3<Wide> separation = centre.template cast<Wide>() - nearest.point;
         const Vector3<Wide> normal = direction_or_zero(separation);
         const Wide distance = norm(separation);
-        for (std::size_t i = 0; i < (std::min)(triangles.size(), touched.size() - first); ++i) {
+        for (std::size_t i = 0; i < (std::min)(triangles.size(), listed.size() - first); ++i) {
             const auto of_lane = [i](const Vector3<Wide>& a) { return Vector3<Scalar>(a[0][i], a[1][i], a[2][i]); };
-            const auto& [f, corners] = touched[first + i];
+            const auto& [f, corners] = listed[first + i];
             ContactPoint<Scalar> point{f, 0, corners, of_lane(nearest.barycentric), of_lane(normal)};
             point.gap = distance[i] - scene.radius;
             list(point);

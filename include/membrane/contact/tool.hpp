@@ -44,7 +44,7 @@ template <Real Scalar>
 
 /// The nearest points of tool and triangle.
 template <Real Scalar>
-struct Proximity {
+struct ClosestPoints {
     Vector3<Scalar> barycentric;  ///< of the triangle's point
     Vector3<Scalar> separation;   ///< from that point to the tool's axis [m]; the gap is its length minus the radius
 };
@@ -61,22 +61,22 @@ template <Real Scalar>
 /// pair changes smoothly with the positions. If all gaps are positive, the tool is outside the triangle, or its axis
 /// runs through the triangle's interior.
 template <Real Scalar>
-[[nodiscard]] std::optional<Proximity<Scalar>> proximity(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool,
-                                                         int pair) noexcept;
+[[nodiscard]] std::optional<ClosestPoints<Scalar>> closest_points(const Triangle<Scalar>& triangle,
+                                                                  const Tool<Scalar>& tool, int pair) noexcept;
 
 template <Real Scalar>
-std::optional<Proximity<Scalar>> proximity(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool,
-                                           int pair) noexcept {
+std::optional<ClosestPoints<Scalar>> closest_points(const Triangle<Scalar>& triangle, const Tool<Scalar>& tool,
+                                                    int pair) noexcept {
     const Vector3<Scalar> other_end = tool.position + tool.axis;
     if (pair < 2) {
         const Vector3<Scalar>& end = pair == 0 ? tool.position : other_end;
         const auto nearest = closest_point(triangle, end);
-        return Proximity<Scalar>{nearest.barycentric, end - nearest.point};
+        return ClosestPoints<Scalar>{nearest.barycentric, end - nearest.point};
     }
     const auto nearest = closest_to_segment(triangle, pair - 2, tool.position, other_end);
-    if (!(nearest.along > 0 && nearest.along < 1)) return std::nullopt;
-    const Vector3<Scalar> axis_point = tool.position + nearest.along * tool.axis;
-    return Proximity<Scalar>{nearest.on_triangle.barycentric, axis_point - nearest.on_triangle.point};
+    if (!(nearest.fraction > 0 && nearest.fraction < 1)) return std::nullopt;
+    const Vector3<Scalar> axis_point = tool.position + nearest.fraction * tool.axis;
+    return ClosestPoints<Scalar>{nearest.on_triangle.barycentric, axis_point - nearest.on_triangle.point};
 }
 
 }  // namespace membrane

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include <membrane/surface/box.hpp>
+#include <membrane/surface/aabb.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
@@ -81,7 +81,7 @@ class TriangleSplit {
     [[nodiscard]] Index operator()(std::span<Index> set, bool evenly) const;
 
   private:
-    std::vector<Box<Scalar>> boxes_;
+    std::vector<Aabb<Scalar>> boxes_;
     std::vector<Vector3<Scalar>> centroids_;
 };
 
@@ -96,7 +96,7 @@ TriangleSplit<Scalar>::TriangleSplit(const TriangleMesh<Scalar>& mesh) {
 
 template <Real Scalar>
 Index TriangleSplit<Scalar>::operator()(std::span<Index> set, bool evenly) const {
-    Box<Scalar> box;
+    Aabb<Scalar> box;
     for (const Index f : set) box.include(boxes_[static_cast<std::size_t>(f)]);
     const int axis = major_axis(box);
     const auto coordinate = [&](Index f) { return centroids_[static_cast<std::size_t>(f)][axis]; };

@@ -15,7 +15,7 @@
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/lane_points.hpp>
 #include <membrane/core/lanes.hpp>
-#include <membrane/surface/box.hpp>
+#include <membrane/surface/aabb.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
@@ -55,10 +55,10 @@ class WideBvh {
     [[nodiscard]] const TreeStatistics& statistics() const noexcept { return statistics_; }
 
     /// The box around all triangles.
-    [[nodiscard]] const Box<Scalar>& surface() const noexcept { return surface_; }
+    [[nodiscard]] const Aabb<Scalar>& surface() const noexcept { return surface_; }
 
     /// The box around the triangles below a node of `tree_shape`. @pre 0 <= `node` < `statistics().nodes` (asserted)
-    [[nodiscard]] Box<Scalar> box(Index node) const noexcept;
+    [[nodiscard]] Aabb<Scalar> box(Index node) const noexcept;
 
   private:
     static constexpr std::size_t width = Lanes<Scalar>::count;
@@ -68,7 +68,7 @@ class WideBvh {
     /// The box and the part index of each child. Missing children have the box of the first child: keys must be
     /// computed from finite numbers only.
     struct alignas(64) Node {
-        Box<Lanes<Scalar>> boxes;
+        Aabb<Lanes<Scalar>> boxes;
         std::array<Index, width> child;
         std::size_t children;
     };
@@ -87,10 +87,10 @@ class WideBvh {
         const auto [first, count] = leaves_[static_cast<std::size_t>(leaf)];
         return std::span(items_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
     }
-    [[nodiscard]] Box<Scalar> box_in(Index slot) const noexcept;
+    [[nodiscard]] Aabb<Scalar> box_in(Index slot) const noexcept;
     void fit_leaf(const ConstPointsRef<Scalar>& x, Index leaf) noexcept;
     void fit_node(Index n) noexcept;
-    void put(const Box<Scalar>& box, Index slot) noexcept;
+    void put(const Aabb<Scalar>& box, Index slot) noexcept;
     void mark_parent(Index part) noexcept;
     [[nodiscard]] static Triangle<Lanes<Scalar>> triangles_at(const ConstPointsRef<Scalar>& x,
                                                               const Item* some) noexcept;
@@ -101,7 +101,7 @@ class WideBvh {
 
     TreeTopology shape_;
     std::vector<Node> nodes_;
-    Box<Scalar> surface_;      // around all triangles
+    Aabb<Scalar> surface_;     // around all triangles
     std::vector<Item> items_;  // leaf by leaf
     std::vector<Leaf> leaves_;
 
@@ -208,7 +208,7 @@ void WideBvh<Scalar>::collect_vertices_and_leaves(Index vertex_count) {
 }
 
 template <Real Scalar>
-Box<Scalar> WideBvh<Scalar>::box_in(Index slot) const noexcept {
+Aabb<Scalar> WideBvh<Scalar>::box_in(Index slot) const noexcept {
     const auto& boxes = nodes_[static_cast<std::size_t>(slot) / width].boxes;
     const std::size_t i = static_cast<std::size_t>(slot) % width;
     return {{boxes.low[0][i], boxes.low[1][i], boxes.low[2][i]},
@@ -236,9 +236,9 @@ template <Real Scalar>
 void WideBvh<Scalar>::fit_node(Index n) noexcept {
     const std::size_t children = nodes_[static_cast<std::size_t>(n)].children;
     const Index first = n * static_cast<Index>(width);
-    const Box<Scalar> box_of_first = box_in(first);
+    const Aabb<Scalar> box_of_first = box_in(first);
     for (std::size_t i = children; i < width; ++i) put(box_of_first, first + static_cast<Index>(i));
-    Box<Scalar> box;
+    Aabb<Scalar> box;
     for (Index i = 0; i < static_cast<Index>(width); ++i) box.include(box_in(first + i));
     const Index slot = slot_of_part_[static_cast<std::size_t>(n)];
     if (slot == no_index) {
@@ -249,7 +249,7 @@ void WideBvh<Scalar>::fit_node(Index n) noexcept {
 }
 
 template <Real Scalar>
-[[gnu::always_inline]] inline void WideBvh<Scalar>::put(const Box<Scalar>& box, Index slot) noexcept {
+[[gnu::always_inline]] inline void WideBvh<Scalar>::put(const Aabb<Scalar>& box, Index slot) noexcept {
     auto& boxes = nodes_[static_cast<std::size_t>(slot) / width].boxes;
     const std::size_t i = static_cast<std::size_t>(slot) % width;
     for (int k = 0; k < 3; ++k) {
@@ -367,13 +367,13 @@ void WideBvh<Scalar>::examine_leaf(const ConstPointsRef<Scalar>& x, std::span<co
 }
 
 template <Real Scalar>
-Box<Scalar> WideBvh<Scalar>::box(Index node) const noexcept {
+Aabb<Scalar> WideBvh<Scalar>::box(Index node) const noexcept {
     MEMBRANE_ASSERT(node >= 0 && node < statistics_.nodes);
     if (node == 0) return surface_;
     const Index slot = slot_of_node_[static_cast<std::size_t>(node)];
     if (slot != no_index) return box_in(slot);
     const Index first = shape_.nodes[static_cast<std::size_t>(node)].first;
-    Box<Scalar> both = box(first);
+    Aabb<Scalar> both = box(first);
     both.include(box(first + 1));
     return both;
 }

@@ -43,7 +43,7 @@ namespace detail {
 template <Real Scalar>
 int winding_number(const LocalSurface<Scalar>& surface, const AabbTree<Scalar>& tree,
                    const std::type_identity_t<ConstPointsRef<Scalar>>& x, const Vector3<Scalar>& q) noexcept {
-    const Box<Scalar> all = tree.box(0);
+    const Aabb<Scalar> all = tree.box(0);
     if (!(squared_distance(all, q) == 0)) return 0;
     const Vector3<Scalar> above = all.high - q, below = q - all.low;
     const bool upward = above.minCoeff() < below.minCoeff();

@@ -13,7 +13,7 @@ namespace membrane {
 /// capacity.)
 ///
 ///     FixedVector<ContactPoint<double>> points(4096);
-///     if (!points.push(point)) { /* full */ }
+///     if (!points.try_push_back(point)) { /* full */ }
 template <class Item>
 class FixedVector {
   public:
@@ -21,7 +21,7 @@ class FixedVector {
     explicit FixedVector(std::size_t capacity) : slots_(capacity) {}
 
     /// Appends `item`; returns false if the capacity is used up.
-    bool push(const Item& item) noexcept {
+    bool try_push_back(const Item& item) noexcept {
         if (count_ == slots_.size()) return false;
         slots_[count_++] = item;
         return true;
@@ -29,7 +29,7 @@ class FixedVector {
     void clear() noexcept { count_ = 0; }
 
     /// Keeps the first `count` items. @pre `count` <= size() (asserted)
-    void cut(std::size_t count) noexcept {
+    void truncate(std::size_t count) noexcept {
         MEMBRANE_ASSERT(count <= count_);
         count_ = count;
     }

@@ -13,9 +13,9 @@ namespace membrane {
 
 /// A set of vertex or triangle indices in order of insertion. `clear` is O(1), amortised.
 ///
-///     IndexSet touched(mesh.triangle_count());
-///     if (touched.insert(f)) { ... }         // f was not in it
-///     for (const Index f : touched.items()) { ... }
+///     IndexSet found(mesh.triangle_count());
+///     if (found.insert(f)) { ... }         // f was not in it
+///     for (const Index f : found.items()) { ... }
 class IndexSet {
   public:
     IndexSet() = default;
@@ -27,7 +27,7 @@ class IndexSet {
     bool insert(Index i) noexcept {
         if (contains(i)) return false;
         mark_[static_cast<std::size_t>(i)] = current_;
-        items_.push(i);
+        items_.try_push_back(i);
         return true;
     }
 

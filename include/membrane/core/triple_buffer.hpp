@@ -10,8 +10,8 @@ namespace membrane {
 /// and one atomic exchange swaps it with the middle slot.
 ///
 ///     TripleBuffer<Pose> poses;
-///     poses.back() = pose;  poses.publish();          // one thread
-///     if (poses.take()) draw(poses.front());          // another thread
+///     poses.back() = pose;  poses.publish();             // one thread
+///     if (poses.acquire()) draw(poses.front());          // another thread
 ///
 /// Neither copyable nor movable: two threads refer to it.
 template <class Slot>
@@ -31,10 +31,10 @@ class TripleBuffer {
         return (old & fresh) == 0;
     }
 
-    /// If a slot was published since the last `take`, makes the newest one the reader's and returns true. Never misses
-    /// a slot published before the call.
-    bool take() noexcept {
-        // A fresh slot stays fresh until it is taken here: the exchange below can only get a newer one.
+    /// If a slot was published since the last `acquire`, makes the newest one the reader's and returns true. Never
+    /// misses a slot published before the call.
+    bool acquire() noexcept {
+        // A fresh slot stays fresh until it is acquired here: the exchange below can only get a newer one.
         if ((middle_.load(std::memory_order_relaxed) & fresh) == 0) return false;
         front_ = middle_.exchange(front_, std::memory_order_acq_rel) & ~fresh;
         return true;

@@ -77,17 +77,17 @@ struct ScriptedDeviceOptions {
     double radius = 0;   ///< of the tool [m]
 };
 
-/// Model of the hand that holds the tool of a `ScriptedDevice`. `place` sets a position with zero velocity. `aim` sets
-/// the present target and its velocity. `move` advances time under a force; then `position` and `velocity` hold the new
-/// state.
+/// Model of the hand that holds the tool of a `ScriptedDevice`. `reset_to` sets a position with zero velocity.
+/// `set_target` sets the present target and its velocity. `advance` advances time under a force; then `position` and
+/// `velocity` hold the new state.
 template <class H, class Scalar>
 concept Hand = Real<Scalar> && std::copyable<H> &&
     requires(H& hand, const H& idle, const Vector3<Scalar>& vector, Scalar dt) {
-    { hand.place(vector) }
+    { hand.reset_to(vector) }
     noexcept;
-    { hand.aim(vector, vector) }
+    { hand.set_target(vector, vector) }
     noexcept;
-    { hand.move(vector, dt) }
+    { hand.advance(vector, dt) }
     noexcept;
     { idle.position() }
     noexcept->std::convertible_to<Vector3<Scalar>>;
@@ -102,22 +102,22 @@ consteval bool check_hand() noexcept {
     static_assert(std::copyable<H>, "Hand: must be copyable");
     static_assert(
         requires(H & hand, const Vector3<Scalar>& vector) {
-            { hand.place(vector) }
+            { hand.reset_to(vector) }
             noexcept;
         },
-        "Hand: there must be place(const Vector3<Scalar>& position) noexcept");
+        "Hand: there must be reset_to(const Vector3<Scalar>& position) noexcept");
     static_assert(
         requires(H & hand, const Vector3<Scalar>& vector) {
-            { hand.aim(vector, vector) }
+            { hand.set_target(vector, vector) }
             noexcept;
         },
-        "Hand: there must be aim(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept");
+        "Hand: there must be set_target(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept");
     static_assert(
         requires(H & hand, const Vector3<Scalar>& vector, Scalar dt) {
-            { hand.move(vector, dt) }
+            { hand.advance(vector, dt) }
             noexcept;
         },
-        "Hand: there must be move(const Vector3<Scalar>& force, Scalar dt) noexcept");
+        "Hand: there must be advance(const Vector3<Scalar>& force, Scalar dt) noexcept");
     static_assert(
         requires(const H& idle) {
             { idle.position() }
@@ -143,12 +143,12 @@ concept CheckedHand = detail::check_hand<H, Scalar>();
 template <Real Scalar>
 class IdealHand {
   public:
-    void place(const Vector3<Scalar>& position) noexcept { aim(position, Vector3<Scalar>::Zero()); }
-    void aim(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
+    void reset_to(const Vector3<Scalar>& position) noexcept { set_target(position, Vector3<Scalar>::Zero()); }
+    void set_target(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
         position_ = target;
         velocity_ = velocity;
     }
-    void move(const Vector3<Scalar>& /*force*/, Scalar /*dt*/) const noexcept {}
+    void advance(const Vector3<Scalar>& /*force*/, Scalar /*dt*/) const noexcept {}
 
     [[nodiscard]] const Vector3<Scalar>& position() const noexcept { return position_; }
     [[nodiscard]] const Vector3<Scalar>& velocity() const noexcept { return velocity_; }
@@ -189,7 +189,7 @@ class ScriptedDevice {
         ticks_ = 0;
         next_ = 0;
         force_.setZero();
-        hand_.place(script_.front().position);
+        hand_.reset_to(script_.front().position);
     }
 
   private:
@@ -224,14 +224,14 @@ ScriptedDevice<Scalar, Holder>::ScriptedDevice(std::vector<Waypoint<Scalar>> scr
                    " s");
         }
     }
-    hand_.place(script_.front().position);
+    hand_.reset_to(script_.front().position);
 }
 
 template <Real Scalar, CheckedHand<Scalar> Holder>
 Tool<Scalar> ScriptedDevice<Scalar, Holder>::read() noexcept {
     Tool<Scalar> tool = scripted(time());
-    if (ticks_ > 0) hand_.move(force_, tick_);
-    hand_.aim(tool.position, tool.velocity);
+    if (ticks_ > 0) hand_.advance(force_, tick_);
+    hand_.set_target(tool.position, tool.velocity);
     ++ticks_;
     tool.position = hand_.position();
     tool.velocity = hand_.velocity();

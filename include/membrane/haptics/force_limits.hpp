@@ -22,7 +22,7 @@ struct LimitOptions {
     double max_state_age = 0.04;  ///< largest age of the solver's state [s]; infinity: no watchdog
     double fade_time = 0.05;      ///< time in which the force of an older state fades to zero [s]
     double max_tick = 2e-3;       ///< upper limit of the tick length that lets a force grow [s]
-    bool heating = true;          ///< whether hot motors are limited to the continuous force
+    bool thermal_limit = true;    ///< whether hot motors are limited to the continuous force
 
     /// @throws InvalidInput if an option is out of its range
     void check() const;
@@ -59,11 +59,11 @@ class SoftStart {
     explicit SoftStart(double time) noexcept : time_(time) {}
 
     double update(double allowed, double dt) noexcept;
-    [[nodiscard]] double share() const noexcept { return share_; }
+    [[nodiscard]] double gain() const noexcept { return gain_; }
 
   private:
     double time_;
-    double share_ = 0;
+    double gain_ = 0;
 };
 
 /// Thermal load of a motor, relative to its final value under the continuous force. Heating is proportional to the
@@ -88,7 +88,7 @@ class MotorThermalModel {
 
 /// Limits a force for a device, in a fixed order:
 /// 1. fault: a force that is not finite becomes zero, since the later limits compute with it;
-/// 2. watchdog and soft start: a factor on the requested force, since they doubt the force itself;
+/// 2. watchdog and soft start: a factor on the requested force, as that force itself may be wrong;
 /// 3. peak and heat: the limits of the device, on the scaled force;
 /// 4. slew, against the force that the device got in the last tick. The part of that force which is no longer requested
 ///    falls straight towards zero at once. Any other change is bounded, also of direction: a reversal passes
@@ -123,11 +123,11 @@ class ForceLimiter {
     [[nodiscard]] Vector3<Scalar> operator()(const Vector3<Scalar>& force, double now, std::uint64_t state) noexcept;
 
     /// Limits that reduced the last force.
-    [[nodiscard]] const ActiveLimits& acted() const noexcept { return acted_; }
+    [[nodiscard]] const ActiveLimits& active_limits() const noexcept { return active_limits_; }
     /// Thermal load of the motors: 0 cold, 1 the final value under the continuous force; see `MotorThermalModel`.
     [[nodiscard]] double thermal_load() const noexcept { return heat_.thermal_load(); }
     /// Factor of watchdog and soft start on the force, 0 to 1.
-    [[nodiscard]] double share() const noexcept { return soft_start_.share(); }
+    [[nodiscard]] double gain() const noexcept { return soft_start_.gain(); }
     [[nodiscard]] const DeviceProfile& device() const noexcept { return device_; }
 
     /// As new, except for the thermal load. For a replay construct a new limiter.
@@ -142,7 +142,7 @@ class ForceLimiter {
     Watchdog watchdog_;
     SoftStart soft_start_;
     MotorThermalModel heat_;
-    ActiveLimits acted_;
+    ActiveLimits active_limits_;
     bool began_ = false;
     double time_ = 0;
     Vector3<double> force_ = Vector3<double>::Zero();  // last force [N]
@@ -209,9 +209,9 @@ inline double Watchdog::update(std::uint64_t state, double dt) noexcept {
 }
 
 inline double SoftStart::update(double allowed, double dt) noexcept {
-    const double risen = dt < time_ ? share_ + dt / time_ : 1.0;
-    share_ = (std::min)({allowed, risen, 1.0});
-    return share_;
+    const double risen = dt < time_ ? gain_ + dt / time_ : 1.0;
+    gain_ = (std::min)({allowed, risen, 1.0});
+    return gain_;
 }
 
 inline void MotorThermalModel::add(double force, double dt) noexcept {
@@ -246,8 +246,8 @@ inline double ForceLimiter::time_since_last(double now) noexcept {
 
 template <Real Scalar>
 Vector3<Scalar> ForceLimiter::operator()(const Vector3<Scalar>& force, double now, std::uint64_t state) noexcept {
-    acted_ = {};
-    acted_.fault = !is_finite(force) || !is_finite(now);
+    active_limits_ = {};
+    active_limits_.fault = !is_finite(force) || !is_finite(now);
     const double dt = is_finite(now) ? time_since_last(now) : 0;
     // If the time stands still or goes back, the watchdog still counts and no force grows.
     const double passed = dt > 0 && is_finite(dt) ? dt : options_.max_tick;
@@ -255,22 +255,22 @@ Vector3<Scalar> ForceLimiter::operator()(const Vector3<Scalar>& force, double no
     heat_.add(norm(force_), passed);
 
     const double fresh = watchdog_.update(state, passed);
-    const double share = soft_start_.update(acted_.fault ? 0.0 : fresh, growing);
-    if (acted_.fault) {
+    const double gain = soft_start_.update(active_limits_.fault ? 0.0 : fresh, growing);
+    if (active_limits_.fault) {
         force_.setZero();
         return Vector3<Scalar>::Zero();
     }
-    acted_.faded = share < 1;
-    Vector3<Scalar> felt = acted_.faded ? Vector3<Scalar>(static_cast<Scalar>(share) * force) : force;
+    active_limits_.faded = gain < 1;
+    Vector3<Scalar> felt = active_limits_.faded ? Vector3<Scalar>(static_cast<Scalar>(gain) * force) : force;
 
     const auto change_to = [&felt](const Vector3<Scalar>& limited) {
         const bool acts = limited != felt;
         felt = limited;
         return acts;
     };
-    acted_.peak = change_to(detail::shortened(felt, device_.peak_force));
-    acted_.heat = options_.heating && change_to(detail::shortened(felt, heat_.max_force()));
-    acted_.slew = slew_ > 0 && change_to(detail::slewed(felt, force_, slew_ * growing));
+    active_limits_.peak = change_to(detail::shortened(felt, device_.peak_force));
+    active_limits_.heat = options_.thermal_limit && change_to(detail::shortened(felt, heat_.max_force()));
+    active_limits_.slew = slew_ > 0 && change_to(detail::slewed(felt, force_, slew_ * growing));
     force_ = felt.template cast<double>();
     return felt;
 }
@@ -278,7 +278,7 @@ Vector3<Scalar> ForceLimiter::operator()(const Vector3<Scalar>& force, double no
 inline void ForceLimiter::reset() noexcept {
     watchdog_ = Watchdog(options_.max_state_age, options_.fade_time);
     soft_start_ = SoftStart(options_.soft_start);
-    acted_ = {};
+    active_limits_ = {};
     began_ = false;
     force_.setZero();
 }

@@ -62,7 +62,7 @@ class Latest {
 
     /// Called by the reader; valid until its next `read`.
     [[nodiscard]] const Snapshot<T>& read() noexcept {
-        slots_.take();
+        slots_.acquire();
         return slots_.front();
     }
 
@@ -87,14 +87,7 @@ struct MovedSnapshot : Stamp {
 /// Wait-free, no allocation: a publish copies each moved vertex twice, and those of the previous publish at most once
 /// more; a read exchanges one atomic number. Memory per vertex: three slots of 3 numbers and 8 bytes, plus 8 bytes.
 ///
-/// Why no vertex is lost: before publish k, the writer's slot holds all vertices moved in the publishes s + 1 to k - 1,
-/// with their positions then, for a snapshot s that the reader has taken (0: its start). Publish k adds the vertices
-/// moved in it and swaps slots. If the reader had not taken k - 1, the slot that comes back is that of k - 1: it lacks
-/// only the vertices moved in k, which are added. If the reader had taken k - 1, the slot is cleared and gets the
-/// vertices moved in k: now s = k - 1. The reader never returns to an older snapshot, so it has s whenever it takes a
-/// slot.
-/// Why slots do not fill up: if the reader has taken k - 1, the slot of k may still hold vertices moved long before. If
-/// it comes back from publish k + 1, it is cleared too and gets the vertices moved in k and k + 1.
+/// Why no vertex is lost and no slot fills up: README.md in this folder.
 template <Real Scalar>
 class MovedPoints {
   public:
@@ -107,7 +100,7 @@ class MovedPoints {
 
     /// Called by the reader; valid until its next `read`.
     [[nodiscard]] MovedSnapshot<Scalar> read() noexcept {
-        const bool newer = slots_.take();
+        const bool newer = slots_.acquire();
         const Slot& slot = slots_.front();
         return {slot.stamp, newer ? slot.moved.items() : std::span<const Index>(), slot.x};
     }

@@ -67,19 +67,13 @@ struct PassivityReport {
 
 /// Whether a held, sampled force gives the hand no more energy than the hand put in.
 ///
-/// The force of a tick is held until the next, so a released spring pushes with the force of the deeper position: this
-/// generates at most K / 2 d^2 in a tick in which the tool moves by d. With a delay of n ticks the force responds to a
-/// position that is off by the last n d: if no slope is steeper than L = max(K, N), up or down, this generates n L d^2
-/// more on average. Damping by differences generates B d^2 / T. A damper b dissipates b d^2 / T. So the loop is passive
-/// if
+/// The loop is passive if the damper b of device and hand satisfies
 ///
 ///     b >= K T / 2 + max(K, N) delay + B,                                                        [Colgate97]
 ///
-/// for any force with a potential: springs that harden and, without a delay, walls that end, whose N is infinite. A
-/// position with a resolution of r makes the force wrong by (L / 2 + B / T) r. Friction must exceed this error
-/// [Abbott05] plus the part of the force that has no potential, whose energy no damper dissipates in a slow loop. The
-/// remaining friction c dissipates c d, at least c / v d^2 / T at speeds up to v [Diolaiti06]. The condition is
-/// sufficient. For N <= K it is necessary if the hand may be any passive system.
+/// for any force with a potential, and if friction exceeds the error by the resolution of the position [Abbott05] plus
+/// the part of the force without a potential. The remaining friction counts as damping [Diolaiti06]. The condition is
+/// sufficient. For N <= K it is necessary if the hand may be any passive system. Derivation: README.md in this folder.
 ///
 /// @throws InvalidInput if a number is out of its range
 [[nodiscard]] inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device,

@@ -22,11 +22,11 @@ struct HandOptions {
 };
 
 /// A mass on a spring and a damper to a target, m a = F - k (p - target) - b (v - target velocity). The target is the
-/// intended position of the hand; it moves at its velocity until the next `aim`. The force is held from one call to the
-/// next, as by a device.
+/// intended position of the hand; it moves at its velocity until the next `set_target`. The force is held from one call
+/// to the next, as by a device.
 ///
-/// `move` is the exact solution: any time step is stable, many small steps give the result of one large step, and only
-/// the loop can generate energy. It uses `exp` and `sin`, whose last digits differ between mathematics libraries.
+/// `advance` is the exact solution: any time step is stable, many small steps give the result of one large step, and
+/// only the loop can generate energy. It uses `exp` and `sin`, whose last digits differ between mathematics libraries.
 template <Real Scalar>
 class SimulatedHand {
   public:
@@ -34,20 +34,20 @@ class SimulatedHand {
     explicit SimulatedHand(const HandOptions& options);
 
     /// Sets position and target, with zero velocity.
-    void place(const Vector3<Scalar>& position) noexcept {
+    void reset_to(const Vector3<Scalar>& position) noexcept {
         position_ = target_ = position;
         velocity_ = target_velocity_ = Vector3<Scalar>::Zero();
     }
 
     /// Sets the target [m] and its velocity [m/s].
-    void aim(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
+    void set_target(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
         target_ = target;
         target_velocity_ = velocity;
     }
 
     /// Advances by `dt` [s] under a force [N]. If a number is not finite or `dt` is negative, returns false and changes
     /// nothing.
-    bool move(const Vector3<Scalar>& force, Scalar dt) noexcept;
+    bool advance(const Vector3<Scalar>& force, Scalar dt) noexcept;
 
     [[nodiscard]] const Vector3<Scalar>& position() const noexcept { return position_; }  ///< [m]
     [[nodiscard]] const Vector3<Scalar>& velocity() const noexcept { return velocity_; }  ///< [m/s]
@@ -82,7 +82,7 @@ SimulatedHand<Scalar>::SimulatedHand(const HandOptions& options) {
 }
 
 template <Real Scalar>
-bool SimulatedHand<Scalar>::move(const Vector3<Scalar>& force, Scalar dt) noexcept {
+bool SimulatedHand<Scalar>::advance(const Vector3<Scalar>& force, Scalar dt) noexcept {
     if (!(dt >= 0)) return false;
     const Response by = response(static_cast<double>(dt));
     // Relative to its equilibrium under the force, which moves with the target, the mass oscillates freely.

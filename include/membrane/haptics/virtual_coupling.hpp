@@ -11,7 +11,7 @@
 /// stiff the tissue is.
 ///
 ///     auto coupling = membrane::VirtualCoupling<double>({.stiffness = 300, .scale = 40});
-///     const auto tool    = coupling.follow(device.read(), reaction, dt);     // the tool in contact
+///     const auto tool    = coupling.update(device.read(), reaction, dt);     // the tool in contact
 ///     const auto contact = tracker.update(tree, x, tool);
 ///     const auto report  = solver.step(x, dt, network, foundation, press(tool, contact));
 ///     reaction = report.total_reaction();                                    // for the next tick
@@ -46,7 +46,7 @@ class VirtualCoupling {
 
     /// The tool at the equilibrium of spring, damping and the membrane's `reaction` on it, as of the last tick [N]. If
     /// a number is not finite, returns the hand's tool.
-    Tool<Scalar> follow(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction, Scalar dt) noexcept;
+    Tool<Scalar> update(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction, Scalar dt) noexcept;
 
     /// Force on the hand [N].
     [[nodiscard]] const Vector3<Scalar>& force() const noexcept { return force_; }
@@ -73,7 +73,7 @@ inline void CouplingOptions::check() const {
 }
 
 template <Real Scalar>
-Tool<Scalar> VirtualCoupling<Scalar>::follow(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction,
+Tool<Scalar> VirtualCoupling<Scalar>::update(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction,
                                              Scalar dt) noexcept {
     Tool<Scalar> tool = hand;
     const bool valid = is_valid(hand) && is_finite(reaction) && is_finite(dt) && dt > 0;

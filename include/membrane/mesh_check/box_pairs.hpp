@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/surface/box.hpp>
+#include <membrane/surface/aabb.hpp>
 
 /// Pairs of overlapping boxes.
 ///
@@ -21,7 +21,7 @@ namespace membrane {
 /// boxes found subtracts 1 from `effort`; `visit` may subtract more. If `effort` falls below 0, the search stops and
 /// returns false; if it completes, returns true. O(n log n) if boxes overlap few others.
 template <class Visit>
-[[nodiscard]] bool for_each_overlap(std::span<const Box<double>> boxes, std::int64_t& effort, Visit visit);
+[[nodiscard]] bool for_each_overlap(std::span<const Aabb<double>> boxes, std::int64_t& effort, Visit visit);
 
 namespace detail {
 
@@ -29,13 +29,13 @@ namespace detail {
 class HalvedBoxes {
   public:
     struct Node {
-        Box<double> box;
+        Aabb<double> box;
         std::size_t first, count;  // range in the order
         std::size_t right;         // child, 0 for a leaf; the left child is the next node
         [[nodiscard]] bool is_leaf() const noexcept { return right == 0; }
     };
 
-    explicit HalvedBoxes(std::span<const Box<double>> boxes) : boxes_(boxes), order_(boxes.size()) {
+    explicit HalvedBoxes(std::span<const Aabb<double>> boxes) : boxes_(boxes), order_(boxes.size()) {
         std::iota(order_.begin(), order_.end(), Index{0});
         if (!boxes.empty()) split(0, boxes.size());
     }
@@ -48,7 +48,7 @@ class HalvedBoxes {
     void split(std::size_t first, std::size_t count) {  // recursion depth: log2 of the count
         const std::size_t n = nodes_.size();
         nodes_.push_back({{}, first, count, 0});
-        Box<double> middles;
+        Aabb<double> middles;
         for (const Index i : std::span(order_).subspan(first, count)) {
             nodes_[n].box.include(boxes_[static_cast<std::size_t>(i)]);
             middles.include(middle(i));
@@ -64,11 +64,11 @@ class HalvedBoxes {
         split(first + half, count - half);
     }
     [[nodiscard]] Vector3<double> middle(Index i) const noexcept {
-        const Box<double>& box = boxes_[static_cast<std::size_t>(i)];
+        const Aabb<double>& box = boxes_[static_cast<std::size_t>(i)];
         return box.low + box.high;
     }
 
-    std::span<const Box<double>> boxes_;
+    std::span<const Aabb<double>> boxes_;
     std::vector<Index> order_;
     std::vector<Node> nodes_;
 };
@@ -76,11 +76,11 @@ class HalvedBoxes {
 }  // namespace detail
 
 template <class Visit>
-bool for_each_overlap(std::span<const Box<double>> boxes, std::int64_t& effort, Visit visit) {
+bool for_each_overlap(std::span<const Aabb<double>> boxes, std::int64_t& effort, Visit visit) {
     if (boxes.empty()) return true;
     const detail::HalvedBoxes tree(boxes);
     const auto& nodes = tree.nodes();
-    const auto box = [&](Index i) -> const Box<double>& { return boxes[static_cast<std::size_t>(i)]; };
+    const auto box = [&](Index i) -> const Aabb<double>& { return boxes[static_cast<std::size_t>(i)]; };
     std::vector<std::pair<std::size_t, std::size_t>> waiting{{0, 0}};
     while (!waiting.empty()) {
         const auto [m, n] = waiting.back();

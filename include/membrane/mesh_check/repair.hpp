@@ -24,7 +24,7 @@
 /// Repairs that need no guess, each only on request.
 ///
 ///     const auto repaired = membrane::repair(x, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true});
-///     std::cout << to_string(repaired.done);                        // welded 12 vertices, turned 3 triangles
+///     std::cout << to_string(repaired.report);                      // welded 12 vertices, turned 3 triangles
 ///     const membrane::TriangleMesh mesh(repaired.positions, repaired.triangles);
 namespace membrane {
 
@@ -58,7 +58,7 @@ struct RepairedMesh {
     Points<Scalar> positions;
     Triangles triangles;
     std::vector<Index> vertices, source_triangles;  ///< For each its index in the input.
-    RepairReport done;
+    RepairReport report;
 };
 
 /// The mesh after the repairs of `options`, without other changes. Kept vertices and triangles keep their order and
@@ -79,20 +79,20 @@ template <class S, std::size_t m, std::integral I, std::size_t n>
 }
 
 /// A phrase for each option that has changed something.
-[[nodiscard]] inline std::string to_string(const RepairReport& done) {
+[[nodiscard]] inline std::string to_string(const RepairReport& report) {
     std::string text;
     const auto say = [&](const char* what, Index count, const char* of) {
         if (count > 0) (((((text += text.empty() ? "" : ", ") += what) += " ") += std::to_string(count)) += " ") += of;
     };
-    say("welded", done.welded, "vertices");
-    say("dropped", done.repeated, "triangles with a repeated vertex");
-    say("dropped", done.zero_area, "triangles without area");
-    say("dropped", done.duplicates, "duplicate triangles");
-    say("turned", done.turned, "triangles");
-    say("split off", done.split, "vertices");
-    say("flipped", done.flipped, "inward triangles");
-    say("dropped", done.isolated, "isolated vertices");
-    if (!done.complete) text += " (gave up welding)";
+    say("welded", report.welded, "vertices");
+    say("dropped", report.repeated, "triangles with a repeated vertex");
+    say("dropped", report.zero_area, "triangles without area");
+    say("dropped", report.duplicates, "duplicate triangles");
+    say("turned", report.turned, "triangles");
+    say("split off", report.split, "vertices");
+    say("flipped", report.flipped, "inward triangles");
+    say("dropped", report.isolated, "isolated vertices");
+    if (!report.complete) text += " (gave up welding)";
     return text.empty() ? "nothing" : text;
 }
 
@@ -149,7 +149,7 @@ class Repair {
     std::vector<bool> kept_vertices_;
     std::vector<Index> kept_;    // triangles
     std::vector<Index> origin_;  // of each vertex: itself, or the vertex it was split from
-    RepairReport done_;
+    RepairReport report_;
 };
 
 inline void Repair::weld(std::span<const Index> points, double distance) {
@@ -158,19 +158,19 @@ inline void Repair::weld(std::span<const Index> points, double distance) {
     std::size_t v = 0;
     for (const Index lowest : near.representative()) sets.unite(v++, static_cast<std::size_t>(lowest));
     std::int64_t effort = 1'000'000 + 1000 * x_.cols();
-    done_.complete = distance == 0 || near.for_each_pair(distance, effort, [&](Index i, Index j) {
+    report_.complete = distance == 0 || near.for_each_pair(distance, effort, [&](Index i, Index j) {
         sets.unite(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
     });
     for (v = 0; v < kept_vertices_.size(); ++v) {
         kept_vertices_[v] = sets.find(v) == v;
-        done_.welded += kept_vertices_[v] ? 0 : 1;
+        report_.welded += kept_vertices_[v] ? 0 : 1;
     }
     const auto one = [&](Index corner) { return static_cast<Index>(sets.find(static_cast<std::size_t>(corner))); };
     for (Index& corner : triangles_.reshaped()) corner = one(corner);
 }
 
 inline void Repair::drop_repeated() {
-    done_.repeated = static_cast<Index>(std::erase_if(kept_, [&](Index f) { return repeats(f); }));
+    report_.repeated = static_cast<Index>(std::erase_if(kept_, [&](Index f) { return repeats(f); }));
 }
 
 inline void Repair::drop_zero_area(const std::vector<bool>& usable) {
@@ -181,7 +181,7 @@ inline void Repair::drop_zero_area(const std::vector<bool>& usable) {
         return !repeats(f) &&
                on_one_line(point(x_, triangles_(0, f)), point(x_, triangles_(1, f)), point(x_, triangles_(2, f)));
     };
-    done_.zero_area = static_cast<Index>(std::erase_if(kept_, flat));
+    report_.zero_area = static_cast<Index>(std::erase_if(kept_, flat));
 }
 
 inline void Repair::drop_duplicates() {
@@ -192,7 +192,7 @@ inline void Repair::drop_duplicates() {
             if (edge[i].apex == edge[i - 1].apex) is_duplicate[static_cast<std::size_t>(edge[i].triangle)] = true;
         }
     });
-    done_.duplicates =
+    report_.duplicates =
         static_cast<Index>(std::erase_if(kept_, [&](Index f) { return is_duplicate[static_cast<std::size_t>(f)]; }));
 }
 
@@ -233,7 +233,7 @@ inline void Repair::orient(const std::vector<bool>& usable) {
         const SurfaceComponent& part = now.parts[static_cast<std::size_t>(p)];
         if (part.closed && part.volume < 0) turn_over(f);
     }
-    done_.turned = static_cast<Index>(std::count(turned.begin(), turned.end(), true));
+    report_.turned = static_cast<Index>(std::count(turned.begin(), turned.end(), true));
 }
 
 inline void Repair::split_vertices() {
@@ -255,7 +255,7 @@ inline void Repair::split_vertices() {
             if (own == no_index) {
                 own = static_cast<Index>(origin_.size());
                 origin_.push_back(corner);
-                ++done_.split;
+                ++report_.split;
             }
             corner = own;
         }
@@ -285,7 +285,7 @@ inline void Repair::flip_inward(const std::vector<bool>& usable) {
         const SurfaceComponent& part = now.parts[static_cast<std::size_t>(p)];
         if (!part.closed || part.volume >= 0) continue;
         turn(f);
-        ++done_.flipped;
+        ++report_.flipped;
     }
 }
 
@@ -297,7 +297,7 @@ inline void Repair::drop_isolated() {
     for (std::size_t v = 0; v < referenced.size(); ++v) {
         if (!kept_vertices_[v] || referenced[v]) continue;
         kept_vertices_[v] = false;
-        ++done_.isolated;
+        ++report_.isolated;
     }
 }
 
@@ -317,7 +317,7 @@ RepairedMesh<Scalar> Repair::result(const Points<Scalar>& given) const {
     mesh.triangles = selected(triangles_, kept_);
     for (Index& corner : mesh.triangles.reshaped()) corner = number[static_cast<std::size_t>(corner)];
     mesh.source_triangles = kept_;
-    mesh.done = done_;
+    mesh.report = report_;
     return mesh;
 }
 

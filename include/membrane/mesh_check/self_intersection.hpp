@@ -160,7 +160,7 @@ struct MeetingTriangles {
 template <class Found>
 bool for_each_self_intersection(const Points<double>& x, const Triangles& triangles, std::span<const Index> some,
                                 const std::vector<Index>& representative, std::int64_t& effort, Found found) {
-    std::vector<Box<double>> boxes(some.size());
+    std::vector<Aabb<double>> boxes(some.size());
     double largest = 0;
     for (std::size_t i = 0; i < some.size(); ++i) {
         for (const Index v : triangles.col(some[i])) boxes[i].include(point(x, v));

@@ -55,7 +55,7 @@ struct SurfaceComponent {
     bool closed = true;  ///< Each edge has two triangles, which run along it in opposite directions.
     double area = 0;     ///< [m^2]
     double volume = 0;   ///< If closed [m^3].
-    Box<double> extent;
+    Aabb<double> extent;
 };
 
 /// The connected components, in order of their first triangles.
@@ -150,7 +150,7 @@ inline void measure(SurfaceFacts& facts, const Points<double>& x, std::span<cons
                     const std::vector<bool>& finite) {
     facts.shortest_edge = facts.smallest_angle = std::numeric_limits<double>::infinity();
     double sum = 0, count = 0;
-    Box<double> extent;
+    Aabb<double> extent;
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
         if (!finite[static_cast<std::size_t>(edge[0].triangle)]) return;
         const auto length = norm<double>(point(x, edge[0].second) - point(x, edge[0].first));

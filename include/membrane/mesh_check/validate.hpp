@@ -44,7 +44,7 @@ struct ValidateOptions {
     Index max_findings_per_kind = 100;
 
     /// Each search tests at most a million pairs plus this number for each triangle. Not negative.
-    Index effort = 100;
+    Index max_pairs_per_triangle = 100;
 };
 
 /// All defects, with their vertices and triangles and a remedy, and the facts. `valid()` exactly if `TriangleMesh`
@@ -79,7 +79,8 @@ inline void check_options(const ValidateOptions& options) {
     if (options.max_findings_per_kind < 1) {
         refuse(component, "max_findings_per_kind must be at least 1, got ", options.max_findings_per_kind);
     }
-    if (options.effort < 0) refuse(component, "effort must not be negative, got ", options.effort);
+    if (options.max_pairs_per_triangle < 0)
+        refuse(component, "max_pairs_per_triangle must not be negative, got ", options.max_pairs_per_triangle);
 }
 
 /// Finds the defects, other than errors, that follow from the indices alone.
@@ -155,12 +156,12 @@ template <class Found>
 bool check_t_junctions(const CheckedMesh& mesh, std::span<const std::vector<HalfEdge>> borders, double tolerance,
                        std::int64_t effort, Found found) {
     std::vector<HalfEdge> edges;
-    std::vector<Box<double>> boxes;
+    std::vector<Aabb<double>> boxes;
     for (const auto& line : borders) {
         for (const HalfEdge& side : line) {
             if (!mesh.finite[static_cast<std::size_t>(side.triangle)]) continue;
             edges.push_back(side);
-            Box<double> box;
+            Aabb<double> box;
             for (const Index v : {side.first, side.second}) {
                 box.include(point(mesh.x, v) - Vector3<double>::Constant(tolerance));
                 box.include(point(mesh.x, v) + Vector3<double>::Constant(tolerance));
@@ -214,7 +215,7 @@ template <class Found>
 bool check_geometry(const CheckedMesh& mesh, const SurfaceParts& parts, std::span<const std::vector<HalfEdge>> borders,
                     double mean_edge, const ValidateOptions& options, Found found) {
     const double tolerance = options.tolerance.value_or((std::max)(1e-6 * mean_edge, 4 * mesh.spacing));
-    const std::int64_t effort = 1'000'000 + std::int64_t{options.effort} * mesh.triangles.cols();
+    const std::int64_t effort = 1'000'000 + std::int64_t{options.max_pairs_per_triangle} * mesh.triangles.cols();
     const CoincidentVertices near(mesh.x, mesh.points);
     const auto& representative = near.representative();
     for (Index v = 0; v < mesh.x.cols(); ++v) {

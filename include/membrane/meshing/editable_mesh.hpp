@@ -48,10 +48,10 @@ class EditableMesh {
     /// Calls `visit(side)` for the outgoing side of `v` in each of its triangles, counter-clockwise, from border to
     /// border.
     template <class Visit>
-    void around(Index v, Visit visit) const;
+    void for_each_outgoing(Index v, Visit visit) const;
 
     /// Whether an edge joins the two vertices. Linear in the triangles around `v`.
-    [[nodiscard]] inline bool joined(Index v, Index w) const;
+    [[nodiscard]] inline bool has_edge(Index v, Index w) const;
 
     [[nodiscard]] const Vector3<double>& position(Index v) const noexcept { return positions_[at(v)]; }
     void move(Index v, const Vector3<double>& to) noexcept { positions_[at(v)] = to; }
@@ -101,7 +101,7 @@ inline EditableMesh::EditableMesh(const TriangleMesh<double>& mesh)
 }
 
 template <class Visit>
-void EditableMesh::around(Index v, Visit visit) const {
+void EditableMesh::for_each_outgoing(Index v, Visit visit) const {
     const Index first = side_from_[at(v)];
     Index side = first;
     do {
@@ -110,9 +110,9 @@ void EditableMesh::around(Index v, Visit visit) const {
     } while (side != first && side != no_index);
 }
 
-inline bool EditableMesh::joined(Index v, Index w) const {
+inline bool EditableMesh::has_edge(Index v, Index w) const {
     bool found = false;
-    around(v, [&](Index side) { found = found || to(side) == w || apex(side) == w; });
+    for_each_outgoing(v, [&](Index side) { found = found || to(side) == w || apex(side) == w; });
     return found;
 }
 
@@ -143,7 +143,7 @@ inline void EditableMesh::begin_at_border(Index v, Index side) noexcept {
 
 inline bool EditableMesh::flip(Index side) {
     const Index other = twin(side);
-    if (other == no_index || joined(apex(side), apex(other))) return false;
+    if (other == no_index || has_edge(apex(side), apex(other))) return false;
     // Triangles a b c and b a d become d c a, whose first side is `side`, and c d b, whose first is `other`.
     const Index a = from(side), b = to(side), c = apex(side), d = apex(other);
     const Index bc = twin(next(side)), ca = twin(last(side)), ad = twin(next(other)), db = twin(last(other));
@@ -198,11 +198,11 @@ inline bool EditableMesh::can_collapse(Index side) const {
     if (!inner && twin(next(side)) == no_index && twin(last(side)) == no_index) return false;
     bool valid = true;
     int around_a = 0, around_b = 0;
-    around(b, [&](Index) { ++around_b; });
+    for_each_outgoing(b, [&](Index) { ++around_b; });
     const auto check = [&](Index v) {
-        if (v != b && v != apex(side) && (!inner || v != apex(other)) && joined(v, b)) valid = false;
+        if (v != b && v != apex(side) && (!inner || v != apex(other)) && has_edge(v, b)) valid = false;
     };
-    around(a, [&](Index out) {
+    for_each_outgoing(a, [&](Index out) {
         ++around_a;
         check(to(out));
         if (twin(last(out)) == no_index) check(apex(out));
@@ -214,7 +214,7 @@ inline bool EditableMesh::collapse(Index side) {
     if (!can_collapse(side)) return false;
     const Index a = from(side), b = to(side), other = twin(side);
     std::vector<Index> out_of_a;
-    around(a, [&](Index out) { out_of_a.push_back(out); });
+    for_each_outgoing(a, [&](Index out) { out_of_a.push_back(out); });
     for (const Index out : out_of_a) from_[at(out)] = b;
     side_from_[at(a)] = no_index;
     // The two other sides of a removed triangle merge: their twins become twins of each other.

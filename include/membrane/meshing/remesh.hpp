@@ -146,13 +146,14 @@ class Remesher {
 template <class Surface>
 bool Remesher<Surface>::may_move(Index v, const OnSurface& to, Index but_next_to) const {
     double before = min_facing, after = 1;
-    mesh_.around(v, [&](Index side) {
+    mesh_.for_each_outgoing(v, [&](Index side) {
         const Index b = mesh_.to(side), c = mesh_.apex(side);
         if (b == but_next_to || c == but_next_to) return;
         after = (std::min)(after, facing(to, b, c));
     });
     if (after >= min_facing) return true;
-    mesh_.around(v, [&](Index side) { before = (std::min)(before, facing(v, mesh_.to(side), mesh_.apex(side))); });
+    mesh_.for_each_outgoing(
+        v, [&](Index side) { before = (std::min)(before, facing(v, mesh_.to(side), mesh_.apex(side))); });
     return after >= before;
 }
 

@@ -154,7 +154,7 @@ template <Real Scalar>
 Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh, double rigidity) {
     detail::check_option("bending_springs", rigidity, "rigidity", "N m");
     using All = Elements<Scalar, Hinge<Scalar>>;
-    std::vector<typename All::Placed> all;
+    std::vector<typename All::Instance> all;
     const auto sides = half_edges(mesh.triangles());
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
         if (edge.size() != 2) return;

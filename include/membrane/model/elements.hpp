@@ -55,7 +55,7 @@ concept Element = std::copyable<E> && requires(const E& element, const Corners<d
 
 /// An element and its vertices.
 template <class E>
-struct PlacedElement {
+struct ElementInstance {
     std::array<Index, E::corner_count> corners;
     E element;
 
@@ -134,65 +134,65 @@ class Elements {
   public:
     using Scalar = Scalar_;
     static constexpr std::size_t corner_count = Each::corner_count;
-    using Placed = PlacedElement<Each>;
+    using Instance = ElementInstance<Each>;
 
     /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, or whose force or stiffness
     /// at rest is not finite: a triangle is too thin, or a constant too large, for the scalar. Cost: linear.
-    Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all);
+    Elements(const TriangleMesh<Scalar>& mesh, std::vector<Instance> all);
 
     [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
-    [[nodiscard]] std::span<const Placed> all() const noexcept { return all_; }
+    [[nodiscard]] std::span<const Instance> all() const noexcept { return all_; }
 
-    /// Calls `act(placed)` for each element.
+    /// Calls `act(instance)` for each element.
     template <class Act>
     void for_each_element(Act act) const {
-        for (const auto& placed : all_) act(placed);
+        for (const auto& instance : all_) act(instance);
     }
 
-    /// Calls `act(placed, x, corner)` for each element of vertex `v`: `x` are the positions of its corners, number
+    /// Calls `act(instance, x, corner)` for each element of vertex `v`: `x` are the positions of its corners, number
     /// `corner` is `v`.
     template <class Act>
     void for_each(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
         for (const auto& at : corners_of_[v]) {
-            const Placed& placed = all_[static_cast<std::size_t>(at.element)];
-            act(placed, placed.where(x), static_cast<std::size_t>(at.corner));
+            const Instance& instance = all_[static_cast<std::size_t>(at.element)];
+            act(instance, instance.where(x), static_cast<std::size_t>(at.corner));
         }
     }
 
     /// Positions of the corners of an element.
     template <class Positions>
-    [[nodiscard]] static auto where(const Placed& placed, const Positions& x) noexcept {
-        return placed.where(x);
+    [[nodiscard]] static auto where(const Instance& instance, const Positions& x) noexcept {
+        return instance.where(x);
     }
 
     /// See `MassSpringNetwork::force_tolerance`.
-    [[nodiscard]] Scalar force_tolerance() const noexcept { return negligible_force_; }
+    [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
   private:
     struct Corner {
         Index element, corner;
     };
-    [[nodiscard]] Scalar negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept;
+    [[nodiscard]] Scalar force_tolerance_of(const Instance& instance, const Points<Scalar>& x) const noexcept;
 
-    std::vector<Placed> all_;
+    std::vector<Instance> all_;
     CompressedRows<Corner> corners_of_;
-    Scalar negligible_force_ = 0;
+    Scalar force_tolerance_ = 0;
 };
 
 template <Real Scalar, CheckedElement Each>
-Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<Placed> all) : all_(std::move(all)) {
+Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<Instance> all) : all_(std::move(all)) {
     for (std::size_t i = 0; i < all_.size(); ++i) {
         for (const Index v : all_[i].corners) {
             if (v >= 0 && v < mesh.vertex_count()) continue;
             refuse("Elements", "element ", i, " names vertex ", v, ", expected 0 to ", mesh.vertex_count() - 1);
         }
-        const Scalar negligible = negligible_force_of(all_[i], mesh.positions());
+        const Scalar negligible = force_tolerance_of(all_[i], mesh.positions());
         if (!is_finite(negligible)) {
             refuse("Elements", "element ", i, " at vertex ", all_[i].corners[0],
                    " must pull with a finite force and stiffness at rest: its triangle is too thin, or a constant too "
                    "large");
         }
-        negligible_force_ = (std::max)(negligible_force_, negligible);
+        force_tolerance_ = (std::max)(force_tolerance_, negligible);
     }
     corners_of_ = CompressedRows<Corner>(mesh.vertex_count(), [this](auto put) {
         for (std::size_t i = 0; i < all_.size(); ++i) {
@@ -204,11 +204,11 @@ Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<P
 }
 
 template <Real Scalar, CheckedElement Each>
-Scalar Elements<Scalar, Each>::negligible_force_of(const Placed& placed, const Points<Scalar>& x) const noexcept {
-    const auto corners = placed.where(x);
+Scalar Elements<Scalar, Each>::force_tolerance_of(const Instance& instance, const Points<Scalar>& x) const noexcept {
+    const auto corners = instance.where(x);
     Scalar largest = 0, stiffness = 0, size = 0;
     for (std::size_t i = 0; i < corner_count; ++i) {
-        const auto corner = placed.element.force_on(corners, i);
+        const auto corner = instance.element.force_on(corners, i);
         if (!is_finite(corner.force) || !is_finite(corner.hessian.trace()))
             return std::numeric_limits<Scalar>::infinity();
         stiffness = (std::max)(stiffness, corner.hessian.trace());

@@ -167,17 +167,8 @@ template <Number Scalar>
 /// Lower bound of the stiffness of a linear spring at all edge vectors within `displacement` [m] of `edge`; there it is
 /// in no direction stiffer than its constant k. If the spring may become too short for the bound, returns nullopt.
 ///
-/// At an edge vector d of length l and direction u the Hessian of k (|d| - r)^2 / 2 is k I - k r/l (I - u u^T). Let d'
-/// be at most s l away from d. In the plane of d and d', at an angle a from u, d' is no shorter than l' = l (cos a -
-/// sqrt(s^2 - sin^2 a)), and with q = r / (l - s l)
-///
-///     r/l' (I - u' u'^T)  <=  q (I - u u^T) + 2 s q u u^T,                                                     (*)
-///
-/// so that the stiffness is at least k (1 - q) across u and k (1 - 2 s q) along u. At right angles to the plane (*)
-/// follows from l' >= l - s l. Within it the left side is r/l' n n^T, n at right angles to u', and so (*) states that
-/// r/l' (sin^2 a / (2 s q) + cos^2 a / q) <= 1, or with z = sin^2 a that sqrt(1 - z) - sqrt(s^2 - z) >= (1 - s) (1 - z
-/// + z / (2 s)). At z = 0 both sides are 1 - s; up to z = s^2 the left side is convex, the right side is linear, and at
-/// z = 0 the slope of the left side is larger by 1 - s.
+/// With the length l of `edge`, `displacement` = s l and q = r / (l - s l) it is k (1 - q) across the edge and
+/// k (1 - 2 s q) along it, r the rest length. Derivation: README.md in this folder.
 [[nodiscard]] inline std::optional<SpringStiffness<double>> min_stiffness(const Spring<double>& spring,
                                                                           const Vector3<double>& edge,
                                                                           double displacement) noexcept {
@@ -258,10 +249,10 @@ class MassSpringNetwork {
     /// The springs of vertex `v`, by ascending vertex at the other end.
     [[nodiscard]] std::span<const SpringEnd<Scalar>> springs_of(Index v) const noexcept { return ends_[v]; }
 
-    /// Calls `act(placed)` for each spring: `PlacedElement<SpringElement>`.
+    /// Calls `act(instance)` for each spring: `ElementInstance<SpringElement>`.
     template <class Act>
     void for_each_element(Act act) const {
-        for (const auto& spring : springs_) act(placed(spring));
+        for (const auto& spring : springs_) act(instance(spring));
     }
 
     [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const noexcept { return ends_[v]; }
@@ -302,7 +293,7 @@ class MassSpringNetwork {
     /// Tension of spring `s` [N].
     [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
         const auto& spring = springs_[static_cast<std::size_t>(s)];
-        return placed(spring).element.response(norm(edge_vector(spring, x))).tension;
+        return instance(spring).element.response(norm(edge_vector(spring, x))).tension;
     }
 
     /// Energy stored in all springs [J]. Cost: O(springs).
@@ -310,10 +301,10 @@ class MassSpringNetwork {
 
     /// A negligible residual force [N]: 1e-9 of the force of the stiffest spring stretched by its own length, or its
     /// stiffness times 64 roundings of a coordinate if that is larger.
-    [[nodiscard]] Scalar force_tolerance() const noexcept { return negligible_force_; }
+    [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
   private:
-    [[nodiscard]] PlacedElement<SpringElement<Scalar, Law>> placed(const Spring<Scalar>& spring) const noexcept {
+    [[nodiscard]] ElementInstance<SpringElement<Scalar, Law>> instance(const Spring<Scalar>& spring) const noexcept {
         return {{spring.first, spring.second}, {&law_, spring.stiffness, spring.rest_length}};
     }
     void build_springs(const Adjacency& adjacency, const Points<Scalar>& x, const NetworkOptions<Scalar>& options);
@@ -323,7 +314,7 @@ class MassSpringNetwork {
     CompressedRows<SpringEnd<Scalar>> ends_;  // each spring twice
     std::vector<Scalar> mass_, viscosity_;
     std::vector<unsigned char> pinned_;
-    Scalar negligible_force_ = 0;
+    Scalar force_tolerance_ = 0;
 };
 
 template <Real Scalar, class Law>
@@ -384,7 +375,7 @@ void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, c
     const Scalar spacing = std::numeric_limits<Scalar>::epsilon() * x.cwiseAbs().maxCoeff();
     for (const auto& s : springs_) {
         const Scalar force = s.stiffness * (std::max)(s.rest_length / Scalar(1e9), 64 * spacing);
-        negligible_force_ = (std::max)(negligible_force_, force);
+        force_tolerance_ = (std::max)(force_tolerance_, force);
     }
 }
 

@@ -60,8 +60,8 @@ struct MaterialRange {
 namespace materials {
 
 /// In vivo 0.25 +- 0.1 MPa (mean and deviation, aged 21) at the pressure in the eye [Pye20]; more with age and pressure
-/// [Elsheikh07]. 0.535 mm thick in the middle, 95 % within 0.06 mm [Doughty00]. A Poisson ratio of 0.49 is what such
-/// studies assume.
+/// [Elsheikh07]. 0.535 mm thick in the middle, 95 % within 0.06 mm [Doughty00]. A Poisson ratio of 0.49 is the value
+/// that such studies assume.
 [[nodiscard]] constexpr MaterialRange cornea() noexcept {
     return {{.young_modulus = 0.25e6, .poisson_ratio = 0.49, .thickness = 0.535e-3},
             {.young_modulus = 0.15e6, .poisson_ratio = 0.49, .thickness = 0.475e-3},

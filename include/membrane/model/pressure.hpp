@@ -101,7 +101,7 @@ template <Real Scalar>
 Elements<Scalar, PressureLoad<Scalar>> pressure(const TriangleMesh<Scalar>& mesh, double pascal) {
     if (!is_finite(pascal)) refuse("pressure", "pascal must be finite [Pa], got ", pascal);
     using All = Elements<Scalar, PressureLoad<Scalar>>;
-    std::vector<typename All::Placed> all;
+    std::vector<typename All::Instance> all;
     for (const auto& corners : mesh.triangles().colwise()) {
         all.push_back({{corners[0], corners[1], corners[2]}, {static_cast<Scalar>(pascal)}});
     }
@@ -115,7 +115,7 @@ Elements<Scalar, DeadLoad<Scalar>> balancing_loads(const TriangleMesh<Scalar>& m
                network.vertex_count());
     }
     using All = Elements<Scalar, DeadLoad<Scalar>>;
-    std::vector<typename All::Placed> all;
+    std::vector<typename All::Instance> all;
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         all.push_back({{v}, {-network.force_on(v, mesh.positions()).force}});
     }

@@ -26,7 +26,7 @@ struct DecayLengths {
 
 /// Values for a solver's threshold of layers.
 struct RecommendedLayers {
-    Index normal;      ///< for a force that lifts; a pressing tool needs fewer, since layer 0 is all that it touches
+    Index normal;      ///< for a force that lifts; a pressing tool needs fewer, since it presses on layer 0 only
     Index tangential;  ///< for a force along the surface as well
 };
 

@@ -40,7 +40,7 @@ class Tissue {
         std::apply([&](const auto&... kinds) { (act(kinds), ...); }, kinds_);
     }
 
-    /// Calls `act(placed)` for each spring and each element: `PlacedElement`.
+    /// Calls `act(instance)` for each spring and each element: `ElementInstance`.
     template <class Act>
     void for_each_element(Act act) const {
         springs_.for_each_element(act);
@@ -58,7 +58,7 @@ class Tissue {
     [[nodiscard]] bool has_masses() const noexcept { return springs_.has_masses(); }
     [[nodiscard]] Scalar mass(Index v) const noexcept { return springs_.mass(v); }
     [[nodiscard]] Scalar viscosity(Index v) const noexcept { return springs_.viscosity(v); }
-    [[nodiscard]] Scalar force_tolerance() const noexcept { return negligible_force_; }
+    [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
 
@@ -72,8 +72,8 @@ class Tissue {
     template <class Act>
     void for_each_corner_force(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
         for_each_kind([&](const auto& elements) {
-            elements.for_each(v, x, [&](const auto& placed, const auto& corners, std::size_t i) {
-                act(placed.element.force_on(corners, i));
+            elements.for_each(v, x, [&](const auto& instance, const auto& corners, std::size_t i) {
+                act(instance.element.force_on(corners, i));
             });
         });
     }
@@ -82,18 +82,18 @@ class Tissue {
     Springs springs_;
     std::tuple<Kinds...> kinds_;
     CompressedRows<Neighbour> neighbours_;
-    Scalar negligible_force_;
+    Scalar force_tolerance_;
 };
 
 template <class Springs, class... Kinds>
 Tissue<Springs, Kinds...>::Tissue(const Springs& springs, const Kinds&... kinds)
-    : springs_(springs), kinds_(kinds...), negligible_force_(springs.force_tolerance()) {
+    : springs_(springs), kinds_(kinds...), force_tolerance_(springs.force_tolerance()) {
     for_each_kind([&](const auto& elements) {
         if (elements.vertex_count() != vertex_count()) {
             refuse("Tissue", "elements must be of the springs' mesh of ", vertex_count(), " vertices, got one of ",
                    elements.vertex_count());
         }
-        negligible_force_ = (std::max)(negligible_force_, elements.force_tolerance());
+        force_tolerance_ = (std::max)(force_tolerance_, elements.force_tolerance());
     });
     join();
 }
@@ -105,9 +105,9 @@ void Tissue<Springs, Kinds...>::join() {
         for (const auto& end : springs_.neighbours(v)) pairs.emplace_back(v, end.other);
     }
     for_each_kind([&](const auto& elements) {
-        for (const auto& placed : elements.all()) {
-            for (const Index a : placed.corners) {
-                for (const Index b : placed.corners) {
+        for (const auto& instance : elements.all()) {
+            for (const Index a : instance.corners) {
+                for (const Index b : instance.corners) {
                     if (a != b) pairs.emplace_back(a, b);
                 }
             }
@@ -159,8 +159,8 @@ auto Tissue<Springs, Kinds...>::energy_change(Index v, const Vector3<Scalar>& di
                                               const ConstPointsRef<Scalar>& x) const noexcept -> EnergyChange<Scalar> {
     auto sum = springs_.energy_change(v, displacement, x);
     for_each_kind([&](const auto& elements) {
-        elements.for_each(v, x, [&](const auto& placed, const auto& corners, std::size_t i) {
-            sum += placed.element.energy_change(corners, i, displacement);
+        elements.for_each(v, x, [&](const auto& instance, const auto& corners, std::size_t i) {
+            sum += instance.element.energy_change(corners, i, displacement);
         });
     });
     return sum;

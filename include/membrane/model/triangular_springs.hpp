@@ -180,7 +180,7 @@ Elements<Scalar, TriangularSpring<Scalar>> triangular_springs(const TriangleMesh
     material.check();
     detail::check_option("triangular_springs", stretch, "stretch", "1", false);
     using All = Elements<Scalar, TriangularSpring<Scalar>>;
-    std::vector<typename All::Placed> all;
+    std::vector<typename All::Instance> all;
     for (const auto& corners : mesh.triangles().colwise()) {
         const std::array<Index, 3> placed{corners[0], corners[1], corners[2]};
         Corners<double, 3> x;

@@ -18,7 +18,7 @@
 ///
 ///     const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
 ///     solver.step(x, dt, network, foundation, press(tool, contact));               // the body stands still
-///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));     // it moves, see `moved_volume.hpp`
+///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));  // it moves, see `moving_foundation.hpp`
 namespace membrane {
 
 /// Constants of the volume springs: one value for all vertices, or one for each vertex.
@@ -48,7 +48,7 @@ concept FoundationModel = Real<Scalar> &&
 namespace detail {
 
 template <class Volume, class Scalar>
-consteval bool check_volume_model() noexcept {
+consteval bool check_foundation_model() noexcept {
     static_assert(
         FoundationModel<Volume, Scalar>,
         "FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) "
@@ -60,7 +60,7 @@ consteval bool check_volume_model() noexcept {
 
 /// A `FoundationModel`: if a type does not satisfy it, the error names the missing requirement.
 template <class Volume, class Scalar>
-concept CheckedFoundationModel = detail::check_volume_model<Volume, Scalar>();
+concept CheckedFoundationModel = detail::check_foundation_model<Volume, Scalar>();
 
 /// No body under the membrane: no force, at no cost.
 struct NoFoundation {
@@ -109,7 +109,7 @@ struct VolumeSpring {
 };
 
 template <class Volume, Real Scalar>
-class MovedVolume;  // of moved_volume.hpp
+class MovingFoundation;  // of moving_foundation.hpp
 
 /// Virtual volume springs, [Liu07] (5): one for each vertex, of rest length zero, from the anchor to the vertex.
 template <Real Scalar>

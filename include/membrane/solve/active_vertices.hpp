@@ -14,9 +14,9 @@
 
 /// The vertices that a step updates.
 ///
-///     active.arrange(network, seeds, options);
+///     active.begin_step(network, seeds, options);
 ///     for (const membrane::Index v : active.vertices()) { ... }           // updates, nearest to the contact first
-///     const bool balanced = active.finish(network, is_balanced, moved);
+///     const bool balanced = active.end_step(network, is_balanced, moved);
 namespace membrane {
 
 /// The active vertices: the propagation queue, and outside it the vertices awake, whose forces do not balance after a
@@ -31,10 +31,10 @@ class ActiveVertices {
 
     /// Begins a step: builds the queue if the seeds have changed, and lists the active vertices: the queue, then those
     /// awake, then those that the queue has dropped, up to the capacity by `options`, layer 0 and one more in any case.
-    /// Vertices of the queue beyond the capacity are active in later steps. A last call without `finish` is undone.
+    /// Vertices of the queue beyond the capacity are active in later steps. A last call without `end_step` is undone.
     /// Online.
     template <class Network, class Options>
-    void arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept;
+    void begin_step(const Network& network, std::span<const Index> seeds, const Options& options) noexcept;
 
     /// This step's vertices in the order of their updates, and the first of them, which are layer 0.
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return active_.items(); }
@@ -45,7 +45,7 @@ class ActiveVertices {
     [[nodiscard]] std::size_t from_queue() const noexcept { return from_queue_; }
 
     /// Ends in `vertices` of the groups outside the queue, if they are updated in groups.
-    [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return groups_.ends(); }
+    [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return colouring_.ends(); }
 
     /// Whether the queue has changed since the last call.
     [[nodiscard]] bool take_new_queue() noexcept { return std::exchange(has_new_queue_, false); }
@@ -62,7 +62,7 @@ class ActiveVertices {
     template <class Network, class Options>
     void grow(const Network& network, const Options& options) noexcept;
 
-    /// `v` is awake from the next `arrange` on. @pre a vertex (asserted) that is not pinned
+    /// `v` is awake from the next `begin_step` on. @pre a vertex (asserted) that is not pinned
     void wake(Index v) noexcept {
         awake_.insert(v);
         activated_.insert(v);
@@ -71,13 +71,13 @@ class ActiveVertices {
     /// Ends a step: awake are now the active and frontier vertices for which `is_balanced(v)` is false, the vertices
     /// that had to wait, and the neighbours of those that `moved`. Returns whether the forces on all vertices balance.
     template <class Network, class IsBalanced>
-    [[nodiscard]] bool finish(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept;
+    [[nodiscard]] bool end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept;
 
     void clear() noexcept;
 
   private:
     template <class Network>
-    void undo_arrange(const Network& network) noexcept;
+    void undo_step(const Network& network) noexcept;
     template <class IsBalanced>
     void find_awake(IsBalanced is_balanced) noexcept;
     template <class Network>
@@ -101,7 +101,7 @@ class ActiveVertices {
     IndexSet dropped_;    // by the queue, because it changed or lacks capacity
     IndexSet active_;     // in this step
     IndexSet activated_;  // active since the last equilibrium
-    VertexColouring groups_;
+    VertexColouring colouring_;
     Index capacity_ = 0;  // for active vertices
     std::size_t from_queue_ = 0;
     Index layers_ = 0, layers_before_ = 0;
@@ -110,7 +110,7 @@ class ActiveVertices {
     bool has_new_queue_ = false;
     bool queue_fits_ = true, truncated_ = false;
     bool queue_balanced_ = true;
-    bool is_open_ = false;  // between `arrange` and `finish`
+    bool is_open_ = false;  // between `begin_step` and `end_step`
 };
 
 inline ActiveVertices::ActiveVertices(Index vertex_count)
@@ -122,11 +122,11 @@ inline ActiveVertices::ActiveVertices(Index vertex_count)
       dropped_(seeds_),
       active_(seeds_),
       activated_(seeds_),
-      groups_(vertex_count) {}
+      colouring_(vertex_count) {}
 
 template <class Network, class Options>
-void ActiveVertices::arrange(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
-    if (std::exchange(is_open_, true)) undo_arrange(network);
+void ActiveVertices::begin_step(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
+    if (std::exchange(is_open_, true)) undo_step(network);
     as_needed_ = options.adaptive_layers;
     order_ = as_needed_ ? UpdateOrder::breadth_first : options.order;
     if (order_ == UpdateOrder::colour_all && options.max_vertex_updates != unlimited)
@@ -154,8 +154,8 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
     from_queue_ = static_cast<std::size_t>(active_.count());
     activate(awake_.items(), capacity_);
     activate(dropped_.items(), capacity_);
-    groups_.clear();
-    if (order_ != UpdateOrder::breadth_first) groups_.add(network, active_, from_queue_, vertices().size());
+    colouring_.clear();
+    if (order_ != UpdateOrder::breadth_first) colouring_.add(network, active_, from_queue_, vertices().size());
     extend(network, options);
 }
 
@@ -163,17 +163,18 @@ void ActiveVertices::arrange(const Network& network, std::span<const Index> seed
 template <class Options>
 Index ActiveVertices::capacity_for(const Options& options) const noexcept {
     if (options.max_vertex_updates == unlimited) return unlimited;
-    const auto touched = static_cast<Index>(layer_0().size());
-    const auto own = std::int64_t{touched} * (std::int64_t{options.sweeps} * options.contact_iterations + 1);
+    const auto contact_count = static_cast<Index>(layer_0().size());
+    const auto own = std::int64_t{contact_count} * (std::int64_t{options.sweeps} * options.contact_iterations + 1);
     const auto passes =
         (std::int64_t{options.sweeps} + 1) * (as_needed_ ? 2 : 1);  // forces of a layer before it is added
-    return touched + static_cast<Index>((std::max)((options.max_vertex_updates - own) / passes, std::int64_t{1}));
+    return contact_count + static_cast<Index>((std::max)((options.max_vertex_updates - own) / passes, std::int64_t{1}));
 }
 
 // Capacity reserved for vertices awake or dropped by the queue: they are updated under a lasting contact, too.
 inline Index ActiveVertices::capacity_of_others() const noexcept {
-    const auto touched = static_cast<Index>(layer_0().size());
-    return (std::min)(awake_.count() + dropped_.count(), std::clamp(capacity_ / 4, Index(1), capacity_ - touched));
+    const auto contact_count = static_cast<Index>(layer_0().size());
+    return (std::min)(awake_.count() + dropped_.count(),
+                      std::clamp(capacity_ / 4, Index(1), capacity_ - contact_count));
 }
 
 inline void ActiveVertices::drop(std::span<const Index> vertices) noexcept {
@@ -213,7 +214,7 @@ void ActiveVertices::extend(const Network& network, const Options& options) noex
 }
 
 template <class Network, class IsBalanced>
-bool ActiveVertices::finish(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept {
+bool ActiveVertices::end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept {
     find_awake(is_balanced);
     for (const Index v : moved) wake_neighbours(network, v);
     std::swap(seeds_, next_seeds_);
@@ -257,7 +258,7 @@ void ActiveVertices::wake_neighbours(const Network& network, Index v) noexcept {
 
 // Back to the state after the last step that was finished.
 template <class Network>
-void ActiveVertices::undo_arrange(const Network& network) noexcept {
+void ActiveVertices::undo_step(const Network& network) noexcept {
     build_queue(network, seeds_.items(), layers_before_);
     queue_fits_ = true;
     has_frontier_ = false;

@@ -60,7 +60,7 @@ class ConstraintContext {
     }
 
     /// Moves `v` by a displacement [m].
-    void move(Index v, const Vector3<Scalar>& by) noexcept { place(v, position(v) + by); }
+    void move(Index v, const Vector3<Scalar>& by) noexcept { set_position(v, position(v) + by); }
 
     /// Adds to the external force on `v` for this step [N]. Only active vertices move by it: `seed` makes one active in
     /// `begin`.
@@ -122,7 +122,7 @@ class ConstraintContext {
     void load(Index v) noexcept {
         if (!state_.loaded.contains(v)) state_.load(v, x_, Pins{*this});
     }
-    void place(Index v, const Vector3<Scalar>& target) noexcept {
+    void set_position(Index v, const Vector3<Scalar>& target) noexcept {
         load(v);
         state_.set_position(v, target);
     }
@@ -195,7 +195,7 @@ bool ConstraintContext<Scalar>::check(Index v) noexcept {
 template <Real Scalar>
 void ConstraintContext<Scalar>::prescribe(Index v, const Vector3<Scalar>& target) noexcept {
     prescribe(v);
-    if (!is_pinned_(network_, v)) place(v, target);
+    if (!is_pinned_(network_, v)) set_position(v, target);
 }
 
 template <Real Scalar>
@@ -222,7 +222,7 @@ const ContactPoint<Scalar>* ConstraintContext<Scalar>::cached_point(Index triang
 
 template <Real Scalar>
 void ConstraintContext<Scalar>::add_point(const ContactPoint<Scalar>& point) noexcept {
-    if (!state_.points.push(point)) state_.full = true;
+    if (!state_.points.try_push_back(point)) state_.full = true;
     state_.point_ranges[constraint_].end = state_.points.size();
 }
 

@@ -13,18 +13,18 @@
 ///
 ///     template <class Terms>                                                        // of a constraint of one's own
 ///     void describe(const Clamp& clamp, Terms& terms) {
-///         terms.add(membrane::ConstraintTerm::hold(clamp.vertex, clamp.target));
+///         terms.add(membrane::ConstraintTerm::prescribe(clamp.vertex, clamp.target));
 ///     }
 namespace membrane {
 
 /// A point of the membrane with a target or a load, or a tool that the surface stays outside of. In double.
 struct ConstraintTerm {
     enum class Kind : unsigned char {
-        pin,          ///< the vertex does not move; no force enters there
-        hold_vertex,  ///< the vertex is at `target`
-        hold_point,   ///< the point of a triangle is at `target`
-        load,         ///< `force` acts on the point
-        press,        ///< the surface stays outside `tool`, in the contact `contact`
+        pin,               ///< the vertex does not move; no force enters there
+        prescribe_vertex,  ///< the vertex is at `target`
+        prescribe_point,   ///< the point of a triangle is at `target`
+        load,              ///< `force` acts on the point
+        press,             ///< the surface stays outside `tool`, in the contact `contact`
     };
 
     Kind kind = Kind::pin;
@@ -37,15 +37,15 @@ struct ConstraintTerm {
     std::size_t constraint = 0;  ///< number of the constraint; a collector of terms sets it
 
     [[nodiscard]] static ConstraintTerm pin(Index v) noexcept;
-    [[nodiscard]] static ConstraintTerm hold(Index v, const Vector3<double>& target) noexcept;
-    [[nodiscard]] static ConstraintTerm hold(const std::array<Index, 3>& corners, const Vector3<double>& weights,
-                                             const Vector3<double>& target) noexcept;
+    [[nodiscard]] static ConstraintTerm prescribe(Index v, const Vector3<double>& target) noexcept;
+    [[nodiscard]] static ConstraintTerm prescribe(const std::array<Index, 3>& corners, const Vector3<double>& weights,
+                                                  const Vector3<double>& target) noexcept;
     [[nodiscard]] static ConstraintTerm load(const std::array<Index, 3>& corners, const Vector3<double>& weights,
                                              const Vector3<double>& force) noexcept;
     [[nodiscard]] static ConstraintTerm press(const Tool<double>& tool, const Contact<double>& contact) noexcept;
 
     /// Whether the position of a point is prescribed.
-    [[nodiscard]] bool holds() const noexcept { return kind != Kind::load && kind != Kind::press; }
+    [[nodiscard]] bool prescribes() const noexcept { return kind != Kind::load && kind != Kind::press; }
 
     [[nodiscard]] double weight(std::size_t k) const noexcept { return weights[static_cast<Eigen::Index>(k)]; }
 
@@ -61,15 +61,15 @@ struct ConstraintTerm {
 };
 
 template <Real Scalar, class Terms>
-void describe(const VertexAttachment<Scalar>& held, Terms& terms) {
-    terms.add(ConstraintTerm::hold(held.vertex, held.target.template cast<double>()));
+void describe(const VertexAttachment<Scalar>& attachment, Terms& terms) {
+    terms.add(ConstraintTerm::prescribe(attachment.vertex, attachment.target.template cast<double>()));
 }
 
 template <Real Scalar, class Terms>
-void describe(const PointAttachment<Scalar>& held, Terms& terms) {
-    if (held.triangle == no_index) return;
-    terms.add(ConstraintTerm::hold(held.corners, held.barycentric.template cast<double>(),
-                                   held.target.template cast<double>()));
+void describe(const PointAttachment<Scalar>& attachment, Terms& terms) {
+    if (attachment.triangle == no_index) return;
+    terms.add(ConstraintTerm::prescribe(attachment.corners, attachment.barycentric.template cast<double>(),
+                                        attachment.target.template cast<double>()));
 }
 
 template <class Terms>
@@ -135,13 +135,13 @@ void for_each_term(const C& constraint, Act act) {
 
 inline ConstraintTerm ConstraintTerm::pin(Index v) noexcept { return {.kind = Kind::pin, .corners = {v, v, v}}; }
 
-inline ConstraintTerm ConstraintTerm::hold(Index v, const Vector3<double>& target) noexcept {
-    return {.kind = Kind::hold_vertex, .corners = {v, v, v}, .target = target};
+inline ConstraintTerm ConstraintTerm::prescribe(Index v, const Vector3<double>& target) noexcept {
+    return {.kind = Kind::prescribe_vertex, .corners = {v, v, v}, .target = target};
 }
 
-inline ConstraintTerm ConstraintTerm::hold(const std::array<Index, 3>& corners, const Vector3<double>& weights,
-                                           const Vector3<double>& target) noexcept {
-    return {.kind = Kind::hold_point, .corners = corners, .weights = weights, .target = target};
+inline ConstraintTerm ConstraintTerm::prescribe(const std::array<Index, 3>& corners, const Vector3<double>& weights,
+                                                const Vector3<double>& target) noexcept {
+    return {.kind = Kind::prescribe_point, .corners = corners, .weights = weights, .target = target};
 }
 
 inline ConstraintTerm ConstraintTerm::load(const std::array<Index, 3>& corners, const Vector3<double>& weights,

@@ -25,7 +25,7 @@ namespace membrane {
 /// each update of layer 0, and, if there is time, at the end of the step unless nothing has changed since the last call
 /// and that found no violation. `reaction` is the force of the
 /// membrane on the constraint [N]. Optional members: `driving_input(): DrivingInput<Scalar>`, from which the next steps
-/// are extrapolated; `hold(context)`, which prescribes vertices and is called before any `begin`.
+/// are extrapolated; `prescribe(context)`, which prescribes vertices and is called before any `begin`.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> &&
     requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
@@ -85,7 +85,7 @@ class ConstraintRef {
 
     [[nodiscard]] bool valid() const noexcept { return calls_->valid(constraint_); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return calls_->driving_input(constraint_); }
-    void hold(ConstraintContext<Scalar>& context) const noexcept { calls_->hold(constraint_, context); }
+    void prescribe(ConstraintContext<Scalar>& context) const noexcept { calls_->prescribe(constraint_, context); }
     void begin(ConstraintContext<Scalar>& context) const noexcept { calls_->begin(constraint_, context); }
     [[nodiscard]] bool enforce(ConstraintContext<Scalar>& context) const noexcept {
         return calls_->enforce(constraint_, context);
@@ -98,7 +98,7 @@ class ConstraintRef {
     struct Calls {
         bool (*valid)(const void*) noexcept;
         DrivingInput<Scalar> (*driving_input)(const void*) noexcept;
-        void (*hold)(const void*, ConstraintContext<Scalar>&) noexcept;
+        void (*prescribe)(const void*, ConstraintContext<Scalar>&) noexcept;
         void (*begin)(const void*, ConstraintContext<Scalar>&) noexcept;
         bool (*enforce)(const void*, ConstraintContext<Scalar>&) noexcept;
         Vector3<Scalar> (*reaction)(const void*, const ConstraintContext<Scalar>&) noexcept;
@@ -114,9 +114,9 @@ class ConstraintRef {
             if constexpr (requires { as<C>(c).driving_input(); }) return as<C>(c).driving_input();
             return {};
         },
-        .hold =
+        .prescribe =
             [](const void* c, ConstraintContext<Scalar>& context) noexcept {
-                if constexpr (requires { as<C>(c).hold(context); }) as<C>(c).hold(context);
+                if constexpr (requires { as<C>(c).prescribe(context); }) as<C>(c).prescribe(context);
             },
         .begin = [](const void* c, ConstraintContext<Scalar>& context) noexcept { as<C>(c).begin(context); },
         .enforce = [](const void* c, ConstraintContext<Scalar>& context) noexcept -> bool {
@@ -147,7 +147,7 @@ class ConstraintList {
     }
     /// Begins all constraints. A vertex that one prescribes is fixed for all, in any order of the arguments.
     void begin() const noexcept {
-        for_each([this](const auto& constraint, std::size_t) { constraint.hold(context_); });
+        for_each([this](const auto& constraint, std::size_t) { constraint.prescribe(context_); });
         for_each([this](const auto& constraint, std::size_t) {
             context_.begin_points();
             constraint.begin(context_);
@@ -207,7 +207,7 @@ struct VertexAttachment {
 
     [[nodiscard]] bool valid() const noexcept { return is_finite(target); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return InputSample<Scalar>{target}; }
-    void hold(ConstraintContext<Scalar>& context) const noexcept {
+    void prescribe(ConstraintContext<Scalar>& context) const noexcept {
         if (context.check(vertex)) context.prescribe(vertex, target);
     }
     void begin(ConstraintContext<Scalar>& context) const noexcept;
@@ -224,10 +224,10 @@ struct PinnedVertices {
 
     [[nodiscard]] bool valid() const noexcept { return true; }
     template <Real Scalar>
-    void hold(ConstraintContext<Scalar>& context) const noexcept;
+    void prescribe(ConstraintContext<Scalar>& context) const noexcept;
     template <Real Scalar>
     void begin(ConstraintContext<Scalar>& context) const noexcept {
-        hold(context);
+        prescribe(context);
     }
     template <Real Scalar>
     bool enforce(ConstraintContext<Scalar>&) const noexcept {
@@ -335,7 +335,7 @@ void VertexAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const n
 }
 
 template <Real Scalar>
-void PinnedVertices::hold(ConstraintContext<Scalar>& context) const noexcept {
+void PinnedVertices::prescribe(ConstraintContext<Scalar>& context) const noexcept {
     for (const Index v : vertices) {
         if (!context.check(v)) return;
         context.prescribe(v);

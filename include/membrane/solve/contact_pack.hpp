@@ -29,7 +29,7 @@ enum class ContactKind : unsigned char {
 /// The feature of a point whose weights and normal stay as they are.
 inline constexpr int fixed_feature = -1;
 
-/// Features have the numbers of the pairs of `proximity`.
+/// Features have the numbers of the pairs of `closest_points`.
 template <Real Scalar>
 [[nodiscard]] constexpr ContactKind kind_of(const ContactPoint<Scalar>& point) noexcept {
     if (point.feature == fixed_feature) return ContactKind::fixed;
@@ -124,7 +124,7 @@ void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     pack.point.fill(no_index);
     pack.turn.fill(0);
     pack.kind = kind;
-    packs_.push(pack);
+    packs_.try_push_back(pack);
 }
 
 template <Real Scalar>

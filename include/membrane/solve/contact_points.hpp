@@ -201,8 +201,8 @@ template <Real Scalar>
         const Vector3<Wide> start = tool.position.template cast<Wide>(), axis = tool.axis.template cast<Wide>();
         const auto nearest = closest_on_edge<Wide>(axis, triangle.b - triangle.a, triangle.a - start);
         pack.load.weights = Vector3<Wide>(1 - nearest.foot, nearest.foot, 0);
-        const Vector3<Wide> separation = (start + nearest.along * axis) - point_at(triangle, pack.load.weights);
-        set_normal(listed & (nearest.along > 0) & (nearest.along < 1), separation, separation, pack);
+        const Vector3<Wide> separation = (start + nearest.fraction * axis) - point_at(triangle, pack.load.weights);
+        set_normal(listed & (nearest.fraction > 0) & (nearest.fraction < 1), separation, separation, pack);
     }
 }
 

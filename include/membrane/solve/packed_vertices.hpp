@@ -28,9 +28,9 @@ namespace membrane {
 /// foundation model has `spring`, and no update needs a line search.
 template <class Scalar, class Rule, class Network, class Volume>
 concept UpdatesInLanes = (Network::never_stiffens ||
-                          !is_safe_rule<Rule>)&&requires(const Rule& rule, const Network& network,
-                                                         const SpringState<Lanes<Scalar>>& spring,
-                                                         const VertexState<Lanes<Scalar>>& vertex) {
+                          !is_descent_rule<Rule>)&&requires(const Rule& rule, const Network& network,
+                                                            const SpringState<Lanes<Scalar>>& spring,
+                                                            const VertexState<Lanes<Scalar>>& vertex) {
     network.law()(spring);
     rule.compliance(vertex);
 }
@@ -155,7 +155,7 @@ class PackedVertices {
     void truncate(const Extent& extent) noexcept;
     void need(Index v) noexcept {
         unsigned char& marked = is_needed_[static_cast<std::size_t>(v)];
-        if (marked == 0) needed_.push(v);
+        if (marked == 0) needed_.try_push_back(v);
         marked = 1;
     }
     template <class Sum, class Scene>
@@ -257,10 +257,10 @@ bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t b
 template <Real Scalar>
 void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
     for (const Index v : needed_.items().subspan(extent.needed)) is_needed_[static_cast<std::size_t>(v)] = 0;
-    members_.cut(extent.members);
-    packs_.cut(extent.packs);
+    members_.truncate(extent.members);
+    packs_.truncate(extent.packs);
     slot_count_ = extent.slots;
-    needed_.cut(extent.needed);
+    needed_.truncate(extent.needed);
 }
 
 // False if the vertices exceed the capacity. Lanes without a vertex, and those of vertices with fewer springs, have
@@ -274,11 +274,11 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
     Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}, false};
     pack.own.fill(unused_row_);
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
-    if (!packs_.push(pack)) return false;
+    if (!packs_.try_push_back(pack)) return false;
     const auto slots = std::span(slots_).subspan(slot_count_, springs);
     for (Slot& slot : slots) slot = {Scalar(0), Scalar(0), pack.own};
     for (std::size_t i = 0; i < vertices.size(); ++i) {
-        members_.push(vertices[i]);
+        members_.try_push_back(vertices[i]);
         need(vertices[i]);
         Slot* slot = slots.data();
         for (const auto& spring : network.springs_of(vertices[i])) {
@@ -411,7 +411,7 @@ template <bool in_contact, class Rule, class Scene>
     at.vertex.stiffness += at.others.stiffness;
     at.vertex.mass = terms_[p].mass;
     at.vertex.dt = scene.dt;
-    at.vertex.touched = in_contact;
+    at.vertex.constrained = in_contact;
     return at;
 }
 
@@ -424,7 +424,7 @@ template <bool in_contact, class Scene, class Rule>
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
     const auto move = move_of(rule, at.vertex, rows.force_tolerance);
-    if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+    if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
         if (!allowed && any(move.may_overshoot & may_move)) {
             const auto springs = springs_on<CurvedSum<Wide>>(p, at.here, scene).total();
             const Wide bound = stiffness_bound_of(springs) + at.others.stiffness;

@@ -46,7 +46,7 @@ class Predictor {
     [[nodiscard]] Scalar extrapolation_factor(std::span<const DrivingInput<Scalar>> inputs) noexcept;
 
     /// The factor is 0 in the next two steps.
-    void forget() noexcept { inputs_ = {}; }
+    void reset() noexcept { inputs_ = {}; }
 
   private:
     struct Input {

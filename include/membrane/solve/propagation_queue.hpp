@@ -21,7 +21,7 @@ namespace membrane {
 class PropagationQueue {
   public:
     explicit PropagationQueue(Index vertex_count)
-        : reached_(vertex_count), layer_ends_(static_cast<std::size_t>(vertex_count)), groups_(vertex_count) {}
+        : reached_(vertex_count), layer_ends_(static_cast<std::size_t>(vertex_count)), colouring_(vertex_count) {}
 
     /// Rebuilds the queue, up to layer `layers` (0: the seeds alone; `unlimited`: all vertices connected to them). A
     /// pinned vertex transmits no force: it is never in the queue. Seeds may repeat.
@@ -40,7 +40,7 @@ class PropagationQueue {
     void group(const Network& network, bool together = false) noexcept;
 
     /// Ends of the groups in `vertices`; empty before `group` is called.
-    [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return groups_.ends(); }
+    [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return colouring_.ends(); }
 
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
     [[nodiscard]] bool contains(Index v) const noexcept { return reached_.contains(v); }
@@ -59,13 +59,13 @@ class PropagationQueue {
     void clear() noexcept {
         reached_.clear();
         layer_ends_.clear();
-        groups_.clear();
+        colouring_.clear();
     }
 
   private:
     IndexSet reached_;
     FixedVector<std::size_t> layer_ends_;
-    VertexColouring groups_;
+    VertexColouring colouring_;
 };
 
 template <class Network>
@@ -75,7 +75,7 @@ void PropagationQueue::build(const Network& network, std::span<const Index> seed
         if (!network.pinned(v)) reached_.insert(v);
     }
     if (vertices().empty()) return;
-    layer_ends_.push(vertices().size());
+    layer_ends_.try_push_back(vertices().size());
     while (layer_count() <= layers && grow(network)) {
     }
 }
@@ -90,19 +90,19 @@ bool PropagationQueue::grow(const Network& network) noexcept {
         }
     }
     if (vertices().size() == end) return false;
-    layer_ends_.push(vertices().size());
+    layer_ends_.try_push_back(vertices().size());
     return true;
 }
 
 template <class Network>
 void PropagationQueue::group(const Network& network, bool together) noexcept {
-    groups_.clear();
+    colouring_.clear();
     if (together && layer_count() > 1) {
-        layer_ends_.cut(1);
-        layer_ends_.push(vertices().size());
+        layer_ends_.truncate(1);
+        layer_ends_.try_push_back(vertices().size());
     }
     const auto ends = layer_ends_.items();
-    for (std::size_t k = 0; k < ends.size(); ++k) groups_.add(network, reached_, k > 0 ? ends[k - 1] : 0, ends[k]);
+    for (std::size_t k = 0; k < ends.size(); ++k) colouring_.add(network, reached_, k > 0 ? ends[k - 1] : 0, ends[k]);
 }
 
 }  // namespace membrane

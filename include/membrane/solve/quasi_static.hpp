@@ -233,8 +233,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     sweeps.load_and_pack();
     sweeps.run();
     if (report_.status == StepStatus::advanced && !sweeps.evaluate_residuals()) {
-        state_.forget_points();  // a force of the last step may have diverged
-        state_.restore(start);   // not finite at the start positions either: the input is invalid
+        state_.reset_points();  // a force of the last step may have diverged
+        state_.restore(start);  // not finite at the start positions either: the input is invalid
         report_.status = sweeps.evaluate_residuals() ? StepStatus::unstable : StepStatus::invalid_input;
     }
     if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
@@ -297,7 +297,7 @@ void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
         if (!network.pinned(v)) active_.wake(v);
     }
     woken_.clear();
-    active_.arrange(network, state_.seeds.items(), options_);
+    active_.begin_step(network, state_.seeds.items(), options_);
 }
 
 // Writes the positions of moved vertices, and wakes their neighbours.
@@ -309,7 +309,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     for (const Index v : state_.loaded.items()) {
         const Vector3<Scalar> now = state_.position_of(v), before = point(x, v);
         if (now == before) continue;
-        moved_.push(v);
+        moved_.try_push_back(v);
         if (options_.predict) last_displacements_.col(v) = now - before;
         x.col(v) = now;
     }
@@ -317,7 +317,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     const auto is_balanced = [&](Index v) {
         return state_.is_fixed(v) || state_.unbalanced_force(v) <= state_.force_tolerance;
     };
-    report_.converged = active_.finish(network, is_balanced, report_.moved) && !constraints_changed &&
+    report_.converged = active_.end_step(network, is_balanced, report_.moved) && !constraints_changed &&
                         report_.residual <= state_.force_tolerance;
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
@@ -326,8 +326,8 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus status) noexcept {
-    if (status == StepStatus::unstable) state_.forget_points();  // a force of the last step may have diverged
-    predictor_.forget();
+    if (status == StepStatus::unstable) state_.reset_points();  // a force of the last step may have diverged
+    predictor_.reset();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_.status = status;
     return report_;
@@ -349,7 +349,7 @@ template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     active_.clear();
     state_.reset();
-    predictor_.forget();
+    predictor_.reset();
     complete_ = false;
     last_prescribed_.clear();
     woken_.clear();

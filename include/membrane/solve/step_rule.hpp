@@ -29,15 +29,16 @@ template <Number Scalar>
 struct VertexState : EnergyMajoriser<Scalar> {
     Scalar contact_stiffness = 0;  ///< the part of `stiffness` that acts along `contact_normal` alone [N/m]
     Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();
-    Scalar mass = 0;       ///< [kg], zero where the network has none
-    Each<Scalar> dt = 0;   ///< [s]
-    bool touched = false;  ///< a constraint acts on it
+    Scalar mass = 0;           ///< [kg], zero where the network has none
+    Each<Scalar> dt = 0;       ///< [s]
+    bool constrained = false;  ///< a constraint acts on it
 };
 
 /// A step rule: the compliance of a vertex [m/N], a number, or a `Symmetric3` for a rule whose displacements are not
 /// along the force. Beyond the signature: not negative, finite. If a rule sets `needs_mass`, the solver refuses a
 /// network without masses. Only a rule that sets `needs_majoriser` gets `stiffness_reduction` and `size`. If a rule
-/// sets `is_safe`, no vertex update may raise the energy: for springs that stiffen the solver adds a line search.
+/// sets `guarantees_descent`, no vertex update may raise the energy: for springs that stiffen the solver adds a line
+/// search.
 template <class Rule, class Scalar>
 concept StepRule = Real<Scalar> && std::copyable<Rule> &&
     requires(const Rule& rule, const VertexState<Scalar>& vertex) {
@@ -67,10 +68,10 @@ template <class Rule, class Scalar>
 inline constexpr bool moves_along_force =
     std::same_as<Scalar, decltype(std::declval<const Rule&>().compliance(std::declval<const VertexState<Scalar>&>()))>;
 
-/// Whether `Rule` sets `is_safe`: its updates need no check for divergence.
+/// Whether `Rule` sets `guarantees_descent`: its updates need no check for divergence.
 template <class Rule>
-inline constexpr bool is_safe_rule = requires {
-    requires Rule::is_safe;
+inline constexpr bool is_descent_rule = requires {
+    requires Rule::guarantees_descent;
 };
 
 /// The rule as published, [Liu07] (4): dx = F dt^2 / m. It converges while dt^2 / m stays below 2 over the largest
@@ -89,7 +90,7 @@ namespace detail {
 /// No over-relaxation where constraints act: they set their forces by the response of the vertices.
 template <Number Scalar>
 [[nodiscard]] Each<Scalar> relaxation(double omega, const VertexState<Scalar>& vertex) noexcept {
-    return static_cast<Each<Scalar>>(vertex.touched ? (std::min)(omega, 1.0) : omega);
+    return static_cast<Each<Scalar>>(vertex.constrained ? (std::min)(omega, 1.0) : omega);
 }
 
 }  // namespace detail
@@ -98,7 +99,7 @@ template <Number Scalar>
 /// foundation and damping, less the work of the constraints' forces) for 0 < omega < 2: at the displacement s F it is
 /// at most E - s F^2 + s^2 F^2 stiffness / 2, which is below E for 0 < s < 2 / stiffness.
 struct SafeStep {
-    static constexpr bool is_safe = true;
+    static constexpr bool guarantees_descent = true;
 
     double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and beyond 1 may oscillate
 
@@ -123,7 +124,7 @@ struct SafeStep {
 /// and H is the Hessian of the energy, without the compression of short springs across their edges. If a contact adds a
 /// stiffness s along a normal n, s n n^T is added to H.
 struct BlockStep {
-    static constexpr bool is_safe = true, needs_majoriser = true;
+    static constexpr bool guarantees_descent = true, needs_majoriser = true;
 
     double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and may oscillate
 
@@ -138,8 +139,8 @@ namespace detail {
 
 /// Updates the inverse of H to that of H + stiffness normal normal^T [Sherman50].
 template <Number Scalar>
-[[gnu::always_inline]] inline void stiffen(Symmetric3<Scalar>& compliance, const Scalar& stiffness,
-                                           const Vector3<Scalar>& normal) noexcept {
+[[gnu::always_inline]] inline void add_stiffness(Symmetric3<Scalar>& compliance, const Scalar& stiffness,
+                                                 const Vector3<Scalar>& normal) noexcept {
     const Vector3<Scalar> along = compliance * normal;
     compliance += outer<Scalar>(-stiffness / (1 + stiffness * dot(normal, along)), along);
 }
@@ -175,7 +176,7 @@ Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) cons
     Symmetric3<Scalar> block = (-per_stiffness * part) * vertex.stiffness_reduction;
     block += diagonal3(Scalar(1));
     Symmetric3<Scalar> compliance = inverse(block, select<Scalar>(resists, relaxation * per_stiffness, Scalar(0)));
-    if (vertex.touched) detail::stiffen(compliance, vertex.contact_stiffness, vertex.contact_normal);
+    if (vertex.constrained) detail::add_stiffness(compliance, vertex.contact_stiffness, vertex.contact_normal);
     return compliance;
 }
 

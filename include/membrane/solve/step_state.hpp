@@ -54,7 +54,7 @@ struct StepState {
 
     void begin_step() noexcept;  ///< Unloads all vertices, clears all forces.
     void end_step() noexcept;    ///< Keeps the contact points of this step for the next one.
-    void forget_points() noexcept;
+    void reset_points() noexcept;
     void reset() noexcept;                                              ///< As new.
     void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< Rotates the kept vectors with the body.
 
@@ -210,7 +210,7 @@ void StepState<Scalar>::begin_step() noexcept {
 
 template <Real Scalar>
 void StepState<Scalar>::end_step() noexcept {
-    forget_points();
+    reset_points();
     std::swap(points, previous_points);
     std::swap(point_ranges, previous_ranges);
     for (std::size_t i = 0; i < previous_points.size(); ++i) {
@@ -221,7 +221,7 @@ void StepState<Scalar>::end_step() noexcept {
 }
 
 template <Real Scalar>
-void StepState<Scalar>::forget_points() noexcept {
+void StepState<Scalar>::reset_points() noexcept {
     for (const auto& point : previous_points.items()) {
         const Index v = point.corners[0];
         if (v >= 0 && v < vertex_count()) first_previous[static_cast<std::size_t>(v)] = no_index;
@@ -233,7 +233,7 @@ void StepState<Scalar>::forget_points() noexcept {
 template <Real Scalar>
 void StepState<Scalar>::reset() noexcept {
     begin_step();
-    forget_points();
+    reset_points();
     for (Rows* rows : {&position, &response, &support, &residual})
         std::fill(rows->begin(), rows->end(), PaddedPoint<Scalar>{});
 }

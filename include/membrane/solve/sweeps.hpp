@@ -248,7 +248,7 @@ struct Sweeps {
         using Outcome = typename PackedVertices<Scalar>::Outcome;
         Outcome outcome = packed.outcome(p);
         report.vertex_updates += packed.free_count(p);
-        if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+        if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
             if (outcome == Outcome::too_far) {
                 for (const Index v : packed.vertices(p)) {
                     if (scene.state.is_fixed(v) || !diverges(scene, v, rule.compliance(state_of<Rule>(scene, v))))
@@ -268,14 +268,14 @@ struct Sweeps {
         ++report.vertex_updates;
         const auto vertex = state_of<Rule>(scene, v);
         const auto move = move_of(rule, vertex, state.force_tolerance);
-        if constexpr (moves_along_force<Rule, Scalar> && !is_safe_rule<Rule>) {
+        if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
             if (move.may_overshoot && diverges(scene, v, move.compliance)) {
                 report.status = StepStatus::unstable;
                 return false;
             }
         }
         state.set_compliance(v, as_block<Scalar>(move.compliance), move.least);
-        if (vertex.touched) {
+        if (vertex.constrained) {
             state.set_internal(v, norm<Scalar>(vertex.force - state.constraint_force(v)),
                                vertex.stiffness - vertex.contact_stiffness);
         }

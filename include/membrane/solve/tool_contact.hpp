@@ -153,8 +153,8 @@ bool ToolContact<Scalar>::seed(Context& context) const noexcept {
     if (!all_are_vertices(contact.triangles) || !all_are_vertices(contact.candidates) ||
         !all_are_vertices(contact.points))
         return false;
-    for (const auto& touched : contact.triangles) {
-        for (const Index v : touched.corners) context.seed(v);
+    for (const auto& listed : contact.triangles) {
+        for (const Index v : listed.corners) context.seed(v);
     }
     return true;
 }
@@ -180,20 +180,20 @@ template <Real Scalar>
 void ToolContact<Scalar>::carry_with_tool(Context& context) const noexcept {
     const Vector3<Scalar> path = contact.axis_point - contact.previous_axis_point;
     const Scalar length = norm(path);
-    for (const auto& touched : contact.triangles) {
-        for (const Index v : touched.corners) context.keep(v);
+    for (const auto& listed : contact.triangles) {
+        for (const Index v : listed.corners) context.keep(v);
     }
-    for (const auto& touched : contact.triangles) {
-        const auto& v = touched.corners;
+    for (const auto& listed : contact.triangles) {
+        const auto& v = listed.corners;
         const auto before = kept_triangle(context, v);
         const auto hit = first_hit(before, contact.previous_axis_point, contact.axis_point);
         if (!hit) continue;
-        const Scalar part = 1 - detail::fraction(hit->along * length - contact.radius, length);
+        const Scalar part = 1 - detail::fraction(hit->fraction * length - contact.radius, length);
         for (const Index corner : v) {
             if (context.fixed(corner)) continue;
             const Vector3<Scalar> so_far = context.position(corner) - context.kept(corner);
             if (dot(so_far, path) < part * squared_norm(path)) {
-                context.place(corner, context.kept(corner) + part * path);
+                context.set_position(corner, context.kept(corner) + part * path);
             }
         }
     }
@@ -368,14 +368,14 @@ bool ToolContact<Scalar>::has_new_overlap(const Context& context) const noexcept
     const int features = feature_pairs(tool);
     const auto points = context.points();
     auto next = points.begin();  // in the same order
-    for (const auto& touched : contact.triangles) {
+    for (const auto& listed : contact.triangles) {
         for (int feature = 0; feature < features; ++feature) {
-            if (next != points.end() && next->triangle == touched.triangle && next->feature == feature) {
+            if (next != points.end() && next->triangle == listed.triangle && next->feature == feature) {
                 ++next;
                 continue;
             }
-            const auto nearest = proximity(surface_triangle(context, touched.corners), tool, feature);
-            const Scalar slack = negligible_distance(context, touched.corners[0]);
+            const auto nearest = closest_points(surface_triangle(context, listed.corners), tool, feature);
+            const Scalar slack = negligible_distance(context, listed.corners[0]);
             if (nearest && norm(nearest->separation) < contact.radius - slack) return true;
         }
     }

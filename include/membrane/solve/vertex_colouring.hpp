@@ -66,7 +66,7 @@ void VertexColouring::add(const Network& network, IndexSet& set, std::size_t beg
     for (Index group = 0; group < groups; ++group) {
         const Index first = group_end;
         group_end += std::exchange(fill_[at(group)], first);
-        ends_.push(begin + at(group_end));
+        ends_.try_push_back(begin + at(group_end));
     }
     for (const Index v : vertices) order_[at(fill_[at(std::exchange(group_of_[at(v)], no_index))]++)] = v;
     set.reorder(begin, std::span(order_).first(vertices.size()));

@@ -63,7 +63,7 @@ template <class Rule, Number N>
     move.compliance = compliance;
     if constexpr (moves_along_force<Rule, N>) {
         move.least = compliance;
-        move.may_overshoot = is_safe_rule<Rule> ? N(0) > N(0) : compliance * vertex.stiffness >= 2;
+        move.may_overshoot = is_descent_rule<Rule> ? N(0) > N(0) : compliance * vertex.stiffness >= 2;
     } else {
         const auto resists = vertex.stiffness > 0;
         move.least = select<N>(resists, 1 / select<N>(resists, vertex.stiffness, 1), 0);
@@ -78,7 +78,7 @@ template <class Rule, Number N>
 
 /// Force and stiffness on vertex `v` by foundation, damping and constraints, without the network.
 template <class Scalar, class Network, class Volume>
-[[nodiscard]] VertexForce<Scalar> others_on(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
+[[nodiscard]] VertexForce<Scalar> non_network_force(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
     const auto& state = scene.state;
     const Scalar stiffness = state.contact_stiffness(v) + state.added_stiffness[static_cast<std::size_t>(v)];
     if constexpr (std::is_same_v<Volume, NoFoundation>) return {state.constraint_force(v), stiffness};
@@ -89,7 +89,7 @@ template <class Scalar, class Network, class Volume>
 /// Sum of all forces on vertex `v`, and its stiffness.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] VertexForce<Scalar> total_force(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
-    const auto springs = scene.network.force_on(v, scene.x), others = others_on(scene, v);
+    const auto springs = scene.network.force_on(v, scene.x), others = non_network_force(scene, v);
     return {springs.force + others.force, springs.stiffness + others.stiffness};
 }
 
@@ -119,13 +119,13 @@ template <class Rule, class Scalar, class Network, class Volume>
         state.force = springs.force;
         state.stiffness = springs.stiffness;
     }
-    const auto others = others_on(scene, v);
+    const auto others = non_network_force(scene, v);
     state.force += others.force;
     state.stiffness += others.stiffness;
     state.mass = scene.network.has_masses() ? scene.network.mass(v) : Scalar(0);
     state.dt = scene.dt;
-    state.touched = scene.state.seeds.contains(v);
-    if (state.touched) {
+    state.constrained = scene.state.seeds.contains(v);
+    if (state.constrained) {
         state.contact_stiffness = scene.state.contact_stiffness(v);
         state.contact_normal = direction_or_zero(scene.state.constraint_force(v));
     }
@@ -135,7 +135,7 @@ template <class Rule, class Scalar, class Network, class Volume>
 /// Whether updates of a vertex by `compliance` times its force diverge: each overshoots by more than the last.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] bool diverges(const StepInput<Scalar, Network, Volume>& scene, Index v, Scalar compliance) noexcept {
-    const Scalar others = others_on(scene, v).stiffness;
+    const Scalar others = non_network_force(scene, v).stiffness;
     if (compliance * (stiffness_bound_of(scene.network.majoriser(v, scene.x)) + others) < 2) return false;
     return compliance * (largest_eigenvalue_at<Scalar>(scene.network, v, scene.x) + others) >= 2;
 }
@@ -145,8 +145,8 @@ template <class Scalar, class Network, class Volume>
 template <class Rule, class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> backtracked(const StepInput<Scalar, Network, Volume>& scene, Index v,
                                           std::type_identity_t<Vector3<Scalar>> displacement) noexcept {
-    if constexpr (!Network::never_stiffens && is_safe_rule<Rule>) {
-        const auto others = others_on(scene, v);
+    if constexpr (!Network::never_stiffens && is_descent_rule<Rule>) {
+        const auto others = non_network_force(scene, v);
         for (int i = 0; i < std::numeric_limits<Scalar>::digits; ++i, displacement /= 2) {
             const Scalar work = dot(others.force, displacement) - others.stiffness * squared_norm(displacement) / 2;
             const auto energy = scene.network.energy_change(v, displacement, scene.x);

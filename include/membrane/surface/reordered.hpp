@@ -7,7 +7,7 @@
 #include <numeric>
 #include <vector>
 
-#include <membrane/surface/box.hpp>
+#include <membrane/surface/aabb.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
 /// A mesh in an order in which elements close in space are close in memory.
@@ -58,7 +58,7 @@ template <class Key>
 template <Real Scalar>
 ReorderedMesh<Scalar> reordered(const TriangleMesh<Scalar>& mesh) {
     const auto& x = mesh.positions();
-    Box<Scalar> all;
+    Aabb<Scalar> all;
     for (Index v = 0; v < mesh.vertex_count(); ++v) all.include(point(x, v));
     const Vector3<Scalar> low = all.low, size = all.high - all.low;
     const Scalar cells = Scalar(1 << 21) * (1 - Scalar(1e-6)), per_metre = cells / size.maxCoeff();

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include <membrane/surface/box.hpp>
+#include <membrane/surface/aabb.hpp>
 #include <membrane/surface/triangle.hpp>
 
 namespace membrane {
@@ -49,7 +49,7 @@ template <Real Scalar>
 
 template <Real Scalar>
 Scalar time_of_impact(const Triangle<Scalar>& from, const Triangle<Scalar>& to, const Vector3<Scalar>& q) noexcept {
-    Box<Scalar> swept = bounds(from);
+    Aabb<Scalar> swept = bounds(from);
     swept.include(bounds(to));
     if (!contains(swept, q)) return 1;
 

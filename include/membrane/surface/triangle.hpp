@@ -9,7 +9,7 @@
 #include <membrane/core/check.hpp>
 #include <membrane/core/lanes.hpp>
 
-/// Proximity of one triangle to a point, a segment or a box.
+/// Distances of one triangle from a point, a segment or a box.
 ///
 ///     const auto triangle = membrane::triangle_at(x, mesh.triangles().col(f));
 ///     const auto nearest  = membrane::closest_point(triangle, tool.position);
@@ -37,14 +37,14 @@ struct TrianglePoint {
 /// A point of a segment and the point of a triangle nearest to it.
 template <Real Scalar>
 struct SegmentPair {
-    Scalar along;  ///< 0 at the segment's start, 1 at its end.
+    Scalar fraction;  ///< 0 at the segment's start, 1 at its end.
     TrianglePoint<Scalar> on_triangle;
 };
 
 /// Where a segment enters a triangle.
 template <Real Scalar>
 struct SegmentHit {
-    Scalar along;  ///< 0 at the segment's start, 1 at its end.
+    Scalar fraction;  ///< 0 at the segment's start, 1 at its end.
     Vector3<Scalar> barycentric;
 };
 
@@ -213,7 +213,7 @@ namespace detail {
 /// The nearest points of a segment and an edge.
 template <Number N>
 struct SegmentAndEdge {
-    N along, foot;  ///< fraction of the segment, and of the edge: 0 to 1
+    N fraction, foot;  ///< of the segment, and of the edge: 0 to 1
 };
 
 /// The nearest points of two lines, each then clamped to its segment in turn [Ericson05] 5.1.9. `offset` runs from the
@@ -245,7 +245,7 @@ template <Real Scalar>
 SegmentPair<Scalar> closest_to_segment(const Triangle<Scalar>& triangle, const Vector3<Scalar>& p,
                                        const Vector3<Scalar>& q) noexcept {
     if (const auto hit = first_hit(triangle, p, q)) {
-        return {hit->along, {hit->barycentric, point_at(triangle, hit->barycentric), 0}};
+        return {hit->fraction, {hit->barycentric, point_at(triangle, hit->barycentric), 0}};
     }
     SegmentPair<Scalar> best{0, closest_point(triangle, p)};
     const auto end = closest_point(triangle, q);

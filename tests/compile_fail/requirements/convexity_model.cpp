@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // wrong: ConvexityModel: must be copyable
 // wrong: ConvexityModel: must have a constructor from const EquilibriumProblem&
-// wrong: ConvexityModel: around(const EquilibriumProblem&, double radius) noexcept must return double
+// wrong: ConvexityModel: eigenvalue_bound(const EquilibriumProblem&, double radius) noexcept must return double
 #include <membrane/accuracy/convexity.hpp>
 
 struct Guess {
@@ -11,7 +11,7 @@ struct Guess {
 #if WRONG == 1
     Guess(const Guess&) = delete;
 #endif
-    double around(const membrane::EquilibriumProblem&, double radius) noexcept(WRONG != 3);
+    double eigenvalue_bound(const membrane::EquilibriumProblem&, double radius) noexcept(WRONG != 3);
 };
 
 static_assert(membrane::CheckedConvexityModel<Guess>);

@@ -1,6 +1,6 @@
-// SPDX-License-Identifier: MIT
-// The default order updates several vertices at once, and not nearest to the contact first within a layer as [Liu07] has it:
-// is the force any worse for it, where a tool presses and slides, and where forceps hold one triangle and layers decide?
+// SPDX-License-Identifier: MIT The default order updates several vertices at once, and not nearest to the contact first
+// within a layer as [Liu07] has it: is the force any worse for it, where a tool presses and slides, and where forceps
+// hold one triangle and layers decide?
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -55,12 +55,12 @@ TEST_CASE("the default order of updates costs no accuracy, in press and pull, at
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
         const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0});
         for (const bool pulls : {false, true}) {
-            const Stroke<double> stroke(mesh, pulls ? pull() : press(), tick);
+            const ToolTrajectory<double> stroke(mesh, pulls ? pull() : press(), tick);
             const auto references = equilibria(mesh, network, foundation, stroke, 6);
             REQUIRE(references.size() == 15);
             const auto error = [&](UpdateOrder order, Index layers, Index sweeps) {
                 const SolverOptions<double> options{.layers = layers, .sweeps = sweeps, .order = order};
-                return trial(mesh, network, foundation, stroke, references, options).force_error;
+                return run_trial(mesh, network, foundation, stroke, references, options).force_error;
             };
             for (const auto& [layers, sweeps] : {std::pair<Index, Index>{6, 2}, {3, 1}, {6, 8}}) {
                 CAPTURE(mesh.vertex_count(), pulls, layers, sweeps);

@@ -34,9 +34,9 @@ template <Real Number, Real Scalar>
 /// with the body. Arguments are transformed to the rest pose of the body, results back. A short-lived view of both, see
 /// `on`.
 template <class Volume, Real Scalar>
-class MovedVolume {
+class MovingFoundation {
   public:
-    MovedVolume(const MovingBody<Scalar>& body, const Volume& volume) noexcept : body_(&body), volume_(&volume) {}
+    MovingFoundation(const MovingBody<Scalar>& body, const Volume& volume) noexcept : body_(&body), volume_(&volume) {}
 
     /// The body, with which a solver carries the membrane along.
     [[nodiscard]] const MovingBody<Scalar>& body() const noexcept { return *body_; }
@@ -110,11 +110,11 @@ class MovedVolume {
 
 /// `volume`, made for the body at rest, on the current `body`. Both must outlive the result.
 template <Real Scalar, FoundationModel<Scalar> Volume>
-[[nodiscard]] MovedVolume<Volume, Scalar> on(const MovingBody<Scalar>& body, const Volume& volume) noexcept {
+[[nodiscard]] MovingFoundation<Volume, Scalar> on(const MovingBody<Scalar>& body, const Volume& volume) noexcept {
     return {body, volume};
 }
 
-static_assert(FoundationModel<MovedVolume<VirtualVolumeSprings<float>, float>, float>);
-static_assert(FoundationModel<MovedVolume<NoFoundation, double>, double>);
+static_assert(FoundationModel<MovingFoundation<VirtualVolumeSprings<float>, float>, float>);
+static_assert(FoundationModel<MovingFoundation<NoFoundation, double>, double>);
 
 }  // namespace membrane

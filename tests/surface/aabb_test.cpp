@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/surface/box.hpp>
+#include <membrane/surface/aabb.hpp>
 
 #include <algorithm>
 #include <array>
@@ -17,8 +17,8 @@ using test::Random;
 namespace {
 
 template <class S>
-Box<S> random_box(Random& random) {
-    Box<S> box;
+Aabb<S> random_box(Random& random) {
+    Aabb<S> box;
     box.include(random.vector<S>());
     box.include(random.vector<S>());
     if (random.chance(0.2)) box.high[0] = box.low[0];  // flat
@@ -27,19 +27,19 @@ Box<S> random_box(Random& random) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[box]", float, double) {
+TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[aabb]", float, double) {
     using S = TestType;
-    Box<S> box;
+    Aabb<S> box;
     CHECK((box.low.eigen().array() > box.high.eigen().array()).all());
     box.include(Vector3<S>(1, 2, 3));
     CHECK(box.low == box.high);
     box.include(Vector3<S>(0, 5, 3));
     CHECK(box.low == Vector3<S>(0, 2, 3));
     CHECK(box.high == Vector3<S>(1, 5, 3));
-    box.include(Box<S>{{0, 0, 0}, {1, 1, 9}});
+    box.include(Aabb<S>{{0, 0, 0}, {1, 1, 9}});
     CHECK(box.low == Vector3<S>(0, 0, 0));
     CHECK(box.high == Vector3<S>(1, 5, 9));
-    box.include(Box<S>{});  // nothing
+    box.include(Aabb<S>{});  // nothing
     box.include(Vector3<S>::Constant(std::numeric_limits<S>::quiet_NaN()));
     CHECK(box.low == Vector3<S>(0, 0, 0));
     CHECK(box.high == Vector3<S>(1, 5, 9));
@@ -49,30 +49,30 @@ TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[box]", flo
     CHECK(around.high == Vector3<S>(2, 6, 0));
 }
 
-TEST_CASE("the longest axis is the first of the longest", "[box]") {
-    CHECK(major_axis(Box<double>{{0, 0, 0}, {1, 1, 1}}) == 0);
-    CHECK(major_axis(Box<double>{{0, 0, 0}, {1, 2, 2}}) == 1);
-    CHECK(major_axis(Box<double>{{0, 0, 0}, {2, 1, 2}}) == 0);
-    CHECK(major_axis(Box<double>{{0, 0, -1}, {1, 1, 1}}) == 2);
+TEST_CASE("the longest axis is the first of the longest", "[aabb]") {
+    CHECK(major_axis(Aabb<double>{{0, 0, 0}, {1, 1, 1}}) == 0);
+    CHECK(major_axis(Aabb<double>{{0, 0, 0}, {1, 2, 2}}) == 1);
+    CHECK(major_axis(Aabb<double>{{0, 0, 0}, {2, 1, 2}}) == 0);
+    CHECK(major_axis(Aabb<double>{{0, 0, -1}, {1, 1, 1}}) == 2);
 }
 
-TEST_CASE("boxes overlap when no axis separates them, borders included", "[box]") {
-    const Box<double> box{{0, 0, 0}, {1, 2, 3}};
+TEST_CASE("boxes overlap when no axis separates them, borders included", "[aabb]") {
+    const Aabb<double> box{{0, 0, 0}, {1, 2, 3}};
     CHECK(overlap(box, {{1, 2, 3}, {4, 4, 4}}));
     CHECK(overlap(box, {{0.5, 0.5, 0.5}, {0.6, 0.6, 0.6}}));
-    CHECK(overlap(Box<double>{{-1, -1, -1}, {9, 9, 9}}, box));
+    CHECK(overlap(Aabb<double>{{-1, -1, -1}, {9, 9, 9}}, box));
     for (int k = 0; k < 3; ++k) {
-        Box<double> beside = box;
+        Aabb<double> beside = box;
         beside.low[k] += box.high[k] * 1.001;
         beside.high[k] += box.high[k] * 1.001;
         CHECK_FALSE(overlap(box, beside));
         CHECK_FALSE(overlap(beside, box));
     }
-    CHECK_FALSE(overlap(box, Box<double>{}));
+    CHECK_FALSE(overlap(box, Aabb<double>{}));
 }
 
-TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther than its reach", "[box]", float,
-                   double) {
+TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther than its farthest corner", "[aabb]",
+                   float, double) {
     using S = TestType;
     for (int seed = 1; seed <= cases(2000); ++seed) {
         CAPTURE(seed);
@@ -90,10 +90,10 @@ TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther t
         if (squared_distance(box, q) > 0) continue;
         CHECK((at_most(box.low, q) && at_most(q, box.high)));
     }
-    CHECK(squared_distance(Box<S>{}, Vector3<S>(0, 0, 0)) == std::numeric_limits<S>::infinity());
+    CHECK(squared_distance(Aabb<S>{}, Vector3<S>(0, 0, 0)) == std::numeric_limits<S>::infinity());
 }
 
-TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[box]", float, double) {
+TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[aabb]", float, double) {
     using S = TestType;
     int touching = 0, missing = 0;
     for (int seed = 1; seed <= cases(20'000); ++seed) {
@@ -135,16 +135,16 @@ TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[box]", floa
     CHECK(missing > cases(3000));
 }
 
-TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[box][lanes]", float, double) {
+TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[aabb][lanes]", float, double) {
     using S = TestType;
     using Wide = Lanes<S>;
     for (int seed = 1; seed <= cases(2000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         std::array<Triangle<S>, Wide::count> each;
-        std::array<Box<S>, Wide::count> box;
+        std::array<Aabb<S>, Wide::count> box;
         Triangle<Wide> triangles;
-        Box<Wide> boxes;
+        Aabb<Wide> boxes;
         for (std::size_t i = 0; i < Wide::count; ++i) {
             each[i] = {random.vector<S>(), random.vector<S>(), random.vector<S>()};
             box[i] = random_box<S>(random);
@@ -158,7 +158,7 @@ TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[box][la
         }
         Vector3<S> q = random.vector<S>(-2, 2), p = random.vector<S>(-2, 2);
         if (random.chance(0.2)) p[random.index(3)] = q[0];
-        const Box<S> other = random_box<S>(random);
+        const Aabb<S> other = random_box<S>(random);
         const CapsuleQuery<S> probe(q, p, random.number<S>(0, S(0.2)), other);
         const auto around = bounds(triangles);
         for (std::size_t i = 0; i < Wide::count; ++i) {
@@ -174,8 +174,8 @@ TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[box][la
     }
 }
 
-TEST_CASE("boxes lie within others, overlap, or have a gap between them", "[box]") {
-    const auto inside = [](const Box<double>& a, const Box<double>& b) {
+TEST_CASE("boxes lie within others, overlap, or have a gap between them", "[aabb]") {
+    const auto inside = [](const Aabb<double>& a, const Aabb<double>& b) {
         bool all = true;
         for (Index k = 0; k < 3; ++k) all &= a.low[k] <= b.low[k] && b.high[k] <= a.high[k];
         return all;
@@ -184,8 +184,8 @@ TEST_CASE("boxes lie within others, overlap, or have a gap between them", "[box]
     for (int seed = 1; seed <= cases(2'000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        Box<double> a, b;
-        for (Box<double>* box : {&a, &b}) {
+        Aabb<double> a, b;
+        for (Aabb<double>* box : {&a, &b}) {
             for (int i = 0; i < 2 + random.index(6); ++i) box->include(random.vector<double>());
         }
         REQUIRE(contains(a, b) == inside(a, b));
@@ -198,5 +198,5 @@ TEST_CASE("boxes lie within others, overlap, or have a gap between them", "[box]
     }
     CHECK(within > 0);
     CHECK(apart > 0);
-    CHECK(gap_between(Box<double>{{0, 0, 0}, {1, 1, 1}}, Box<double>{{0, 3, 1}, {1, 4, 2}}) == 2);
+    CHECK(gap_between(Aabb<double>{{0, 0, 0}, {1, 1, 1}}, Aabb<double>{{0, 3, 1}, {1, 4, 2}}) == 2);
 }

@@ -7,11 +7,11 @@ namespace test {
 
 /// Steps of `dt` until nothing is left to do, or `most` of them; the last one's report.
 ///
-///     const auto report = test::settle(solver, x, dt, network, foundation, membrane::pull(v, target));
+///     const auto report = test::run_to_equilibrium(solver, x, dt, network, foundation, membrane::pull(v, target));
 ///     REQUIRE(report.converged);
 template <class Solver, class Positions, class Network, class Volume, class... Constraints>
-auto settle_within(int most, Solver& solver, Positions& x, typename Network::Scalar dt, const Network& network,
-                   const Volume& volume, const Constraints&... constraints) {
+auto run_within(int most, Solver& solver, Positions& x, typename Network::Scalar dt, const Network& network,
+                const Volume& volume, const Constraints&... constraints) {
     auto report = solver.step(x, dt, network, volume, constraints...);
     for (int i = 1; i < most && !report.converged; ++i) {
         if (report.status != membrane::StepStatus::advanced) break;
@@ -21,9 +21,9 @@ auto settle_within(int most, Solver& solver, Positions& x, typename Network::Sca
 }
 
 template <class Solver, class Positions, class Network, class Volume, class... Constraints>
-auto settle(Solver& solver, Positions& x, typename Network::Scalar dt, const Network& network, const Volume& volume,
-            const Constraints&... constraints) {
-    return settle_within(100'000, solver, x, dt, network, volume, constraints...);
+auto run_to_equilibrium(Solver& solver, Positions& x, typename Network::Scalar dt, const Network& network,
+                        const Volume& volume, const Constraints&... constraints) {
+    return run_within(100'000, solver, x, dt, network, volume, constraints...);
 }
 
 }  // namespace test

@@ -19,5 +19,5 @@ using Backing = Tether;
 
 auto error(membrane::ErrorBound<>& bound, const membrane::Points<double>& x,
            const membrane::MassSpringNetwork<double, membrane::LinearSpring>& network) {
-    return bound.of(x, network, Backing{});
+    return bound.compute(x, network, Backing{});
 }

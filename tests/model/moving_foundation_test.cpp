@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/moved_volume.hpp>
+#include <membrane/model/moving_foundation.hpp>
 
 #include <limits>
 
@@ -37,7 +37,8 @@ Symmetric3<S> outward_stiffness(S normal, S tangential, const Vector3<S>& n) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("on a body that moves rigidly every model pulls as at rest, turned", "[moved]", double, float) {
+TEMPLATE_TEST_CASE("on a body that moves rigidly every model pulls as at rest, turned", "[moving_foundation]", double,
+                   float) {
     using S = TestType;
     const S tolerance = 3000 * std::numeric_limits<S>::epsilon();
     for (int seed = 1; seed <= cases(50); ++seed) {
@@ -84,7 +85,8 @@ TEMPLATE_TEST_CASE("on a body that moves rigidly every model pulls as at rest, t
     }
 }
 
-TEST_CASE("on a body that is deformed springs pull to the anchors, and a foundation as its surface faces", "[moved]") {
+TEST_CASE("on a body that is deformed springs pull to the anchors, and a foundation as its surface faces",
+          "[moving_foundation]") {
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -108,7 +110,7 @@ TEST_CASE("on a body that is deformed springs pull to the anchors, and a foundat
     }
 }
 
-TEST_CASE("what goes along with its body is not damped, and what stays behind is", "[moved]") {
+TEST_CASE("what goes along with its body is not damped, and what stays behind is", "[moving_foundation]") {
     Random random(1);
     const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
     const VirtualVolumeSprings volume(mesh, {.stiffness = 3.0, .damping = 0.5});
