@@ -44,8 +44,8 @@ using PointsRef = Eigen::Ref<Points<Scalar>, 0, Eigen::OuterStride<>>;
 template <Real Scalar>
 using ConstPointsRef = Eigen::Ref<const Points<Scalar>, 0, Eigen::OuterStride<>>;
 
-/// Point `v` of `x`, by value. Reads number by number: compilers generate better code than for a column, and from memory
-/// where `x` is columns in memory: without optimisation that costs a third.
+/// Point `v` of `x`, by value. Reads number by number: compilers generate better code than for a column. Where `x` has
+/// its points in memory, reads from there, which without optimisation costs a third.
 template <class Positions>
 [[nodiscard]] auto point(const Positions& x, Index v) noexcept {
     using Point = Vector3<typename Positions::Scalar>;
