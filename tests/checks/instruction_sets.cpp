@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // A user's program of units for several instruction sets, in parts: -D MAKE, -D STEP (both with -D UNIT=NAME), -D ALL_MAIN,
-// -D CROSSING_MAIN, -D GIVE, -D TAKE_MAIN. The linker takes `Scene`'s own functions from any unit that has them.
+// -D CROSSING_MAIN (with -D UNIT), -D GIVE, -D TAKE_MAIN. The linker takes `Scene`'s own functions from any unit that has them.
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -35,6 +35,10 @@ namespace avx2 {
 Scene* make();
 double step(Scene* scene);
 }  // namespace avx2
+namespace portable {
+Scene* make();
+double step(Scene* scene);
+}  // namespace portable
 
 #if defined(MAKE)
 Scene* UNIT::make() {
@@ -68,12 +72,13 @@ double UNIT::step(Scene* scene) {
 #elif defined(ALL_MAIN)
 int main() {
     const double force = sse2::step(sse2::make());
-    for (const double other : {avx2::step(avx2::make()), avx2::step(sse2::make()), sse2::step(avx2::make())}) {
-        if (!(force > 0.01 && std::abs(other - force) < 1e-9)) return std::printf("%.17g N, %.17g N\n", force, other);
+    for (const double other : {avx2::step(avx2::make()), portable::step(portable::make()), avx2::step(sse2::make()),
+                               sse2::step(avx2::make()), portable::step(avx2::make()), sse2::step(portable::make())}) {
+        if (!(force > 0.01 && other == force)) return std::printf("%.17g N, %.17g N\n", force, other);
     }
 }
 #elif defined(CROSSING_MAIN)
-int main() { return avx2::step(sse2::make()) > 0 ? 0 : 1; }
+int main() { return UNIT::step(sse2::make()) > 0 ? 0 : 1; }
 #elif defined(GIVE)
 membrane::AabbTree<double>* given() { return nullptr; }
 void take(const membrane::AabbTree<double>*) {}

@@ -216,7 +216,7 @@ Aabb<Scalar> WideBvh<Scalar>::box_in(Index slot) const noexcept {
 }
 
 template <Real Scalar>
-[[gnu::always_inline]] inline void WideBvh<Scalar>::fit_leaf(const ConstPointsRef<Scalar>& x, Index leaf) noexcept {
+MEMBRANE_INLINE void WideBvh<Scalar>::fit_leaf(const ConstPointsRef<Scalar>& x, Index leaf) noexcept {
     using Limits = std::numeric_limits<Scalar>;
     const Scalar* const first = x.data();
     const std::ptrdiff_t stride = x.outerStride();
@@ -249,7 +249,7 @@ void WideBvh<Scalar>::fit_node(Index n) noexcept {
 }
 
 template <Real Scalar>
-[[gnu::always_inline]] inline void WideBvh<Scalar>::put(const Aabb<Scalar>& box, Index slot) noexcept {
+MEMBRANE_INLINE void WideBvh<Scalar>::put(const Aabb<Scalar>& box, Index slot) noexcept {
     auto& boxes = nodes_[static_cast<std::size_t>(slot) / width].boxes;
     const std::size_t i = static_cast<std::size_t>(slot) % width;
     for (int k = 0; k < 3; ++k) {

@@ -1,23 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <limits>
-#include <type_traits>
-#include <utility>
 
 #include <membrane/core/instruction_set.hpp>
 #include <membrane/core/types.hpp>
-
-#if defined(__AVX__)
-#include <immintrin.h>
-#elif defined(__SSE2__)
-#include <emmintrin.h>
-#endif
 
 /// A pack of numbers in SIMD registers, with the same operation on each.
 ///
@@ -27,37 +17,33 @@ namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-#if defined(__AVX__)
-inline constexpr std::size_t register_bytes = 32;
-#else
-inline constexpr std::size_t register_bytes = 16;
-#endif
-
-template <class Scalar, std::size_t bytes = register_bytes>
-struct Register {
-    using Type __attribute__((vector_size(bytes))) = Scalar;
-};
-
 /// 8 floats or 4 doubles, on every processor. Each lane gives the same bits as scalar arithmetic.
 template <Real Scalar>
 class Lanes {
+    // Operations are written out for the first and the last register, without a loop, which is slow without
+    // optimisation. Where one register holds all lanes, it is both, and the compiler computes it once.
+    using Registers = Register<Scalar>;
+    static constexpr std::size_t width = Registers::size;
+
   public:
     using Each = Scalar;
     static constexpr std::size_t count = 32 / sizeof(Scalar);
 
-    /// One register; `parts` of them hold all lanes.
-    using Part = typename Register<Scalar>::Type;
-    static constexpr std::size_t parts = 32 / register_bytes;
+    /// One register; `parts` of them hold all lanes, one or two.
+    using Part = typename Registers::Type;
+    static constexpr std::size_t parts = count / width;
 
     Lanes() = default;
-    Lanes(Scalar all) noexcept {  // NOLINT(google-explicit-constructor): one number stands for all lanes
-        for (auto& part : parts_) part = all - Part{};  // keeps the sign of a zero
+    MEMBRANE_INLINE Lanes(Scalar all) noexcept {  // NOLINT(google-explicit-constructor): one number for all lanes
+        const Part part = Registers::all(all);
+        parts_[0] = part;
+        parts_[last] = part;
     }
 
     /// `count` numbers, one after the other.
-    [[nodiscard]] static Lanes load(const Scalar* from) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE static Lanes load(const Scalar* from) noexcept {
         Lanes lanes;
-        std::memcpy(lanes.parts_.data(), from, sizeof lanes.parts_);
+        std::memcpy(lanes.parts_, from, sizeof lanes.parts_);
         return lanes;
     }
 
@@ -76,178 +62,123 @@ class Lanes {
         }
         return lanes;
     }
-    void store(Scalar* to) const noexcept { std::memcpy(to, parts_.data(), sizeof parts_); }
-    [[nodiscard]] Scalar operator[](std::size_t i) const noexcept { return parts_[i / width][i % width]; }
-    void set(std::size_t i, Scalar value) noexcept { parts_[i / width][i % width] = value; }
-    [[nodiscard]] Part& part(std::size_t i) noexcept { return parts_[i]; }
-    [[nodiscard]] const Part& part(std::size_t i) const noexcept { return parts_[i]; }
+    MEMBRANE_INLINE void store(Scalar* to) const noexcept { std::memcpy(to, parts_, sizeof parts_); }
+    [[nodiscard]] MEMBRANE_INLINE Scalar operator[](std::size_t i) const noexcept {
+        return parts_[i / width][i % width];
+    }
+    MEMBRANE_INLINE void set(std::size_t i, Scalar value) noexcept { parts_[i / width][i % width] = value; }
+    [[nodiscard]] MEMBRANE_INLINE Part& part(std::size_t i) noexcept { return parts_[i]; }
+    [[nodiscard]] MEMBRANE_INLINE const Part& part(std::size_t i) const noexcept { return parts_[i]; }
 
-    [[nodiscard]] friend Lanes operator+(const Lanes& a, const Lanes& b) noexcept {
-        return each([](auto x, auto y) { return x + y; }, a, b);
+    [[nodiscard]] MEMBRANE_INLINE friend Lanes operator+(const Lanes& a, const Lanes& b) noexcept {
+        return {a.parts_[0] + b.parts_[0], a.parts_[last] + b.parts_[last]};
     }
-    [[nodiscard]] friend Lanes operator-(const Lanes& a, const Lanes& b) noexcept {
-        return each([](auto x, auto y) { return x - y; }, a, b);
+    [[nodiscard]] MEMBRANE_INLINE friend Lanes operator-(const Lanes& a, const Lanes& b) noexcept {
+        return {a.parts_[0] - b.parts_[0], a.parts_[last] - b.parts_[last]};
     }
-    [[nodiscard]] friend Lanes operator*(const Lanes& a, const Lanes& b) noexcept {
-        return each([](auto x, auto y) { return x * y; }, a, b);
+    [[nodiscard]] MEMBRANE_INLINE friend Lanes operator*(const Lanes& a, const Lanes& b) noexcept {
+        return {a.parts_[0] * b.parts_[0], a.parts_[last] * b.parts_[last]};
     }
-    [[nodiscard]] friend Lanes operator/(const Lanes& a, const Lanes& b) noexcept {
-        return each([](auto x, auto y) { return x / y; }, a, b);
+    [[nodiscard]] MEMBRANE_INLINE friend Lanes operator/(const Lanes& a, const Lanes& b) noexcept {
+        return {a.parts_[0] / b.parts_[0], a.parts_[last] / b.parts_[last]};
     }
-    [[nodiscard]] Lanes operator-() const noexcept {
-        return each([](auto x, auto) { return -x; }, *this, *this);
-    }
-    Lanes& operator+=(const Lanes& b) noexcept { return *this = *this + b; }
-    Lanes& operator-=(const Lanes& b) noexcept { return *this = *this - b; }
-    Lanes& operator*=(const Lanes& b) noexcept { return *this = *this * b; }
-    Lanes& operator/=(const Lanes& b) noexcept { return *this = *this / b; }
+    [[nodiscard]] MEMBRANE_INLINE Lanes operator-() const noexcept { return {-parts_[0], -parts_[last]}; }
+    MEMBRANE_INLINE Lanes& operator+=(const Lanes& b) noexcept { return *this = *this + b; }
+    MEMBRANE_INLINE Lanes& operator-=(const Lanes& b) noexcept { return *this = *this - b; }
+    MEMBRANE_INLINE Lanes& operator*=(const Lanes& b) noexcept { return *this = *this * b; }
+    MEMBRANE_INLINE Lanes& operator/=(const Lanes& b) noexcept { return *this = *this / b; }
 
     /// A boolean for each lane.
     class Mask {
       public:
-        using PartMask = decltype(Part{} < Part{});
+        using PartMask = typename Registers::Mask;
 
-        [[nodiscard]] friend Mask operator&(const Mask& a, const Mask& b) noexcept {
-            Mask both;
-            for (std::size_t i = 0; i < parts; ++i) both.parts_[i] = a.parts_[i] & b.parts_[i];
-            return both;
+        Mask() = default;
+        MEMBRANE_INLINE Mask(const PartMask& first_part, const PartMask& last_part) noexcept {
+            parts_[0] = first_part;
+            parts_[last] = last_part;
         }
-        [[nodiscard]] friend Mask operator|(const Mask& a, const Mask& b) noexcept {
-            Mask either;
-            for (std::size_t i = 0; i < parts; ++i) either.parts_[i] = a.parts_[i] | b.parts_[i];
-            return either;
+        [[nodiscard]] MEMBRANE_INLINE friend Mask operator&(const Mask& a, const Mask& b) noexcept {
+            return {a.parts_[0] & b.parts_[0], a.parts_[last] & b.parts_[last]};
         }
-        [[nodiscard]] Mask operator!() const noexcept {
-            Mask none;
-            for (std::size_t i = 0; i < parts; ++i) none.parts_[i] = ~parts_[i];
-            return none;
+        [[nodiscard]] MEMBRANE_INLINE friend Mask operator|(const Mask& a, const Mask& b) noexcept {
+            return {a.parts_[0] | b.parts_[0], a.parts_[last] | b.parts_[last]};
         }
-        [[nodiscard]] friend bool all(const Mask& mask) noexcept { return !any(!mask); }
-        [[nodiscard]] friend bool any(const Mask& mask) noexcept { return bits(mask) != 0; }
+        [[nodiscard]] MEMBRANE_INLINE Mask operator!() const noexcept { return {~parts_[0], ~parts_[last]}; }
+        [[nodiscard]] MEMBRANE_INLINE friend bool all(const Mask& mask) noexcept { return !any(!mask); }
+        [[nodiscard]] MEMBRANE_INLINE friend bool any(const Mask& mask) noexcept { return bits(mask) != 0; }
 
         /// Lane i in bit i.
-        [[nodiscard]] friend std::uint32_t bits(const Mask& mask) noexcept {
-            std::uint32_t all = 0;
-            for (std::size_t i = 0; i < parts; ++i) all |= bits_of(mask.parts_[i]) << (i * count / parts);
-            return all;
+        [[nodiscard]] MEMBRANE_INLINE friend std::uint32_t bits(const Mask& mask) noexcept {
+            return Registers::bits(mask.parts_[0]) | Registers::bits(mask.parts_[last]) << last * width;
         }
 
       private:
         friend Lanes;
-        static std::uint32_t bits_of(const PartMask& mask) noexcept {
-#if defined(__AVX__)
-            if constexpr (sizeof(Scalar) == 4)
-                return static_cast<std::uint32_t>(_mm256_movemask_ps(reinterpret_cast<Part>(mask)));
-            else
-                return static_cast<std::uint32_t>(_mm256_movemask_pd(reinterpret_cast<Part>(mask)));
-#elif defined(__SSE2__)
-            if constexpr (sizeof(Scalar) == 4)
-                return static_cast<std::uint32_t>(_mm_movemask_ps(reinterpret_cast<Part>(mask)));
-            else
-                return static_cast<std::uint32_t>(_mm_movemask_pd(reinterpret_cast<Part>(mask)));
-#else
-            std::uint32_t all = 0;
-            for (std::size_t i = 0; i < count / parts; ++i) all |= static_cast<std::uint32_t>(mask[i] != 0) << i;
-            return all;
-#endif
-        }
-
-        std::array<PartMask, parts> parts_;
+        PartMask parts_[parts];
     };
 
-    [[nodiscard]] friend Mask operator<(const Lanes& a, const Lanes& b) noexcept {
-        return compare([](auto x, auto y) { return x < y; }, a, b);
+    [[nodiscard]] MEMBRANE_INLINE friend Mask operator<(const Lanes& a, const Lanes& b) noexcept {
+        return {a.parts_[0] < b.parts_[0], a.parts_[last] < b.parts_[last]};
     }
-    [[nodiscard]] friend Mask operator<=(const Lanes& a, const Lanes& b) noexcept {
-        return compare([](auto x, auto y) { return x <= y; }, a, b);
+    [[nodiscard]] MEMBRANE_INLINE friend Mask operator<=(const Lanes& a, const Lanes& b) noexcept {
+        return {a.parts_[0] <= b.parts_[0], a.parts_[last] <= b.parts_[last]};
     }
-    [[nodiscard]] friend Mask operator>(const Lanes& a, const Lanes& b) noexcept { return b < a; }
-    [[nodiscard]] friend Mask operator>=(const Lanes& a, const Lanes& b) noexcept {
-        return compare([](auto x, auto y) { return x >= y; }, a, b);
-    }
-    [[nodiscard]] friend Mask operator!=(const Lanes& a, const Lanes& b) noexcept {
-        return compare([](auto x, auto y) { return x != y; }, a, b);
+    [[nodiscard]] MEMBRANE_INLINE friend Mask operator>(const Lanes& a, const Lanes& b) noexcept { return b < a; }
+    [[nodiscard]] MEMBRANE_INLINE friend Mask operator>=(const Lanes& a, const Lanes& b) noexcept { return b <= a; }
+    [[nodiscard]] MEMBRANE_INLINE friend Mask operator!=(const Lanes& a, const Lanes& b) noexcept {
+        return {a.parts_[0] != b.parts_[0], a.parts_[last] != b.parts_[last]};
     }
 
-    [[nodiscard]] friend Lanes abs(const Lanes& a) noexcept {
-        using Bits = typename Mask::PartMask;
-        using One = std::remove_cvref_t<decltype(Bits{}[0])>;
-        const Bits all_but_sign = (std::numeric_limits<One>::max)() - Bits{};
-        return each([&](auto x, auto) { return reinterpret_cast<Part>(reinterpret_cast<Bits>(x) & all_but_sign); }, a,
-                    a);
+    [[nodiscard]] MEMBRANE_INLINE friend Lanes abs(const Lanes& a) noexcept {
+        return {Registers::absolute(a.parts_[0]), Registers::absolute(a.parts_[last])};
     }
 
     /// `yes` in the lanes of `mask`, `no` in the others.
-    [[nodiscard]] static Lanes choose(const Mask& mask, const Lanes& yes, const Lanes& no) noexcept {
-        Lanes chosen;
-        for (std::size_t i = 0; i < parts; ++i) chosen.parts_[i] = mask.parts_[i] ? yes.parts_[i] : no.parts_[i];
-        return chosen;
+    [[nodiscard]] MEMBRANE_INLINE static Lanes choose(const Mask& mask, const Lanes& yes, const Lanes& no) noexcept {
+        return {Registers::choose(mask.parts_[0], yes.parts_[0], no.parts_[0]),
+                Registers::choose(mask.parts_[last], yes.parts_[last], no.parts_[last])};
     }
 
     /// Correctly rounded.
-    [[nodiscard]] friend Lanes sqrt(const Lanes& a) noexcept {
-        return each([](auto x, auto) { return root(x); }, a, a);
+    [[nodiscard]] MEMBRANE_INLINE friend Lanes sqrt(const Lanes& a) noexcept {
+        return {Registers::root(a.parts_[0]), Registers::root(a.parts_[last])};
     }
 
   private:
-    template <class Operation>
-    static Lanes each(Operation operation, const Lanes& a, const Lanes& b) noexcept {
-        Lanes result;
-        for (std::size_t i = 0; i < parts; ++i) result.parts_[i] = operation(a.parts_[i], b.parts_[i]);
-        return result;
-    }
-    template <class Relation>
-    static Mask compare(Relation relation, const Lanes& a, const Lanes& b) noexcept {
-        Mask mask;
-        for (std::size_t i = 0; i < parts; ++i) mask.parts_[i] = relation(a.parts_[i], b.parts_[i]);
-        return mask;
-    }
-    // Compilers vectorise a square root only under `-fno-math-errno`.
-    static Part root(const Part& a) noexcept {
-#if defined(__AVX__)
-        if constexpr (sizeof(Scalar) == 4)
-            return _mm256_sqrt_ps(a);
-        else
-            return _mm256_sqrt_pd(a);
-#elif defined(__SSE2__)
-        if constexpr (sizeof(Scalar) == 4)
-            return _mm_sqrt_ps(a);
-        else
-            return _mm_sqrt_pd(a);
-#else
-        Part roots;
-        for (std::size_t i = 0; i < sizeof(Part) / sizeof(Scalar); ++i) roots[i] = std::sqrt(a[i]);
-        return roots;
-#endif
+    static constexpr std::size_t last = parts - 1;
+
+    MEMBRANE_INLINE Lanes(const Part& first_part, const Part& last_part) noexcept {
+        parts_[0] = first_part;
+        parts_[last] = last_part;
     }
 
-    static constexpr std::size_t width = count / parts;
-    std::array<Part, parts> parts_;
+    Part parts_[parts];
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
 /// choice ? yes : no, in every lane.
 template <Number N, class Choice>
-[[nodiscard]] N select(const Choice& choice, const N& yes, const N& no) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N select(const Choice& choice, const N& yes, const N& no) noexcept {
     if constexpr (Real<N>)
         return choice ? yes : no;
     else
         return N::choose(choice, yes, no);
 }
-[[nodiscard]] constexpr bool any(bool choice) noexcept { return choice; }
-[[nodiscard]] constexpr bool all(bool choice) noexcept { return choice; }
+[[nodiscard]] MEMBRANE_INLINE constexpr bool any(bool choice) noexcept { return choice; }
+[[nodiscard]] MEMBRANE_INLINE constexpr bool all(bool choice) noexcept { return choice; }
 
 /// The square root of a number, or of every lane.
 template <Number N>
-[[nodiscard]] N root_of(const N& a) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N root_of(const N& a) noexcept {
     using std::sqrt;
     return sqrt(a);
 }
 
 /// `f` of the numbers, or of those in each lane.
 template <Number N, class F, class... Rest>
-[[nodiscard]] N lane_by_lane(const F& f, const N& a, const Rest&... rest) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N lane_by_lane(const F& f, const N& a, const Rest&... rest) noexcept {
     if constexpr (Real<N>)
         return f(a, rest...);
     else
@@ -256,17 +187,17 @@ template <Number N, class F, class... Rest>
 
 /// `std::max` and `std::min` of every lane.
 template <Number N>
-[[nodiscard]] N larger(const N& a, const N& b) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N larger(const N& a, const N& b) noexcept {
     return select(a < b, b, a);
 }
 template <Number N>
-[[nodiscard]] N smaller(const N& a, const N& b) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N smaller(const N& a, const N& b) noexcept {
     return select(b < a, b, a);
 }
 
 /// The unit vector along `a`; zero if `a` is zero.
 template <Number N>
-[[gnu::always_inline, nodiscard]] inline Vector3<N> direction_or_zero(const Vector3<N>& a) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<N> direction_or_zero(const Vector3<N>& a) noexcept {
     const N size = norm(a);
     return (1 / select<N>(size > 0, size, 1)) * a;
 }

@@ -17,29 +17,30 @@ template <Number Scalar>
 struct Symmetric3 {
     Scalar xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
 
-    Symmetric3& operator+=(const Symmetric3& b) noexcept {
+    MEMBRANE_INLINE Symmetric3& operator+=(const Symmetric3& b) noexcept {
         xx += b.xx, yy += b.yy, zz += b.zz, xy += b.xy, xz += b.xz, yz += b.yz;
         return *this;
     }
-    [[nodiscard]] friend Symmetric3 operator*(Scalar s, const Symmetric3& a) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE friend Symmetric3 operator*(Scalar s, const Symmetric3& a) noexcept {
         return {s * a.xx, s * a.yy, s * a.zz, s * a.xy, s * a.xz, s * a.yz};
     }
-    [[nodiscard]] friend Vector3<Scalar> operator*(const Symmetric3& a, const Vector3<Scalar>& b) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE friend Vector3<Scalar> operator*(const Symmetric3& a,
+                                                                   const Vector3<Scalar>& b) noexcept {
         return {(a.xx * b[0] + a.xy * b[1]) + a.xz * b[2], (a.xy * b[0] + a.yy * b[1]) + a.yz * b[2],
                 (a.xz * b[0] + a.yz * b[1]) + a.zz * b[2]};
     }
-    [[nodiscard]] Scalar trace() const noexcept { return (xx + yy) + zz; }
+    [[nodiscard]] MEMBRANE_INLINE Scalar trace() const noexcept { return (xx + yy) + zz; }
 };
 
 /// `s` times the identity.
 template <Number Scalar>
-[[nodiscard]] Symmetric3<Scalar> diagonal3(Scalar s) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Symmetric3<Scalar> diagonal3(Scalar s) noexcept {
     return {s, s, s, 0, 0, 0};
 }
 
 /// s u u^T.
 template <Number Scalar>
-[[nodiscard]] Symmetric3<Scalar> outer(Scalar s, const Vector3<Scalar>& u) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Symmetric3<Scalar> outer(Scalar s, const Vector3<Scalar>& u) noexcept {
     const Scalar x = s * u[0], y = s * u[1], z = s * u[2];
     return {x * u[0], y * u[1], z * u[2], x * u[1], x * u[2], y * u[2]};
 }
@@ -63,7 +64,7 @@ template <Real Scalar>
 /// `s` times the inverse. @pre positive definite. Cost: one division. Half the digits remain if the largest eigenvalue
 /// is epsilon^(-1/3) times the smallest.
 template <Number Scalar>
-[[nodiscard]] Symmetric3<Scalar> inverse(const Symmetric3<Scalar>& a, Scalar s = 1) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Symmetric3<Scalar> inverse(const Symmetric3<Scalar>& a, Scalar s = 1) noexcept {
     const Scalar xx = a.yy * a.zz - a.yz * a.yz, xy = a.xz * a.yz - a.xy * a.zz, xz = a.xy * a.yz - a.xz * a.yy;
     const Scalar scale = s / ((a.xx * xx + a.xy * xy) + a.xz * xz);
     return scale * Symmetric3<Scalar>{xx, a.xx * a.zz - a.xz * a.xz, a.xx * a.yy - a.xy * a.xy, xy,

@@ -7,6 +7,7 @@
 
 #include <Eigen/Core>
 
+#include <membrane/core/instruction_set.hpp>
 #include <membrane/core/number.hpp>
 
 /// Three numbers: a point, a direction, a force.
@@ -64,7 +65,7 @@ template <Number N>
 class Vector3 : public detail::ThreeByOne<N> {
   public:
     Vector3() = default;  ///< Not initialised.
-    constexpr Vector3(const N& x, const N& y, const N& z) noexcept : number_{x, y, z} {}
+    MEMBRANE_INLINE constexpr Vector3(const N& x, const N& y, const N& z) noexcept : number_{x, y, z} {}
 
     template <detail::Column<N> Derived>
     Vector3(const Eigen::MatrixBase<Derived>& column) noexcept {  // NOLINT(google-explicit-constructor)
@@ -84,35 +85,37 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] static constexpr Vector3 UnitY() noexcept { return {0, 1, 0}; }
     [[nodiscard]] static constexpr Vector3 UnitZ() noexcept { return {0, 0, 1}; }
 
-    [[nodiscard]] constexpr N& x() noexcept { return number_[0]; }
-    [[nodiscard]] constexpr N& y() noexcept { return number_[1]; }
-    [[nodiscard]] constexpr N& z() noexcept { return number_[2]; }
-    [[nodiscard]] constexpr const N& x() const noexcept { return number_[0]; }
-    [[nodiscard]] constexpr const N& y() const noexcept { return number_[1]; }
-    [[nodiscard]] constexpr const N& z() const noexcept { return number_[2]; }
-    [[nodiscard]] constexpr N& operator[](std::integral auto k) noexcept { return number_[k]; }
-    [[nodiscard]] constexpr const N& operator[](std::integral auto k) const noexcept { return number_[k]; }
-    [[nodiscard]] constexpr N* data() noexcept { return number_; }
-    [[nodiscard]] constexpr const N* data() const noexcept { return number_; }
-    [[nodiscard]] constexpr const N* begin() const noexcept { return number_; }
-    [[nodiscard]] constexpr const N* end() const noexcept { return number_ + 3; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr N& x() noexcept { return number_[0]; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr N& y() noexcept { return number_[1]; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr N& z() noexcept { return number_[2]; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr const N& x() const noexcept { return number_[0]; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr const N& y() const noexcept { return number_[1]; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr const N& z() const noexcept { return number_[2]; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr N& operator[](std::integral auto k) noexcept { return number_[k]; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr const N& operator[](std::integral auto k) const noexcept {
+        return number_[k];
+    }
+    [[nodiscard]] MEMBRANE_INLINE constexpr N* data() noexcept { return number_; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr const N* data() const noexcept { return number_; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr const N* begin() const noexcept { return number_; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr const N* end() const noexcept { return number_ + 3; }
 
-    [[nodiscard]] friend constexpr Vector3 operator+(const Vector3& a, const Vector3& b) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE friend constexpr Vector3 operator+(const Vector3& a, const Vector3& b) noexcept {
         return {a.number_[0] + b.number_[0], a.number_[1] + b.number_[1], a.number_[2] + b.number_[2]};
     }
-    [[nodiscard]] friend constexpr Vector3 operator-(const Vector3& a, const Vector3& b) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE friend constexpr Vector3 operator-(const Vector3& a, const Vector3& b) noexcept {
         return {a.number_[0] - b.number_[0], a.number_[1] - b.number_[1], a.number_[2] - b.number_[2]};
     }
-    [[nodiscard]] friend constexpr Vector3 operator-(const Vector3& a) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE friend constexpr Vector3 operator-(const Vector3& a) noexcept {
         return {-a.number_[0], -a.number_[1], -a.number_[2]};
     }
-    [[nodiscard]] friend constexpr Vector3 operator*(const N& s, const Vector3& a) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE friend constexpr Vector3 operator*(const N& s, const Vector3& a) noexcept {
         return {s * a.number_[0], s * a.number_[1], s * a.number_[2]};
     }
-    [[nodiscard]] friend constexpr Vector3 operator*(const Vector3& a, const N& s) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE friend constexpr Vector3 operator*(const Vector3& a, const N& s) noexcept {
         return {a.number_[0] * s, a.number_[1] * s, a.number_[2] * s};
     }
-    [[nodiscard]] friend constexpr Vector3 operator/(const Vector3& a, const N& s) noexcept {
+    [[nodiscard]] MEMBRANE_INLINE friend constexpr Vector3 operator/(const Vector3& a, const N& s) noexcept {
         return {a.number_[0] / s, a.number_[1] / s, a.number_[2] / s};
     }
     template <detail::ThreeColumns<N> Derived>
@@ -132,36 +135,36 @@ class Vector3 : public detail::ThreeByOne<N> {
     friend Eigen::CommaInitializer<Matrix>& operator,(Eigen::CommaInitializer<Matrix>&& list, const Vector3& a) {
         return list, a.eigen();
     }
-    constexpr Vector3& operator+=(const Vector3& b) noexcept { return *this = *this + b; }
-    constexpr Vector3& operator-=(const Vector3& b) noexcept { return *this = *this - b; }
-    constexpr Vector3& operator*=(const N& s) noexcept { return *this = *this * s; }
-    constexpr Vector3& operator/=(const N& s) noexcept { return *this = *this / s; }
-    constexpr void setZero() noexcept { *this = Zero(); }
-    [[nodiscard]] friend constexpr bool operator==(const Vector3& a, const Vector3& b) noexcept {
+    MEMBRANE_INLINE constexpr Vector3& operator+=(const Vector3& b) noexcept { return *this = *this + b; }
+    MEMBRANE_INLINE constexpr Vector3& operator-=(const Vector3& b) noexcept { return *this = *this - b; }
+    MEMBRANE_INLINE constexpr Vector3& operator*=(const N& s) noexcept { return *this = *this * s; }
+    MEMBRANE_INLINE constexpr Vector3& operator/=(const N& s) noexcept { return *this = *this / s; }
+    MEMBRANE_INLINE constexpr void setZero() noexcept { *this = Zero(); }
+    [[nodiscard]] MEMBRANE_INLINE friend constexpr bool operator==(const Vector3& a, const Vector3& b) noexcept {
         return a.number_[0] == b.number_[0] && a.number_[1] == b.number_[1] && a.number_[2] == b.number_[2];
     }
 
-    [[nodiscard]] constexpr N dot(const Vector3& b) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr N dot(const Vector3& b) const noexcept {
         return (number_[0] * b.number_[0] + number_[1] * b.number_[1]) + number_[2] * b.number_[2];
     }
-    [[nodiscard]] constexpr Vector3 cross(const Vector3& b) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr Vector3 cross(const Vector3& b) const noexcept {
         return {number_[1] * b.number_[2] - number_[2] * b.number_[1],
                 number_[2] * b.number_[0] - number_[0] * b.number_[2],
                 number_[0] * b.number_[1] - number_[1] * b.number_[0]};
     }
-    [[nodiscard]] constexpr N squaredNorm() const noexcept { return dot(*this); }
-    [[nodiscard]] N norm() const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr N squaredNorm() const noexcept { return dot(*this); }
+    [[nodiscard]] MEMBRANE_INLINE N norm() const noexcept {
         using std::sqrt;
         return sqrt(squaredNorm());
     }
     /// @pre not zero
-    [[nodiscard]] Vector3 normalized() const noexcept { return *this / norm(); }
+    [[nodiscard]] MEMBRANE_INLINE Vector3 normalized() const noexcept { return *this / norm(); }
 
-    [[nodiscard]] constexpr N sum() const noexcept { return (number_[0] + number_[1]) + number_[2]; }
-    [[nodiscard]] constexpr N minCoeff() const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr N sum() const noexcept { return (number_[0] + number_[1]) + number_[2]; }
+    [[nodiscard]] MEMBRANE_INLINE constexpr N minCoeff() const noexcept {
         return (std::min)((std::min)(number_[0], number_[1]), number_[2]);
     }
-    [[nodiscard]] constexpr N maxCoeff() const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr N maxCoeff() const noexcept {
         return (std::max)((std::max)(number_[0], number_[1]), number_[2]);
     }
     /// Whether no number exceeds `tolerance` in magnitude.
@@ -169,26 +172,26 @@ class Vector3 : public detail::ThreeByOne<N> {
         return std::abs(number_[0]) <= tolerance && std::abs(number_[1]) <= tolerance &&
                std::abs(number_[2]) <= tolerance;
     }
-    [[nodiscard]] Vector3 cwiseAbs() const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE Vector3 cwiseAbs() const noexcept {
         return {std::abs(number_[0]), std::abs(number_[1]), std::abs(number_[2])};
     }
-    [[nodiscard]] constexpr Vector3 cwiseMin(const Vector3& b) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr Vector3 cwiseMin(const Vector3& b) const noexcept {
         return {(std::min)(number_[0], b.number_[0]), (std::min)(number_[1], b.number_[1]),
                 (std::min)(number_[2], b.number_[2])};
     }
-    [[nodiscard]] constexpr Vector3 cwiseMax(const Vector3& b) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr Vector3 cwiseMax(const Vector3& b) const noexcept {
         return {(std::max)(number_[0], b.number_[0]), (std::max)(number_[1], b.number_[1]),
                 (std::max)(number_[2], b.number_[2])};
     }
-    [[nodiscard]] constexpr Vector3 cwiseProduct(const Vector3& b) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr Vector3 cwiseProduct(const Vector3& b) const noexcept {
         return {number_[0] * b.number_[0], number_[1] * b.number_[1], number_[2] * b.number_[2]};
     }
-    [[nodiscard]] constexpr Vector3 cwiseQuotient(const Vector3& b) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr Vector3 cwiseQuotient(const Vector3& b) const noexcept {
         return {number_[0] / b.number_[0], number_[1] / b.number_[1], number_[2] / b.number_[2]};
     }
 
     template <Number To>
-    [[nodiscard]] constexpr Vector3<To> cast() const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE constexpr Vector3<To> cast() const noexcept {
         return {static_cast<To>(number_[0]), static_cast<To>(number_[1]), static_cast<To>(number_[2])};
     }
     /// An Eigen row: for `a * b.transpose()` and for printing.
@@ -200,34 +203,35 @@ class Vector3 : public detail::ThreeByOne<N> {
 };
 
 template <Number N>
-[[nodiscard]] constexpr N dot(const Vector3<N>& a, const Vector3<N>& b) noexcept {
+[[nodiscard]] MEMBRANE_INLINE constexpr N dot(const Vector3<N>& a, const Vector3<N>& b) noexcept {
     return a.dot(b);
 }
 
 template <Number N>
-[[nodiscard]] constexpr N squared_norm(const Vector3<N>& a) noexcept {
+[[nodiscard]] MEMBRANE_INLINE constexpr N squared_norm(const Vector3<N>& a) noexcept {
     return a.dot(a);
 }
 
 template <Number N>
-[[nodiscard]] N norm(const Vector3<N>& a) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N norm(const Vector3<N>& a) noexcept {
     return a.norm();
 }
 
 template <Number N>
-[[nodiscard]] constexpr Vector3<N> cross(const Vector3<N>& a, const Vector3<N>& b) noexcept {
+[[nodiscard]] MEMBRANE_INLINE constexpr Vector3<N> cross(const Vector3<N>& a, const Vector3<N>& b) noexcept {
     return a.cross(b);
 }
 
 /// Whether each number of `a` is at most that of `b`.
 template <Real Scalar>
-[[nodiscard]] constexpr bool at_most(const Vector3<Scalar>& a, const Vector3<Scalar>& b) noexcept {
+[[nodiscard]] MEMBRANE_INLINE constexpr bool at_most(const Vector3<Scalar>& a, const Vector3<Scalar>& b) noexcept {
     return a.x() <= b.x() && a.y() <= b.y() && a.z() <= b.z();
 }
 
 /// `a` at unit length, or `otherwise` if `a` is zero.
 template <Real Scalar>
-[[nodiscard]] Vector3<Scalar> direction(const Vector3<Scalar>& a, const Vector3<Scalar>& otherwise) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<Scalar> direction(const Vector3<Scalar>& a,
+                                                        const Vector3<Scalar>& otherwise) noexcept {
     const Scalar length = norm(a);
     return length > 0 ? a / length : otherwise;
 }

@@ -90,15 +90,15 @@ struct SpringEdge {
     Scalar per_length;     ///< 1 / divisor [1/m]
 
     SpringEdge() = default;
-    [[gnu::always_inline]] explicit SpringEdge(const Vector3<Scalar>& to) noexcept
+    MEMBRANE_INLINE explicit SpringEdge(const Vector3<Scalar>& to) noexcept
         : edge(to), length(norm(to)), divisor(select(length != 0, length, Scalar(1))), per_length(1 / divisor) {}
 };
 
 /// Force of a spring of this stiffness [N/m] and rest length [m] on the vertex where its edge vector starts.
 template <Number Scalar, class Law>
-[[gnu::always_inline, nodiscard]] inline SpringForce<Scalar> spring_force(const Law& law, const SpringEdge<Scalar>& to,
-                                                                          const Scalar& stiffness,
-                                                                          const Scalar& rest_length) noexcept {
+[[nodiscard]] MEMBRANE_INLINE SpringForce<Scalar> spring_force(const Law& law, const SpringEdge<Scalar>& to,
+                                                               const Scalar& stiffness,
+                                                               const Scalar& rest_length) noexcept {
     const auto has_length = to.length != 0;
     const auto response = law(SpringState<Scalar>{stiffness, rest_length, to.divisor});
     return {{select(has_length, response.stiffness, stiffness),
@@ -108,15 +108,15 @@ template <Number Scalar, class Law>
             select(has_length, response.tension, Scalar(0))};
 }
 template <Number Scalar, class Law>
-[[gnu::always_inline, nodiscard]] inline SpringForce<Scalar> spring_force(const Law& law, const Vector3<Scalar>& edge,
-                                                                          const Scalar& stiffness,
-                                                                          const Scalar& rest_length) noexcept {
+[[nodiscard]] MEMBRANE_INLINE SpringForce<Scalar> spring_force(const Law& law, const Vector3<Scalar>& edge,
+                                                               const Scalar& stiffness,
+                                                               const Scalar& rest_length) noexcept {
     return spring_force(law, SpringEdge<Scalar>(edge), stiffness, rest_length);
 }
 
 /// Adds the force and the stiffness of a spring to those on a vertex.
 template <Number Scalar>
-[[gnu::always_inline]] inline void add(VertexForce<Scalar>& sum, const SpringForce<Scalar>& spring) noexcept {
+MEMBRANE_INLINE void add(VertexForce<Scalar>& sum, const SpringForce<Scalar>& spring) noexcept {
     sum.force += spring.force();
     sum.stiffness += larger(spring.along, spring.across);
 }
@@ -130,7 +130,7 @@ struct CurvedSum {
     Symmetric3<Scalar> dyads;                   ///< sum of r u u^T, r the stiffness reduction across a spring [N/m]
     Scalar size_force = 1, size_stiffness = 0;  ///< the quotient is the smallest size [N], [N/m]
 
-    [[gnu::always_inline, nodiscard]] EnergyMajoriser<Scalar> total() const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE EnergyMajoriser<Scalar> total() const noexcept {
         EnergyMajoriser<Scalar> sum{force, stiffness, diagonal3(dyads.trace())};
         sum.stiffness_reduction += Scalar(-1) * dyads;
         const auto has_size = size_stiffness > 0;
@@ -139,7 +139,7 @@ struct CurvedSum {
     }
 };
 template <Number Scalar>
-[[gnu::always_inline]] inline void add(CurvedSum<Scalar>& sum, const SpringForce<Scalar>& spring) noexcept {
+MEMBRANE_INLINE void add(CurvedSum<Scalar>& sum, const SpringForce<Scalar>& spring) noexcept {
     const Scalar stiffness = larger(spring.along, spring.across);
     const Scalar stiffness_reduction = smaller(stiffness - spring.across, stiffness);
     sum.force += spring.force();

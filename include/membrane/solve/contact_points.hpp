@@ -66,7 +66,7 @@ namespace detail {
 
 /// Calls `act` with 0, 1 and 2. Unrolled by hand: compilers do not unroll a long loop, and keep its data in memory.
 template <class Act>
-[[gnu::always_inline]] inline void each_corner(const Act& act) noexcept {
+MEMBRANE_INLINE void each_corner(const Act& act) noexcept {
     act(std::integral_constant<std::size_t, 0>());
     act(std::integral_constant<std::size_t, 1>());
     act(std::integral_constant<std::size_t, 2>());
@@ -102,8 +102,8 @@ inline constexpr Scalar too_far = Scalar(sizeof(Scalar) == 4 ? 1e18 : 1e153);
 
 /// The normal with the sign that keeps the tool on its last side.
 template <Real Scalar>
-[[gnu::always_inline, nodiscard]] inline Vector3<Lanes<Scalar>> on_same_side(const Vector3<Lanes<Scalar>>& normal,
-                                                                             const ContactPack<Scalar>& pack) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<Lanes<Scalar>> on_same_side(const Vector3<Lanes<Scalar>>& normal,
+                                                                  const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     return select<Wide>(dot(normal, pack.load.normal) < 0, -1, 1) * normal;
 }
@@ -111,10 +111,8 @@ template <Real Scalar>
 /// Sets the normal of a pack along `along` in lanes where the point is `found`: the tool stays on its last side of the
 /// triangle, or of the nearest edge or corner. `separation` is from the points to the tool's axis [m].
 template <Real Scalar>
-[[gnu::always_inline]] inline void set_normal(const typename Lanes<Scalar>::Mask& found,
-                                              const Vector3<Lanes<Scalar>>& along,
-                                              const Vector3<Lanes<Scalar>>& separation,
-                                              ContactPack<Scalar>& pack) noexcept {
+MEMBRANE_INLINE void set_normal(const typename Lanes<Scalar>::Mask& found, const Vector3<Lanes<Scalar>>& along,
+                                const Vector3<Lanes<Scalar>>& separation, ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const Wide length = norm(along);
     const auto exists = found & (length < too_far<Scalar>)&(squared_norm(separation) < too_far<Scalar>);
@@ -131,9 +129,8 @@ template <Real Scalar>
 
 /// Inside of a triangle the tool is on the known side; elsewhere it stays on its last side.
 template <Real Scalar>
-[[gnu::always_inline]] inline void use_known_side(const typename Lanes<Scalar>::Mask& in_face,
-                                                  const Vector3<Lanes<Scalar>>& area,
-                                                  ContactPack<Scalar>& pack) noexcept {
+MEMBRANE_INLINE void use_known_side(const typename Lanes<Scalar>::Mask& in_face, const Vector3<Lanes<Scalar>>& area,
+                                    ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     if (!pack.has_sides) return;
     const auto known = in_face & (pack.side != Wide(0));
@@ -144,9 +141,8 @@ template <Real Scalar>
 /// `locate` for the usual case that all points lie inside their triangles: one root and one division. If a point does
 /// not, returns false and changes nothing.
 template <Real Scalar>
-[[gnu::always_inline]] inline bool locate_in_faces(const Triangle<Lanes<Scalar>>& triangle,
-                                                   const Vector3<Lanes<Scalar>>& axis_point,
-                                                   ContactPack<Scalar>& pack) noexcept {
+MEMBRANE_INLINE bool locate_in_faces(const Triangle<Lanes<Scalar>>& triangle, const Vector3<Lanes<Scalar>>& axis_point,
+                                     ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     using Limits = std::numeric_limits<Scalar>;
     const Vector3<Wide> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = axis_point - triangle.a;
@@ -173,9 +169,8 @@ template <Real Scalar>
 /// Updates weights, normal and distance of a pack to the current positions. Its forces stay, but for points that no
 /// longer exist.
 template <Real Scalar>
-[[gnu::always_inline]] inline void locate(const ContactTool<Scalar>& tool,
-                                          const std::array<PaddedLanes<Scalar>, 3>& corner,
-                                          ContactPack<Scalar>& pack) noexcept {
+MEMBRANE_INLINE void locate(const ContactTool<Scalar>& tool, const std::array<PaddedLanes<Scalar>, 3>& corner,
+                            ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const Triangle<Wide> triangle{corner[0].point, corner[1].point, corner[2].point};
     const auto listed = pack.listed > 0;
@@ -208,7 +203,7 @@ template <Real Scalar>
 
 /// Adds the change of a pack's forces since they were last applied to the rows of forces.
 template <Real Scalar>
-[[gnu::always_inline]] inline void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& pack) noexcept {
+MEMBRANE_INLINE void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const auto &load = pack.load, &applied = pack.applied;
     each_corner([&](std::size_t k) {
@@ -257,18 +252,17 @@ template <Real Scalar>
 
 /// Gap between the tool and the points of a pack, along their normals, with the displacement of fixed corners [m].
 template <Real Scalar>
-[[gnu::always_inline, nodiscard]] inline Lanes<Scalar> gap_of(const ContactTool<Scalar>& tool,
-                                                              const ContactPack<Scalar>& pack,
-                                                              const SupportOfPack<Scalar>& support) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_of(const ContactTool<Scalar>& tool, const ContactPack<Scalar>& pack,
+                                                   const SupportOfPack<Scalar>& support) noexcept {
     return pack.distance - support.displacement - tool.radius;
 }
 
 /// A negligible gap: the response to a negligible force, or a few roundings [m].
 template <Real Scalar>
-[[gnu::always_inline, nodiscard]] inline Lanes<Scalar> gap_tolerance(const StepState<Scalar>& state,
-                                                                     const std::array<PaddedLanes<Scalar>, 3>& corner,
-                                                                     const ContactPack<Scalar>& pack,
-                                                                     const SupportOfPack<Scalar>& support) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Lanes<Scalar> gap_tolerance(const StepState<Scalar>& state,
+                                                          const std::array<PaddedLanes<Scalar>, 3>& corner,
+                                                          const ContactPack<Scalar>& pack,
+                                                          const SupportOfPack<Scalar>& support) noexcept {
     using Wide = Lanes<Scalar>;
     Wide sum = 0;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -282,8 +276,8 @@ template <Real Scalar>
 }
 
 template <Real Scalar>
-[[gnu::always_inline, nodiscard]] inline std::array<PaddedLanes<Scalar>, 3> corners_of(
-    const StepState<Scalar>& state, const ContactPack<Scalar>& pack) noexcept {
+[[nodiscard]] MEMBRANE_INLINE std::array<PaddedLanes<Scalar>, 3> corners_of(const StepState<Scalar>& state,
+                                                                            const ContactPack<Scalar>& pack) noexcept {
     return {gather_padded(state.position.data(), pack.corner[0].data()),
             gather_padded(state.position.data(), pack.corner[1].data()),
             gather_padded(state.position.data(), pack.corner[2].data())};
@@ -298,9 +292,9 @@ struct PackResponse {
 };
 
 template <Real Scalar>
-[[gnu::always_inline, nodiscard]] inline PackResponse<Scalar> response_of(const StepState<Scalar>& state,
-                                                                          const SupportOfPack<Scalar>& support,
-                                                                          const ContactPack<Scalar>& pack) noexcept {
+[[nodiscard]] MEMBRANE_INLINE PackResponse<Scalar> response_of(const StepState<Scalar>& state,
+                                                               const SupportOfPack<Scalar>& support,
+                                                               const ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     PackResponse<Scalar> response;
     response.compliance = support.compliance;
@@ -325,11 +319,10 @@ template <Real Scalar>
 /// Changes the force of each acting point by its gap over its compliance, never below zero, and moves the corners by
 /// their response. Returns the absolute change [N].
 template <Real Scalar>
-[[gnu::always_inline]] inline Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lanes<Scalar>::Mask& acts,
-                                                  const Lanes<Scalar>& gap, const Lanes<Scalar>& tolerance,
-                                                  const PackResponse<Scalar>& response,
-                                                  std::array<PaddedLanes<Scalar>, 3>& corner, ContactPack<Scalar>& pack,
-                                                  ContactPass<Scalar>& pass) noexcept {
+MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lanes<Scalar>::Mask& acts,
+                                    const Lanes<Scalar>& gap, const Lanes<Scalar>& tolerance,
+                                    const PackResponse<Scalar>& response, std::array<PaddedLanes<Scalar>, 3>& corner,
+                                    ContactPack<Scalar>& pack, ContactPass<Scalar>& pass) noexcept {
     using Wide = Lanes<Scalar>;
     const auto moves = acts & (response.compliance > 0);
     const Wide divisor = select<Wide>(moves, response.compliance, 1);
@@ -361,7 +354,7 @@ template <Real Scalar>
 }  // namespace detail
 
 template <Real Scalar>
-[[gnu::flatten]] bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
+MEMBRANE_FLATTEN bool push_out(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
                                std::span<ContactPack<Scalar>> packs) noexcept {
     using Wide = Lanes<Scalar>;
     bool moved = false;
@@ -385,7 +378,7 @@ template <Real Scalar>
 }
 
 template <Real Scalar>
-[[gnu::flatten]] ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
+MEMBRANE_FLATTEN ContactPass<Scalar> solve_contacts(StepState<Scalar>& state, const ContactTool<Scalar>& tool,
                                                     std::span<ContactPack<Scalar>> packs, bool again) noexcept {
     using Wide = Lanes<Scalar>;
     ContactPass<Scalar> pass;
@@ -413,7 +406,7 @@ template <Real Scalar>
 }
 
 template <Real Scalar>
-[[gnu::flatten]] void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept {
+MEMBRANE_FLATTEN void apply_forces(StepState<Scalar>& state, std::span<ContactPack<Scalar>> packs) noexcept {
     for (auto& pack : packs) {
         auto& load = pack.load;
         if (any(load.force > 0)) {

@@ -320,8 +320,8 @@ void PackedVertices<Scalar>::begin_step(const Scene& scene) noexcept {
 
 template <Real Scalar>
 template <class Sum, class Scene>
-[[gnu::always_inline]] inline Sum PackedVertices<Scalar>::springs_on(std::size_t p, const Vector3<Wide>& here,
-                                                                     const Scene& scene) const noexcept {
+MEMBRANE_INLINE Sum PackedVertices<Scalar>::springs_on(std::size_t p, const Vector3<Wide>& here,
+                                                       const Scene& scene) const noexcept {
     Sum sum{};
     const auto* rows = scene.state.position.data();
     const auto slots = std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count);
@@ -342,9 +342,8 @@ template <class Sum, class Scene>
 // The part of the vertices' state by their springs.
 template <Real Scalar>
 template <class Rule, class Scene>
-[[gnu::always_inline]] inline auto PackedVertices<Scalar>::spring_state(std::size_t p, const Vector3<Wide>& here,
-                                                                        const Scene& scene) const noexcept
-    -> VertexState<Wide> {
+MEMBRANE_INLINE auto PackedVertices<Scalar>::spring_state(std::size_t p, const Vector3<Wide>& here,
+                                                          const Scene& scene) const noexcept -> VertexState<Wide> {
     VertexState<Wide> vertex;
     if constexpr (requires { requires Rule::needs_majoriser; }) {
         static_cast<EnergyMajoriser<Wide>&>(vertex) = springs_on<CurvedSum<Wide>>(p, here, scene).total();
@@ -359,9 +358,8 @@ template <class Rule, class Scene>
 // Adds the volume springs to `others`, which has the forces of constraints.
 template <Real Scalar>
 template <bool in_contact, class Scene>
-[[gnu::always_inline]] inline void PackedVertices<Scalar>::add_others(std::size_t p, const Vector3<Wide>& here,
-                                                                      const Scene& scene,
-                                                                      VertexForce<Wide>& others) const noexcept {
+MEMBRANE_INLINE void PackedVertices<Scalar>::add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene,
+                                                        VertexForce<Wide>& others) const noexcept {
     if constexpr (!std::same_as<std::remove_cvref_t<decltype(scene.volume)>, NoFoundation>) {
         const auto& spring = terms_[p].spring;
         const auto foundation = terms_[p].damps ? spring.force_on(here) : spring.elastic_pull(here);
@@ -372,9 +370,9 @@ template <bool in_contact, class Scene>
 
 // Writes compliance, internal force and internal stiffness; zero for fixed vertices.
 template <Real Scalar>
-[[gnu::always_inline]] inline void PackedVertices<Scalar>::keep_response(std::size_t p, const PackState& at,
-                                                                         const Symmetric3<Wide>& block,
-                                                                         StepState<Scalar>& rows) const noexcept {
+MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const PackState& at,
+                                                           const Symmetric3<Wide>& block,
+                                                           StepState<Scalar>& rows) const noexcept {
     const auto may_move = terms_[p].free != 0;
     const auto kept = [&](const Wide& number) { return select<Wide>(may_move, number, 0); };
     Begins begins;
@@ -390,8 +388,7 @@ template <Real Scalar>
 // Evaluates the forces on the vertices of a pack.
 template <Real Scalar>
 template <bool in_contact, class Rule, class Scene>
-[[gnu::always_inline]] inline auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene) const noexcept
-    -> PackState {
+MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene) const noexcept -> PackState {
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     PackState at;
@@ -417,9 +414,8 @@ template <bool in_contact, class Rule, class Scene>
 
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
-[[gnu::always_inline]] inline auto PackedVertices<Scalar>::move(std::size_t p, const PackState& at, const Scene& scene,
-                                                                const Rule& rule,
-                                                                [[maybe_unused]] bool allowed) noexcept -> Outcome {
+MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState& at, const Scene& scene,
+                                                  const Rule& rule, [[maybe_unused]] bool allowed) noexcept -> Outcome {
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
@@ -441,7 +437,7 @@ template <bool in_contact, class Scene, class Rule>
 
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
-[[gnu::flatten]] auto PackedVertices<Scalar>::update_pack(std::size_t p, const Scene& scene, const Rule& rule,
+MEMBRANE_FLATTEN auto PackedVertices<Scalar>::update_pack(std::size_t p, const Scene& scene, const Rule& rule,
                                                           bool allowed) noexcept -> Outcome {
     const auto state = evaluate<in_contact, Rule>(p, scene);
     return move<in_contact>(p, state, scene, rule, allowed);
@@ -450,7 +446,7 @@ template <bool in_contact, class Scene, class Rule>
 // Pack `p` and the next one of its group.
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
-[[gnu::flatten]] void PackedVertices<Scalar>::update_two(std::size_t p, const Scene& scene, const Rule& rule) noexcept {
+MEMBRANE_FLATTEN void PackedVertices<Scalar>::update_two(std::size_t p, const Scene& scene, const Rule& rule) noexcept {
     const auto state = evaluate<in_contact, Rule>(p, scene), next = evaluate<in_contact, Rule>(p + 1, scene);
     outcomes_[p] = move<in_contact>(p, state, scene, rule, false);
     outcomes_[p + 1] = move<in_contact>(p + 1, next, scene, rule, false);
@@ -458,7 +454,7 @@ template <bool in_contact, class Scene, class Rule>
 
 template <Real Scalar>
 template <class Scene>
-[[gnu::flatten]] void PackedVertices<Scalar>::evaluate_residual(std::size_t p, const Scene& scene) const noexcept {
+MEMBRANE_FLATTEN void PackedVertices<Scalar>::evaluate_residual(std::size_t p, const Scene& scene) const noexcept {
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     const Vector3<Wide> here = gather(rows.position.data(), own.data());

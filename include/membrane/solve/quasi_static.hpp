@@ -311,7 +311,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
         if (now == before) continue;
         moved_.try_push_back(v);
         if (options_.predict) last_displacements_.col(v) = now - before;
-        x.col(v) = now;
+        set_point(x, v, now);
     }
     report_.moved = moved_.items();
     const auto is_balanced = [&](Index v) {

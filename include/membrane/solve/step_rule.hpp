@@ -139,8 +139,8 @@ namespace detail {
 
 /// Updates the inverse of H to that of H + stiffness normal normal^T [Sherman50].
 template <Number Scalar>
-[[gnu::always_inline]] inline void add_stiffness(Symmetric3<Scalar>& compliance, const Scalar& stiffness,
-                                                 const Vector3<Scalar>& normal) noexcept {
+MEMBRANE_INLINE void add_stiffness(Symmetric3<Scalar>& compliance, const Scalar& stiffness,
+                                   const Vector3<Scalar>& normal) noexcept {
     const Vector3<Scalar> along = compliance * normal;
     compliance += outer<Scalar>(-stiffness / (1 + stiffness * dot(normal, along)), along);
 }

@@ -70,9 +70,7 @@ struct StepState {
     template <class Network>
     void load(Index v, const ConstPointsRef<Scalar>& x, const Network& network) noexcept {
         if (!loaded.insert(v)) return;
-        row(position, v).number[0] = x(0, v);
-        row(position, v).number[1] = x(1, v);
-        row(position, v).number[2] = x(2, v);
+        set_position(v, point(x, v));
         fixed[static_cast<std::size_t>(v)] = network.pinned(v) ? 1 : 0;
     }
     /// Reloads all loaded positions from `x`, except prescribed ones, and clears the forces of constraints.
@@ -94,8 +92,8 @@ struct StepState {
     /// Position of `v` [m].
     [[nodiscard]] Vector3<Scalar> position_of(Index v) const noexcept { return row(position, v).point(); }
     void set_position(Index v, const Vector3<Scalar>& p) noexcept {
-        auto& number = row(position, v).number;
-        for (std::size_t k = 0; k < 3; ++k) number[k] = p[static_cast<Eigen::Index>(k)];
+        Scalar* number = row(position, v).number.data();
+        number[0] = p.x(), number[1] = p.y(), number[2] = p.z();
     }
 
     /// The force of the constraints on `v` [N], and the stiffness that contact adds along it [N/m].

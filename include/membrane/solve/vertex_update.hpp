@@ -56,8 +56,8 @@ template <Number N>
 }
 
 template <class Rule, Number N>
-[[gnu::always_inline, nodiscard]] inline auto move_of(const Rule& rule, const VertexState<N>& vertex,
-                                                      Each<N> force_tolerance) noexcept {
+[[nodiscard]] MEMBRANE_INLINE auto move_of(const Rule& rule, const VertexState<N>& vertex,
+                                           Each<N> force_tolerance) noexcept {
     const auto compliance = rule.compliance(vertex);
     VertexMove<N, std::remove_cvref_t<decltype(compliance)>> move;
     move.compliance = compliance;

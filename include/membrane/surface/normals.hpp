@@ -127,8 +127,8 @@ template <Real Scalar>
 /// Twice the area that the one-ring encloses, as z, x, y. The triangles from its first vertex have this area together.
 /// They are computed two at a time, as the cross product of their diagonals.
 template <Real Scalar>
-[[gnu::always_inline]] inline PaddedVector<Scalar> area_within(const OneRing& ring, const Index* overflow,
-                                                               const Scalar* x, std::ptrdiff_t stride) noexcept {
+MEMBRANE_INLINE PaddedVector<Scalar> area_within(const OneRing& ring, const Index* overflow, const Scalar* x,
+                                                 std::ptrdiff_t stride) noexcept {
     const auto at = [&](Index v) { return PaddedVector<Scalar>::load_point(x + v * stride); };
     const auto first = at(ring.vertices[0]);
     auto last = at(ring.vertices[1]);
@@ -231,9 +231,8 @@ void VertexNormals<Scalar>::face(const ConstPointsRef<Scalar>& x, Index count, c
 /// are lanes: square root and division are slow one by one.
 template <Real Scalar>
 template <class VertexAt>
-[[gnu::always_inline]] inline void VertexNormals<Scalar>::normalise(const ConstPointsRef<Scalar>& x,
-                                                                    const VertexAt& vertex, Index first,
-                                                                    Index end) noexcept {
+MEMBRANE_INLINE void VertexNormals<Scalar>::normalise(const ConstPointsRef<Scalar>& x, const VertexAt& vertex,
+                                                      Index first, Index end) noexcept {
     std::array<Index, Lanes<Scalar>::count> begins, vertices;
     PaddedVector<Scalar> positions;
     for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -260,7 +259,7 @@ template <class VertexAt>
 
 /// Sets the normal at rest of vertex `v` if it has no other; `squared` is the square of twice its area.
 template <Real Scalar>
-[[gnu::noinline]] void VertexNormals<Scalar>::check(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept {
+MEMBRANE_NOINLINE void VertexNormals<Scalar>::check(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept {
     const bool measurable = is_finite(squared) && squared >= (std::numeric_limits<Scalar>::min)();
     if (!measurable || !is_finite(position)) values_.col(v) = at_rest_.col(v);
 }

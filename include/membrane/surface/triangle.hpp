@@ -100,7 +100,7 @@ namespace detail {
 
 /// `part / whole` clamped to [0, 1], for any two numbers.
 template <Number N>
-[[gnu::always_inline, nodiscard]] inline N fraction(const N& part, const N& whole) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N fraction(const N& part, const N& whole) noexcept {
     const auto inside = (part > 0) & (part < whole);
     return select<N>(inside, part / select<N>(inside, whole, 1), select<N>(part > 0, 1, 0));
 }
@@ -155,8 +155,7 @@ namespace detail {
 /// Inline, so that unused results are not computed. With `branches`, a triangle with its nearest point on the face
 /// costs half: for several triangles only if this holds for all of them.
 template <bool branches, Number N>
-[[gnu::always_inline]] inline TrianglePoint<N> closest_point_inline(const Triangle<N>& triangle,
-                                                                    const Vector3<N>& q) noexcept {
+MEMBRANE_INLINE TrianglePoint<N> closest_point_inline(const Triangle<N>& triangle, const Vector3<N>& q) noexcept {
     using Limits = std::numeric_limits<Each<N>>;
     const Vector3<N> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
     const Vector3<N> normal = cross(ab, ac);
@@ -176,17 +175,18 @@ template <bool branches, Number N>
         N on_edges = Limits::infinity();
         Vector3<N> weights(1, 0, 0);
         const auto consider = [&](Eigen::Index k, const auto& faces, const Vector3<N>& offset, const Vector3<N>& edge)
-            __attribute__((always_inline)) {
-            if (Real<N> && !any(faces)) return;  // for several triangles this branch is not predictable
-            const N along = fraction(dot(offset, edge), squared_norm(edge));
-            const N squared_distance = squared_norm<N>(offset - along * edge);
-            const auto nearer = finite & faces & (squared_distance < on_edges);
-            on_edges = select<N>(nearer, squared_distance, on_edges);
-            const Eigen::Index next = (k + 1) % 3, last = (k + 2) % 3;
-            weights[k] = select<N>(nearer, 1 - along, weights[k]);
-            weights[next] = select<N>(nearer, along, weights[next]);
-            weights[last] = select<N>(nearer, 0, weights[last]);
-        };
+                                  MEMBRANE_INLINE_LAMBDA {
+                                      if (Real<N> && !any(faces))
+                                          return;  // for several triangles this branch is not predictable
+                                      const N along = fraction(dot(offset, edge), squared_norm(edge));
+                                      const N squared_distance = squared_norm<N>(offset - along * edge);
+                                      const auto nearer = finite & faces & (squared_distance < on_edges);
+                                      on_edges = select<N>(nearer, squared_distance, on_edges);
+                                      const Eigen::Index next = (k + 1) % 3, last = (k + 2) % 3;
+                                      weights[k] = select<N>(nearer, 1 - along, weights[k]);
+                                      weights[next] = select<N>(nearer, along, weights[next]);
+                                      weights[last] = select<N>(nearer, 0, weights[last]);
+                                  };
         consider(0, (!has_area) | (weight_c < 0), aq, ab);
         consider(1, (!has_area) | (weight_a < 0), q - triangle.b, triangle.c - triangle.b);
         consider(2, (!has_area) | (weight_b < 0), q - triangle.c, -ac);
@@ -219,9 +219,8 @@ struct SegmentAndEdge {
 /// The nearest points of two lines, each then clamped to its segment in turn [Ericson05] 5.1.9. `offset` runs from the
 /// start of the segment to that of the edge.
 template <Number N>
-[[gnu::always_inline, nodiscard]] inline SegmentAndEdge<N> closest_on_edge(const Vector3<N>& segment,
-                                                                           const Vector3<N>& edge,
-                                                                           const Vector3<N>& offset) noexcept {
+[[nodiscard]] MEMBRANE_INLINE SegmentAndEdge<N> closest_on_edge(const Vector3<N>& segment, const Vector3<N>& edge,
+                                                                const Vector3<N>& offset) noexcept {
     const Vector3<N> common = cross(segment, edge);
     const N on_line = fraction<N>(dot(cross(offset, edge), common), squared_norm(common));
     const N foot = fraction<N>(dot<N>(on_line * segment - offset, edge), squared_norm(edge));
