@@ -13,6 +13,7 @@
 #include <vector>
 
 #include <assimp/mesh.h>
+#include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <assimp/Importer.hpp>
 
@@ -74,7 +75,8 @@ Soup read_obj(const std::string& file, const std::string& text) {
 
 Soup read_by_assimp(const std::string& file, const std::string& text, const std::string& kind) {
     Assimp::Importer importer;
-    const aiScene* scene = importer.ReadFileFromMemory(text.data(), text.size(), 0, kind.c_str());
+    const aiScene* scene =
+        importer.ReadFileFromMemory(text.data(), text.size(), aiProcess_ValidateDataStructure, kind.c_str());
     if (scene == nullptr) refuse(file, "assimp: ", one_line(importer.GetErrorString()));
     Soup soup{file};
     std::map<std::array<double, 3>, membrane::Index> known;  // for STL
@@ -110,8 +112,7 @@ std::string bytes_of(const std::filesystem::path& path, const std::string& file)
 
 Surface read_mesh(const std::filesystem::path& path, double unit) {
     const std::string file = path.string();
-    std::string ending = path.extension().string();
-    for (char& c : ending) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+    const std::string ending = lower(path.extension().string());
     const std::map<std::string, std::string (*)(const std::string&, std::string_view)> kinds{
         {".obj", checked_obj}, {".off", checked_off}, {".ply", checked_ply}, {".stl", checked_stl}};
     const auto kind = kinds.find(ending);

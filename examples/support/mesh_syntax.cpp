@@ -3,259 +3,348 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
-#include <cstring>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <system_error>
 #include <utility>
+#include <vector>
+
+#include <membrane/core/check.hpp>
 
 namespace examples {
 namespace {
 
-constexpr std::string_view blanks = " \t\v\f";
-constexpr std::int64_t max_vertices = std::numeric_limits<std::int32_t>::max();
+using membrane::refuse;
 
-bool digit(char c) { return c >= '0' && c <= '9'; }
+constexpr std::int64_t max_index = std::numeric_limits<std::int32_t>::max();
+constexpr std::int64_t max_corners = 255;  // tinyobjloader counts them in a byte, assimp reads 4096 characters a line
 
-std::string lower(std::string_view text) {
-    std::string result(text);
-    for (char& c : result) {
-        if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+/// A decimal number. The libraries read only a part of other words, and 0 if more digits stand before the point.
+bool is_number(std::string_view text) {
+    const auto skip = [&](std::string_view any, std::size_t most) {
+        const std::size_t count = std::min({text.find_first_not_of(any), text.size(), most});
+        text.remove_prefix(count);
+        return count;
+    };
+    if (text.size() > 64) return false;
+    skip("+-", 1);
+    std::size_t digits = skip("0123456789", 18);
+    if (skip(".", 1) > 0) digits += skip("0123456789", 64);
+    if (digits > 0 && skip("eE", 1) > 0) {
+        const std::size_t most = text.starts_with('-') ? 64 : 2;
+        skip("+-", 1);
+        digits = skip("0123456789", most);
     }
-    return result;
+    return digits > 0 && text.empty();
 }
 
-}  // namespace
+/// The words of a text, line by line, and what is kept of them for the library. A comment goes from # to a line's end.
+struct Lines {
+    const std::string& file;
+    std::string_view rest;  ///< of the text
+    std::size_t line = 0, at = 0;
+    std::vector<std::string_view> words = {};
+    std::string kept = {};
 
-bool Lines::next(bool comments) {
-    words_.clear();
-    while (words_.empty() && !rest_.empty()) {
-        const std::size_t end = std::min(rest_.find('\n'), rest_.size());
-        std::string_view text = rest_.substr(0, end);
-        rest_.remove_prefix(std::min(end + 1, rest_.size()));
-        ++line_;
-        if (comments) text = text.substr(0, text.find('#'));
-        while (text.find_first_not_of(blanks) != text.npos) {
+    Lines(const std::string& name, std::string_view text) : file(name), rest(text) {
+        if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3);
+    }
+
+    /// Goes to the next line with a word; false at the end. If it `joins`, a backslash continues a line in the next.
+    bool next(bool joins = false);
+    void expect(const std::string& what) {
+        if (!next()) examples::refuse(file, "the file ends after line ", line, ", expected ", what);
+    }
+    [[noreturn]] void refuse(const std::string& expected, std::string_view word) const;
+
+    /// The next word of the line. Like the other functions, refuses the end of the line.
+    std::string_view word() {
+        if (at == words.size()) examples::refuse(file, "line ", line, ": expected more than ", at, " words");
+        return words[at++];
+    }
+    std::string_view keep(std::string_view word) {
+        (kept += word) += ' ';
+        return word;
+    }
+    void number() {
+        if (!is_number(keep(word()))) refuse("a finite number of at most 18 digits before the point", words[at - 1]);
+    }
+    std::int64_t integer(std::string_view word, std::int64_t least, std::int64_t most);
+    void end_line() {
+        if (at < words.size()) refuse("the end of the line", words[at]);
+        kept += '\n';
+    }
+};
+
+bool Lines::next(bool joins) {
+    words.clear();
+    at = 0;
+    for (bool joined = false; !rest.empty() && (words.empty() || joined);) {
+        std::string_view text = rest.substr(0, rest.find_first_of("\r\n"));
+        rest.remove_prefix(text.size());
+        rest.remove_prefix(std::min<std::size_t>(rest.starts_with("\r\n") ? 2 : 1, rest.size()));
+        ++line;
+        if (text.find('\0') != text.npos) refuse("text in ASCII or UTF-8 without NUL", text);
+        text = text.substr(0, text.find('#'));
+        joined = joins && text.ends_with('\\');
+        if (joined) text.remove_suffix(1);
+        for (constexpr std::string_view blanks = " \t\v\f"; text.find_first_not_of(blanks) != text.npos;) {
             text.remove_prefix(text.find_first_not_of(blanks));
-            words_.push_back(text.substr(0, text.find_first_of(blanks)));
-            text.remove_prefix(words_.back().size());
+            words.push_back(text.substr(0, text.find_first_of(blanks)));
+            text.remove_prefix(words.back().size());
         }
     }
-    return !words_.empty();
+    return !words.empty();
 }
 
-std::string Lines::quoted(std::string_view text) {
-    std::string shown(text.substr(0, 24));
-    for (char& c : shown) {
-        if (c < ' ' || c > '~') c = '?';
-    }
-    return "'" + shown + (text.size() > shown.size() ? "...'" : "'");
+void Lines::refuse(const std::string& expected, std::string_view word) const {
+    std::string got(word.substr(0, 24));
+    std::replace_if(
+        got.begin(), got.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+    examples::refuse(file, "line ", line, ": expected ", expected, ", got '", got, word.size() > 24 ? "...'" : "'");
 }
 
-void Lines::check_number(std::size_t i) const {
-    std::string_view text = word(i);
-    if (text.front() == '+' && text.size() > 1 && text[1] != '-') text.remove_prefix(1);
-    const auto whole = std::find_if_not(text.begin() + (text.front() == '-' ? 1 : 0), text.end(), digit);
-    if (whole - text.begin() > 18 || text.size() > 64) {  // assimp makes 0 of more
-        refuse("expected a number of at most 18 digits before the point and 64 characters, got ", quoted(i));
-    }
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const bool all = end == text.data() + text.size() && error != std::errc::invalid_argument;
-    const bool too_small = error == std::errc::result_out_of_range && text.find_first_of("eE") != text.npos &&
-                           text[text.find_first_of("eE") + 1] == '-';
-    if (!all || !(digit(text.back()) || text.back() == '.') || (error != std::errc() && !too_small)) {
-        refuse("expected a finite number, got ", quoted(i));
-    }
-}
-
-std::int64_t Lines::integer(std::string_view text, std::int64_t least, std::int64_t most) const {
+std::int64_t Lines::integer(std::string_view word, std::int64_t least, std::int64_t most) {
     std::int64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc() || end != text.data() + text.size() || value < least || value > most) {
-        refuse("expected an integer from ", least, " to ", most, ", got ", quoted(text));
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size() || value < least || value > most) {
+        refuse("an integer from " + std::to_string(least) + " to " + std::to_string(most), word);
     }
+    keep(word);
     return value;
 }
 
-void Lines::check_size(std::size_t count) const {
-    if (size() != count) refuse("expected ", count, " words, got ", size());
+/// Type of a number in a PLY; only the size of a number that is no integer matters.
+struct Type {
+    std::size_t size = 0;
+    bool is_signed = false;
+};
+
+/// Numbers of a vertex or a face in a PLY; a list of corners has a count.
+struct Property {
+    Type type = {}, count = {};
+};
+
+struct Element {
+    std::string name;
+    std::int64_t count;
+    std::vector<Property> properties = {};
+};
+
+Type type_of(const std::string& name, bool integer, const Lines& lines) {
+    constexpr std::array<std::pair<std::size_t, std::string_view>, 4> types{
+        {{1, " char int8 uchar uint8 "},
+         {2, " short int16 ushort uint16 "},
+         {4, " int int32 uint uint32 float float32 "},
+         {8, " double float64 "}}};
+    const bool real = name.starts_with('f') || name.starts_with('d');
+    for (const auto& [size, names] : types) {
+        if (names.find(' ' + name + ' ') != names.npos && !(integer && real)) return {size, !name.starts_with('u')};
+    }
+    lines.refuse(integer ? "a type of integers" : "a type of numbers", name);
 }
 
-std::string plain_text(const std::string& file, std::string_view bytes) {
-    if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff")) {
-        membrane::refuse(file, "is UTF-16, expected ASCII or UTF-8");
+/// The rows of a text, each a line. A face of an OFF may have a colour behind its corners.
+struct TextRows {
+    Lines& lines;
+    bool off;
+
+    void begin(const Element& element) { lines.expect(element.name); }
+    void number(const Type&) { lines.number(); }
+    std::int64_t integer(const Type&, std::int64_t least, std::int64_t most) {
+        return lines.integer(lines.word(), least, most);
     }
-    if (const auto nul = bytes.find('\0'); nul != bytes.npos) {
-        membrane::refuse(file, "byte ", nul, " is NUL, expected text");
+    void end(const Element& element) {
+        if (off && element.name == "face") lines.at = lines.words.size();
+        lines.end_line();
     }
-    if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
-    std::string text;
-    text.reserve(bytes.size());
-    for (std::size_t i = 0; i < bytes.size(); ++i) {
-        if (bytes[i] != '\r') {
-            text += bytes[i];
-        } else if (i + 1 == bytes.size() || bytes[i + 1] != '\n') {
-            text += '\n';
+    void end_file() {
+        if (lines.next()) lines.refuse("the end of the file", lines.words[0]);
+    }
+};
+
+struct BinaryRows {
+    const std::string& file;
+    std::string_view bytes;
+    std::size_t at;
+    bool big_endian;
+
+    void begin(const Element&) {}
+    void number(const Type& type) {
+        if (bytes.size() - at < type.size)
+            refuse(file, "the file ends after ", bytes.size(), " bytes, within an element");
+        at += type.size;
+    }
+    std::int64_t integer(const Type& type, std::int64_t least, std::int64_t most) {
+        number(type);
+        std::uint64_t bits = 0;
+        for (std::size_t i = 1; i <= type.size; ++i) {
+            bits = bits << 8 | static_cast<unsigned char>(bytes[big_endian ? at - type.size - 1 + i : at - i]);
+        }
+        auto value = static_cast<std::int64_t>(bits);
+        if (type.is_signed && bits >> (8 * type.size - 1) != 0) value -= std::int64_t{1} << (8 * type.size);
+        if (value >= least && value <= most) return value;
+        refuse(file, "byte ", at - type.size, ": expected an integer from ", least, " to ", most, ", got ", value);
+    }
+    void end(const Element&) {}
+    void end_file() {
+        if (at < bytes.size()) refuse(file, "byte ", at, ": expected the end of the file");
+    }
+};
+
+/// Checks all rows of the elements, the first of which are the vertices.
+template <class Rows>
+void check_rows(const std::vector<Element>& elements, Rows rows) {
+    for (const Element& element : elements) {
+        for (std::int64_t row = 0; row < element.count; ++row) {
+            rows.begin(element);
+            for (const Property& property : element.properties) {
+                if (property.count.size == 0) {
+                    rows.number(property.type);
+                    continue;
+                }
+                for (auto corners = rows.integer(property.count, 3, max_corners); corners > 0; --corners) {
+                    static_cast<void>(rows.integer(property.type, 0, elements[0].count - 1));
+                }
+            }
+            rows.end(element);
         }
     }
-    return text;
-}
-
-namespace {
-
-/// Lines that end in a backslash go on in the next one, but for comments; its end is put after them, so that all other
-/// lines keep their numbers.
-std::string joined(std::string_view text) {
-    std::string result;
-    std::size_t ends = 1;
-    bool comment = false;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-        comment = text[i] == '#' || (comment && text[i] != '\n');
-        if (!comment && text.substr(i, 2) == "\\\n") {
-            result += ' ';
-            ++ends;
-            ++i;
-        } else if (text[i] == '\n') {
-            result.append(std::exchange(ends, 1), '\n');
-        } else {
-            result += text[i];
-        }
-    }
-    return result;
+    rows.end_file();
 }
 
 }  // namespace
 
-/// Vertices and faces, each in the line where it was found, so that tinyobjloader's messages name that.
+std::string lower(std::string_view text) {
+    std::string result(text);
+    for (char& c : result) c = static_cast<char>(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
+    return result;
+}
+
 std::string checked_obj(const std::string& file, std::string_view bytes) {
-    const std::string text = joined(plain_text(file, bytes));
-    std::string result;
-    Lines lines(file, text);
-    std::size_t written = 1;
-    std::int64_t vertices = 0;
-    while (lines.next()) {
-        const std::string_view kind = lines.word(0);
-        if (kind != "v" && kind != "f") {
-            constexpr std::array others{"vn", "vt", "vp", "g", "o", "s", "l", "p", "usemtl", "mtllib"};
-            if (std::find(others.begin(), others.end(), kind) != others.end()) continue;
-            lines.refuse("expected a statement of an OBJ surface, got ", lines.quoted(0));
+    constexpr std::array unused{"vn", "vt", "vp", "g", "o", "s", "l", "p", "usemtl", "mtllib"};
+    Lines lines(file, bytes);
+    for (std::int64_t vertices = 0; lines.next(true);) {
+        const std::string_view kind = lines.word();
+        const bool vertex = kind == "v";
+        if (std::find(unused.begin(), unused.end(), kind) != unused.end()) continue;
+        if (!vertex && kind != "f") lines.refuse("a statement of an OBJ surface", kind);
+        const std::size_t most = vertex ? 7 : max_corners;  // with a weight and a colour
+        if (lines.words.size() > 1 + most)
+            lines.refuse("at most " + std::to_string(most) + " words in a statement", kind);
+        lines.keep(kind);
+        vertices += vertex;
+        for (std::size_t i = 0; i < 3 || lines.at < lines.words.size(); ++i) {
+            if (vertex) {
+                lines.number();
+                continue;
+            }
+            const std::string_view word = lines.word(), corner = word.substr(0, word.find('/'));
+            if (lines.integer(corner, -vertices, max_index) == 0) lines.refuse("a vertex, counted from 1", word);
         }
-        result.append(lines.line() - written, '\n');
-        written = lines.line();
-        result += kind;
-        vertices += kind == "v";
-        if (kind == "v" && (lines.size() < 4 || lines.size() > 8)) {
-            lines.refuse("expected 3 to 7 numbers of a vertex, got ", lines.size() - 1);
-        }
-        if (kind == "f" && (lines.size() < 4 || lines.size() > 256)) {  // tinyobjloader counts corners in a byte
-            lines.refuse("expected 3 to 255 corners of a polygon, got ", lines.size() - 1);
-        }
-        for (std::size_t i = 1; i < lines.size(); ++i) {
-            if (kind == "v") lines.check_number(i);
-            if (kind == "v" && i > 3) continue;  // a weight or a colour
-            const std::string_view corner = lines.word(i).substr(0, lines.word(i).find('/'));
-            if (kind == "f") static_cast<void>(lines.integer(corner, -vertices, max_vertices));
-            (result += ' ') += corner;
-        }
+        lines.end_line();
     }
-    return result += '\n';
+    return lines.kept;
 }
 
-/// One line for each vertex and face, without colours: assimp knows no comments within.
 std::string checked_off(const std::string& file, std::string_view bytes) {
-    const std::string text = plain_text(file, bytes);
-    Lines lines(file, text);
+    const auto most = static_cast<std::int64_t>(bytes.size());
+    Lines lines(file, bytes);
     lines.expect("OFF");
-    if (lines.word(0) != "OFF") lines.refuse("expected OFF, in ASCII and without variants, got ", lines.quoted(0));
-    const bool same_line = lines.size() > 1;
-    if (same_line && lines.word(1) == "BINARY") lines.refuse("expected an OFF in ASCII, got BINARY");
-    if (!same_line) lines.expect("the counts of vertices and faces");
-    lines.check_size(same_line ? 4 : 3);
-    const auto vertices = lines.integer(same_line ? 1 : 0, 1, max_vertices);
-    const auto faces = lines.integer(same_line ? 2 : 1, 1, max_vertices);
-    std::string result = "OFF\n" + std::to_string(vertices) + ' ' + std::to_string(faces) + " 0\n";
-    for (std::int64_t v = 0; v < vertices; ++v) {
-        lines.expect("vertex ", v, " of ", vertices);
-        lines.check_size(3);
-        for (std::size_t i = 0; i < 3; ++i) {
-            lines.check_number(i);
-            (result += lines.word(i)) += i < 2 ? ' ' : '\n';
-        }
-    }
-    for (std::int64_t f = 0; f < faces; ++f) {
-        lines.expect("face ", f, " of ", faces);
-        const auto corners = static_cast<std::size_t>(lines.integer(0, 3, max_vertices));
-        if (lines.size() <= corners) lines.refuse("expected ", corners, " corners, got ", lines.size() - 1);
-        const std::size_t begin = result.size();
-        result += lines.word(0);
-        for (std::size_t i = 1; i <= corners; ++i) {
-            (result += ' ') += std::to_string(lines.integer(i, 0, vertices - 1));
-        }
-        if (result.size() - begin > 4000) lines.refuse("expected a polygon in at most 4000 characters");  // assimp's
-        result += '\n';
-    }
-    if (lines.next()) lines.refuse("expected the end of the file, got ", lines.quoted(0));
-    return result;
+    if (lines.keep(lines.word()) != "OFF") lines.refuse("OFF, in ASCII and without variants", lines.words[0]);
+    if (lines.words.size() == 1) lines.expect("the counts of vertices and faces");
+    const std::int64_t vertices = lines.integer(lines.word(), 1, most), faces = lines.integer(lines.word(), 1, most);
+    lines.number();
+    lines.end_line();
+    check_rows({{"vertex", vertices, std::vector<Property>(3)}, {"face", faces, {{{}, {1}}}}}, TextRows{lines, true});
+    return lines.kept;
 }
 
-namespace {
-
-/// The lines of a triangle in an STL in ASCII; `#` is a number.
-const std::array<std::vector<std::string_view>, 7> facet_lines{{{"facet", "normal", "#", "#", "#"},
-                                                                {"outer", "loop"},
-                                                                {"vertex", "#", "#", "#"},
-                                                                {"vertex", "#", "#", "#"},
-                                                                {"vertex", "#", "#", "#"},
-                                                                {"endloop"},
-                                                                {"endfacet"}}};
-
-void check_words(const Lines& lines, const std::vector<std::string_view>& words) {
-    for (std::size_t i = 0; i < words.size() && i < lines.size(); ++i) {
-        if (words[i] == "#") {
-            lines.check_number(i);
-        } else if (lines.word(i) != words[i]) {
-            lines.refuse("expected '", words[i], "', got ", lines.quoted(i));
-        }
-    }
-    lines.check_size(words.size());
-}
-
-}  // namespace
-
-/// Binary unchanged. ASCII in lower case and without the names, in which assimp searches for keywords.
+/// ASCII in lower case and without the names, in which assimp searches for keywords.
 std::string checked_stl(const std::string& file, std::string_view bytes) {
+    std::uint64_t count = 0;
     if (bytes.size() >= 84) {
-        std::uint32_t count = 0;
         for (std::size_t i = 4; i-- > 0;) count = count << 8 | static_cast<unsigned char>(bytes[80 + i]);
-        if (bytes.size() == 84 + std::uint64_t{50} * count) {
-            if (count == 0) membrane::refuse(file, "has no triangles");
-            return std::string(bytes);
-        }
+        if (bytes.size() == 84 + 50 * count) return std::string(bytes);
         if (bytes.find('\0') != bytes.npos) {
-            membrane::refuse(file, "expected ", 84 + std::uint64_t{50} * count, " bytes of a binary STL with ", count,
-                             " triangles, got ", bytes.size());
+            refuse(file, "expected ", 84 + 50 * count, " bytes of a binary STL with ", count, " triangles, got ",
+                   bytes.size());
         }
     }
-    const std::string text = lower(plain_text(file, bytes));
+    Lines facet(file,
+                "facet normal 0 0 0 ; outer loop ; vertex 0 0 0 ; vertex 0 0 0 ; vertex 0 0 0 ; endloop ; endfacet");
+    facet.next();
+    const std::string text = lower(bytes);
     Lines lines(file, text);
-    std::string result;
     lines.expect("'solid'");
     do {
-        if (lines.word(0) != "solid") lines.refuse("expected 'solid', got ", lines.quoted(0));
-        result += "solid\n";
-        for (lines.expect("'facet' or 'endsolid'"); lines.word(0) != "endsolid"; lines.expect("'endsolid'")) {
-            for (const auto& words : facet_lines) {
-                if (&words != &facet_lines[0]) lines.expect("'", words[0], "'");
-                check_words(lines, words);
-                for (std::size_t i = 0; i < lines.size(); ++i) (result += lines.word(i)) += ' ';
-                result += '\n';
+        if (lines.keep(lines.word()) != "solid") lines.refuse("'solid'", lines.words[0]);
+        lines.kept += '\n';
+        for (lines.expect("'facet'"); lines.words[0] != "endsolid"; lines.expect("'endsolid'")) {
+            for (const std::string_view wanted : facet.words) {
+                if (wanted == "0") {
+                    lines.number();
+                } else if (wanted == ";") {
+                    lines.end_line();
+                    lines.expect("a line of a facet");
+                } else if (lines.keep(lines.word()) != wanted) {
+                    lines.refuse("'" + std::string(wanted) + "'", lines.words[lines.at - 1]);
+                }
             }
+            lines.end_line();
         }
-        result += "endsolid\n";
+        lines.kept += "endsolid\n";
     } while (lines.next());
-    return result;
+    return lines.kept;
+}
+
+std::string checked_ply(const std::string& file, std::string_view bytes) {
+    std::vector<Element> elements;
+    std::string format, coordinates;
+    Lines lines(file, bytes);
+    lines.expect("'ply'");
+    if (lines.keep(lines.word()) != "ply") lines.refuse("'ply'", lines.words[0]);
+    for (lines.end_line(), lines.expect("'end_header'"); lines.words[0] != "end_header"; lines.expect("'end_header'")) {
+        const std::string_view kind = lines.word();
+        if (kind == "comment" || kind == "obj_info") continue;
+        lines.keep(kind);
+        if (kind == "format") {
+            format = lines.keep(lines.word());
+            if (lines.keep(lines.word()) != "1.0") lines.refuse("version 1.0", lines.words[2]);
+        } else if (kind == "element") {
+            const std::string name(lines.keep(lines.word()));
+            elements.push_back({name, lines.integer(lines.word(), 0, static_cast<std::int64_t>(bytes.size()))});
+        } else if (kind == "property" && !elements.empty()) {
+            std::string type(lines.keep(lines.word()));
+            Property property;
+            if (type == "list") {
+                if (elements.size() != 2) lines.refuse("a list of face alone, the second element", type);
+                property.count = type_of(std::string(lines.keep(lines.word())), true, lines);
+                type = lines.keep(lines.word());
+            }
+            property.type = type_of(type, property.count.size > 0, lines);
+            const std::string_view name = lines.keep(lines.word());
+            if (elements.size() == 1 && (name == "x" || name == "y" || name == "z")) coordinates += name;
+            elements.back().properties.push_back(property);
+        } else {
+            lines.refuse("a statement of a PLY header", kind);
+        }
+        lines.end_line();
+    }
+    if (elements.size() < 2 || elements[0].name != "vertex" || elements[1].name != "face") {
+        refuse(file, "expected the elements vertex and face to be the first");
+    }
+    std::sort(coordinates.begin(), coordinates.end());
+    if (coordinates != "xyz") refuse(file, "expected a property x, y and z of a vertex, got '", coordinates, "'");
+    lines.kept += "end_header\r\n";  // after \n, assimp skips a binary body's first \n
+    if (format == "ascii") {
+        check_rows(elements, TextRows{lines, false});
+        return lines.kept;
+    }
+    check_rows(elements, BinaryRows{file, bytes, bytes.size() - lines.rest.size(), format == "binary_big_endian"});
+    return lines.kept.append(lines.rest);
 }
 
 }  // namespace examples

@@ -7,7 +7,7 @@ find_path(MEMBRANE_TINYOBJLOADER tiny_obj_loader.h REQUIRED)
 
 add_library(membrane_example_support STATIC EXCLUDE_FROM_ALL
     ${CMAKE_CURRENT_LIST_DIR}/command_line.cpp ${CMAKE_CURRENT_LIST_DIR}/specimen.cpp
-    ${CMAKE_CURRENT_LIST_DIR}/mesh_file.cpp ${CMAKE_CURRENT_LIST_DIR}/mesh_syntax.cpp ${CMAKE_CURRENT_LIST_DIR}/ply_syntax.cpp)
+    ${CMAKE_CURRENT_LIST_DIR}/mesh_file.cpp ${CMAKE_CURRENT_LIST_DIR}/mesh_syntax.cpp)
 cmake_path(GET CMAKE_CURRENT_LIST_DIR PARENT_PATH examples)
 target_include_directories(membrane_example_support PUBLIC ${examples})
 target_include_directories(membrane_example_support SYSTEM PRIVATE ${MEMBRANE_TINYOBJLOADER})

@@ -11,7 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include <membrane/calibration/singular_values.hpp>
+#include <Eigen/SVD>
+
 #include <membrane/calibration/student_t.hpp>
 #include <membrane/core/check.hpp>
 
@@ -127,10 +128,11 @@ class FitSearch {
     [[nodiscard]] Fit run();
 
   private:
-    struct Linearisation {  // at the current constants
-        SingularValues sensitivities;
-        Eigen::VectorXd slopes;  // of half the sum of squares along the singular directions
-        double negligible;       // sensitivities up to this one are neglected
+    struct Linearisation {              // at the current constants
+        Eigen::VectorXd sensitivities;  // singular values: of the residuals along each direction
+        Eigen::MatrixXd directions;     // of the constants' logarithms, one each column
+        Eigen::VectorXd slopes;         // of half the sum of squares along the directions
+        double negligible;              // sensitivities up to this one are neglected
     };
 
     [[nodiscard]] std::optional<Eigen::VectorXd> residuals(const Eigen::VectorXd& logs);
@@ -256,23 +258,23 @@ typename FitSearch<Model>::Linearisation FitSearch<Model>::linearise() {
         beyond[k] -= sensitivities.col(k).dot(residuals_) > 0 ? options_.step : -options_.step;
         if (within_search_range(beyond)[k] == logs_[k]) sensitivities.col(k).setZero();
     }
-    Linearisation local{SingularValues(sensitivities), {}, 0};
-    local.slopes = local.sensitivities.rotated.transpose() * residuals_;
-    local.negligible = options_.min_sensitivity * local.sensitivities.values.maxCoeff();
-    return local;
+    const Eigen::JacobiSVD<Eigen::MatrixXd> parts(sensitivities, Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::VectorXd& values = parts.singularValues();
+    return {values, parts.matrixV(), values.cwiseProduct(parts.matrixU().transpose() * residuals_),
+            options_.min_sensitivity * values.maxCoeff()};
 }
 
 template <class Model>
 bool FitSearch<Model>::is_converged(const Linearisation& local) const {
     const Eigen::VectorXd remaining = damped_step(local, 0);
-    return (local.sensitivities.directions * remaining).cwiseAbs().maxCoeff() <= options_.tolerance ||
-           remaining.cwiseProduct(local.sensitivities.values).norm() <= 1e-3 * scatter();
+    return (local.directions * remaining).cwiseAbs().maxCoeff() <= options_.tolerance ||
+           remaining.cwiseProduct(local.sensitivities).norm() <= 1e-3 * scatter();
 }
 
 // The damped Gauss-Newton step along each singular direction; 0 where the sensitivity is negligible.
 template <class Model>
 Eigen::VectorXd FitSearch<Model>::damped_step(const Linearisation& local, double damping) const {
-    const Eigen::VectorXd& values = local.sensitivities.values;
+    const Eigen::VectorXd& values = local.sensitivities;
     const double least = damping * values.maxCoeff() * values.maxCoeff();
     Eigen::VectorXd result = Eigen::VectorXd::Zero(values.size());
     for (Eigen::Index j = 0; j < values.size(); ++j) {
@@ -293,7 +295,7 @@ template <class Model>
 bool FitSearch<Model>::advance(const Linearisation& local) {
     constexpr double longest = 2;  // of a step in the logarithms; a longer one may give the model absurd constants
     for (; damping_ < 1e12; damping_ *= 8) {
-        Eigen::VectorXd step = local.sensitivities.directions * damped_step(local, damping_);
+        Eigen::VectorXd step = local.directions * damped_step(local, damping_);
         step *= longest / (std::max)(longest, step.cwiseAbs().maxCoeff());
         const Eigen::VectorXd next = within_search_range(logs_ + step);
         const auto next_residuals = residuals(next);
@@ -308,8 +310,8 @@ bool FitSearch<Model>::advance(const Linearisation& local) {
 
 template <class Model>
 Fit FitSearch<Model>::report(const Linearisation& local, bool converged) const {
-    const Eigen::VectorXd& values = local.sensitivities.values;
-    const Eigen::MatrixXd& directions = local.sensitivities.directions;
+    const Eigen::VectorXd& values = local.sensitivities;
+    const Eigen::MatrixXd& directions = local.directions;
     const auto left = static_cast<Index>(residuals_.size() - logs_.size());
     const double scale = scatter() * student_t(options_.confidence, left);
 
