@@ -12,5 +12,6 @@ configure_package_config_file(cmake/membrane-config.cmake.in membrane-config.cma
 write_basic_package_version_file(membrane-config-version.cmake COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
 install(
     FILES ${CMAKE_CURRENT_BINARY_DIR}/membrane-config.cmake ${CMAKE_CURRENT_BINARY_DIR}/membrane-config-version.cmake
+        cmake/instantiated.cmake cmake/instantiated_double.cpp cmake/instantiated_float.cpp
     DESTINATION ${package_dir})
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATADIR}/licenses/membrane)

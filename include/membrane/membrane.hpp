@@ -37,3 +37,7 @@
 #include <membrane/haptics/force_policy.hpp>
 #include <membrane/haptics/device.hpp>
 // clang-format on
+
+#if defined(MEMBRANE_INSTANTIATED)
+#include <membrane/instantiated.hpp>
+#endif
