@@ -122,7 +122,7 @@ TEMPLATE_TEST_CASE(
                 REQUIRE(outcome.advanced);
                 REQUIRE(outcome.at_rest);
                 // With half the effort, a point that did not penetrate in the last pass may be moved inside by others.
-                const double allowed = sweeps == 1 ? 0.012 : 0.01;
+                const double allowed = sweeps == 1 ? 0.013 : 0.01;
                 REQUIRE(outcome.overlap <= allowed + (sizeof(S) == 4 ? 1e-5 : 1e-9));  // rounding of positions
                 const bool bounded = outcome.force <= 2 * exact;
                 if (stroke.shape != Shape::point) REQUIRE(bounded);
