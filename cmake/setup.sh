@@ -88,4 +88,4 @@ example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json
     libtinyobjloader-dev zlib1g-dev)
 bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox
     libbullet-dev libcgal-dev libembree-dev libfcl-dev)
-check_packages=(clang clang-format clang-tidy debootstrap git libclang-rt-dev valgrind)
+check_packages=(clang clang-format-14 clang-tidy debootstrap git libclang-rt-dev valgrind)
