@@ -85,7 +85,7 @@ build() {
 test_packages=(g++ cmake ninja-build libeigen3-dev catch2 libcgal-dev libseccomp-dev libcli11-dev libassimp-dev
     libtinyobjloader-dev zlib1g-dev)
 example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json3-dev libassimp-dev
-    libtinyobjloader-dev zlib1g-dev)
+    libtinyobjloader-dev zlib1g-dev gnuplot-nox)
 bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox
     libbullet-dev libcgal-dev libembree-dev libfcl-dev)
 check_packages=(clang clang-format-14 clang-tidy debootstrap git libclang-rt-dev valgrind)

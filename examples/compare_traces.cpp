@@ -42,8 +42,6 @@ Recording recorded(const examples::Specimen& body, Device device) {
 }
 
 void compare(const Recording& a, const Recording& b, const std::filesystem::path& out) {
-    const auto picture = out / "compare_traces.svg";
-    examples::save(picture, drawn(examples::plot_of(a, b)));
     const std::size_t ticks = std::min(a.ticks.size(), b.ticks.size());
     std::size_t same = 0, first_other = ticks;
     double largest = 0;  // [N]
@@ -56,7 +54,7 @@ void compare(const Recording& a, const Recording& b, const std::filesystem::path
     std::printf("ticks: %zu and %zu, %zu the same to the bit\n", a.ticks.size(), b.ticks.size(), same);
     if (first_other < ticks) std::printf("the first that is not: %zu\n", first_other);
     std::printf("largest difference of forces: %g N\n", largest);
-    std::printf("picture: %s\n", picture.string().c_str());
+    std::puts(examples::plot(out / "compare_traces", examples::curves_of(a, b), "compare_traces").c_str());
 }
 
 int main(int argc, char** argv) {

@@ -23,18 +23,10 @@
 
 using Numbers = std::span<const double>;
 
-std::string picture(const membrane::ForceTable& table, Numbers depths, Numbers forces) {
-    const auto curve = [](Numbers d, Numbers f, examples::Curve result) {
-        for (std::size_t i = 0; i < d.size(); ++i) result.samples.push_back({1e3 * d[i], 1e3 * f[i]});  // mm, mN
-        return result;
-    };
-    return drawn(examples::Plot{
-        .title = "A lens under an indenter",
-        .phases = {{"", 0, 1e3 * depths.back()}},
-        .panels = {{"force [mN]",
-                    {curve(depths, forces, {.name = "fitted", .colour = "#12507b"}),
-                     curve(table.depth, table.force, {.name = "measured", .colour = "#b3541e", .dots = true})}}},
-        .axis = "depth [mm]"});
+examples::Curve curve(Numbers depths, Numbers forces) {
+    examples::Curve result;
+    for (std::size_t i = 0; i < depths.size(); ++i) result.push_back({1e3 * depths[i], 1e3 * forces[i]});  // mm, mN
+    return result;
 }
 
 void run(const std::filesystem::path& data, const examples::Specimen& body, const std::filesystem::path& out) {
@@ -65,9 +57,8 @@ void run(const std::filesystem::path& data, const examples::Specimen& body, cons
     std::vector<double> depths{0};
     const double deepest = *std::max_element(table.depth.begin(), table.depth.end());
     for (int i = 1; i <= 20; ++i) depths.push_back(deepest * i / 20);
-    const auto file = out / "fit_constants.svg";
-    examples::save(file, picture(table, depths, model(found.constants, depths)));
-    std::printf("picture: %s\n", file.c_str());
+    const auto fitted = curve(depths, model(found.constants, depths)), measured = curve(table.depth, table.force);
+    std::puts(examples::plot(out / "fit_constants", {fitted, measured}, "fit_constants").c_str());
 }
 
 int main(int argc, char** argv) {

@@ -60,20 +60,15 @@ Felt slide(const Specimen& body) {
     return felt;
 }
 
-/// Force over time and its spectrum, for both kinds of normals.
-std::string picture(const Felt& felt) {
-    Curve before{.name = "normals of the triangles", .colour = "#d0532f"},
-        after{.name = "smooth normals", .colour = "#12507b"};
-    PlotPanel force{"force [mN]", {before, after}}, above{"amplitude [mN]", {before, after}};
+/// Force over time [mN] and its spectrum, for both kinds of normals.
+std::vector<Curve> curves(const Felt& felt) {
+    std::vector<Curve> result(2);
     for (std::size_t k = 0; k < 2; ++k) {
-        const auto& forces = k == 0 ? felt.flat : felt.smooth;
         double now = 0;
-        for (const auto& f : forces) force.curves[k].samples.push_back({now += tick, 1e3 * f.norm()});
-        above.curves[k].samples = spectrum(forces, tick, 100);
+        for (const auto& f : k == 0 ? felt.flat : felt.smooth) result[k].push_back({now += tick, 1e3 * f.norm()});
     }
-    const Plot time{"A slide over triangles: the force on the hand", {{"", 0, slide_for}}, {force}};
-    const Plot frequency{"Its spectrum above 100 Hz", {{"", 100, 0.5 / tick}}, {above}, "frequency [Hz]"};
-    return drawn(std::vector<Plot>{time, frequency});
+    for (const auto* forces : {&felt.flat, &felt.smooth}) result.push_back(spectrum(*forces, tick, 100));
+    return result;
 }
 
 double largest_change(const std::vector<Eigen::Vector3d>& forces) {
@@ -91,9 +86,8 @@ int main(int argc, char** argv) {
     return command.run(argc, argv, [&] {
         const auto felt = slide(mesh.specimen(stock_sphere()));
         std::filesystem::create_directories(folder);
-        save(folder / "slide.svg", picture(felt));
         std::printf("Largest change in a tick: %.2g mN with the normals of the triangles, %.2g mN with smooth ones.\n",
                     largest_change(felt.flat), largest_change(felt.smooth));
-        std::printf("picture: %s\n", (folder / "slide.svg").c_str());
+        std::puts(plot(folder / "slide", curves(felt), "slide").c_str());
     });
 }

@@ -146,6 +146,21 @@ Type type_of(const std::string& name, bool integer, const Lines& lines) {
     lines.refuse(integer ? "a type of integers" : "a type of numbers", name);
 }
 
+/// The rest of a line that begins with `property`, of the last of `elements`; notes which coordinates a vertex has.
+Property property_of(Lines& lines, std::size_t elements, std::string& coordinates) {
+    std::string type(lines.keep(lines.word()));
+    Property property;
+    if (type == "list") {
+        if (elements != 2) lines.refuse("a list of face alone, the second element", type);
+        property.count = type_of(std::string(lines.keep(lines.word())), true, lines);
+        type = lines.keep(lines.word());
+    }
+    property.type = type_of(type, property.count.size > 0, lines);
+    const std::string_view name = lines.keep(lines.word());
+    if (elements == 1 && (name == "x" || name == "y" || name == "z")) coordinates += name;
+    return property;
+}
+
 /// The rows of a text, each a line. A face of an OFF may have a colour behind its corners.
 struct TextRows {
     Lines& lines;
@@ -317,17 +332,7 @@ std::string checked_ply(const std::string& file, std::string_view bytes) {
             const std::string name(lines.keep(lines.word()));
             elements.push_back({name, lines.integer(lines.word(), 0, static_cast<std::int64_t>(bytes.size()))});
         } else if (kind == "property" && !elements.empty()) {
-            std::string type(lines.keep(lines.word()));
-            Property property;
-            if (type == "list") {
-                if (elements.size() != 2) lines.refuse("a list of face alone, the second element", type);
-                property.count = type_of(std::string(lines.keep(lines.word())), true, lines);
-                type = lines.keep(lines.word());
-            }
-            property.type = type_of(type, property.count.size > 0, lines);
-            const std::string_view name = lines.keep(lines.word());
-            if (elements.size() == 1 && (name == "x" || name == "y" || name == "z")) coordinates += name;
-            elements.back().properties.push_back(property);
+            elements.back().properties.push_back(property_of(lines, elements.size(), coordinates));
         } else {
             lines.refuse("a statement of a PLY header", kind);
         }

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <ios>
 #include <iostream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -52,9 +53,18 @@ class Output {
         print(std::cout, force_table(outcomes), force_note());
         std::vector<Drawing> drawings;
         for (const Outcome& outcome : outcomes) {
-            for (const auto draw : {pressed_and_pulled, recovered, over_time}) drawings.push_back(draw(outcome));
+            for (const auto draw : {pressed_and_pulled, recovered}) {
+                drawings.push_back(draw(outcome));
+                save(folder_ / (drawings.back().name + ".svg"), drawings.back().svg);
+            }
+            const auto file = folder_ / (outcome.scene.key + "_force");
+            std::cout << plot(file, curves(outcome), "press_and_pull", settings(outcome)) << '\n';
+            std::ifstream svg(file.string() + ".svg");
+            if (!svg) continue;
+            drawings.push_back({file.stem().string(),
+                                force_caption,
+                                {std::istreambuf_iterator<char>(svg), std::istreambuf_iterator<char>()}});
         }
-        for (const Drawing& drawing : drawings) save(folder_ / (drawing.name + ".svg"), drawing.svg);
         save(page_, page(outcomes, drawings, layers));
         if (!json_.empty()) save(json_, json(outcomes, layers).dump(2) + '\n');
         if (!csv_.empty()) save(csv_, csv(outcomes));

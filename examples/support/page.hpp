@@ -15,14 +15,13 @@ using Table = std::vector<std::vector<std::string>>;
 /// One self-contained HTML page: drawings are inline.
 ///
 ///     Page page("Press and pull");
-///     page.heading("Sphere, 642 vertices");
+///     page.paragraph("Sphere, 642 vertices");
 ///     page.figure(svg.str(), "Figure 4. At rest, pressed, pulled.");
 ///     std::ofstream("index.html") << page.str();
 class Page {
   public:
     explicit Page(std::string_view title) : title_(escaped(title)) {}
 
-    void heading(std::string_view text) { body_ += "<h2>" + escaped(text) + "</h2>\n"; }
     void paragraph(std::string_view text) { body_ += "<p>" + escaped(text) + "</p>\n"; }
 
     void figure(std::string_view svg, std::string_view caption) {
@@ -50,17 +49,14 @@ class Page {
   private:
     static constexpr std::string_view style = R"(body { max-width: 60rem; margin: 2.5rem auto; padding: 0 1.2rem;
   font: 1rem/1.55 Helvetica, Arial, "Liberation Sans", sans-serif; color: #222; background: #fff; }
-h1 { font-size: 1.7rem; line-height: 1.25; margin-bottom: .6rem; }
-h2 { font-size: 1.2rem; margin-top: 2.6rem; padding-bottom: .25rem; border-bottom: 1px solid #ddd; }
-p { max-width: 46rem; }
+p, caption, figcaption { max-width: 46rem; }
 figure { margin: 1.4rem 0 2rem; }
 figure svg { max-width: 100%; height: auto; display: block; }
-figcaption, caption { color: #555; font-size: .9rem; text-align: left; max-width: 46rem; }
-caption { margin-bottom: .5rem; }
+figcaption, caption { color: #555; font-size: .9rem; text-align: left; margin-bottom: .5rem; }
 .table { overflow-x: auto; margin: 1.2rem 0; }
 table { border-collapse: collapse; font-size: .88rem; font-variant-numeric: tabular-nums; }
-th, td { text-align: right; padding: .3rem .7rem; border-bottom: 1px solid #e4e4e4; white-space: nowrap; }
-th { font-weight: 600; vertical-align: bottom; white-space: normal; border-bottom: 1px solid #888; }
+th, td { text-align: right; padding: .3rem .7rem; border-bottom: 1px solid #ddd; white-space: nowrap; }
+th { vertical-align: bottom; white-space: normal; }
 th:first-child, td:first-child { text-align: left; padding-left: 0; white-space: nowrap; }
 )";
 

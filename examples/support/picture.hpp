@@ -44,7 +44,7 @@ struct Picture {
     membrane::Points<double> points;                  ///< Deformed, 3 x V [m].
     ColourScale colours = {};                         ///< Of the quantity shown as colour.
     std::optional<Eigen::VectorXd> values = {};       ///< Of each triangle, in SI; if none, displacements [m].
-    std::optional<membrane::Tool<double>> tool = {};  ///< Drawn as a sphere or a capsule.
+    std::optional<membrane::Tool<double>> tool = {};  ///< Drawn as a sphere.
     Vector3d force = Vector3d::Zero();                ///< On the tool [N], drawn as an arrow with its value.
     double arrow = 0.1;                               ///< Length of an arrow of one newton [m].
 };
@@ -70,10 +70,8 @@ struct Facet {
 
 /// Whether the tool hides nothing of the triangle: a plane between the two has the eye on the triangle's side.
 inline bool over(const membrane::Tool<double>& tool, const membrane::Triangle<double>& triangle, const Vector3d& eye) {
-    const Vector3d end = tool.position + tool.axis;
-    const auto pair = membrane::closest_to_segment<double>(triangle, tool.position, end);
-    const Vector3d on_tool = tool.position + pair.fraction * tool.axis;
-    return (pair.on_triangle.point - on_tool).dot(eye - pair.on_triangle.point) > 0;
+    const Vector3d near = membrane::closest_point<double>(triangle, tool.position).point;
+    return (near - tool.position).dot(eye - near) > 0;
 }
 
 /// Far triangles first, those over the tool last. The inside of a closed surface is left out.
@@ -142,36 +140,12 @@ inline void draw_facet(Svg& svg, const Camera& camera, const Picture& picture, c
     }
 }
 
-inline constexpr std::string_view tool_border = "stroke='#46525e' stroke-width='.7'";
-
-inline void draw_sphere(Svg& svg, Pixel middle, double radius, const std::string& name) {
-    svg.add("<radialGradient id='", name, "-tool' cx='.36' cy='.3' r='.72'><stop offset='0' stop-color='#fdfeff'/>",
-            "<stop offset='.35' stop-color='#c6d0d9'/><stop offset='1' stop-color='#667482'/></radialGradient>\n");
-    svg.add("<circle cx='", middle.x, "' cy='", middle.y, "' r='", radius, "' fill='url(#", name, "-tool)' ",
-            tool_border, "/>\n");
-}
-
-/// A capsule: two circles and the region between them.
-inline void draw_capsule(Svg& svg, Pixel p, double p_radius, Pixel q, double q_radius, const std::string& name) {
-    const double length = std::hypot(q.x - p.x, q.y - p.y);
-    const Pixel across{-(q.y - p.y) / length, (q.x - p.x) / length};
-    const auto beside = [&](Pixel from, double by) { return Pixel{from.x + by * across.x, from.y + by * across.y}; };
-    const Pixel left = beside(p, -p_radius), right = beside(p, p_radius);
-    svg.add("<linearGradient id='", name, "-tool' gradientUnits='userSpaceOnUse' x1='", left.x, "' y1='", left.y,
-            "' x2='", right.x, "' y2='", right.y, "'><stop offset='0' stop-color='#7d8a97'/>",
-            "<stop offset='.35' stop-color='#fafcfd'/><stop offset='1' stop-color='#667482'/></linearGradient>\n");
-    svg.add("<path d='M", left, "A", p_radius, " ", p_radius, " 0 0 0 ", right, "L", beside(q, q_radius), "A", q_radius,
-            " ", q_radius, " 0 0 0 ", beside(q, -q_radius), "z' fill='url(#", name, "-tool)' ", tool_border, "/>\n");
-}
-
 inline void draw_tool(Svg& svg, const Camera& camera, const membrane::Tool<double>& tool, const std::string& name) {
-    constexpr double point_radius = 2;  // [px]
-    const Vector3d end = tool.position + tool.axis;
-    const double p_radius = std::max(point_radius, tool.radius * camera.scale(tool.position));
-    const double q_radius = std::max(point_radius, tool.radius * camera.scale(end));
-    const Pixel p = camera.pixel(tool.position), q = camera.pixel(end);
-    if (std::hypot(q.x - p.x, q.y - p.y) < 1) return draw_sphere(svg, p, p_radius, name);
-    draw_capsule(svg, p, p_radius, q, q_radius, name);
+    const Pixel p = camera.pixel(tool.position);
+    svg.add("<radialGradient id='", name, "-tool' cx='.36' cy='.3' r='.72'><stop offset='0' stop-color='#fdfeff'/>",
+            "<stop offset='.35' stop-color='#c6d0d9'/><stop offset='1' stop-color='#667482'/></radialGradient>\n",
+            "<circle cx='", p.x, "' cy='", p.y, "' r='", std::max(2.0, tool.radius * camera.scale(tool.position)),
+            "' fill='url(#", name, "-tool)' stroke='#46525e' stroke-width='.7'/>\n");
 }
 
 inline std::string force_text(double newtons) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -92,30 +93,43 @@ inline std::string after_figure(const std::string& number) {
             drawn(figure)};
 }
 
-/// Force and depth over time.
-[[nodiscard]] inline Drawing over_time(const Outcome& outcome) {
-    const auto& [scene, with, without] = outcome;
-    Curve felt{.name = "felt, -k x - \u03bc v", .colour = "#8a8f94"};
-    Curve reaction{.name = "reaction", .colour = "#12507b"};
-    Curve loose{.name = "reaction without volume springs", .colour = "#d0532f", .dashed = true};
-    Curve depth{.name = "depth of the tool", .colour = "#333"};
-    Curve pulled{.name = "displacement of the held point", .colour = "#7a4ea3"};
-    for (const Frame& frame : with.frames) {
-        felt.samples.push_back({frame.tool.time, 1e3 * frame.felt.norm()});
-        reaction.samples.push_back({frame.tool.time, 1e3 * frame.reaction.norm()});
-        depth.samples.push_back({frame.tool.time, 1e3 * frame.depth});
-        pulled.samples.push_back({frame.tool.time, 1e3 * frame.pulled});
+/// Force [mN] and depth [mm] over time: felt, reaction, reaction without volume springs, depth, pulled.
+[[nodiscard]] inline std::vector<Curve> curves(const Outcome& outcome) {
+    std::vector<Curve> result(5);
+    for (const Frame& frame : outcome.with.frames) {
+        const double now = frame.tool.time;
+        result[0].push_back({now, 1e3 * frame.felt.norm()});
+        result[1].push_back({now, 1e3 * frame.reaction.norm()});
+        result[3].push_back({now, 1e3 * frame.depth});
+        result[4].push_back({now, 1e3 * frame.pulled});
     }
-    for (const Frame& frame : without.frames) {
-        loose.samples.push_back({frame.tool.time, 1e3 * frame.reaction.norm()});
+    for (const Frame& frame : outcome.without.frames) {
+        result[2].push_back({frame.tool.time, 1e3 * frame.reaction.norm()});
     }
-    const Plot plot{.title = "Force and depth, " + scene.name,
-                    .phases = with.phases,
-                    .panels = {{"force [mN]", {felt, reaction, loose}}, {"depth [mm]", {depth, pulled}}}};
-    return {scene.key + "_force",
-            "Force and depth over time. Felt is the paper's formula, a function of depth and velocity alone; the "
-            "reaction is the force of the membrane on the tool.",
-            drawn(plot)};
+    return result;
+}
+
+inline constexpr const char* force_caption =
+    "Force and depth over time. Felt is the paper's formula, a function of depth and velocity alone; the reaction is "
+    "the "
+    "force of the membrane on the tool.";
+
+/// For gnuplot: the name of the scene, and the phases as labels, every second one shaded.
+[[nodiscard]] inline std::string settings(const Outcome& outcome) {
+    std::ostringstream text;
+    text << "name = '" << outcome.scene.name << "'\n";
+    bool shaded = false;
+    for (const Phase& phase : outcome.with.phases) {
+        text << "set label '" << phase.name << "' at " << (phase.begin + phase.end) / 2
+             << ", graph 1.06 center font ',11' tc '#666666'\n";
+        if (shaded) {
+            text << "set object rectangle from " << phase.begin << ", graph 0 to " << phase.end
+                 << ", graph 1 behind fc '#f2f4f6' fs solid noborder\n";
+        }
+        shaded = !shaded;
+    }
+    text << "set xrange [" << outcome.with.phases.front().begin << ':' << outcome.with.phases.back().end << "]\n";
+    return text.str();
 }
 
 /// Tables and drawings on one page.

@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
-#include <utility>
+#include <vector>
 
 #include <membrane/haptics/recording_file.hpp>
 
@@ -37,40 +37,25 @@ inline void save(const std::filesystem::path& path, const membrane::Recording<do
     if (!file.flush() || !table.flush()) throw std::runtime_error("cannot write " + path.string());
 }
 
-namespace detail {
-
-/// `value(i)` of each of the first ticks; omits values that are not finite.
-template <class Value>
-[[nodiscard]] Curve traced(Curve curve, std::size_t ticks, Value value) {
-    for (std::size_t i = 0; i < ticks; ++i) {
-        const double now = value(i);
-        if (std::isfinite(now)) curve.samples.push_back({static_cast<double>(i), now});
-    }
-    return curve;
-}
-
-}  // namespace detail
-
-/// Two runs: displacement of the tool from its first position, force, and difference of the forces.
-[[nodiscard]] inline Plot plot_of(const membrane::Recording<double>& first, const membrane::Recording<double>& second) {
-    PlotPanel displacement{"displacement [mm]", {}}, force{"force [N]", {}};
-    const auto add = [&](const auto& ticks, const Curve& curve) {
-        const auto millimetres = [&](std::size_t i) {
-            return 1e3 * (ticks[i].tool.position - ticks[0].tool.position).norm();
-        };
-        displacement.curves.push_back(detail::traced(curve, ticks.size(), millimetres));
-        force.curves.push_back(detail::traced(curve, ticks.size(), [&](auto i) { return ticks[i].force.norm(); }));
+/// Two runs: displacement of the tool from its first position [mm] in each, force [N] in each, and difference of the
+/// forces, over the ticks; without values that are not finite.
+[[nodiscard]] inline std::vector<Curve> curves_of(const membrane::Recording<double>& first,
+                                                  const membrane::Recording<double>& second) {
+    std::vector<Curve> curves(5);
+    const auto add = [&](std::size_t curve, std::size_t tick, double value) {
+        if (std::isfinite(value)) curves[curve].push_back({static_cast<double>(tick), value});
     };
-    add(first.ticks, {.name = "first", .colour = "#7fb3d5"});
-    add(second.ticks, {.name = "second", .colour = "#7a2e0e", .dashed = true});
-    const auto [both, most] = std::minmax({first.ticks.size(), second.ticks.size()});
-    const auto apart = detail::traced({.name = "second less first", .colour = "#555"}, both, [&](std::size_t i) {
-        return (second.ticks[i].force - first.ticks[i].force).norm();
-    });
-    return {.title = "Two traces",
-            .phases = {{"", 0, static_cast<double>((std::max)(most, std::size_t{2}) - 1)}},
-            .panels = {std::move(displacement), std::move(force), {"apart [N]", {apart}}},
-            .axis = "tick"};
+    for (std::size_t run = 0; run < 2; ++run) {
+        const auto& ticks = (run == 0 ? first : second).ticks;
+        for (std::size_t i = 0; i < ticks.size(); ++i) {
+            add(run, i, 1e3 * (ticks[i].tool.position - ticks[0].tool.position).norm());
+            add(2 + run, i, ticks[i].force.norm());
+        }
+    }
+    for (std::size_t i = 0; i < std::min(first.ticks.size(), second.ticks.size()); ++i) {
+        add(4, i, (second.ticks[i].force - first.ticks[i].force).norm());
+    }
+    return curves;
 }
 
 }  // namespace examples

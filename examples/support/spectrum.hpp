@@ -15,10 +15,9 @@ namespace examples {
 
 /// Amplitude spectrum [mN] of equidistant forces [N], over frequencies from `lowest` on [Hz]. Uses a Hann window, which
 /// removes the effect of the ends of the record.
-[[nodiscard]] inline std::vector<Sample> spectrum(const std::vector<Eigen::Vector3d>& forces, double tick,
-                                                  double lowest) {
+[[nodiscard]] inline Curve spectrum(const std::vector<Eigen::Vector3d>& forces, double tick, double lowest) {
     const auto count = static_cast<double>(forces.size());
-    std::vector<Sample> amplitudes;
+    Curve amplitudes;
     for (double k = std::ceil(lowest * tick * count); 2 * k < count; ++k) {
         Eigen::Vector3cd sum = Eigen::Vector3cd::Zero();
         for (std::size_t i = 0; i < forces.size(); ++i) {

@@ -76,8 +76,7 @@ struct TextStyle {
     std::string_view colour = "#333";
     std::string_view anchor = "start";  ///< Or "middle", "end".
     bool bold = false;
-    bool halo = false;     ///< A white border, to be read over a picture.
-    bool upright = false;  ///< Turned to run upwards.
+    bool halo = false;  ///< A white border, to be read over a picture.
 };
 
 class Svg {
@@ -104,7 +103,6 @@ class Svg {
         if (style.anchor != "start") add(" text-anchor='", style.anchor, "'");
         if (style.bold) add(" font-weight='bold'");
         if (style.halo) add(" stroke='#fff' stroke-width='3.5' stroke-linejoin='round' paint-order='stroke'");
-        if (style.upright) add(" transform='rotate(-90 ", where, ")'");
         add(">", escaped(words), "</text>\n");
     }
 

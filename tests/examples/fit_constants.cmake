@@ -18,10 +18,18 @@ foreach(expected "springs;25" "foundation;3")
     endif()
 endforeach()
 file(READ ${folder}/fit_constants.svg svg)
-string(REGEX MATCHALL "<circle " dots "${svg}")
+string(REGEX MATCHALL "<use xlink:href='#gpPt6'" dots "${svg}")
 list(LENGTH dots count)
 if(NOT count EQUAL 13 OR NOT svg MATCHES "^<svg .*</svg>\n$" OR svg MATCHES "nan|inf[^o]")
     message(FATAL_ERROR "expected a drawing of 12 rows and a legend, got ${count} dots")
+endif()
+
+# Without gnuplot the data are written, and it is said what is missing.
+file(REMOVE ${folder}/fit_constants.dat ${folder}/fit_constants.svg)
+execute_process(COMMAND ${CMAKE_COMMAND} -E env PATH=/nonexistent ${program} --out ${folder} RESULT_VARIABLE code OUTPUT_VARIABLE output)
+if(NOT code EQUAL 0 OR NOT output MATCHES "\nno picture, gnuplot is missing; data: ${folder}/fit_constants.dat\n$"
+    OR NOT EXISTS ${folder}/fit_constants.dat OR EXISTS ${folder}/fit_constants.svg)
+    message(FATAL_ERROR "expected data and no picture, exit code ${code}:\n${output}")
 endif()
 
 # From three shallow presses, springs and foundation are not identifiable.

@@ -70,7 +70,7 @@ file(READ ${pictures}/index.html html)
 string(REGEX MATCHALL "<svg " drawings "${html}")
 list(LENGTH drawings drawing_count)
 expect("${drawing_count} EQUAL 9")
-if(html MATCHES "(src|href)=|@import|url\\([^#]")
+if(html MATCHES "(src|href)=['\"][^#]|@import|url\\([^#]")
     message(FATAL_ERROR "index.html refers to something outside: ${CMAKE_MATCH_0}")
 endif()
 
