@@ -169,7 +169,7 @@ TEMPLATE_TEST_CASE("shapes that are none are refused by validation as by the mes
     CHECK(test::refusal([&] { (void)validate(t.x, t.triangles, {.max_findings_per_kind = 0}); }) ==
           "validate: max_findings_per_kind must be at least 1, got 0");
     CHECK(test::refusal([&] { (void)validate(t.x, t.triangles, {.max_pairs_per_triangle = -2}); }) ==
-          "validate: effort must not be negative, got -2");
+          "validate: max_pairs_per_triangle must not be negative, got -2");
     const std::vector<S> flat(t.x.data(), t.x.data() + 12);
     const std::vector<Index> flat_corners(t.triangles.data(), t.triangles.data() + 12);
     CHECK(validate(std::span(flat), std::span(flat_corners)).empty());

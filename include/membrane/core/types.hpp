@@ -44,17 +44,10 @@ using PointsRef = Eigen::Ref<Points<Scalar>, 0, Eigen::OuterStride<>>;
 template <Real Scalar>
 using ConstPointsRef = Eigen::Ref<const Points<Scalar>, 0, Eigen::OuterStride<>>;
 
-/// Point `v` of `x`, by value. Reads number by number: compilers generate better code than for a column. Where `x` has
-/// its points in memory, reads from there, which without optimisation costs a third.
+/// Point `v` of `x`, by value. Reads number by number: compilers generate better code than for a column.
 template <class Positions>
 [[nodiscard]] auto point(const Positions& x, Index v) noexcept {
-    using Point = Vector3<typename Positions::Scalar>;
-    if constexpr (Positions::InnerStrideAtCompileTime == 1 && !Positions::IsRowMajor) {
-        const auto* number = x.data() + v * x.outerStride();
-        return Point(number[0], number[1], number[2]);
-    } else {
-        return Point(x(0, v), x(1, v), x(2, v));
-    }
+    return Vector3<typename Positions::Scalar>(x(0, v), x(1, v), x(2, v));
 }
 
 /// Sets point `v` of `x`.
