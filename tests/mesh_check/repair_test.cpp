@@ -82,12 +82,12 @@ TEMPLATE_TEST_CASE("repair does nothing unasked", "[mesh]", double, float) {
         Random random(static_cast<std::uint64_t>(seed));
         const Surface<S> broken = broken_surface<S>(random);
         REQUIRE(same(repaired(broken, {}), broken));
-        REQUIRE(to_string(repaired(broken, {}).report) == "nothing");
+        REQUIRE(to_string(repaired(broken, {}).report) == "no changes");
         // Without a defect the repair changes nothing.
         const Surface<S> valid = test::random_surface<S>(random);
         const auto kept = repaired(valid, everything);
         REQUIRE(same(kept, valid));
-        REQUIRE(to_string(kept.report) == "nothing");
+        REQUIRE(to_string(kept.report) == "no changes");
         for (Index v = 0; v < valid.vertex_count(); ++v) REQUIRE(kept.vertices[static_cast<std::size_t>(v)] == v);
         for (Index f = 0; f < valid.triangle_count(); ++f) {
             REQUIRE(kept.source_triangles[static_cast<std::size_t>(f)] == f);

@@ -21,7 +21,7 @@
 ///     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
 ///     const auto error = bound.compute(x, network, foundation, membrane::pull(7, target));
 ///     if (error.certified()) {
-///         error.position                                                            // no vertex is farther off [m]
+///         error.position                                              // no vertex is farther from its equilibrium [m]
 ///         error.reactions[0].max_distance_to(report.reactions[0])                   // error bound of a force [N]
 ///     }
 ///
@@ -31,7 +31,7 @@
 namespace membrane {
 
 struct ErrorBoundOptions {
-    Index cg_iterations = 200;  ///< maximum number of products with the stiffness; soft foundations need more
+    Index cg_iterations = 200;  ///< at most, over all Newton steps; soft foundations need more
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
@@ -40,17 +40,18 @@ struct ErrorBoundOptions {
 /// Proves an upper bound of the distance of a membrane of linear springs from equilibrium. The state may come from any
 /// solver, which may have moved all of its vertices or only some: the equilibrium is that of all free vertices.
 ///
-/// The bound is e = |r| / mu: r are the residual forces of a state y near `x`, and no eigenvalue of the stiffness is
-/// below mu > 0 around it, as `Convexity` shows. y comes from Newton's method with conjugate gradients (inexact,
-/// [Dembo82]), so that near the equilibrium the bound is hardly larger than the distance. With tools, y is an
-/// equilibrium computed before, and `ContactBounds` bounds the work of the contact forces. Proof: README.md in this
-/// folder.
+/// The bound is max |y_v - x_v| + e. y is a state near `x` with residual forces r, and e = |r| / mu without tools. mu >
+/// 0 is a lower bound of the eigenvalues of the stiffness at all states C whose free vertices are within rho of `x`;
+/// `Convexity` computes it. y comes from Newton's method with conjugate gradients (inexact, [Dembo82]), so that near
+/// the equilibrium the bound is hardly larger than the distance. With tools, y is an equilibrium computed before, and e
+/// includes the work of the contact forces, which `ContactBounds` bounds. Proof: README.md in this folder.
 ///
-/// Rounding is that of IEEE double: with -ffast-math this is no proof. The equilibrium has no damping forces. A
-/// reaction in a step's report may include some; its distance from the equilibrium's reaction is bounded all the same.
-/// A press without contact or grasp counts as no constraint.
+/// The proof includes rounding in IEEE double arithmetic. It does not hold with -ffast-math. The equilibrium has no
+/// damping forces. A reaction in a step's report may include some; `max_distance_to` then includes them, and the bound
+/// still holds. A press without contact or grasp adds no force, and its reaction is exactly zero.
 ///
-/// Calls are independent of each other. One thread at a time for each instance.
+/// A result does not depend on earlier calls. Each call invalidates the `reactions` of the last report. One thread at a
+/// time for each instance.
 template <CheckedConvexityModel Convexity = BlockConvexity>
 class ErrorBound {
   public:
@@ -65,8 +66,9 @@ class ErrorBound {
                                       const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                       const Constraints&... constraints) noexcept;
 
-    /// Bounds the error with tools in contact; `rest` is the equilibrium under these constraints. No tool may touch a
-    /// fixed or prescribed vertex, nor a vertex that another tool may touch, and there may be no point attachment.
+    /// Bounds the error with tools in contact; `rest` is the equilibrium under these constraints. The status is
+    /// `not_convex` if a tool may touch a fixed or prescribed vertex, or one that another tool may touch, and
+    /// `unsupported` with a point attachment.
     /// @throws InvalidInput for a constraint that is not valid. Offline.
     template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
     [[nodiscard]] ErrorReport compute(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
@@ -94,8 +96,10 @@ class ErrorBound {
     StiffnessOperator stiffness_;
     Convexity convexity_;
     ContactBounds pressed_;
-    Points<double> y_, force_, rest_,
-        displacement_;  // y, forces on all vertices, residual forces, a step
+    Points<double> y_;             // a state near the equilibrium [m]
+    Points<double> force_;         // of springs, foundation and loads, without contacts [N]
+    Points<double> residual_;      // with contacts, on free vertices [N]
+    Points<double> displacement_;  // a step of Newton's method [m]
     std::vector<double> magnitude_, weights_, slopes_;
     double distance_ = 0, unbalanced_ = 0;  // of y: distance from x [m], norm of the residual [N]
     double radius_ = -1;                    // rho of C [m]
@@ -122,7 +126,7 @@ ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network,
       pressed_(problem_),
       y_(Points<double>::Zero(3, network.vertex_count())),
       force_(y_),
-      rest_(y_),
+      residual_(y_),
       displacement_(y_),
       magnitude_(static_cast<std::size_t>(network.vertex_count())),
       weights_(magnitude_),
@@ -189,8 +193,7 @@ ErrorReport ErrorBound<Convexity>::report(const Constraints&... constraints) noe
     return error_;
 }
 
-// Approaches the equilibrium by Newton's method until e is small compared with the distance; then finds a radius rho
-// for C that is not below the bound it yields.
+// Approaches the equilibrium by Newton's method until e is small compared with the distance; then encloses it.
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::locate() noexcept {
     y_ = problem_.centre();
@@ -213,7 +216,7 @@ void ErrorBound<Convexity>::locate() noexcept {
     enclose();
 }
 
-// Finds a radius rho for C that is not below the bound it yields.
+// Increases rho until the bound that C yields, |y - x| + e, is not above it.
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::enclose() noexcept {
     error_.status = BoundStatus::not_converged;
@@ -234,7 +237,7 @@ bool ErrorBound<Convexity>::refine() noexcept {
     stiffness_.at(problem_, y_);
     displacement_.setZero();
     const auto report =
-        stiffness_.solve(problem_, rest_, displacement_,
+        stiffness_.solve(problem_, residual_, displacement_,
                          {.tolerance = 1e-2, .iterations = options_.cg_iterations - error_.cg_iterations});
     error_.cg_iterations += report.iterations;
     y_ += displacement_;
@@ -246,9 +249,9 @@ bool ErrorBound<Convexity>::refine() noexcept {
 template <CheckedConvexityModel Convexity>
 void ErrorBound<Convexity>::evaluate_residuals() noexcept {
     problem_.forces(y_, force_, magnitude_);
-    rest_ = force_;
-    pressed_.add_force(rest_, magnitude_);
-    problem_.project(rest_);
+    residual_ = force_;
+    pressed_.add_force(residual_, magnitude_);
+    problem_.project(residual_);
     double rounding = 0, farthest = 0;
     for (Index v = 0; v < problem_.vertex_count(); ++v) {
         farthest = (std::max)(farthest, norm<double>(point(y_, v) - point(problem_.given(), v)));
@@ -256,10 +259,10 @@ void ErrorBound<Convexity>::evaluate_residuals() noexcept {
         if (!problem_.fixed(v)) rounding += magnitude * magnitude;
     }
     distance_ = (1 + 1e-12) * farthest;
-    unbalanced_ = (1 + 1e-9) * std::sqrt(inner(rest_, rest_)) + problem_.rounding() * std::sqrt(rounding);
+    unbalanced_ = (1 + 1e-9) * std::sqrt(inner(residual_, residual_)) + problem_.rounding() * std::sqrt(rounding);
 }
 
-// Sets C to the states within `radius`; true if the energy is convex on it.
+// Sets C to the states within `radius` of x; true if the energy is shown to be convex on it.
 template <CheckedConvexityModel Convexity>
 bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
     radius_ = radius;
@@ -270,8 +273,8 @@ bool ErrorBound<Convexity>::convex_within(double radius) noexcept {
     return error_.convexity > 0;
 }
 
-// The radius e of the ball around y. If an attached point is off its target by rounding, the ball is around the nearest
-// state with all points at their targets.
+// The radius e of a ball around y that contains the equilibrium. If an attached point is off its target by rounding,
+// the proof holds for the nearest state with all points at their targets; the radius includes the distance to it.
 template <CheckedConvexityModel Convexity>
 double ErrorBound<Convexity>::enclosure() const noexcept {
     const double violation = problem_.attachments().violation(y_);
@@ -281,7 +284,8 @@ double ErrorBound<Convexity>::enclosure() const noexcept {
     return (1 + 1e-9) * ((std::max)(radius, pressed_.min_radius()) + violation);
 }
 
-// A spring between vertices with shares a and b adds (a - b) times its change of force.
+// The reaction is the sum of weight times force over all vertices. A spring between vertices of weights a and b changes
+// it by (a - b) times the change of its force. `slopes_` bound its change by each vertex's displacement [N/m].
 template <CheckedConvexityModel Convexity>
 template <class C>
 ForceEnclosure ErrorBound<Convexity>::enclose_reaction(const C& constraint, std::size_t& tool) noexcept {

@@ -22,30 +22,36 @@
 ///     auto tree    = membrane::AabbTree(mesh);
 ///     auto tracker = membrane::ContactTracker(mesh);
 ///     const auto contact = tracker.update(tree, x, tool);                    // once a tick, before the solver's step
+///     tree.refit(x, report.moved);                                           // after the step
 namespace membrane {
 
 template <Real Scalar>
 class MovingBody;  // of moving_body.hpp
 
 struct TrackerOptions {
-    double margin = 0.01;              ///< triangles this near are in contact; a point has this radius [mean edges]
-    Index full_query_interval = 128;   ///< ticks in contact between tree queries for further folds in contact
+    double margin = 0.01;              ///< added to the radius to find nearby triangles; radius of a point [mean edges]
+    Index full_query_interval = 128;   ///< ticks in contact between full tree queries, which find further folds
     Index max_contact_points = 16384;  ///< capacity for contact points; determines memory, not time
 };
 
 /// Without contact, queries the tree. In contact, tests the contact triangles of the last tick and their neighbours
-/// [Liu07] 2.3: the cost depends on the contact area, not on the size of the mesh.
+/// [Liu07] 2.3: that cost depends on the contact area, not on the size of the mesh.
 ///
-/// Beyond the paper: the search floods every triangle within the detection distance. If the reference point of the tool
-/// (or the other end of a capsule) passes through the surface within a tick, the contact is at that intersection,
-/// however long the displacement: every tick queries the tree with the displacement. A second fold of the surface that
-/// approaches a tool in contact is found within `full_query_interval` ticks.
+/// Beyond the paper: the search floods every triangle within the detection distance. Each tick also casts the
+/// displacement of the tool's position (and of the other end of a capsule) against the tree. If it hits, the contact is
+/// at the intersection, however long the displacement. A second fold of the surface that approaches a tool in contact
+/// is found within `full_query_interval` ticks.
+///
+/// A contact begins if the gap is not positive. It ends if the gap is positive and either the tool has left the rest
+/// surface or the gap exceeds depth plus travel of the tool: a membrane that springs back stays in contact.
 ///
 /// The tool stays outside a closed surface: where the winding number is 0. At an open surface the tool stays on the
-/// side of first contact until it is clear of the surface, or has slid off a border that it displaced. After a shaft
-/// slides off, its parts may be on different sides; until it is clear, only its ends can tunnel. The surface without
-/// the tool is the mesh, or the anchors of a moving body. Depth is measured against it. A tool outside it has no
-/// contact with a part of the membrane that it would pull farther out.
+/// side of first contact until it is clear of the surface (no triangle within two mean edges), or has slid off a border
+/// that it displaced. A capsule that has slid off a border may lie on both sides. Until it is clear, only the passage
+/// of its ends is detected.
+///
+/// The rest surface is the mesh, or the anchors of a moving body. Depth is measured against it. If the tool is outside
+/// the rest surface and the membrane lies farther out, there is no contact: a contact must not pull.
 template <Real Scalar>
 class ContactTracker {
   public:
@@ -53,8 +59,9 @@ class ContactTracker {
     explicit ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options = {});
 
     /// The contact of `tool` with the surface at `x` (3 x V [m]). If the tool is not valid, returns no contact and
-    /// leaves the state unchanged. Online. Cost: O(log F), plus in contact the triangles within detection distance and
-    /// their neighbours.
+    /// leaves the state unchanged. Online. Cost: one or two segment casts, and a query of the tree or, in contact, the
+    /// triangles within detection distance and their neighbours; a tool behind the surface adds a ray cast.
+    /// @pre `tree` was refitted to `x`
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool) noexcept {
         return track(tree, x, tool, origins_);
@@ -64,10 +71,10 @@ class ContactTracker {
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
 
-    /// Number of tree queries for contact triangles during contact, since construction.
+    /// Number of full tree queries (for all triangles near the tool) during contact, since construction.
     [[nodiscard]] Index full_query_count() const noexcept { return full_query_count_; }
 
-    /// Drops contact and tool: from here on the tracker equals a new one, bit for bit.
+    /// Drops contact, tool and side. Later contacts equal those of a new tracker, bit for bit.
     void reset() noexcept;
 
   private:
@@ -90,8 +97,8 @@ class ContactTracker {
     [[nodiscard]] Scalar expected_side() const noexcept {
         return side_ != 0 ? side_ : last_.touching() ? last_.side : Scalar(1);
     }
-    // The tool may approach an open surface from either side.
-    [[nodiscard]] bool is_first_seen() const noexcept { return !surface_.closed() && !last_.touching() && side_ == 0; }
+    // Whether the tool may still approach an open surface from either side.
+    [[nodiscard]] bool side_is_open() const noexcept { return !surface_.closed() && !last_.touching() && side_ == 0; }
     [[nodiscard]] bool is_clear(const Scene& scene) const noexcept;
     bool follow(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
@@ -99,6 +106,7 @@ class ContactTracker {
     bool sweep_test(const Scene& scene, Contact<Scalar>& contact) const noexcept;
     void describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept;
     void describe_shaft(const Scene& scene, Index f, Scalar side, Contact<Scalar>& contact) const noexcept;
+    // Describes the contact as one from the other side.
     static void turn(const Scene& scene, Contact<Scalar>& contact) noexcept {
         contact.gap = -contact.gap - 2 * scene.radius;
         contact.normal = -contact.normal;
@@ -131,8 +139,10 @@ class ContactTracker {
     Scalar margin_;  // [m]
     Index full_query_interval_;
 
-    IndexSet near_, near_before_;  // the local model: triangles within detection distance, now and before
-    Index nearest_ = no_index;     // of `near_`
+    // Triangles within detection distance, those around the active one, and those on the path of a tunnelling tool;
+    // now and in the last tick.
+    IndexSet near_, near_before_;
+    Index nearest_ = no_index;  // of `near_`
     Scalar nearest_square_ = 0;
     IndexSet queued_;      // for `near_`, in the order of examination
     IndexSet candidates_;  // `near_` and the rings around it
@@ -144,7 +154,7 @@ class ContactTracker {
     RigidFrame<Scalar> pose_;  // of the body at the last update
     Scalar side_ = 0;          // of the tool, 1 or -1; 0: not yet known
     bool slid_off_ = false;    // whether a shaft has slid off a displaced border: its parts may be on different sides
-    // The triangles of the surface without the tool nearest to the tool's two ends and its axis point.
+    // The triangles of the rest surface nearest to the tool's two ends and its axis point.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
     Index ticks_ = 0, full_query_count_ = 0;
     int rebound_ticks_ = 0;
@@ -251,11 +261,11 @@ auto ContactTracker<Scalar>::scene_of(const AabbTree<Scalar>& tree, const ConstP
     const Tool<Scalar>& last = last_tool_ ? *last_tool_ : tool;
     const Vector3<Scalar> displacement = tool.position - last.position;
     const Scalar travel = (std::max)(norm(displacement), norm<Scalar>(displacement + tool.axis - last.axis));
-    // The membrane follows a tool that withdraws.
-    const Scalar behind = (std::max)(last_.gap, Scalar(0));
+    // The membrane may follow a withdrawing tool by its last gap.
+    const Scalar rebound = (std::max)(last_.gap, Scalar(0));
     const Scalar radius = (std::max)(tool.radius, margin_);
     return {
-        tree, x, tool, anchors, radius, travel, radius + margin_ + (std::min)(travel + behind, surface_.mean_edge())};
+        tree, x, tool, anchors, radius, travel, radius + margin_ + (std::min)(travel + rebound, surface_.mean_edge())};
 }
 
 // Finds the contact among the triangles of the last tick and their neighbours; false if the tool has left all of them.
@@ -294,7 +304,7 @@ bool ContactTracker<Scalar>::find(const Scene& scene, Contact<Scalar>& contact) 
     return true;
 }
 
-// A contact begins with penetration and ends when the membrane has fully recovered.
+// Whether the contact begins or goes on.
 template <Real Scalar>
 bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& contact) noexcept {
     if (!last_.touching() && contact.gap > 0) return false;
@@ -319,10 +329,11 @@ bool ContactTracker<Scalar>::sweep_test(const Scene& scene, Contact<Scalar>& con
         if (passed.gap > 0) {
             if (hit.fraction < negligible_part) return false;  // it leaves the surface it was on
             if ((surface_.closed() || side_ != 0) && has_passed(scene, hit.triangle, side, from))
-                return false;                // it leaves the inside
-            passed.normal = -passed.normal;  // a crease, or the other side of an open surface
+                return false;  // it leaves the inside
+            // From back to front: a penetration from the other side, in a concave fold or of an open surface.
+            passed.normal = -passed.normal;
             passed.gap = -passed.gap;
-            if (is_first_seen() && was_behind(scene, hit.triangle, side, from)) passed.side = -side;
+            if (side_is_open() && was_behind(scene, hit.triangle, side, from)) passed.side = -side;
         }
         contact = passed;
         contact.gap -= scene.radius;
@@ -345,9 +356,9 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
     // A shaft beside a border may extend to both sides: its middle in the last tick determines the side.
     const Tool<Scalar>& before = last_tool_ ? *last_tool_ : scene.tool;
     const Vector3<Scalar> middle = before.position + before.axis / 2;
-    if (behind && is_first_seen() && was_behind(scene, f, side, middle)) behind = seen_from(-1);
-    // A tool apart from the surface has not tunnelled: `sweep_test` has excluded it for the ends.
-    if (is_first_seen() && contact.gap < -2 * scene.radius) return turn(scene, contact);
+    if (behind && side_is_open() && was_behind(scene, f, side, middle)) behind = seen_from(-1);
+    // At more than the radius from the surface the tool does not touch it: `sweep_test` has shown that no end passed.
+    if (side_is_open() && contact.gap < -2 * scene.radius) return turn(scene, contact);
     if (side_ != 0 && contact.side != side_) {  // beside a border
         contact.side = side_;
         behind = !leaves_border(scene, contact);
@@ -372,8 +383,8 @@ bool ContactTracker<Scalar>::was_behind(const Scene& scene, Index f, Scalar side
     return side * surface_.height(scene.anchors, surface_.walk_to_closest(scene.anchors, f, q), q) < 0;
 }
 
-// The nearest point of a shaft may be outside while another point is behind: the middle of the part inside, or an end
-// if the shaft lies across a border.
+// If a point of a shaft is behind the surface, makes the contact that of this point. Tests the middle of the part of
+// the axis inside and, at an open surface, both ends.
 template <Real Scalar>
 void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar side,
                                             Contact<Scalar>& contact) const noexcept {
@@ -423,8 +434,9 @@ std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene
     return tool.position + (here->fraction + inward * inside / 2) * tool.axis;
 }
 
-// Whether `q` is behind the surface, not outside in a crease. An open surface has no inside: `q` is behind it if the
-// ray from `q` along the outward normal of the surface without the tool first meets the back of a triangle.
+// Whether `q` is behind the surface. The nearest triangle does not decide it: in a concave fold a point outside may be
+// behind that triangle. Behind a closed surface the winding number is not 0. Behind an open surface the ray from `q`
+// along the outward normal of the rest surface first meets the back of a triangle.
 template <Real Scalar>
 bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar side,
                                         const Vector3<Scalar>& q) const noexcept {
@@ -573,7 +585,7 @@ void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& 
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
                                                 contact.axis_point};
     const std::size_t count = feature_pairs(scene.tool) == 1 ? 1 : 3;
-    const bool below_border = is_below_border(scene, contact);
+    const bool below_border = is_below_border(scene, contact);  // there the sign of the height means nothing
     contact.depth = 0;
     for (std::size_t i = 0; i < count; ++i) {
         Index& f = origin_triangles_[i];
@@ -595,8 +607,9 @@ bool ContactTracker<Scalar>::is_clear(const Scene& scene) const noexcept {
     return clear;
 }
 
-// Beside a border the tool may be on either side. Once above or below the surface, it stays on that side until it is
-// clear of the surface or has slid off a displaced border. It passes an undisplaced border only by force.
+// Beside a border the tool may be on either side. The side is known once the contact is not on a border, or its normal
+// is within 60 degrees of the surface's. The tool keeps it until it is clear of the surface or has slid off a displaced
+// border; it cannot slide around a border that is not displaced.
 template <Real Scalar>
 void ContactTracker<Scalar>::decide_side(const Scene& scene, const Contact<Scalar>& contact) noexcept {
     if (side_ != 0) return;
@@ -613,6 +626,7 @@ bool ContactTracker<Scalar>::is_below_border(const Scene& scene, const Contact<S
     return contact.side * dot<Scalar>(contact.normal, outward) < 0;
 }
 
+// Whether the tool is below a border that is displaced by more than the margin.
 template <Real Scalar>
 bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
     if (contact.triangle == no_index || !is_below_border(scene, contact)) return false;
@@ -620,7 +634,7 @@ bool ContactTracker<Scalar>::leaves_border(const Scene& scene, const Contact<Sca
     return norm<Scalar>(contact.point - origin) > margin_;
 }
 
-// Whether the contact would pull: the tool is outside the surface without the tool, and the membrane lies farther out.
+// Whether the contact would pull: the tool is outside the rest surface, and the membrane lies farther out.
 template <Real Scalar>
 bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
     const auto overlapped = [&](Index f) {

@@ -15,13 +15,14 @@
 ///     device.write(limit(feel({tool, contact, report}), tool.time, solves));   // [N], [s], number of solves
 namespace membrane {
 
-/// All limits are on by default; each can be switched off.
+/// Slew limit, soft start, watchdog and thermal limit are on by default, and each can be disabled. The peak limit and
+/// the check for faults are always on.
 struct LimitOptions {
-    double rise_time = 0.02;      ///< shortest time for a change by the peak force [s]; 0: no slew limit
-    double soft_start = 0.1;      ///< from zero to the full force, at start and after a fault [s]; 0: at once
+    double rise_time = 0.02;      ///< shortest time of a rise from zero to the peak force [s]; 0: no slew limit
+    double soft_start = 0.1;      ///< from zero to the full force, after start, fault, old state [s]; 0: at once
     double max_state_age = 0.04;  ///< largest age of the solver's state [s]; infinity: no watchdog
     double fade_time = 0.05;      ///< time in which the force of an older state fades to zero [s]
-    double max_tick = 2e-3;       ///< upper limit of the tick length that lets a force grow [s]
+    double max_tick = 2e-3;       ///< a longer tick, or one that is not positive, counts as this long [s]
     bool thermal_limit = true;    ///< whether hot motors are limited to the continuous force
 
     /// @throws InvalidInput if an option is out of its range
@@ -90,28 +91,26 @@ class MotorThermalModel {
 /// 1. fault: a force that is not finite becomes zero, since the later limits compute with it;
 /// 2. watchdog and soft start: a factor on the requested force, as that force itself may be wrong;
 /// 3. peak and heat: the limits of the device, on the scaled force;
-/// 4. slew, against the force that the device got in the last tick. The part of that force which is no longer requested
-///    falls straight towards zero at once. Any other change is bounded, also of direction: a reversal passes
-///    through zero.
+/// 4. slew: the force of the last tick drops at once to its part in the requested direction, to zero if the request
+///    reverses it. From there the change in a tick is bounded, in magnitude and direction.
 ///
 /// No limit increases the force, so no limit undoes an earlier one. The first three keep its direction. The slew limit
 /// lags behind a force that turns too fast, but never opposes it: with input f and output g, g . f >= |g|^2. If no
 /// limit acts, the force is returned bit for bit.
 ///
-/// The result of `passivity` holds while no limit acts. The slew limit delays a fast rise, so a fast jab gets back more
-/// energy than it put in: above a speed of peak force / rise time / stiffness, 1.65 m/s for `devices::touch` at 100
-/// N/m.
+/// The result of `passivity` holds while no limit acts. The slew limit delays a fast rise, so a fast push may generate
+/// energy: above a speed of peak force / rise time / rendered stiffness, 1.65 m/s for `devices::touch` at 100 N/m.
 ///
-/// With default options the force is zero 90 ms and at most one tick after the solver has stopped. It is full again 0.1
-/// s after a fault has ended (if the motors are not hot).
+/// With default options the force is zero at most 90 ms and one tick after the solver has stopped. It is full again
+/// 0.1 s after a fault has ended, if the motors are not hot and no tick is longer than `max_tick`.
 ///
 /// Use the tool's time: a recording contains it, so a replay gives the same forces bit for bit, and a script that runs
-/// faster than real time is limited in its own time. If no replay is needed, a steady clock is suitable too. A time in
-/// `float` is accurate to 0.1 ms for 15 minutes; count from the start of the run.
+/// faster than real time is limited in its own time. If no replay is needed, a steady clock is suitable too. The time
+/// of a `Tool<float>` is accurate to 0.1 ms for 15 minutes; count from the start of the run.
 ///
 /// If the time stands still or goes back, watchdog and motors count a tick of `max_tick`, and the force may only fall
-/// towards zero: a device without times gets no force. A jump ahead counts as a gap in which the last force was held:
-/// after a wrong time the motors count as heated by it until they have cooled down.
+/// towards zero: if the time never advances, the force stays zero. A jump ahead counts as a gap in which the last force
+/// was held: the motors count as heated by this force for the whole gap.
 class ForceLimiter {
   public:
     /// @throws InvalidInput if a number of the profile or an option is out of its range
@@ -150,25 +149,27 @@ class ForceLimiter {
 
 namespace detail {
 
-/// `force`, shortened to the length `most`. If it is not longer, returns it bit for bit.
+/// `force`, shortened to the length `max_length`. If it is not longer, returns it bit for bit.
 template <Real Scalar>
-[[nodiscard]] Vector3<Scalar> shortened(const Vector3<Scalar>& force, double most) noexcept {
+[[nodiscard]] Vector3<Scalar> shortened(const Vector3<Scalar>& force, double max_length) noexcept {
     Vector3<double> exact = force.template cast<double>();
     const double largest = exact.cwiseAbs().maxCoeff();
-    if (largest > most) exact *= most / largest;  // so that squares do not overflow
+    if (largest > max_length) exact *= max_length / largest;  // so that squares do not overflow
     const double length = norm(exact);
-    if (largest <= most && length <= most) return force;
+    if (largest <= max_length && length <= max_length) return force;
     // Rounding must not exceed the limit.
-    constexpr double a_little = 4 * static_cast<double>(std::numeric_limits<Scalar>::epsilon());
+    constexpr double rounding = 4 * static_cast<double>(std::numeric_limits<Scalar>::epsilon());
     if (!(length > 0)) return Vector3<Scalar>::Zero();
-    return (exact * (most * (1 - a_little) / length)).template cast<Scalar>();
+    return (exact * (max_length * (1 - rounding) / length)).template cast<Scalar>();
 }
 
-/// The next force after `last` towards `wanted`, with a change of at most `most`. First `last` falls straight towards
-/// zero, as far as its projection on `wanted` requires. The remaining change then goes towards `wanted`. So the result
-/// is either `last` shortened, or at most `most` from it. It is not larger than `wanted` and never opposes it.
+/// The next force after `last` towards `wanted`, with a change of at most `max_length`. First `last` is scaled down to
+/// the projection of `wanted` on it, or to zero if that is negative. The force then moves towards `wanted`. So the
+/// result is either `last` scaled down, or at most `max_length` from it. It is not larger than `wanted` and never
+/// opposes it.
 template <Real Scalar>
-[[nodiscard]] Vector3<Scalar> slewed(const Vector3<Scalar>& wanted, const Vector3<double>& last, double most) noexcept {
+[[nodiscard]] Vector3<Scalar> slewed(const Vector3<Scalar>& wanted, const Vector3<double>& last,
+                                     double max_length) noexcept {
     const Vector3<double> goal = wanted.template cast<double>();
     const double square = squared_norm(last);
     const double kept = square > 0 ? std::clamp(dot(goal, last) / square, 0.0, 1.0) : 0;
@@ -177,11 +178,10 @@ template <Real Scalar>
     if (!(length > 0)) return wanted;
     // Rounding must not exceed the limit, nor turn a fall into a change of direction.
     const double rounding =
-        4 * static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * (most + std::sqrt(square));
-    const double max_change = (std::max)(most - 2 * rounding, 0.0);
+        4 * static_cast<double>(std::numeric_limits<Scalar>::epsilon()) * (max_length + std::sqrt(square));
+    const double max_change = (std::max)(max_length - 2 * rounding, 0.0);
     // Length along `change` within a sphere of this radius around `last`; 0 if the fall has left the sphere.
-    const double back =
-        kept > 0 ? 0 : dot(fall, change) / length;  // otherwise the fall is 0 or orthogonal to the change
+    const double back = kept > 0 ? 0 : dot(fall, change) / length;  // if kept > 0, fall is 0 or orthogonal to change
     const double left = (std::max)(max_change * max_change - squared_norm(fall), 0.0);
     const double step = (std::max)(back + std::sqrt(left + back * back), 0.0);
     if (length <= step + rounding) return wanted;

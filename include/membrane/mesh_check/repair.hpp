@@ -21,49 +21,50 @@
 #include <membrane/mesh_check/surface_facts.hpp>
 #include <membrane/surface/mesh_checks.hpp>
 
-/// Repairs that need no guess, each only on request.
+/// Deterministic repairs of a mesh, each only on request.
 ///
 ///     const auto repaired = membrane::repair(x, triangles, {.weld = 1e-6, .drop_repeated = true, .orient = true});
-///     std::cout << to_string(repaired.report);                      // welded 12 vertices, turned 3 triangles
+///     std::cout << to_string(repaired.report);                      // welded 12 vertices, reversed 3 triangles
 ///     const membrane::TriangleMesh mesh(repaired.positions, repaired.triangles);
 namespace membrane {
 
 /// The repairs, in the order of their application; all are off by default.
 struct RepairOptions {
-    /// Vertices at most this far apart become one, the lowest of them, which keeps its position [m]; 0: only vertices
-    /// at exactly the same position. The ends of a chain of welded vertices may be farther apart.
+    /// Weld distance [m]. Vertices at most this far apart become one, that of lowest index, which keeps its position.
+    /// The ends of a chain of welded vertices may be farther apart. 0: only identical positions. Unset: no welding.
     std::optional<double> weld{};
 
-    bool drop_repeated = false;    ///< Drops triangles that name a vertex twice.
-    bool drop_zero_area = false;   ///< Drops triangles with collinear corners; may leave a T-junction.
+    bool drop_repeated = false;    ///< Drops triangles that reference a vertex twice.
+    bool drop_zero_area = false;   ///< Drops triangles of three collinear vertices; may leave a T-junction.
     bool drop_duplicates = false;  ///< Of triangles with the same vertices, in any order, keeps only the first.
-    /// Turns triangles so that those of a component agree, unless it is one-sided. A closed component then faces
-    /// outward; of any other component, as few triangles as possible are turned. A component with agreeing triangles is
-    /// left unchanged, see `flip_inward`. Each component is treated separately: one inside another faces outward too,
-    /// even if it is meant as the wall of a cavity.
+    /// Reverses triangles until each component is consistently oriented; one that is not orientable is left unchanged.
+    /// A closed component then faces outward; of any other component, as few triangles as possible are reversed. A
+    /// component that is consistently oriented is left unchanged, see `flip_inward`. Each component is treated
+    /// separately: one inside another faces outward too, even if it is meant as the wall of a cavity.
     bool orient = false;
     bool split_vertices = false;  ///< Gives each fan of triangles at a vertex, except the first, its own vertex.
-    bool flip_inward = false;     ///< Turns closed components that face inward.
+    bool flip_inward = false;     ///< Reverses closed components that face inward.
     bool drop_isolated = false;   ///< Drops vertices that no triangle references.
 };
 
 /// Number of vertices or triangles that each option has changed.
 struct RepairReport {
     Index welded = 0, repeated = 0, zero_area = 0, duplicates = 0, turned = 0, split = 0, flipped = 0, isolated = 0;
-    bool complete = true;  ///< False: too many vertices were within the weld distance, and the search stopped early.
+    bool complete = true;  ///< False: the search for pairs within `weld` reached its limit, some may not be welded.
 };
 
 template <Real Scalar>
 struct RepairedMesh {
     Points<Scalar> positions;
     Triangles triangles;
-    std::vector<Index> vertices, source_triangles;  ///< For each its index in the input.
+    /// Index in the input of each vertex (welded: the lowest; split off: the one it was split from) and triangle.
+    std::vector<Index> vertices, source_triangles;
     RepairReport report;
 };
 
-/// The mesh after the repairs of `options`, without other changes. Kept vertices and triangles keep their order and
-/// their bits; a triangle keeps its first corner unless it is turned. The result may still have defects, which
-/// `validate` reports. O(F log F).
+/// The mesh after the repairs of `options`, without other changes. Kept vertices keep their order and their positions,
+/// bit for bit; those split off follow. Kept triangles keep their order and their first corner; a reversed one swaps
+/// the other two. The result may still have defects, which `validate` reports. O(F log F).
 /// @throws InvalidInput for shapes as `validate` does, for triangles that name a vertex that does not exist, and if
 /// `weld` is negative or not finite
 template <class P, class T>
@@ -88,12 +89,12 @@ template <class S, std::size_t m, std::integral I, std::size_t n>
     say("dropped", report.repeated, "triangles with a repeated vertex");
     say("dropped", report.zero_area, "triangles without area");
     say("dropped", report.duplicates, "duplicate triangles");
-    say("turned", report.turned, "triangles");
+    say("reversed", report.turned, "triangles");
     say("split off", report.split, "vertices");
     say("flipped", report.flipped, "inward triangles");
     say("dropped", report.isolated, "isolated vertices");
-    if (!report.complete) text += " (gave up welding)";
-    return text.empty() ? "nothing" : text;
+    if (!report.complete) text += text.empty() ? "welding incomplete" : ", welding incomplete";
+    return text.empty() ? "no changes" : text;
 }
 
 namespace detail {

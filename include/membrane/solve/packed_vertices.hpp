@@ -13,7 +13,7 @@
 #include <membrane/core/lane_points.hpp>
 #include <membrane/solve/vertex_update.hpp>
 
-/// Updates of several vertices at once.
+/// Updates of vertices in SIMD lanes, one vertex in each.
 ///
 ///     packed.assign(queue.vertices(), queue.colour_ends(), network);         // if the queue has changed
 ///     packed.append(active.vertices(), active.from_queue(), active.colour_ends(), network);
@@ -24,8 +24,8 @@
 ///     }
 namespace membrane {
 
-/// Whether a rule's updates may be made in lanes: the network is of springs, their law and the rule take `Lanes`, the
-/// foundation model has `spring`, and no update needs a line search.
+/// Whether `Rule` can update vertices in lanes. The network is of springs. Their law and the rule accept `Lanes`. The
+/// foundation is `NoFoundation` or has `spring`. No update needs a line search.
 template <class Scalar, class Rule, class Network, class Volume>
 concept UpdatesInLanes = (Network::never_stiffens ||
                           !is_descent_rule<Rule>)&&requires(const Rule& rule, const Network& network,
@@ -41,14 +41,15 @@ concept UpdatesInLanes = (Network::never_stiffens ||
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The vertices of a queue, and then others, in packs of one vertex for each lane: each with its springs, its volume
-/// spring and whether it is free. Vertices of one pack are of one group: no spring joins them. Positions are in
-/// `StepState`. It holds the first groups up to its capacity.
+/// spring and whether it is free. Their groups are colour classes: no spring joins two vertices of a group, and all
+/// vertices of a pack are of one group. Positions are in `StepState`. Vertices beyond the capacity are left out, and
+/// the solver updates them one by one.
 template <Real Scalar>
 class PackedVertices {
   public:
     using Wide = Lanes<Scalar>;
 
-    /// Allocates for `capacity` vertices.
+    /// Allocates for about `capacity` vertices: packs may be half full.
     template <ElasticNetwork<Scalar> Network>
     explicit PackedVertices(const Network& network, Index capacity = unlimited);
 
@@ -56,23 +57,24 @@ class PackedVertices {
     template <class Network>
     void assign(std::span<const Index> vertices, std::span<const std::size_t> ends, const Network& network) noexcept;
 
-    /// Appends, until the next call, the groups of `vertices` from number `begin` on. If the assigned vertices exceed
-    /// the capacity, appends nothing. Online. Cost: their springs.
+    /// Appends `vertices[begin]` and all after it, in groups that end at `ends`, in place of what the last call
+    /// appended. If the assigned vertices exceed the capacity, appends nothing. Online. Cost: their springs.
     template <class Network>
     void append(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
                 const Network& network) noexcept;
 
-    /// Number of vertices, and of packs.
+    /// Number of vertices.
     [[nodiscard]] std::size_t size() const noexcept { return members_.size(); }
+    /// Number of packs.
     [[nodiscard]] std::size_t count() const noexcept { return packs_.size(); }
 
-    /// The vertices of pack `p`, and the number of the first among all.
+    /// The vertices of pack `p`, and the position of the first in pack order.
     [[nodiscard]] std::span<const Index> vertices(std::size_t p) const noexcept {
         return members_.items().subspan(packs_[p].first, packs_[p].size);
     }
     [[nodiscard]] std::size_t first_of(std::size_t p) const noexcept { return packs_[p].first; }
 
-    /// The first pack that begins at vertex number `first` or later.
+    /// The first pack whose first vertex is at position `first` or later in pack order.
     [[nodiscard]] std::size_t pack_from(std::size_t first) const noexcept {
         const auto packs = packs_.items();
         const auto begins_before = [](const Pack& pack, std::size_t at) { return pack.first < at; };
@@ -86,10 +88,11 @@ class PackedVertices {
         return p + 1;
     }
 
-    /// All vertices in packs and their neighbours, each once: their positions must be loaded.
+    /// The packed vertices and their neighbours, each once.
     [[nodiscard]] std::span<const Index> needed() const noexcept { return needed_.items(); }
 
-    /// Loads volume springs, masses and fixed vertices of the step. @pre `needed` are loaded
+    /// Copies the step's volume springs, masses and fixed vertices into the packs.
+    /// @pre `StepState` has loaded the positions of `needed`
     template <class Scene>
     void begin_step(const Scene& scene) noexcept;
 
@@ -98,10 +101,10 @@ class PackedVertices {
 
     enum class Outcome : unsigned char { at_rest, moved, too_far };
 
-    /// Updates the vertices of packs number `begin` to `end`, all of one group, by `rule`. If `in_contact`, constraints
-    /// act on them, and their response is kept. If a displacement may be unstable, the outcome is `too_far` and its
-    /// pack is unchanged. Threads share the packs; a thread updates two at a time, so that their roots and divisions
-    /// overlap.
+    /// Updates the vertices of packs `begin` to `end`, the end excluded, all of one group, by `rule`. With
+    /// `in_contact`, adds the forces of constraints and stores the compliance of each vertex. If a displacement may be
+    /// unstable, the outcome of its pack is `too_far` and the pack is unchanged. The packs are divided among threads; a
+    /// thread interleaves two packs, which hides the latency of roots and divisions.
     template <bool in_contact, class Scene, class Rule, Executor E>
     void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule, const E& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
@@ -124,7 +127,7 @@ class PackedVertices {
 
   private:
     static constexpr std::size_t lanes = Wide::count;
-    using Begins = std::array<Index, lanes>;  // begin of each lane's row
+    using Begins = std::array<Index, lanes>;  // offset of each lane's row
     struct Pack {
         std::size_t first, size;  // of the members
         std::size_t slot, slot_count;
@@ -238,7 +241,7 @@ void PackedVertices<Scalar>::append(std::span<const Index> vertices, std::size_t
     if (is_whole_) static_cast<void>(pack(vertices, begin, ends, network));
 }
 
-// False if the vertices exceed the capacity.
+// False if vertices, packs or slots exceed the capacity.
 template <Real Scalar>
 template <class Network>
 bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
@@ -263,8 +266,8 @@ void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
     needed_.truncate(extent.needed);
 }
 
-// False if the vertices exceed the capacity. Lanes without a vertex, and those of vertices with fewer springs, have
-// springs of length 0 without force.
+// False if vertices, packs or slots exceed the capacity. Unused lanes and slots have a spring of stiffness zero from
+// the vertex to itself.
 template <Real Scalar>
 template <class Network>
 bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const Network& network) noexcept {
