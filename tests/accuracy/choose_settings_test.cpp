@@ -419,5 +419,5 @@ TEST_CASE("what makes no sense is refused") {
 
     const SmallScene apart(2 * radius);
     CHECK(refusal([&] { (void)apart.choose(percent); }) ==
-          "choose_settings: the history must have a tick with a force that is felt, got none in equilibrium");
+          "choose_settings: the history must have a tick with a felt force at equilibrium, got none");
 }

@@ -259,7 +259,7 @@ TEST_CASE("a stroke or a trial that makes no sense is refused") {
 
     auto references = references_of(Pinch{}, 5);
     const std::string others =
-        "run_trial: references must be of ticks of the history, one at least, in order, got others";
+        "run_trial: references must be of ticks of the history, in order, at least one; got others";
     CHECK(refusal([&] { (void)scene.play(Pinch{}, {}); }) == others);
     CHECK(refusal([&] { (void)scene.play(Pinch{.last = 12}, references); }) == others);
     CHECK(refusal([&] { (void)scene.play(Odd{.count = 0}, references); }) ==

@@ -157,9 +157,9 @@ TEST_CASE("random loops inside the check never give energy", "[passivity]") {
                                   : play(scene, SpringDamperForce{.stiffness = loop.stiffness, .damping = loop.damping},
                                          tissue, loop, 150);
         const bool good =
-            energies.port.least() >= -1e-9 * energies.port.energy_in() && energies.least >= -1e-9 * energies.given;
+            energies.port.min_energy() >= -1e-9 * energies.port.energy_in() && energies.least >= -1e-9 * energies.given;
         if (!good) {
-            FAIL("seed " << seed << ": " << energies.port.least() << " of " << energies.port.energy_in() << " J, "
+            FAIL("seed " << seed << ": " << energies.port.min_energy() << " of " << energies.port.energy_in() << " J, "
                          << energies.least << " of " << energies.given << " J");
         }
         touched += energies.touched ? 1 : 0;
@@ -201,7 +201,7 @@ TEST_CASE("at 1.5 times the bound loops are active", "[passivity]") {
                 last = scene.hand_mass / 2 * squared_norm(hand.velocity) +
                        loop.stiffness / 2 * squared_norm(hand.position);
             }
-            CHECK((energies.port.least() < -0.01 * energy_in) == (times > 1));
+            CHECK((energies.port.min_energy() < -0.01 * energy_in) == (times > 1));
             CHECK((last > 1.05 * energy_in) == (times > 1));
         }
     }
@@ -412,7 +412,7 @@ TEST_CASE("a wall that ends is refused where its force comes late", "[passivity]
             const double force = seen > 0 && seen < end ? -stiffness * seen : 0;
             observer.update(Vector3<double>(displacement[i], 0, 0), Vector3<double>(force, 0, 0), tick);
         }
-        if (delay == 0) CHECK(observer.least() == 0);
+        if (delay == 0) CHECK(observer.min_energy() == 0);
         if (delay == 1) CHECK(observer.energy() < -0.5);
     }
 }
@@ -470,7 +470,7 @@ TEST_CASE("friction and a coarse position are counted rightly on any path", "[pa
             if (std::abs(position) > 0.005) speed = position > 0 ? -max_speed : max_speed;
             position += loop.tick * speed;
         }
-        if (observer.least() < -1e-9 * observer.energy_in()) FAIL("seed " << seed << ": " << observer.least() << " J");
+        if (observer.min_energy() < -1e-9 * observer.energy_in()) FAIL("seed " << seed << ": " << observer.min_energy() << " J");
     }
 }
 
@@ -483,7 +483,7 @@ TEMPLATE_TEST_CASE("the observer counts what a held force does", "[passivity]", 
     CHECK(observer.energy() == 1);
     observer.update<S>({0, 0, 0}, {0, 0, 0}, 1e-3);  // and back along with 4 N
     CHECK(observer.energy() == -1);
-    CHECK(observer.least() == -1);
+    CHECK(observer.min_energy() == -1);
     CHECK(observer.energy_in() == 1);
     const S nan = std::numeric_limits<S>::quiet_NaN();
     observer.update<S>({nan, 0, 0}, {0, 0, 0}, 1e-3);

@@ -186,7 +186,7 @@ TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept
             noexcept(limit(force, 0.0, 1))&& noexcept(limit.active_limits())&& noexcept(limit.thermal_load()));
         static_assert(noexcept(limit.gain())&& noexcept(limit.device())&& noexcept(limit.reset()));
         static_assert(noexcept(observer.update(force, force, 1e-3))&& noexcept(observer.energy()));
-        static_assert(noexcept(observer.energy_in())&& noexcept(observer.least())&& noexcept(observer.reset()));
+        static_assert(noexcept(observer.energy_in())&& noexcept(observer.min_energy())&& noexcept(observer.reset()));
         static_assert(noexcept(watchdog.update(1, 0.0))&& noexcept(start.update(1.0, 0.0)));
         static_assert(noexcept(heat.add(1.0, 1.0))&& noexcept(heat.max_force()));
     });

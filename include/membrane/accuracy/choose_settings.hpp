@@ -24,7 +24,7 @@ namespace membrane {
 /// The requirement: exactly one of the two.
 struct Requirement {
     double force_error = 0;  ///< upper bound, see `TrialResult`; the cheapest setting within it is chosen
-    double time = 0;         ///< upper bound, of a tick [s]; the most accurate setting within it is chosen
+    double time = 0;         ///< upper bound of the mean tick [s]; the most accurate setting within it is chosen
 };
 
 /// The grid: every number of layers with every number of sweeps and of contact iterations.
@@ -34,7 +34,7 @@ struct GridSearchOptions {
     std::vector<Index> sweeps = {1, 2, 3, 4, 6, 8, 12, 16};
     std::vector<Index> contact_iterations = {1, 2, 4, 8};
     SolverOptions<Scalar> others = {};  ///< all other options
-    double safety_factor = 1.8;         ///< required error over the largest error accepted in the experiment
+    double safety_factor = 1.8;         ///< a setting may have the required error over this, 1 or more
     Index tick_stride = 1;  ///< errors are taken in every `tick_stride`-th tick; more than 1 needs fewer equilibria
     Index repetitions = 3;  ///< of each setting; the shortest time counts
 
@@ -46,24 +46,28 @@ struct GridSearchOptions {
 template <Real Scalar>
 struct ChosenSettings : TrialResult {
     SolverOptions<Scalar> options;
-    bool satisfied = false;  ///< the requirement is met; if not, this setting came closest
+    /// `time` is within the requirement, or `force_error` within it over `safety_factor`; if not, this setting is
+    /// closest.
+    bool satisfied = false;
 };
 
 /// The best solver setting for this membrane and load history, found by experiment, as [Liu07] finds the threshold of
-/// the queue. Computes the equilibria once, then tries one setting after the other. A setting is skipped if earlier
-/// ones show that it cannot be the best: reducing layers, sweeps or iterations lowers cost and accuracy.
+/// the propagation queue. Computes the equilibria once, then tries one setting after the other. A setting is skipped if
+/// earlier ones show that it cannot be the best, assuming that fewer layers, sweeps or iterations take no longer and
+/// are no more accurate.
 ///
 /// The history must represent later use: it should be long, press at many positions, and be as fast as the user's hand;
 /// most errors come with changes between ticks. Errors under other histories of the same kind differ somewhat: hence
-/// `safety_factor`. In 500 random scenes (spheres, ellipsoids and caps of 42 to 642 vertices, foundations of 0.01 to 10
-/// times the springs, 12 presses), 374 could be compared. Under 12 other presses at other positions, 96 % kept the
-/// required error, of 0.1 to 10 %, and 82 % took at most 1.5 times the time of the cheapest setting that keeps it. A
-/// required time has no safety factor.
+/// `safety_factor`. It was tried in 500 random scenes (spheres, ellipsoids and caps of 42 to 642 vertices, foundations
+/// of 0.01 to 10 times the springs, 12 presses, required errors of 0.1 to 10 %), of which 374 had a setting that
+/// satisfies the requirement. Under 12 other presses at other positions, 96 % of the choices kept the required error,
+/// and 82 % took at most 1.5 times the time of the cheapest setting that keeps it. A required time has no safety
+/// factor.
 ///
 /// @throws InvalidInput for a required error or time that is not positive, neither or both of them, an option out of
 /// its range, a history without a felt force or without an equilibrium, and for arguments that `run_trial` and
 /// `equilibria` refuse. Offline. Cost: an `equilibrium` for each compared tick, and about 30 to 300 runs of the
-/// history.
+/// history, repetitions included.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] ChosenSettings<Scalar> choose_settings(
@@ -112,7 +116,7 @@ template <Real Scalar>
             }
         }
     }
-    const auto work = [](const SolverOptions<Scalar>& setting) {  // layers of a triangle mesh grow linearly
+    const auto work = [](const SolverOptions<Scalar>& setting) {  // layer k of a mesh has about 6 k vertices
         const double rings = setting.layers;
         return setting.sweeps * (4.0 * setting.contact_iterations + 3 * rings * (rings + 2));
     };
@@ -130,8 +134,9 @@ class Search {
           max_error_(requirement.force_error / experiment.safety_factor),
           max_time_(time_required_ ? requirement.time : std::numeric_limits<double>::infinity()) {}
 
-    /// Whether earlier settings show that this one cannot be better: fewer layers contain the whole mesh; a setting
-    /// that it covers was too slow; or a setting that covers it missed the required error, or met the required time.
+    /// Whether earlier settings show that this one cannot be better: fewer layers contain all that the queue reaches; a
+    /// setting with no more of anything was too slow, or slower than the best; or a setting with no less of anything
+    /// missed the required error, or met the required time.
     [[nodiscard]] bool is_needless(const SolverOptions<Scalar>& setting) const noexcept {
         return std::any_of(layers_.begin(), layers_.end(),
                            [&](Index fewer) { return fewer < setting.layers && fewer >= all_layers_; }) ||
@@ -227,7 +232,7 @@ ChosenSettings<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const N
     const auto references = equilibria(mesh, network, volume, history, experiment.tick_stride);
     if (std::none_of(references.begin(), references.end(),
                      [](const ReferenceTick& reference) { return reference.force > 0; })) {
-        refuse(detail::choose_name, "the history must have a tick with a force that is felt, got none in equilibrium");
+        refuse(detail::choose_name, "the history must have a tick with a felt force at equilibrium, got none");
     }
     return choose_settings(experiment, requirement, [&](const SolverOptions<Scalar>& options) {
         auto result = run_trial(mesh, network, volume, history, references, options, rule, clock);

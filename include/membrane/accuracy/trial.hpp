@@ -43,8 +43,8 @@ inline constexpr bool are_constraints<std::tuple<Each...>, Scalar> = ((Constrain
 
 /// The constraints on a membrane over the ticks of a scene. A history is called once for each tick in order, with the
 /// present positions (3 x V [m]) and the vertices moved since the last call. It returns the constraints of the tick in
-/// a std::tuple. The compiler cannot check: a copy of a history that has not been called starts at tick 0, and results
-/// depend on the arguments only.
+/// a std::tuple. Not checked by the compiler: a copy of a history that has not been called starts at tick 0, and the
+/// same sequence of calls returns the same constraints.
 template <class History, class Scalar>
 concept LoadHistory = Real<Scalar> && std::copyable<History> &&
     requires(History& history, const History& idle, Index tick, const ConstPointsRef<Scalar>& x,
@@ -114,9 +114,9 @@ struct ReferenceTick {
     double force;                            ///< root of the sum of squares over the felt reactions [N]
 };
 
-/// The equilibrium of every tick, or of every `tick_stride`-th, each started from the tick before. Between them the
-/// solver follows the history with many sweeps. A tick without a converged equilibrium is left out. Equilibria have no
-/// damping: the error of a setting includes the lag of a damped foundation.
+/// The equilibrium of every tick, or of every `tick_stride`-th, each started from the positions of the tick before. In
+/// a tick without one the solver takes a step with all layers and 16 sweeps. A tick without a converged equilibrium is
+/// left out. Equilibria are static: with a damped foundation the error of a setting includes the viscous lag.
 /// @throws InvalidInput for arguments that `equilibrium` refuses, a history without ticks, or a `tick_stride` below 1.
 /// Offline. Cost: an `equilibrium` for each tick of the result.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
@@ -124,14 +124,15 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
 [[nodiscard]] std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network,
                                                     const Volume& volume, History history, Index tick_stride = 1);
 
-/// Cost and error of a setting. A force is felt if its constraint is not made of loads and pins only.
+/// Cost and error of a setting. A reaction is felt if its constraint has a term other than loads and pins, or has no
+/// description.
 struct TrialResult {
-    double force_error = 0;     ///< root mean square over the ticks, relative to the root mean square of the force
+    double force_error = 0;     ///< rms over the ticks of the felt reactions' error, over the rms of the reactions
     double position_error = 0;  ///< largest error of a vertex, root mean square over the ticks [m]
-    double time = 0;            ///< mean of contact and step, over ticks with a felt force [s]
-    Index layers_reached = 0;   ///< by the queue; below `layers` if the mesh has fewer
-    Index ticks_compared = 0;   ///< ticks with a reference
-    bool advanced = true;       ///< no step was refused; otherwise errors and time are infinite
+    double time = 0;  ///< mean of history and step over ticks with a felt force, the least of the repetitions [s]
+    Index layers_reached = 0;  ///< by the queue; below `layers` where no vertex was left to add
+    Index ticks_compared = 0;  ///< ticks with a reference
+    bool advanced = true;      ///< no step was refused; otherwise errors and time are infinite
 };
 
 /// Seconds of the steady clock. On a busy machine a clock of processor time is more reproducible.
@@ -141,9 +142,10 @@ struct SteadySeconds {
     }
 };
 
-/// Runs `history` with a solver of these options from the undeformed mesh, each tick from the end of the tick before,
-/// and compares it with `references`. `clock()` returns the time [s].
-/// @throws InvalidInput for options that the solver refuses, and for `references` of another scene. Offline.
+/// Runs `history` with a solver of these options from the undeformed mesh, each step from the positions of the one
+/// before, and compares it with `references`. `clock()` returns the time [s].
+/// @throws InvalidInput for a history without ticks, options that the solver refuses, and `references` that are empty,
+/// not in order, or of another number of vertices or constraints. Offline.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] TrialResult run_trial(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
@@ -186,9 +188,9 @@ void check_history(std::string_view component, const History& history) {
 
 /// Sums over the ticks of a trial.
 struct TrialSums {
-    double errors = 0, squares = 0;      // of forces [N^2]
+    double errors = 0, squares = 0;      // squared errors of forces, squared forces [N^2]
     double position_errors = 0;          // of the vertex with the largest error [m^2]
-    double time = 0;                     // of the ticks with a force [s]
+    double time = 0;                     // of the ticks with a felt force [s]
     Index ticks_compared = 0, felt = 0;  // ticks
 
     template <class Constraints, class Reactions, class Positions>
@@ -305,7 +307,7 @@ TrialResult run_trial(const TriangleMesh<Scalar>& mesh, const Network& network, 
         sums.compare(*reference++, constraints, report.reactions, x);
     }
     if (sums.ticks_compared == 0 || reference != references.end()) {
-        refuse("run_trial", "references must be of ticks of the history, one at least, in order, got others");
+        refuse("run_trial", "references must be of ticks of the history, in order, at least one; got others");
     }
     return sums.result(layers);
 }

@@ -17,7 +17,7 @@
 namespace membrane {
 
 template <Real Scalar>
-class MovingBody;  // of moving_body.hpp
+class MovingBody;  // of surface/moving_body.hpp, which the update on a moving body needs
 
 /// A point of the membrane that moves with the tool.
 template <Real Scalar>
@@ -26,12 +26,12 @@ struct Grasp {
     std::array<Index, 3> corners{no_index, no_index, no_index};  ///< its vertices
     Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the held point
     Vector3<Scalar> offset = Vector3<Scalar>::Zero();            ///< from the tool to the held point [m]
-    Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< position of the held point without the tool [m]
+    Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< of the held point, on the rest surface [m]
     Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();     ///< of a moving body at the held point [m/s]
 
     [[nodiscard]] bool holding() const noexcept { return triangle != no_index; }
 
-    /// Displacement of the held point by the tool [m]. @pre holding()
+    /// Displacement of the held point from `origin` [m]. @pre holding()
     [[nodiscard]] Vector3<Scalar> displacement(const Tool<Scalar>& tool) const noexcept {
         return tool.position + offset - origin;
     }
@@ -39,7 +39,7 @@ struct Grasp {
 
 /// How forceps grasp.
 struct GraspOptions {
-    bool snap_to_vertex = false;  ///< hold the nearest vertex instead of the contact point
+    bool snap_to_vertex = false;  ///< hold the corner of largest weight, not the contact point
 };
 
 /// Holds the contact point from when the tool closes in contact until it opens.
@@ -49,15 +49,16 @@ class Grasper {
     explicit Grasper(const TriangleMesh<Scalar>& mesh, GraspOptions options = {})
         : origins_(mesh.positions()), options_(options) {}
 
-    /// The present grasp. Forceps that closed before the contact hold no point.
+    /// The present grasp. Forceps that closed before the contact hold no point; those that are closed at the first
+    /// update count as closing then.
     [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                        const Tool<Scalar>& tool) noexcept;
 
-    /// The present grasp on a moving body: the held point moves with the body and turns with it about the tool.
+    /// The present grasp on a moving body: the held point follows the tool, and the body's rotation turns `offset`.
     [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                        const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
 
-    /// Drops the held point and the closed state: from here on the grasper equals a new one, bit for bit.
+    /// Drops the held point and the closed state. Later grasps equal those of a new grasper, bit for bit.
     void reset() noexcept {
         grasp_ = {};
         pose_ = {};

@@ -17,12 +17,12 @@
 ///     const auto most = membrane::passivity(loop, device, {.hand_damping = 2}).max_stiffness;  // [N/m]
 namespace membrane {
 
-/// The force shown to the hand. It has a potential, except for its damping and the part bounded by `off_potential`. Its
-/// stiffness is that of the potential, the eigenvalues of its Hessian: in every direction, not only along a normal.
+/// The force rendered to the hand. It is conservative, except for its damping and the part bounded by `off_potential`.
+/// Stiffness means every eigenvalue of the Hessian of its potential: in all directions, not only along a normal.
 ///
 /// | force | negative_stiffness | off_potential |
 /// |---|---|---|
-/// | `ReactionForce` | reaction / distance to the centre of convex curvature; more if buckling | scale * residual |
+/// | `ReactionForce` | reaction / radius of a convex surface's curvature; more in buckling | scale * report.residual |
 /// | `SpringDamperForce` on a `RestContact` | stiffness * depth / distance, see `RestContact` | 0 |
 /// | `SpringDamperForce` on another contact | stiffness * depth / distance | stiffness * depth * sin(a) |
 ///
@@ -30,18 +30,20 @@ namespace membrane {
 /// `RestContact`.
 struct SampledLoop {
     double stiffness;    ///< K, the largest tangent stiffness at the device, tissue-to-device scale included [N/m]
-    double damping = 0;  ///< B, largest damping of the policy, from differences of the position [N s/m]
+    double damping = 0;  ///< B, largest damping of the force, velocity from backward differences [N s/m]
     double tick = 1e-3;  ///< T, time from one force to the next [s]
-    double delay = 0;    ///< from a position to the tick that responds to it, a multiple of the tick [s]
-    /// N, largest magnitude of a negative tangent stiffness [N/m]: 0 if it is never negative, infinity for a wall that
-    /// ends or if N is not known. N matters only with a delay or with a resolution of the device.
+    double delay = 0;    ///< from a position to the tick that responds to it, whole ticks as a rule [s]
+    /// N, largest magnitude of a negative tangent stiffness [N/m]: 0 if it is never negative, infinity if the force
+    /// drops discontinuously with depth or if N is not known. N matters only with a delay or with a resolution of the
+    /// device.
     double negative_stiffness = std::numeric_limits<double>::infinity();
     /// Largest part of the force, without its damping, that has no potential [N]: 0 if the force has a potential,
     /// infinity if this part is not known. In a slow loop no damping dissipates its energy; friction must. A jump of
     /// the force counts in full.
     double off_potential = std::numeric_limits<double>::infinity();
 
-    /// @throws InvalidInput if a number is not finite or out of its range
+    /// @throws InvalidInput if a number is out of its range; only `negative_stiffness` and `off_potential` may be
+    /// infinite
     void check() const;
 };
 
@@ -59,21 +61,22 @@ struct Dissipation {
 /// Result of `passivity`.
 struct PassivityReport {
     bool passive = false;
-    double max_stiffness = 0;  ///< largest passive stiffness, other numbers unchanged [N/m]; 0: no stiffness is passive
+    double max_stiffness = 0;      ///< largest passive K, all else equal, at most the device's [N/m]; 0: none above 0
     double damping_needed = 0;     ///< by the loop as given [N s/m]
     double damping_available = 0;  ///< of device and hand, and of friction as far as it is counted [N s/m]
     double friction_needed = 0;    ///< of the device, for its resolution and the force without a potential [N]
 };
 
-/// Whether a held, sampled force gives the hand no more energy than the hand put in.
+/// Whether a force, sampled with zero-order hold, gives the hand no more energy than the hand put in.
 ///
-/// The loop is passive if the damper b of device and hand satisfies
+/// The loop is passive if damping b and friction c of device and hand satisfy
 ///
-///     b >= K T / 2 + max(K, N) delay + B,                                                        [Colgate97]
+///     b >= K T / 2 + B + max(K, N) delay,                                         [Colgate97], extended by the delay
+///     c >= (max(K, N) / 2 + B / T) resolution + off_potential,                    [Abbott05], extended
 ///
-/// for any force with a potential, and if friction exceeds the error by the resolution of the position [Abbott05] plus
-/// the part of the force without a potential. The remaining friction counts as damping [Diolaiti06]. The condition is
-/// sufficient. For N <= K it is necessary if the hand may be any passive system. Derivation: README.md in this folder.
+/// and K is at most `DeviceProfile::stiffness`. The rest of c, over `max_speed`, counts as damping [Diolaiti06]. The
+/// conditions are sufficient. For N <= K the first is necessary if the hand may be any passive system. Derivation:
+/// README.md in this folder.
 ///
 /// @throws InvalidInput if a number is out of its range
 [[nodiscard]] inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device,
@@ -91,8 +94,8 @@ inline void require_passive(const SampledLoop& loop, const DeviceProfile& device
 ///     if (observer.energy() < 0) ...                      // active
 class PassivityObserver {
   public:
-    /// `damping` and `friction` of device and hand: their dissipation counts too. Without it each sampled spring
-    /// generates some energy.
+    /// Lower bounds of `damping` [N s/m] and `friction` [N] of device and hand: their dissipation is added to `energy`.
+    /// Without it even a passive sampled spring appears to generate some energy.
     explicit PassivityObserver(double damping = 0, double friction = 0) noexcept
         : damping_(damping), friction_(friction) {}
 
@@ -106,7 +109,7 @@ class PassivityObserver {
     /// Energy that the hand put in, without subtracting the energy it got back [J].
     [[nodiscard]] double energy_in() const noexcept { return energy_in_; }
     /// Smallest `energy` so far [J].
-    [[nodiscard]] double least() const noexcept { return min_energy_; }
+    [[nodiscard]] double min_energy() const noexcept { return min_energy_; }
     void reset() noexcept { *this = PassivityObserver(damping_, friction_); }
 
   private:
@@ -140,9 +143,9 @@ inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& d
     const double lag = loop.tick / 2, coarse = device.resolution, negative = loop.negative_stiffness;
     const double per_speed = 1 / dissipation.max_speed;
     const double viscous = device.damping + dissipation.hand_damping;
-    // Without a lag even an infinite slope has no effect.
     const double friction = device.friction - loop.off_potential - loop.damping / loop.tick * coarse;
-    const auto over = [](double slope, double displacement) { return displacement > 0 ? slope * displacement : 0.0; };
+    // An infinite slope over nothing has no effect.
+    const auto over = [](double slope, double by) { return by > 0 ? slope * by : 0.0; };
 
     PassivityReport report;
     const double steepest = (std::max)(loop.stiffness, negative);

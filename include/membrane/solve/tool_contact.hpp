@@ -24,15 +24,17 @@
 ///     report.reactions[0]                                                    // force of the membrane on the tool [N]
 namespace membrane {
 
-/// Keeps the surface outside the tool, without friction. On the point of each contact triangle nearest to the tool a
-/// force along the normal pushes and never pulls; barycentric weights distribute it to the corners. Pinned and
-/// prescribed corners do not move, and push with their stiffness times the penetration, see
-/// `SolverOptions::rigid_stiffness`: there, and beside them, a penetration of force over stiffness remains. If the
-/// tool's axis is behind such a corner, contact is at the nearest point only; if this point passes a border, or another
-/// part of a surface folded around a pin more sharply than its triangles, the force may jump.
+/// Keeps the surface outside the tool, without friction. Each pair of a triangle in contact and a feature of the tool
+/// (its centre, an end of a shaft, a shaft against an edge) has one contact point. There a force along the normal
+/// pushes and never pulls; barycentric weights distribute it to the corners.
 ///
-/// A sphere whose radius is less than a 50th of an edge, as that of a point is, stays in front of the planes of the
-/// triangles that it touches: on a convex edge or corner it is too far out, by less than its radius.
+/// Fixed corners (pinned or prescribed) do not move. They resist with a penalty force, the penetration times
+/// `SolverOptions::rigid_stiffness`: at triangles with fixed corners a penetration of force over stiffness remains. If
+/// the tool's axis is behind such a triangle, the only contact point is the nearest one. The force may jump where this
+/// point crosses a border of the mesh, or in a sharp fold at a pin.
+///
+/// A sphere whose radius is less than a 70th of an edge, as that of a point tool is by default, stays in front of the
+/// planes of the triangles that it touches: on a convex edge or corner it is too far out, by less than its radius.
 template <Real Scalar>
 struct ToolContact {
     Tool<Scalar> tool;
@@ -41,7 +43,8 @@ struct ToolContact {
     [[nodiscard]] bool valid() const noexcept { return is_valid(tool) && is_valid(contact); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
         if (!contact.touching() || contact.tunnelled) return {};
-        return InputSample<Scalar>{contact.axis_point, contact.radius / 2};  // farther, the surface might pass the tool
+        return InputSample<Scalar>{contact.axis_point,
+                                   contact.radius / 2};  // a longer extrapolation might move the surface past the tool
     }
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>& context) const noexcept;
@@ -101,12 +104,12 @@ namespace detail {
 // Points share vertices: largest number of passes that move them out of the tool.
 inline constexpr int max_push_passes = 8;
 
-// Largest number of contact passes before vertices are updated again: as a rule, and at a deep penetration.
+// Largest number of contact passes before vertices are updated again: without, and with deep penetration.
 inline constexpr int all_contact_passes = 8, deep_contact_passes = 16;
 
-/// Number of passes as a rule. Few points, on a coarse mesh, each have a large part of the force, and more passes
-/// improve it; many points each have little. If points are `stiff`, beside fixed corners or several of a shaft on one
-/// triangle, a pass moves each only a little.
+/// Largest number of passes without deep penetration. With few points each carries a large part of the force, and more
+/// passes reduce its error. Points that are `stiff` (beside fixed corners, or several of a shaft on one triangle)
+/// converge slowly and get all passes.
 [[nodiscard]] constexpr int max_contact_passes(std::size_t points, bool stiff) noexcept {
     constexpr int least = 2, points_of_all_passes = 32;
     if (stiff || points == 0) return all_contact_passes;
@@ -122,6 +125,7 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
         context.state().full = true;
         return;
     }
+    // Until the new points are found, fixed corners are displaced by the forces of the last step.
     for (const auto& point : context.previous_points()) add_support_forces(context, point, point.force);
     const auto out = direction_out_of_support(context);
     if (contact.tunnelled && !out) carry_with_tool(context);
@@ -140,7 +144,8 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
     prevent_tunnelling(context);
 }
 
-// False if a corner is no vertex: the step is refused then.
+// Checks the indices and seeds the queue with the corners of the triangles. False, and the step is refused, if a corner
+// is no vertex.
 template <Real Scalar>
 bool ToolContact<Scalar>::seed(Context& context) const noexcept {
     const auto are_vertices = [&](const auto& corners) {
@@ -159,7 +164,7 @@ bool ToolContact<Scalar>::seed(Context& context) const noexcept {
     return true;
 }
 
-// The vertices that must not pass the tool.
+// The corners of the candidate triangles, for `prevent_tunnelling`, and the positions to which it moves them back.
 template <Real Scalar>
 void ToolContact<Scalar>::list_candidates(Context& context) const noexcept {
     for (const auto& candidate : contact.candidates) {
@@ -208,7 +213,7 @@ void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
 }
 
 // The tracker has found the points on the surface of the last step. The points of a shaft, or of a tool that has
-// tunnelled, are found again on the extrapolated surface: there they may be on the other side.
+// tunnelled, are found again on the extrapolated surface, where a normal may have the opposite sign.
 template <Real Scalar>
 void ToolContact<Scalar>::find_points(Context& context) const noexcept {
     const bool as_found = feature_pairs(tool) == 1 && !contact.tunnelled;
@@ -245,14 +250,14 @@ void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point
     context.add_point(point);
 }
 
-// In a step vertices move by more than the radius of a tiny tool, and then a nearest edge or corner does not
-// determine the side. So the tool stays in front of the planes of the triangles that it is in front of, throughout the
-// step: at a convex edge this is too far out, by less than the radius. Relative to the end of a shaft thinner than an
-// edge vertices move as far, past edges that reverse the normal; inside of a triangle of a closed surface it keeps the
-// side of the start of the step. Under a thick shaft triangles are small enough to turn over, and have no such side.
+// Keeps the tool on its side of the surface. In one step a vertex may move by more than the radius of a tiny sphere;
+// the normal at a nearest edge or corner may then flip. So a tiny sphere stays in front of the planes of its triangles
+// during the step: at a convex edge this is too far out, by less than the radius. The same can happen at an end of a
+// shaft thinner than an edge: on a closed surface, a point inside a triangle keeps the side that it had at the start of
+// the step. A thicker shaft has no such rule: small triangles under it may turn over.
 template <Real Scalar>
 void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scalar>& point) const noexcept {
-    constexpr Scalar tiny = Scalar(5e-4);  // squared radius over area: a tool thinner than a 50th of an edge
+    constexpr Scalar tiny = Scalar(5e-4);  // squared radius over area: a radius of less than a 70th of an edge
     if (point.feature < 0 || point.feature > 1) return;
     const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
     const Scalar size = norm(area), square = contact.radius * contact.radius;
@@ -281,8 +286,9 @@ void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
     range.end = state.packs.size();
 }
 
-// Fixed vertices do not yield to a tool: if it penetrates by more than its radius, its axis is behind them. Then
-// contact is at the nearest point only, on the side of the last step. Returns the direction out of the surface there.
+// Fixed vertices do not yield to a tool: if it penetrates by more than its radius, its axis is behind them. Then the
+// only contact point is the nearest one, on the tool's side in the last step. Returns the direction out of the surface
+// at this point, or null if the axis is not behind.
 template <Real Scalar>
 std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(const Context& context) const noexcept {
     const Vector3<Scalar> fixed = contact.barycentric - free_weights(context, contact.corners, contact.barycentric);
@@ -291,7 +297,7 @@ std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(con
     for (const auto& point : context.previous_points()) pressed += point.force;
     const bool turned = dot(pressed, contact.normal) > 0;
     const Vector3<Scalar> out = turned ? Vector3<Scalar>(-contact.normal) : contact.normal;
-    // A point tool has a contact radius: beyond half of it from the surface the direction is defined.
+    // A point tool has a contact radius: within half of it from the surface the axis counts as behind.
     const Scalar ahead = (contact.radius - tool.radius) / 2;
     if (!(dot<Scalar>(contact.axis_point - contact.point, out) < ahead)) return std::nullopt;
     return out;
@@ -315,8 +321,9 @@ bool ToolContact<Scalar>::comes_out(const Triangle<Scalar>& before, const Triang
            dot<Scalar>(contact.axis_point - now.a, front_now) > 0;
 }
 
-// If a candidate triangle passed the tool's axis point, all vertices go back to before the earliest time of impact,
-// with some clearance.
+// Continuous collision detection of the candidate triangles against the tool's axis point. At an impact all free
+// vertices go back to before the earliest time of impact, with some clearance. Not needed while no vertex has moved by
+// half the radius.
 template <Real Scalar>
 void ToolContact<Scalar>::prevent_tunnelling(Context& context) const noexcept {
     if (on_support(context)) return;
