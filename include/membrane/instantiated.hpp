@@ -12,6 +12,9 @@
 // The library and the files that use it must be compiled for the same instruction set (-march, -mavx2): otherwise they do
 // not link.
 
+// The arguments are types and keywords, which take no parentheses.
+// NOLINTBEGIN(bugprone-macro-parentheses)
+
 /// The step of a solver with a network of linear springs and this foundation.
 #define MEMBRANE_INSTANTIATE_STEP(PREFIX, SCALAR, RULE, ...)                                          \
     PREFIX membrane::StepReport<SCALAR> membrane::QuasiStaticSolver<SCALAR, membrane::RULE>::step_in( \
@@ -57,6 +60,8 @@
     MEMBRANE_INSTANTIATE_SOLVER(PREFIX, SCALAR, MassStep);                                                       \
     MEMBRANE_INSTANTIATE_SOLVER(PREFIX, SCALAR, SafeStep);                                                       \
     MEMBRANE_INSTANTIATE_STEP(PREFIX, SCALAR, BlockStep, membrane::NoFoundation)
+
+// NOLINTEND(bugprone-macro-parentheses)
 
 MEMBRANE_INSTANTIATE(extern template, double);
 MEMBRANE_INSTANTIATE(extern template, float);

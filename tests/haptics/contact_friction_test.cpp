@@ -81,7 +81,8 @@ TEST_CASE("friction keeps to the cone, acts along the surface, and gives no ener
             if (std::abs(depth) > 0.004) speed = (depth > 0 ? 0.2 : -0.2) * normal;
             position += dt * speed;
         }
-        if (observer.min_energy() < -1e-9 * observer.energy_in()) FAIL("seed " << seed << ": " << observer.min_energy() << " J");
+        if (observer.min_energy() < -1e-9 * observer.energy_in())
+            FAIL("seed " << seed << ": " << observer.min_energy() << " J");
     }
 }
 

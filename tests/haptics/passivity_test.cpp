@@ -470,7 +470,8 @@ TEST_CASE("friction and a coarse position are counted rightly on any path", "[pa
             if (std::abs(position) > 0.005) speed = position > 0 ? -max_speed : max_speed;
             position += loop.tick * speed;
         }
-        if (observer.min_energy() < -1e-9 * observer.energy_in()) FAIL("seed " << seed << ": " << observer.min_energy() << " J");
+        if (observer.min_energy() < -1e-9 * observer.energy_in())
+            FAIL("seed " << seed << ": " << observer.min_energy() << " J");
     }
 }
 

@@ -101,7 +101,8 @@ TEST_CASE("however stiff the tissue, the coupling's stiffness decides whether th
             if (std::abs(hand.position.z()) > 0.005) speed.z() = hand.position.z() > 0 ? -0.3 : 0.3;
             hand.position += dt * speed;
         }
-        if (observer.min_energy() < -1e-9 * observer.energy_in()) FAIL("seed " << seed << ": " << observer.min_energy() << " J");
+        if (observer.min_energy() < -1e-9 * observer.energy_in())
+            FAIL("seed " << seed << ": " << observer.min_energy() << " J");
     }
     CHECK(min_damping(100, 300, 1e-3) == 0);
     CHECK(min_damping(500, 300, 1e-3) == Approx(0.1));

@@ -34,7 +34,8 @@ struct GridSearchOptions {
     std::vector<Index> sweeps = {1, 2, 3, 4, 6, 8, 12, 16};
     std::vector<Index> contact_iterations = {1, 2, 4, 8};
     SolverOptions<Scalar> others = {};  ///< all other options
-    double safety_factor = 1.8;         ///< a setting may have the required error over this, 1 or more
+    /// A setting satisfies a required error if its measured error is at most the required one divided by this, >= 1.
+    double safety_factor = 1.8;
     Index tick_stride = 1;  ///< errors are taken in every `tick_stride`-th tick; more than 1 needs fewer equilibria
     Index repetitions = 3;  ///< of each setting; the shortest time counts
 
@@ -46,8 +47,8 @@ struct GridSearchOptions {
 template <Real Scalar>
 struct ChosenSettings : TrialResult {
     SolverOptions<Scalar> options;
-    /// `time` is within the requirement, or `force_error` within it over `safety_factor`; if not, this setting is
-    /// closest.
+    /// Whether `time` is at most the required time, or `force_error` at most the required error over `safety_factor`.
+    /// If no setting satisfies this, the chosen one comes closest.
     bool satisfied = false;
 };
 

@@ -40,15 +40,16 @@ struct ErrorBoundOptions {
 /// Proves an upper bound of the distance of a membrane of linear springs from equilibrium. The state may come from any
 /// solver, which may have moved all of its vertices or only some: the equilibrium is that of all free vertices.
 ///
-/// The bound is max |y_v - x_v| + e. y is a state near `x` with residual forces r, and e = |r| / mu without tools. mu >
-/// 0 is a lower bound of the eigenvalues of the stiffness at all states C whose free vertices are within rho of `x`;
-/// `Convexity` computes it. y comes from Newton's method with conjugate gradients (inexact, [Dembo82]), so that near
-/// the equilibrium the bound is hardly larger than the distance. With tools, y is an equilibrium computed before, and e
-/// includes the work of the contact forces, which `ContactBounds` bounds. Proof: README.md in this folder.
+/// The bound is max |y_v - x_v| + e. y is a state near `x`, r are its residual forces, and e bounds the distance from y
+/// to the equilibrium. Without tools e = |r| / mu: mu > 0 is a lower bound, computed by `Convexity`, of the eigenvalues
+/// of the stiffness at every state whose free vertices are within rho of `x`. C is the set of these states. The bound
+/// is proven if it is at most rho. y comes from Newton's method with conjugate gradients (inexact, [Dembo82]), so that
+/// near the equilibrium the bound is hardly larger than the distance. With tools, y is an equilibrium computed before,
+/// and e includes the work of the contact forces, which `ContactBounds` bounds. Proof: README.md in this folder.
 ///
 /// The proof includes rounding in IEEE double arithmetic. It does not hold with -ffast-math. The equilibrium has no
 /// damping forces. A reaction in a step's report may include some; `max_distance_to` then includes them, and the bound
-/// still holds. A press without contact or grasp adds no force, and its reaction is exactly zero.
+/// still holds. A press without contact, or a pull without a grasp, adds no force: its reaction is exactly zero.
 ///
 /// A result does not depend on earlier calls. Each call invalidates the `reactions` of the last report. One thread at a
 /// time for each instance.
@@ -69,7 +70,9 @@ class ErrorBound {
     /// Bounds the error with tools in contact; `rest` is the equilibrium under these constraints. The status is
     /// `not_convex` if a tool may touch a fixed or prescribed vertex, or one that another tool may touch, and
     /// `unsupported` with a point attachment.
-    /// @throws InvalidInput for a constraint that is not valid. Offline.
+    /// The status is `invalid_input` if a constraint is not valid. Offline.
+    /// @throws InvalidInput if a valid constraint does not fit the mesh, such as a contact at a corner that is no
+    /// vertex
     template <Real Scalar, class Law, LinearFoundation Volume, StaticConstraint... Constraints>
     [[nodiscard]] ErrorReport compute(const Equilibrium& rest, const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                       const TriangleMesh<Scalar>& mesh, const MassSpringNetwork<Scalar, Law>& network,

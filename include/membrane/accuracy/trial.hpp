@@ -42,9 +42,9 @@ inline constexpr bool are_constraints<std::tuple<Each...>, Scalar> = ((Constrain
 }  // namespace detail
 
 /// The constraints on a membrane over the ticks of a scene. A history is called once for each tick in order, with the
-/// present positions (3 x V [m]) and the vertices moved since the last call. It returns the constraints of the tick in
-/// a std::tuple. Not checked by the compiler: a copy of a history that has not been called starts at tick 0, and the
-/// same sequence of calls returns the same constraints.
+/// present positions (3 x V [m]) and a list of vertices, which has every vertex moved since the last call and may have
+/// others. It returns the constraints of the tick in a std::tuple. Not checked by the compiler: a copy of a history
+/// that has not been called starts at tick 0, and the same sequence of calls returns the same constraints.
 template <class History, class Scalar>
 concept LoadHistory = Real<Scalar> && std::copyable<History> &&
     requires(History& history, const History& idle, Index tick, const ConstPointsRef<Scalar>& x,
@@ -117,8 +117,9 @@ struct ReferenceTick {
 /// The equilibrium of every tick, or of every `tick_stride`-th, each started from the positions of the tick before. In
 /// a tick without one the solver takes a step with all layers and 16 sweeps. A tick without a converged equilibrium is
 /// left out. Equilibria are static: with a damped foundation the error of a setting includes the viscous lag.
-/// @throws InvalidInput for arguments that `equilibrium` refuses, a history without ticks, or a `tick_stride` below 1.
-/// Offline. Cost: an `equilibrium` for each tick of the result.
+/// @throws InvalidInput for arguments that `equilibrium` refuses, a history without ticks or with a `dt` that is not
+/// finite and positive, or a `tick_stride` below 1. Offline. Cost: an `equilibrium` for each `tick_stride`-th tick, and
+/// a step for each other tick.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History>
 [[nodiscard]] std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network,
@@ -129,10 +130,10 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
 struct TrialResult {
     double force_error = 0;     ///< rms over the ticks of the felt reactions' error, over the rms of the reactions
     double position_error = 0;  ///< largest error of a vertex, root mean square over the ticks [m]
-    double time = 0;  ///< mean of history and step over ticks with a felt force, the least of the repetitions [s]
-    Index layers_reached = 0;  ///< by the queue; below `layers` where no vertex was left to add
-    Index ticks_compared = 0;  ///< ticks with a reference
-    bool advanced = true;      ///< no step was refused; otherwise errors and time are infinite
+    double time = 0;            ///< mean of history and step over ticks with a felt force [s]
+    Index layers_reached = 0;   ///< by the queue; below `layers` where no vertex was left to add
+    Index ticks_compared = 0;   ///< ticks with a reference
+    bool advanced = true;       ///< no step was refused; otherwise errors and time are infinite
 };
 
 /// Seconds of the steady clock. On a busy machine a clock of processor time is more reproducible.

@@ -29,13 +29,16 @@ template <Real Scalar>
 class MovingBody;  // of moving_body.hpp
 
 struct TrackerOptions {
-    double margin = 0.01;              ///< added to the radius to find nearby triangles; radius of a point [mean edges]
+    /// Added to the tool's radius in the search for triangles, and the smallest radius of a tool: a thinner one, a
+    /// point too, counts as this thick [mean edges].
+    double margin = 0.01;
     Index full_query_interval = 128;   ///< ticks in contact between full tree queries, which find further folds
     Index max_contact_points = 16384;  ///< capacity for contact points; determines memory, not time
 };
 
-/// Without contact, queries the tree. In contact, tests the contact triangles of the last tick and their neighbours
-/// [Liu07] 2.3: that cost depends on the contact area, not on the size of the mesh.
+/// Without contact, or if the tool has moved by more than a mean edge in the tick, queries the tree. Otherwise tests
+/// the contact triangles of the last tick and their neighbours [Liu07] 2.3: that cost depends on the contact area, not
+/// on the size of the mesh.
 ///
 /// Beyond the paper: the search floods every triangle within the detection distance. Each tick also casts the
 /// displacement of the tool's position (and of the other end of a capsule) against the tree. If it hits, the contact is
@@ -46,9 +49,11 @@ struct TrackerOptions {
 /// surface or the gap exceeds depth plus travel of the tool: a membrane that springs back stays in contact.
 ///
 /// The tool stays outside a closed surface: where the winding number is 0. At an open surface the tool stays on the
-/// side of first contact until it is clear of the surface (no triangle within two mean edges), or has slid off a border
-/// that it displaced. A capsule that has slid off a border may lie on both sides. Until it is clear, only the passage
-/// of its ends is detected.
+/// side of first contact. If that contact is on a border, the side is fixed when the contact has left the border, or
+/// when its normal is within 60 degrees of the surface's. The tool keeps the side until it is clear of the surface (no
+/// triangle within two mean edges) or has slid off a border that it displaced; closed forceps keep it in any case. A
+/// capsule that has slid off a border may lie on both sides. Until it is clear, only the passage of its ends is
+/// detected.
 ///
 /// The rest surface is the mesh, or the anchors of a moving body. Depth is measured against it. If the tool is outside
 /// the rest surface and the membrane lies farther out, there is no contact: a contact must not pull.
@@ -60,7 +65,8 @@ class ContactTracker {
 
     /// The contact of `tool` with the surface at `x` (3 x V [m]). If the tool is not valid, returns no contact and
     /// leaves the state unchanged. Online. Cost: one or two segment casts, and a query of the tree or, in contact, the
-    /// triangles within detection distance and their neighbours; a tool behind the surface adds a ray cast.
+    /// triangles within detection distance and their neighbours. A tool behind the surface adds ray casts if the
+    /// surface is open, and winding numbers if it is closed.
     /// @pre `tree` was refitted to `x`
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool) noexcept {

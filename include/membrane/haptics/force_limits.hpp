@@ -22,8 +22,11 @@ struct LimitOptions {
     double soft_start = 0.1;      ///< from zero to the full force, after start, fault, old state [s]; 0: at once
     double max_state_age = 0.04;  ///< largest age of the solver's state [s]; infinity: no watchdog
     double fade_time = 0.05;      ///< time in which the force of an older state fades to zero [s]
-    double max_tick = 2e-3;       ///< a longer tick, or one that is not positive, counts as this long [s]
-    bool thermal_limit = true;    ///< whether hot motors are limited to the continuous force
+    /// Longest tick in which the force may rise [s]. In a longer tick the force rises as in one of this length, but
+    /// watchdog and motors count the whole tick. In a tick that is not positive the force does not rise; watchdog and
+    /// motors count this length.
+    double max_tick = 2e-3;
+    bool thermal_limit = true;  ///< whether hot motors are limited to the continuous force
 
     /// @throws InvalidInput if an option is out of its range
     void check() const;
@@ -91,8 +94,9 @@ class MotorThermalModel {
 /// 1. fault: a force that is not finite becomes zero, since the later limits compute with it;
 /// 2. watchdog and soft start: a factor on the requested force, as that force itself may be wrong;
 /// 3. peak and heat: the limits of the device, on the scaled force;
-/// 4. slew: the force of the last tick drops at once to its part in the requested direction, to zero if the request
-///    reverses it. From there the change in a tick is bounded, in magnitude and direction.
+/// 4. slew: the last force is first scaled down to the projection of the requested force on it, or to zero if the
+///    request reverses it. This fall is not bounded. The force then moves towards the request. Its distance from the
+///    last force stays within the bound, unless the fall alone exceeds it.
 ///
 /// No limit increases the force, so no limit undoes an earlier one. The first three keep its direction. The slew limit
 /// lags behind a force that turns too fast, but never opposes it: with input f and output g, g . f >= |g|^2. If no
@@ -108,9 +112,9 @@ class MotorThermalModel {
 /// faster than real time is limited in its own time. If no replay is needed, a steady clock is suitable too. The time
 /// of a `Tool<float>` is accurate to 0.1 ms for 15 minutes; count from the start of the run.
 ///
-/// If the time stands still or goes back, watchdog and motors count a tick of `max_tick`, and the force may only fall
-/// towards zero: if the time never advances, the force stays zero. A jump ahead counts as a gap in which the last force
-/// was held: the motors count as heated by this force for the whole gap.
+/// If the time stands still or goes back, watchdog and motors count a tick of `max_tick`. With the slew limit on, the
+/// force may then only fall: if the time never advances, it stays zero. A jump ahead counts as a gap in which the last
+/// force was held: the motors count as heated by this force for the whole gap.
 class ForceLimiter {
   public:
     /// @throws InvalidInput if a number of the profile or an option is out of its range

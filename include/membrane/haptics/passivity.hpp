@@ -13,7 +13,7 @@
 ///     const membrane::SampledLoop loop{.stiffness = 40 * 12.0, .damping = 0.5, .tick = 1e-3,  // scaled to the device
 ///                                      .negative_stiffness = 100, .off_potential = 0.06};
 ///     const auto device = membrane::devices::touch;
-///     membrane::require_passive(loop, device, {.hand_damping = 2});     // throws; the message names a limit
+///     membrane::require_passive(loop, device, {.hand_damping = 2});     // throws if the loop is not passive
 ///     const auto most = membrane::passivity(loop, device, {.hand_damping = 2}).max_stiffness;  // [N/m]
 namespace membrane {
 
@@ -69,7 +69,7 @@ struct PassivityReport {
 
 /// Whether a force, sampled with zero-order hold, gives the hand no more energy than the hand put in.
 ///
-/// The loop is passive if damping b and friction c of device and hand satisfy
+/// The loop is passive if the damping b of device and hand and the friction c of the device satisfy
 ///
 ///     b >= K T / 2 + B + max(K, N) delay,                                         [Colgate97], extended by the delay
 ///     c >= (max(K, N) / 2 + B / T) resolution + off_potential,                    [Abbott05], extended
@@ -82,8 +82,10 @@ struct PassivityReport {
 [[nodiscard]] inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device,
                                                const Dissipation& dissipation);
 
-/// @throws InvalidInput if the loop is not passive; the message names the largest passive stiffness and the damping
-/// needed
+/// Does nothing if the loop is passive.
+/// @throws InvalidInput if the loop is not passive, or if a number is out of its range. The message names the first
+/// cause that applies: an unknown `off_potential`, an unknown `negative_stiffness`, too little friction, or too much
+/// stiffness, with the largest passive one and the damping needed
 inline void require_passive(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation);
 
 /// The energy that a hand has put into the loop, updated each tick [Hannaford02]. If it falls below zero, the loop has

@@ -37,10 +37,11 @@ struct RepairOptions {
     bool drop_repeated = false;    ///< Drops triangles that reference a vertex twice.
     bool drop_zero_area = false;   ///< Drops triangles of three collinear vertices; may leave a T-junction.
     bool drop_duplicates = false;  ///< Of triangles with the same vertices, in any order, keeps only the first.
-    /// Reverses triangles until each component is consistently oriented; one that is not orientable is left unchanged.
-    /// A closed component then faces outward; of any other component, as few triangles as possible are reversed. A
-    /// component that is consistently oriented is left unchanged, see `flip_inward`. Each component is treated
-    /// separately: one inside another faces outward too, even if it is meant as the wall of a cavity.
+    /// Reverses triangles until each component is consistently oriented. A component here is what edges of exactly two
+    /// triangles join. One that is consistently oriented, see `flip_inward`, or not orientable, is left unchanged. Any
+    /// other closed component then faces outward; in any other open one as few triangles as possible are reversed. Each
+    /// component is treated separately: one inside another faces outward too, even if it is meant as the wall of a
+    /// cavity.
     bool orient = false;
     bool split_vertices = false;  ///< Gives each fan of triangles at a vertex, except the first, its own vertex.
     bool flip_inward = false;     ///< Reverses closed components that face inward.

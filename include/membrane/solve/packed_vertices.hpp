@@ -40,16 +40,16 @@ concept UpdatesInLanes = (Network::never_stiffens ||
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
-/// The vertices of a queue, and then others, in packs of one vertex for each lane: each with its springs, its volume
-/// spring and whether it is free. Their groups are colour classes: no spring joins two vertices of a group, and all
-/// vertices of a pack are of one group. Positions are in `StepState`. Vertices beyond the capacity are left out, and
-/// the solver updates them one by one.
+/// The vertices of a queue, and then others, in packs of one vertex for each lane. A pack stores for each vertex its
+/// springs, its volume spring and whether it is free. The vertices are in groups, colour classes: no spring joins two
+/// vertices of a group, and all vertices of a pack are of one group. Positions are in `StepState`. From the first
+/// vertex beyond the capacity on, vertices are left out, and the solver updates them one by one.
 template <Real Scalar>
 class PackedVertices {
   public:
     using Wide = Lanes<Scalar>;
 
-    /// Allocates for about `capacity` vertices: packs may be half full.
+    /// Allocates for `capacity` vertices; fewer may fit if more than half of the lanes stay unused.
     template <ElasticNetwork<Scalar> Network>
     explicit PackedVertices(const Network& network, Index capacity = unlimited);
 

@@ -101,7 +101,8 @@ template <Real Scalar>
 
 namespace detail {
 
-// Points share vertices: largest number of passes that move them out of the tool.
+// Points share vertices: moving one point out of the tool may move another one in. So points are moved in several
+// passes, at most this many.
 inline constexpr int max_push_passes = 8;
 
 // Largest number of contact passes before vertices are updated again: without, and with deep penetration.
@@ -288,7 +289,7 @@ void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
 
 // Fixed vertices do not yield to a tool: if it penetrates by more than its radius, its axis is behind them. Then the
 // only contact point is the nearest one, on the tool's side in the last step. Returns the direction out of the surface
-// at this point, or null if the axis is not behind.
+// at this point; null if the axis is not behind, or if no corner that has a weight at this point is fixed.
 template <Real Scalar>
 std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(const Context& context) const noexcept {
     const Vector3<Scalar> fixed = contact.barycentric - free_weights(context, contact.corners, contact.barycentric);
