@@ -8,7 +8,9 @@ option(MEMBRANE_USUAL_TYPES "Compile once what most programs are made of: they b
 if(MEMBRANE_USUAL_TYPES)
     set(folder ${PROJECT_SOURCE_DIR}/tests/support)
     add_library(membrane_usual_types STATIC ${folder}/usual_double.cpp ${folder}/usual_float.cpp)
-    target_link_libraries(membrane_usual_types PUBLIC membrane::instantiated PRIVATE membrane::deterministic membrane_warnings)
+    # Only its precompiled header leaves the types to the libraries: what is compiled with other options does without.
+    target_link_libraries(membrane_usual_types
+        PRIVATE $<LINK_ONLY:membrane::instantiated> membrane::deterministic membrane_warnings)
     target_precompile_headers(membrane_usual_types PRIVATE ${folder}/usual_types.hpp)
 endif()
 
