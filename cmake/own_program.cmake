@@ -10,7 +10,7 @@ if(MEMBRANE_USUAL_TYPES)
     add_library(membrane_usual_types STATIC ${folder}/usual_double.cpp ${folder}/usual_float.cpp)
     # Only its precompiled header leaves the types to the libraries: what is compiled with other options does without.
     target_link_libraries(membrane_usual_types
-        PRIVATE $<LINK_ONLY:membrane::instantiated> membrane::deterministic membrane_warnings)
+        INTERFACE $<LINK_ONLY:membrane::instantiated> PRIVATE membrane::deterministic membrane_warnings)
     target_precompile_headers(membrane_usual_types PRIVATE ${folder}/usual_types.hpp)
 endif()
 
