@@ -89,3 +89,14 @@ example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json
 bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox
     libbullet-dev libcgal-dev libembree-dev libfcl-dev)
 check_packages=(clang clang-format-14 clang-tidy debootstrap git libclang-rt-dev valgrind)
+
+# one_core: sets `pinned`, the command that keeps another on the core of this script, where there is taskset.
+one_core() {
+    pinned=()
+    if command -v taskset > /dev/null; then pinned=(taskset --cpu-list "$(taskset -cp $$ | grep -oE '[0-9]+$')"); fi
+}
+
+# median FILE [COLUMN]: of the numbers in a column, the first if none is given; of an even count the lower one.
+median() {
+    awk -v column="${2-1}" '{ print $column }' "$1" | sort -g | awk '{ all[NR] = $1 } END { print all[int((NR + 1) / 2)] }'
+}

@@ -1,12 +1,7 @@
 # Two recordings: displacement of the tool, force, and difference of the forces.
 set terminal svg size 900,640 font "Helvetica,Arial,sans-serif,13" background "#ffffff"
 set output picture
-set encoding utf8
-set grid lc "#e2e2e2" lw 0.7
-set border 3 lc "#444444"
-set tics nomirror
 set key at screen 0.745, graph 1 left top Left reverse samplen 2 spacing 1.3
-set style data lines
 stats data index 4 using 2 nooutput
 set multiplot layout 3,1 title 'Two traces' font ',15'
 set xrange [0:*]

@@ -1,12 +1,7 @@
 # Measured forces and the fitted model.
 set terminal svg size 900,330 font "Helvetica,Arial,sans-serif,13" background "#ffffff"
 set output picture
-set encoding utf8
-set grid lc "#e2e2e2" lw 0.7
-set border 3 lc "#444444"
-set tics nomirror
 set key top left Left reverse samplen 2 spacing 1.3
-set style data lines
 set title 'A lens under an indenter' font ',15'
 set xlabel 'depth [mm]'
 set ylabel 'force [mN]'

@@ -74,8 +74,11 @@ struct Phase {
     };
     FILE* gnuplot = popen("gnuplot", "w");
     if (gnuplot == nullptr) throw std::runtime_error("cannot run gnuplot");
-    const std::string commands = "data = " + quoted(data) + "picture = " + quoted(picture) + settings + "load " +
-                                 quoted(MEMBRANE_EXAMPLE_DATA "/../support/" + script + ".gnuplot");
+    const auto load = [&](const std::string& name) {
+        return "load " + quoted(MEMBRANE_EXAMPLE_DATA "/../support/" + name + ".gnuplot");
+    };
+    const std::string commands =
+        "data = " + quoted(data) + "picture = " + quoted(picture) + load("style") + settings + load(script);
     std::fputs(commands.c_str(), gnuplot);
     if (pclose(gnuplot) != 0) throw std::runtime_error("gnuplot cannot draw " + data);
 

@@ -1,12 +1,7 @@
 # Force and depth over time, with `name` of the scene and the phases as labels and objects.
 set terminal svg size 1000,500 font "Helvetica,Arial,sans-serif,13" background "#ffffff"
 set output picture
-set encoding utf8
-set grid lc "#e2e2e2" lw 0.7
-set border 3 lc "#444444"
-set tics nomirror
 set key at screen 0.71, graph 1 left top Left reverse samplen 2 spacing 1.3
-set style data lines
 set multiplot layout 2,1 title 'Force and depth, '.name font ',15'
 set lmargin 9
 set tmargin 2.5

@@ -1,12 +1,7 @@
 # The force on the hand with the normals of the triangles and with smooth ones, over time and as a spectrum.
 set terminal svg size 900,560 font "Helvetica,Arial,sans-serif,13" background "#ffffff"
 set output picture
-set encoding utf8
-set grid lc "#e2e2e2" lw 0.7
-set border 3 lc "#444444"
-set tics nomirror
 set key at screen 0.745, graph 1 left top Left reverse samplen 2 spacing 1.3
-set style data lines
 set multiplot layout 2,1
 set lmargin 9
 set rmargin at screen 0.73
