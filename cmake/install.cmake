@@ -5,7 +5,7 @@ include(CMakePackageConfigHelpers)
 set(package_dir ${CMAKE_INSTALL_DATADIR}/cmake/membrane)
 
 install(TARGETS membrane membrane_deterministic EXPORT membrane FILE_SET HEADERS)
-install(DIRECTORY include/membrane DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN README.md)
+install(DIRECTORY include/membrane DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} FILES_MATCHING PATTERN *.md)
 install(EXPORT membrane NAMESPACE membrane:: FILE membrane-targets.cmake DESTINATION ${package_dir})
 
 configure_package_config_file(cmake/membrane-config.cmake.in membrane-config.cmake INSTALL_DESTINATION ${package_dir})

@@ -10,6 +10,7 @@
 
 #include "support/specimen.hpp"
 
+// [suction]
 /// A pressure on some vertices, along the axis of the cup.
 struct Suction {
     std::span<const membrane::Index> vertices;  ///< below the mouth; the caller owns them
@@ -29,6 +30,7 @@ struct Suction {
     Eigen::Vector3d reaction(const Context&) const noexcept { return -static_cast<double>(vertices.size()) * force; }
 };
 static_assert(membrane::Constraint<Suction, double>);
+// [/suction]
 
 int main(int argc, char** argv) {
     const auto specimen = examples::specimen("Draws a membrane out by a suction cup.", argc, argv);

@@ -14,6 +14,7 @@
 #include "support/command_line.hpp"
 #include "support/pictures.hpp"
 #include "support/report.hpp"
+#include "support/text.hpp"
 
 namespace examples {
 
@@ -72,12 +73,6 @@ class Output {
     }
 
   private:
-    static void save(const std::filesystem::path& file, const std::string& text,
-                     std::ios::openmode mode = std::ios::trunc) {
-        std::ofstream stream(file, mode);
-        if (!(stream << text << std::flush)) throw std::runtime_error("cannot write " + file.string());
-    }
-
     std::filesystem::path folder_, page_, json_, csv_;
 };
 

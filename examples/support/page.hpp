@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "support/svg.hpp"
+#include "support/text.hpp"
 
 namespace examples {
 

@@ -91,14 +91,12 @@ inline std::vector<Facet> painters_order(const Camera& camera, const Picture& pi
     return facets;
 }
 
-/// Light from a lamp at the upper left, less and redder in the shade, and a faint gloss.
-inline Colour lit(const Colour& surface, const Vector3d& normal, const Vector3d& view, const Camera& camera) {
+/// Light from a lamp at the upper left, less and redder in the shade. No gloss: it would read as a value.
+inline Colour lit(const Colour& surface, const Vector3d& normal, const Camera& camera) {
     static const Colour shade = screen(168, 140, 136);
-    const Vector3d lamp = camera.seen(-0.5, 0.75, 0.7);
     const double sky = 0.7 + 0.3 * normal.dot(camera.seen(0, 1, 0));
-    const double diffuse = std::max(0.0, (normal.dot(lamp) + 0.15) / 1.15);
-    const double gloss = std::pow(std::max(0.0, normal.dot((lamp + view).normalized())), 30);
-    return surface.cwiseProduct(sky * shade + Colour::Constant(0.82 * diffuse)) + Colour::Constant(0.08 * gloss);
+    const double diffuse = std::max(0.0, (normal.dot(camera.seen(-0.5, 0.75, 0.7)) + 0.15) / 1.15);
+    return surface.cwiseProduct(sky * shade + Colour::Constant(0.82 * diffuse));
 }
 
 /// A triangle as one path: where it starts, then relative lines in tenths of a pixel.
@@ -125,7 +123,7 @@ inline Colour facet_colour(const Camera& camera, const Picture& picture, const F
     Colour surface = tissue(picture.colours.share(value));
     if (!facet.outside) surface = surface.cwiseProduct(screen(214, 205, 212));
     normal *= (facet.outside ? 1 : -1) / normal.norm();
-    return lit(surface, normal, (camera.eye() - triangle.a).normalized(), camera);
+    return lit(surface, normal, camera);
 }
 
 inline void draw_facet(Svg& svg, const Camera& camera, const Picture& picture, const Facet& facet, const Colour& colour,
@@ -163,10 +161,10 @@ inline void draw_force(Svg& svg, const Camera& camera, const Picture& picture) {
     const Pixel neck{q.x - head * along.x, q.y - head * along.y};
     const Pixel left{neck.x - half * along.y, neck.y + half * along.x};
     const Pixel right{neck.x + half * along.y, neck.y - half * along.x};
-    svg.add("<path d='M", p, "L", neck, "M", left, "L", q, "L", right,
-            "z' fill='#fff' stroke='#fff' stroke-width='5' stroke-linejoin='round'/>\n");
-    svg.line(p, neck, "stroke='#12507b' stroke-width='2.4' stroke-linecap='round'");
-    svg.add("<path d='M", left, "L", q, "L", right, "z' fill='#12507b'/>\n");
+    for (const char* style :
+         {"fill='#fff' stroke='#fff' stroke-width='6'", "fill='#12507b' stroke='#12507b' stroke-width='2'"}) {
+        svg.add("<path d='M", p, "L", neck, "M", left, "L", q, "L", right, "z' ", style, "/>\n");
+    }
     const bool leftwards = along.x < -0.3;
     svg.text({q.x + (leftwards ? -7 : 7), q.y + (along.y > 0.5 ? 14 : 4)}, force_text(picture.force.norm()),
              {.size = 13, .colour = "#12507b", .anchor = leftwards ? "end" : "start", .bold = true, .halo = true});
@@ -198,10 +196,7 @@ inline void draw(Svg& svg, const Camera& camera, const Picture& picture, const s
 inline void draw_scale_bar(Svg& svg, const Camera& camera, Pixel left, double width) {
     const double longest = width / camera.options().metre;  // [m]
     double length = std::pow(10, std::floor(std::log10(longest)));
-    if (5 * length <= longest)
-        length *= 5;
-    else if (2 * length <= longest)
-        length *= 2;
+    length *= 5 * length <= longest ? 5 : 2 * length <= longest ? 2 : 1;
     const double right = left.x + length * camera.options().metre;
     svg.line(left, {right, left.y}, "stroke='#333' stroke-width='2'");
     svg.text({(left.x + right) / 2, left.y - 6}, number(1e3 * length, 3) + " mm", {.size = 11, .anchor = "middle"});

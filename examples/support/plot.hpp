@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "support/svg.hpp"
+#include "support/text.hpp"
 
 /// Curves, drawn by gnuplot.
 ///

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdio>
 #include <fstream>
 #include <iomanip>
 #include <numeric>
@@ -19,6 +18,7 @@
 #include "support/record.hpp"
 #include "support/rigid_fit.hpp"
 #include "support/scenes.hpp"
+#include "support/text.hpp"
 
 /// The results of `press_and_pull`: tables for people, JSON and CSV for programs.
 namespace examples {
@@ -58,12 +58,6 @@ struct Speed {
 /// Largest distance of the membrane from its rest shape at the end of `step`, over its radius; rigid drift removed.
 [[nodiscard]] inline double shape_error(const Scene& scene, const Record& record, Step step) {
     return distance_from_shape(record.snapshots[step].points, scene.mesh.positions()) / scene.radius;
-}
-
-[[nodiscard]] inline std::string exponential(double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.1e", value);
-    return text;
 }
 
 /// The names of processor and compiler, as far as known.

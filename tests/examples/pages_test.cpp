@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 //
-// What the README shows beside the examples, as a user's program: nothing of the library's is known by its bare name.
+// What README and chapters show beside the examples, as a user's program: nothing of the library's is known by its bare name.
 #include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
 #include <iostream>
+#include <span>
 #include <sstream>
 #include <thread>
 #include <utility>
@@ -74,6 +75,11 @@
 #include <membrane/accuracy/choose_settings.hpp>
 // [/settings]
 
+// [fit]
+#include <membrane/calibration/fit.hpp>
+#include <membrane/calibration/indentation.hpp>
+// [/fit]
+
 #include "support/catch.hpp"
 
 namespace {
@@ -112,7 +118,7 @@ std::vector<membrane::Tool<double>> stroke_of_ticks() {
 
 }  // namespace
 
-TEST_CASE_METHOD(AtRest, "the README's moving body") {
+TEST_CASE_METHOD(AtRest, "pages: moving body") {
     membrane::QuasiStaticSolver<double> solver(network);
     membrane::AabbTree<double> tree(mesh);
     membrane::ContactTracker<double> tracker(mesh);
@@ -137,7 +143,7 @@ TEST_CASE_METHOD(AtRest, "the README's moving body") {
     CHECK(force.z() > 0);
 }
 
-TEST_CASE_METHOD(Touched, "the README's constraints") {
+TEST_CASE_METHOD(Touched, "pages: constraints") {
     tool.grasping = true;
     const auto& triangles = mesh.triangles();
     const std::array<membrane::Index, 3> corners{triangles(0, 9), triangles(1, 9), triangles(2, 9)};
@@ -154,7 +160,7 @@ TEST_CASE_METHOD(Touched, "the README's constraints") {
     CHECK((report.reactions[2] + force).norm() < 1e-15);
 }
 
-TEST_CASE_METHOD(Touched, "the README's deadline") {
+TEST_CASE_METHOD(Touched, "pages: deadline") {
     // [deadline]
     const auto deadline = membrane::Deadline([] { return Clock::now(); }, Clock::now() + 300us);
     const auto report = solver.step_until(deadline, x, dt, network, foundation, press(tool, contact));
@@ -162,7 +168,7 @@ TEST_CASE_METHOD(Touched, "the README's deadline") {
     CHECK(report.status == membrane::StepStatus::advanced);
 }
 
-TEST_CASE_METHOD(AtRest, "the README's threads") {
+TEST_CASE_METHOD(AtRest, "pages: threads") {
     // [threads]
     const membrane::ThreadPool pool;
     auto solver =
@@ -178,7 +184,7 @@ TEST_CASE_METHOD(AtRest, "the README's threads") {
     CHECK(report.status == membrane::StepStatus::advanced);
 }
 
-TEST_CASE_METHOD(Touched, "the README's hand") {
+TEST_CASE_METHOD(Touched, "pages: hand") {
     membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [hand]
@@ -214,7 +220,7 @@ TEST_CASE_METHOD(Touched, "the README's hand") {
 }
 
 // The lines of the loop and those of the hand, together, as a user has them.
-TEST_CASE_METHOD(AtRest, "the README's loop with limits and recorder replays to the bit, however late it runs") {
+TEST_CASE_METHOD(AtRest, "pages: loop with limits and recorder replays to the bit, however late it runs") {
     const auto feel = membrane::SpringDamperForce{.stiffness = 400, .damping = 0.5};
     const auto smooth = membrane::SmoothContact(mesh);
     const auto play = [&](auto& device, membrane::Recorder<double>* recorder) {
@@ -250,7 +256,7 @@ TEST_CASE_METHOD(AtRest, "the README's loop with limits and recorder replays to 
     CHECK(recorder.size() == 301);
 }
 
-TEST_CASE("the README's device in millimetres") {
+TEST_CASE("pages: device in millimetres") {
     const Eigen::Vector3d position(0, 0, 108), velocity(0, 0, -50);
     const membrane::Vector3<double> force(0, 0, 0.01);
     membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
@@ -265,7 +271,7 @@ TEST_CASE("the README's device in millimetres") {
     CHECK(scale.at_device(membrane::NewtonsPerMetre(40)).value() == Approx(160));
 }
 
-TEST_CASE_METHOD(Touched, "the README's two loops") {
+TEST_CASE_METHOD(Touched, "pages: two loops") {
     auto shown = x;
     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [handover]
@@ -278,7 +284,7 @@ TEST_CASE_METHOD(Touched, "the README's two loops") {
     CHECK(shown == x);
 }
 
-TEST_CASE("the README's meshes from formulas") {
+TEST_CASE("pages: meshes from formulas") {
     // [distmesh]
     const auto lens = membrane::distmesh(membrane::Ellipsoid{.radii = {4.5e-3, 4.5e-3, 2e-3}}, {.edge_length = 0.3e-3});
     const auto front = membrane::trimmed(membrane::Ball{.radius = 8e-3}, membrane::HalfSpace{.point = {0, 0, -5e-3}});
@@ -294,7 +300,7 @@ TEST_CASE("the README's meshes from formulas") {
     CHECK(membrane::validate(ring).facts.genus == 1);
 }
 
-TEST_CASE("the README's mesh from elsewhere") {
+TEST_CASE("pages: mesh from elsewhere") {
     const auto good = membrane::icosphere<double>({.radius = 10, .subdivisions = 2});
     auto triangles = good.triangles();
     membrane::Points<double> points(3, good.vertex_count() + 1);  // triangle 7 has a corner of its own, as in an STL
@@ -318,7 +324,7 @@ TEST_CASE("the README's mesh from elsewhere") {
     CHECK(mesh.positions().colwise().norm().maxCoeff() == Approx(0.01));
 }
 
-TEST_CASE("the README's constants") {
+TEST_CASE("pages: constants") {
     const auto mesh = membrane::icosphere<double>({.radius = 4e-3, .subdivisions = 2});
     membrane::Tool<double> tool{.radius = 2e-3};
     // [constants]
@@ -337,7 +343,7 @@ TEST_CASE("the README's constants") {
     CHECK(tool.radius < 2e-3);
 }
 
-TEST_CASE_METHOD(Touched, "the README's equilibrium") {
+TEST_CASE_METHOD(Touched, "pages: equilibrium") {
     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [equilibrium]
     const auto equilibrium = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
@@ -349,7 +355,7 @@ TEST_CASE_METHOD(Touched, "the README's equilibrium") {
     CHECK(force < 0.1 * equilibrium.reactions[0].norm());
 }
 
-TEST_CASE_METHOD(Touched, "the README's bound") {
+TEST_CASE_METHOD(Touched, "pages: bound") {
     const Eigen::Vector3d target = 1.01 * x.col(7);
     const auto report = solver.step(x, dt, network, foundation, membrane::pull(7, target));
     // [bound]
@@ -365,7 +371,7 @@ TEST_CASE_METHOD(Touched, "the README's bound") {
     CHECK(error.certified());
 }
 
-TEST_CASE_METHOD(AtRest, "the README's settings") {
+TEST_CASE_METHOD(AtRest, "pages: settings") {
     const auto tools = stroke_of_ticks();
     // [settings]
     const auto trajectory = membrane::ToolTrajectory(mesh, tools, 1e-3);  // a tool for each tick of 1 ms
@@ -376,4 +382,99 @@ TEST_CASE_METHOD(AtRest, "the README's settings") {
     auto solver = membrane::QuasiStaticSolver(network, choice.options);
     // [/settings]
     CHECK(choice.satisfied);
+}
+
+TEST_CASE_METHOD(Touched, "pages: surface") {
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+    // [surface]
+    const auto sphere = membrane::icosphere<double>({.radius = 10e-3, .subdivisions = 3});  // 642 vertices
+    const auto cornea = membrane::spherical_cap({.radius = 7.8e-3, .diameter = 11.7e-3, .rings = 12});
+    const auto rim = membrane::border(cornea);           // the vertices on it
+    const auto near = membrane::reordered(sphere).mesh;  // neighbours near each other in memory
+    auto normals = membrane::VertexNormals(mesh);
+    normals.update(x, report.moved);  // unit vectors, 3 x V; cost: the moved vertices and their neighbours
+    // [/surface]
+    CHECK(sphere.vertex_count() == 642);
+    CHECK(near.vertex_count() == 642);
+    CHECK_FALSE(rim.empty());
+    CHECK(normals.values().cols() == mesh.vertex_count());
+}
+
+TEST_CASE("pages: rim") {
+    const auto cornea = membrane::spherical_cap({.radius = 7.8e-3, .diameter = 11.7e-3, .rings = 12});
+    // [rim]
+    const auto network = membrane::MassSpringNetwork(cornea, membrane::LinearSpring{},
+                                                     {.stiffness = 40.0, .pinned = membrane::border(cornea)});
+    // [/rim]
+    for (const auto v : membrane::border(cornea)) CHECK(network.pinned(v));
+}
+
+TEST_CASE_METHOD(Touched, "pages: contact") {
+    // [contact]
+    const auto nearest = tree.closest_point(x, tool.position);  // triangle, barycentric coordinates, distance
+    tree.overlap_sphere(x, tool.position, 2e-3, [](membrane::Index triangle) { std::printf("%d ", triangle); });
+    const membrane::Tool<double> shaft{.position = tool.position, .axis = {0, 0, 0.04}, .radius = 5e-4};
+    const auto contact = tracker.update(tree, x, shaft);
+    if (contact.touching()) std::printf("%g m deep\n", contact.depth);
+    // [/contact]
+    CHECK(nearest.triangle != membrane::no_index);
+}
+
+TEST_CASE_METHOD(Touched, "pages: forceps") {
+    // [forceps]
+    tool.grasping = true;                                 // while the jaws are closed
+    const auto grasp = grasper.update(contact, x, tool);  // holds what the tool touches as they close
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact, grasp), pull(tool, grasp));
+    const auto pulling = report.reactions[1];  // the membrane's force on the jaws [N]
+    // [/forceps]
+    CHECK(grasp.holding());
+    CHECK(membrane::is_finite(pulling));
+}
+
+TEST_CASE_METHOD(Touched, "pages: status") {
+    membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
+    // [status]
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+    if (report.status != membrane::StepStatus::advanced) {
+        device.write({});  // no force; x is unchanged, and the next valid input goes on from it
+    } else {
+        device.write(feel({tool, contact, report}));  // converged or not: the state of this tick
+    }
+    // [/status]
+    CHECK(device.force().norm() > 0);
+}
+
+TEST_CASE_METHOD(Touched, "pages: rigid body") {
+    membrane::ScriptedDevice<double> device({{.time = 0, .position = {0, 0, 0.0308}}}, {.tick = 1e-3, .radius = 1e-3});
+    const Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d origin(0, 0, 0.02);
+    // [rigid_body]
+    membrane::RigidFrame<double> eye{.rotation = rotation, .origin = origin};  // its pose in this tick
+    const auto seen = membrane::to_body_frame(device.read(), eye);
+    const auto contact = tracker.update(tree, x, seen);
+    const auto report = solver.step(x, dt, network, foundation, press(seen, contact));
+    device.write(eye.vector_to_world(feel({seen, contact, report})));
+    // [/rigid_body]
+    CHECK(contact.touching());
+    CHECK(device.force().z() > 0);
+}
+
+TEST_CASE("pages: fit") {
+    const auto mesh = membrane::spherical_cap({.radius = 7.8e-3, .diameter = 11.7e-3, .rings = 4});
+    const auto tip = membrane::Tool<double>{.position = {0, 0, 9.81e-3}, .radius = 2e-3};
+    // [fit]
+    const auto build = [&](std::span<const double> constants) {  // [N/m]
+        return std::pair(membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
+                                                     {.stiffness = constants[0], .pinned = membrane::border(mesh)}),
+                         membrane::VirtualVolumeSprings(mesh, {.stiffness = constants[1]}));
+    };
+    const auto model = membrane::Indentation(mesh, tip, Eigen::Vector3d(0, 0, -1), build);  // a press along -z
+    const auto table = membrane::ForceTable{.depth = {5e-5, 1e-4, 2e-4, 4e-4, 8e-4},        // [m]
+                                            .force = {4.54e-4, 8.52e-4, 1.63e-3, 4.56e-3, 2.02e-2}};  // [N]
+    const auto found = membrane::fit(table, {10, 10}, model);  // from a first guess
+    std::printf("%g N/m, 95 %% within %g to %g\n", found.constants[0], found.intervals[0].lower,
+                found.intervals[0].upper);
+    // [/fit]
+    CHECK(found.constants[0] == Approx(40).epsilon(0.02));  // by which the table was made
+    CHECK(found.constants[1] == Approx(8).epsilon(0.02));
 }

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <ios>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+
+/// Numbers as people read them, text as XML takes it, and text to a file.
+namespace examples {
+
+/// `value` with at most `decimals` digits behind the point and no zeros at the end.
+[[nodiscard]] inline std::string number(double value, int decimals = 1) {
+    char digits[64];
+    std::snprintf(digits, sizeof digits, "%.*f", decimals, value);
+    std::string text = digits;
+    if (text.find('.') != std::string::npos) {
+        text.erase(text.find_last_not_of('0') + 1);
+        if (text.back() == '.') text.pop_back();
+    }
+    return text == "-0" ? "0" : text;
+}
+
+/// `value` with so many significant `digits` and no exponent: 0.0123, 4.57, 1230.
+[[nodiscard]] inline std::string significant(double value, int digits = 3) {
+    const int magnitude = value == 0 ? 0 : static_cast<int>(std::floor(std::log10(std::abs(value))));
+    char text[64];
+    std::snprintf(text, sizeof text, "%.*f", magnitude >= digits - 1 ? 0 : digits - 1 - magnitude, value);
+    return text;
+}
+
+/// `value` in words of powers of ten where it is small: 0.25, 1.1 x 10^-9 with raised digits.
+[[nodiscard]] inline std::string power_of_ten(double value) {
+    if (std::abs(value) >= 1e-3 || value == 0) return significant(value, 2);
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1e", value);  // d.de-dd
+    static constexpr std::string_view raised[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+    std::string exponent = std::string(std::string_view(text).substr(5));
+    exponent.erase(0, exponent.find_first_not_of('0'));
+    std::string result = std::string(text, 3) + " × 10⁻";
+    for (const char digit : exponent) result += raised[digit - '0'];
+    return result;
+}
+
+/// `text`, escaped for XML and HTML.
+[[nodiscard]] inline std::string escaped(std::string_view text) {
+    std::string safe;
+    for (const char c : text) {
+        switch (c) {
+            case '<': safe += "&lt;"; break;
+            case '>': safe += "&gt;"; break;
+            case '&': safe += "&amp;"; break;
+            default: safe += c;
+        }
+    }
+    return safe;
+}
+
+/// `value` as a program prints it: 1.3e-09.
+[[nodiscard]] inline std::string exponential(double value) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.1e", value);
+    return text;
+}
+
+/// Writes a file. @throws std::runtime_error if it cannot
+inline void save(const std::filesystem::path& file, const std::string& text,
+                 std::ios::openmode mode = std::ios::trunc) {
+    std::ofstream stream(file, mode);
+    if (!(stream << text << std::flush)) throw std::runtime_error("cannot write " + file.string());
+}
+
+}  // namespace examples
