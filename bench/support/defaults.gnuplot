@@ -73,12 +73,12 @@ do for [k = 1:2] {
 
 # Times only: the errors are the same.
 unset logscale
-set title 'order: time breadth first over time by colours'
+set title 'order: time breadth first / by colours'
 set xlabel 'vertices'
 set xrange [0.4:4.6]
-set yrange [0:2.2]
-set xtics nomirror ('162' 1, '642' 2, '2562' 3, '642, forceps' 4)
-set ytics nomirror 0, 0.5, 2
+set yrange [0:2.7]
+set xtics nomirror ('162' 1, '642' 2, '2562' 3, 'forceps' 4)
+set ytics nomirror 0, 0.5, 2.5
 place(file) = file eq word(tables, 2) ? 4 : column(0) + 1
 part(other, default) = column(other) / column(default)
 plot for [file in tables] file using (place(file) - 0.18):(part('breadth first', 'default')):(0.32):(hue(file)) \

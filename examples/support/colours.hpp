@@ -32,7 +32,7 @@ using Colour = Eigen::Vector3d;
 /// From resting tissue (0) to the most displaced (1), ever darker.
 [[nodiscard]] inline Colour tissue(double share) {
     static const std::array<Colour, 5> stops{screen(247, 222, 209), screen(243, 180, 148), screen(224, 117, 92),
-                                             screen(178, 52, 66), screen(104, 14, 50)};
+                                             screen(190, 52, 72), screen(128, 16, 62)};
     const double place = std::clamp(share, 0.0, 1.0) * (stops.size() - 1);
     const std::size_t below = std::min(static_cast<std::size_t>(place), stops.size() - 2);
     const double rest = place - static_cast<double>(below);

@@ -91,22 +91,19 @@ inline std::vector<Facet> painters_order(const Camera& camera, const Picture& pi
     return facets;
 }
 
-/// Light from a lamp at the upper left, less and redder in the shade. No gloss: it would read as a value.
+/// Light from a lamp at the upper left: so little that each colour can be found on the colour bar, and no gloss.
 inline Colour lit(const Colour& surface, const Vector3d& normal, const Camera& camera) {
-    static const Colour shade = screen(168, 140, 136);
-    const double sky = 0.7 + 0.3 * normal.dot(camera.seen(0, 1, 0));
-    const double diffuse = std::max(0.0, (normal.dot(camera.seen(-0.5, 0.75, 0.7)) + 0.15) / 1.15);
-    return surface.cwiseProduct(sky * shade + Colour::Constant(0.82 * diffuse));
+    return surface * (0.72 + 0.28 * std::max(0.0, normal.dot(camera.seen(-0.5, 0.75, 0.7))));
 }
 
-/// A triangle as one path: where it starts, then relative lines in tenths of a pixel.
+/// A triangle as one path after "M": where it starts, then relative lines in tenths of a pixel.
 inline std::string outline(const std::array<Pixel, 3>& p) {
     const auto tenths = [](double v) { return std::round(10 * v) / 10; };
     const auto line = [&](Pixel from, Pixel to) {
         const std::string dx = number(tenths(to.x) - tenths(from.x)), dy = number(tenths(to.y) - tenths(from.y));
         return dx + (dy.front() == '-' ? "" : " ") + dy;
     };
-    return "M" + number(p[0].x) + " " + number(p[0].y) + "l" + line(p[0], p[1]) + " " + line(p[1], p[2]) + "z";
+    return number(p[0].x) + " " + number(p[0].y) + "l" + line(p[0], p[1]) + " " + line(p[1], p[2]) + "z";
 }
 
 inline Colour facet_colour(const Camera& camera, const Picture& picture, const Facet& facet,
@@ -130,7 +127,7 @@ inline void draw_facet(Svg& svg, const Camera& camera, const Picture& picture, c
                        const membrane::Adjacency& adjacency) {
     const auto triangle = membrane::triangle_at(picture.points, picture.mesh.triangles().col(facet.triangle));
     const std::array<Pixel, 3> p{camera.pixel(triangle.a), camera.pixel(triangle.b), camera.pixel(triangle.c)};
-    svg.add("<path d='", outline(p), "' fill='", hex(colour), "'/>\n");
+    svg.add("<path d='M", outline(p), "' fill='", hex(colour), "'/>\n");
     const auto& across = adjacency.triangle_neighbours(facet.triangle);
     for (std::size_t k = 0; k < 3; ++k) {
         if (across[k] != membrane::no_index) continue;

@@ -51,11 +51,13 @@ template <class Sheet>
     rest.values = tensions(sheet, rest.points);
     pressed.values = tensions(sheet, pressed.points);
     pressed.arrow = 0.2 * width / pressed.force.norm();
+    const double low_tension = detail::quantile(*pressed.values, 0.02);
+    const double high_tension = detail::quantile(*pressed.values, 0.995);
     rest.colours = pressed.colours = {.name = "mean tension",
                                       .unit = "N/m",
                                       .per_unit = 1,
-                                      .low = detail::quantile(*pressed.values, 0.02),
-                                      .high = detail::quantile(*pressed.values, 0.995)};
+                                      .low = low_tension,
+                                      .high = high_tension + 0.5 * (high_tension - low_tension)};  // none nearly black
     return {
         .name = name,
         .title = name + ": tension at rest and pressed",
