@@ -7,6 +7,7 @@ set datafile separator comma
 set multiplot layout 2,2 title 'Time of a tick against the distance from equilibrium: a tool slides at 50 mm/s, 1.5 mm deep' font ',15'
 set logscale xy
 set yrange [0.00003:50]
+set format y '%g'
 set ytics nomirror (0.0001, 0.001, 0.01, 0.1, 1, 10)
 set grid lc '#d8d8d8' lw 0.7
 set border 3 lc '#444444'

@@ -9,8 +9,6 @@ set multiplot layout 1,5 title "Times by the tree's balance threshold, over thos
 set xlabel 'balance threshold'
 set logscale x 2
 set logscale y
-set xrange [0.9:72]
-set yrange [0.38:6]
 set xtics nomirror (1, 2, 4, 8, 16, 32, 64)
 set ytics nomirror (0.4, 0.5, 0.7, 1, 1.5, 2, 3, 5)
 set grid ytics lc '#d8d8d8' lw 0.7
@@ -26,8 +24,12 @@ names = '"closest point" "touching sphere" "first hit" "refit of the moved" buil
 do for [i = 1:words(names)] {
     name = word(names, i)
     set title name font ',12'
+    set xrange [*:*]
+    set yrange [*:*]
     stats 'threshold_642.tsv' using (column('threshold') == default ? column(name) : NaN) name 'small' nooutput
     stats 'threshold_10242.tsv' using (column('threshold') == default ? column(name) : NaN) name 'large' nooutput
+    set xrange [0.9:72]
+    set yrange [0.38:6]
     plot 'threshold_10242.tsv' using 'threshold':(column(name) / large_mean) title (i == 1 ? '10,242 vertices' : '') \
              lc '#d68910' lw 3.5 pt 7, \
          'threshold_642.tsv' using 'threshold':(column(name) / small_mean) title (i == 1 ? '642' : '') \
