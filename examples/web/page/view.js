@@ -4,7 +4,7 @@
 import * as THREE from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
-// From cividis: told apart by colour-blind eyes, and by brightness alone.
+// From cividis: colour-blind people see the differences, and brightness alone shows them.
 const stops = [[0.95, 0.91, 0.73], [0.80, 0.72, 0.44], [0.55, 0.53, 0.47], [0.30, 0.36, 0.43], [0.0, 0.14, 0.31]]
     .map(([r, g, b]) => new THREE.Color(r, g, b).convertSRGBToLinear());
 
