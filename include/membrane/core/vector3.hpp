@@ -139,8 +139,8 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] friend Eigen::Matrix<N, 3, 3> operator*(const Vector3& a,
                                                           const Eigen::Matrix<N, 1, 3>& row) noexcept {
         return a.eigen() * row;
-    ///@}
     }
+    ///@}
 
     ///@{
     /// For comma initialisers: `x << columns, a, b`.
