@@ -28,6 +28,7 @@ struct HalfEdge {
     Index side;      ///< The triangle's side: from its corner `side` to the next.
     bool forward;    ///< Whether the triangle runs from `first` to `second`.
 
+    /// By edge, then apex, then triangle.
     friend constexpr auto operator<=>(const HalfEdge&, const HalfEdge&) = default;
 };
 
