@@ -13,7 +13,7 @@ namespace membrane {
 /// capacity.)
 ///
 ///     FixedVector<ContactPoint<double>> points(4096);
-///     if (!points.try_push_back(point)) { /* full */ }
+///     if (!points.try_push_back(point)) return;  // full
 template <class Item>
 class FixedVector {
   public:

@@ -95,17 +95,25 @@ class Vector3 : public detail::ThreeByOne<N> {
     ///@}
 
     ///@{
-    /// The coordinates: by name, by number from 0 to 2, and as three contiguous numbers.
+    /// A coordinate.
     [[nodiscard]] MEMBRANE_INLINE constexpr N& x() noexcept { return number_[0]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr N& y() noexcept { return number_[1]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr N& z() noexcept { return number_[2]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N& x() const noexcept { return number_[0]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N& y() const noexcept { return number_[1]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N& z() const noexcept { return number_[2]; }
+    ///@}
+
+    ///@{
+    /// Coordinate `k`, 0 to 2.
     [[nodiscard]] MEMBRANE_INLINE constexpr N& operator[](std::integral auto k) noexcept { return number_[k]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N& operator[](std::integral auto k) const noexcept {
         return number_[k];
     }
+    ///@}
+
+    ///@{
+    /// The coordinates as three contiguous numbers.
     [[nodiscard]] MEMBRANE_INLINE constexpr N* data() noexcept { return number_; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N* data() const noexcept { return number_; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N* begin() const noexcept { return number_; }

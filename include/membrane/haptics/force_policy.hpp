@@ -71,9 +71,9 @@ struct SpringDamperForce {
     double stiffness;    ///< k [N/m]
     double damping = 0;  ///< mu [N s/m]
 
+    // For braced states of double or float. Templates, so that they cost no compile time unless called.
     ///@{
     /// The force on the hand [N], see `ForcePolicy`. Online.
-    // For braced states of double or float. Templates, so that they cost no compile time unless called.
     template <int = 0>
     [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept {
         return force(state);

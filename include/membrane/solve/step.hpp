@@ -10,7 +10,7 @@
 ///
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
 ///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
-///     if (report.status != membrane::StepStatus::advanced) { /* nothing has moved */ }
+///     if (report.status != membrane::StepStatus::advanced) return;  // nothing has moved
 namespace membrane {
 
 /// Order of the vertex updates: the layers from the contact outward, and in each layer

@@ -12,7 +12,7 @@
 ///
 ///     membrane::Aabb<double> box;
 ///     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) box.include(point(x, v));
-///     if (squared_distance(box, tool.position) > tool.radius * tool.radius) { /* the tool contacts nothing */ }
+///     if (squared_distance(box, tool.position) > tool.radius * tool.radius) return;  // no contact
 namespace membrane {
 
 /// The points between two corners, borders included [m]; empty until a point or box is included. With `Lanes`: several

@@ -13,7 +13,7 @@
 ///
 ///     const auto triangle = membrane::triangle_at(x, mesh.triangles().col(f));
 ///     const auto nearest  = membrane::closest_point(triangle, tool.position);
-///     if (nearest.squared_distance < radius * radius) { /* the tool contacts at nearest.point */ }
+///     if (nearest.squared_distance < radius * radius) touched = nearest.point;
 ///
 /// All functions are pure, do not allocate and cost a bounded number of operations. Differences are taken first, so
 /// accuracy depends on the size of the triangle and the distances, not on the position of the origin. Triangles without
