@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-// Headers of the haptic loop, in the order of the data flow. Scripts, the explicit Euler method, threads and error
-// measures are included separately.
-//
+/// Headers of the haptic loop, in the order of the data flow. Scripts, the explicit Euler method, threads and error
+/// measures are included separately.
+
 // clang-format off
 #include <membrane/core/types.hpp>
 #include <membrane/core/check.hpp>
@@ -37,6 +37,9 @@
 #include <membrane/haptics/force_policy.hpp>
 #include <membrane/haptics/device.hpp>
 // clang-format on
+
+/// The whole library. The namespaces `detail` in it are not for its users, and change without notice.
+namespace membrane {}
 
 #if defined(MEMBRANE_INSTANTIATED)
 #include <membrane/instantiated.hpp>

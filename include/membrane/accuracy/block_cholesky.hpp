@@ -41,10 +41,13 @@ class BlockCholesky {
     /// Sets the matrix to zero.
     void open() noexcept;
 
+    /// Adds `block` to the diagonal block of vertex `v` [N/m].
     void add(Index v, const Symmetric3<double>& block) noexcept {
         diagonal_[rank_[at(v)]] += block;
         size_ += detail::size_of(block);
     }
+
+    /// Subtracts `block` from both blocks of link number `link` [N/m].
     void subtract(std::size_t link, const Symmetric3<double>& block) noexcept {
         linked_[link] += -1.0 * block;
         size_ += 2 * detail::size_of(block);

@@ -30,9 +30,13 @@ struct Requirement {
 /// The grid: every number of layers with every number of sweeps and of contact iterations.
 template <Real Scalar>
 struct GridSearchOptions {
+    ///@{
+    /// Values to try of the solver's option of this name.
     std::vector<Index> layers = {1, 2, 3, 4, 6, 8, 12, 16};
     std::vector<Index> sweeps = {1, 2, 3, 4, 6, 8, 12, 16};
     std::vector<Index> contact_iterations = {1, 2, 4, 8};
+    ///@}
+
     SolverOptions<Scalar> others = {};  ///< all other options
     /// A setting satisfies a required error if its measured error is at most the required one divided by this, >= 1.
     double safety_factor = 1.8;
@@ -46,7 +50,7 @@ struct GridSearchOptions {
 /// The chosen setting, with its measured cost and error.
 template <Real Scalar>
 struct ChosenSettings : TrialResult {
-    SolverOptions<Scalar> options;
+    SolverOptions<Scalar> options;  ///< of the chosen setting
     /// Whether `time` is at most the required time, or `force_error` at most the required error over `safety_factor`.
     /// If no setting satisfies this, the chosen one comes closest.
     bool satisfied = false;

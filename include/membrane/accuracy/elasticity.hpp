@@ -16,8 +16,10 @@ namespace membrane {
 /// Forces and energy of springs and foundation at one state.
 struct ElasticState {
     Points<double> x;  ///< 3 x V [m]
-    Points<double> springs,
-        foundation;            ///< force on each vertex, of springs and elements and of the foundation, 3 x V [N]
+    ///@{
+    /// Force on each vertex, of springs and elements and of the foundation, 3 x V [N].
+    Points<double> springs, foundation;
+    ///@}
     double energy = 0;         ///< of springs and elements [J]
     double largest_force = 0;  ///< of one spring, or of an element or the foundation on a vertex [N]
 };
@@ -32,7 +34,7 @@ struct ElasticState {
 template <class Network, class Volume>
 class Elasticity {
   public:
-    using Scalar = typename Network::Scalar;
+    using Scalar = typename Network::Scalar;  ///< that of the network; forces are evaluated in double
 
     /// Keeps a reference to both.
     Elasticity(const Network& network, const Volume& volume) : network_(network), volume_(volume) {}

@@ -28,8 +28,9 @@ concept LinearFoundation = std::same_as<Volume, NoFoundation> || std::same_as<Vo
         MovingFoundation < VirtualVolumeSprings<float>,
 float >> || std::same_as<Volume, MovingFoundation<VirtualVolumeSprings<double>, double>>;
 
+/// Whether a problem could be set up.
 enum class ProblemStatus {
-    valid,
+    valid,          ///< the problem is complete
     invalid_input,  ///< a number is not finite, an index is not a vertex, or counts do not match
     contact,        ///< a tool touches; all other input is in the problem
     unsupported,    ///< a constraint without `describe`, or an attached point that shares a corner with another one
@@ -52,26 +53,40 @@ class EquilibriumProblem {
     /// Also fixes all vertices that are not in `free`. Online. Cost: O(V).
     [[nodiscard]] ProblemStatus fix_all_but(std::span<const Index> free) noexcept;
 
+    /// Number of vertices V.
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed_.size()); }
+
+    /// The springs of the network, in double.
     [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
+
+    /// Stiffness of the foundation at vertex `v` [N/m].
     [[nodiscard]] double foundation(Index v) const noexcept { return foundation_[at(v)].stiffness; }
 
     /// The stiffness of the foundation minus the softening set since the last `assign` [N/m].
     [[nodiscard]] double support(Index v) const noexcept { return foundation(v) - softening_[at(v)]; }
+
+    /// Sets the softening at vertex `v` to `by` [N/m].
     void soften(Index v, double by) noexcept { softening_[at(v)] = by; }
 
+    /// Whether vertex `v` is pinned, prescribed, or excluded by `fix_all_but`.
     [[nodiscard]] bool fixed(Index v) const noexcept { return fixed_[at(v)] != 0; }
+
+    /// Number of the spring's ends that are not fixed, 0 to 2.
     [[nodiscard]] int free_ends(const Spring<double>& spring) const noexcept {
         return (fixed(spring.first) ? 0 : 1) + (fixed(spring.second) ? 0 : 1);
     }
 
+    ///@{
     /// The x of the last `assign`, and x with prescribed vertices at their targets [m].
     [[nodiscard]] const Points<double>& given() const noexcept { return given_; }
     [[nodiscard]] const Points<double>& centre() const noexcept { return centre_; }
+    ///@}
 
     /// Force of springs, foundation and loads on every vertex at `y` [N], and the sum of the magnitudes of its terms:
     /// rounding changes the force by at most `rounding()` times that sum.
     void forces(const Points<double>& y, Points<double>& force, std::vector<double>& magnitude) const noexcept;
+
+    /// Relative rounding error of a sum of forces.
     [[nodiscard]] double rounding() const noexcept { return rounding_; }
 
     /// Removes from `f` the components on fixed vertices and those that move an attached point: the orthogonal

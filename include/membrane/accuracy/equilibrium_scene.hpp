@@ -18,6 +18,7 @@
 ///     }
 namespace membrane {
 
+/// Options of `equilibrium`.
 struct EquilibriumOptions {
     Index increments = 1;       ///< steps in which targets, loads and tools are applied; more for a distant start
     Index layers = unlimited;   ///< vertices beyond this number of layers from the applied forces are fixed
@@ -30,6 +31,7 @@ struct EquilibriumOptions {
     void check() const;
 };
 
+/// The equilibrium of a membrane under the constraints of a scene.
 struct Equilibrium {
     Points<double> x;                        ///< 3 x V [m]
     std::vector<Vector3<double>> reactions;  ///< for each constraint in order, the membrane's force on it [N]
@@ -42,8 +44,8 @@ struct Equilibrium {
 
 /// A tool that the surface must stay outside of.
 struct ScenePress {
-    std::size_t constraint;
-    Tool<double> tool;
+    std::size_t constraint;             ///< number of the constraint
+    Tool<double> tool;                  ///< at the end of the increments
     Vector3<double> exit_displacement;  ///< after it the tool just touches the surface from outside [m]
     double detection_distance;          ///< triangles within this distance of the tool are in contact [m]
 };
@@ -71,6 +73,8 @@ class EquilibriumScene {
     /// last one counts. A tool without contact is ignored.
     void add(const ConstraintTerm& term);
 
+    ///@{
+    /// Adds the term of this name: `target` in [m], `force` in [N]. Without a target the vertex stays at its start.
     void prescribe(Index v, const Vector3<double>& target) { add(ConstraintTerm::prescribe(v, target)); }
     void prescribe(Index v) { add(ConstraintTerm::pin(v)); }
     void prescribe(const std::array<Index, 3>& corners, const Vector3<double>& barycentric,
@@ -81,12 +85,14 @@ class EquilibriumScene {
         add(ConstraintTerm::load(corners, barycentric, force));
     }
     void press(const Tool<double>& tool, const Contact<double>& contact) { add(ConstraintTerm::press(tool, contact)); }
+    ///@}
 
     // For `equilibrium`.
 
     /// The terms added from now on belong to constraint number `constraint`.
     void select_constraint(std::size_t constraint) noexcept { constraint_ = constraint; }
 
+    /// Whether vertex `v` is pinned or prescribed.
     [[nodiscard]] bool fixed(Index v) const noexcept {
         return pinned_[static_cast<std::size_t>(v)] != 0 || prescribed_[static_cast<std::size_t>(v)] != 0;
     }
@@ -99,9 +105,13 @@ class EquilibriumScene {
     [[nodiscard]] const std::vector<std::pair<std::size_t, Index>>& prescribed_vertices() const noexcept {
         return prescribed_vertices_;
     }
+
+    ///@{
+    /// The other terms by their kind, in the order in which they were added.
     [[nodiscard]] const std::vector<ConstraintTerm>& point_attachments() const noexcept { return attachments_; }
     [[nodiscard]] const std::vector<ConstraintTerm>& loads() const noexcept { return loads_; }
     [[nodiscard]] const std::vector<ScenePress>& tools() const noexcept { return tools_; }
+    ///@}
 
     /// Vertices to which a force is applied.
     [[nodiscard]] const std::vector<Index>& seeds() const noexcept { return seeds_; }

@@ -30,6 +30,7 @@
 ///     const auto error = bound.compute(rest, x, mesh, network, foundation, press(tool, contact));
 namespace membrane {
 
+/// Options of an `ErrorBound`.
 struct ErrorBoundOptions {
     Index cg_iterations = 200;  ///< at most, over all Newton steps; soft foundations need more
 

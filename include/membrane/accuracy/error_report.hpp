@@ -12,8 +12,9 @@
 ///     if (error.certified()) error.position; error.reactions[0].max_distance_to(report.reactions[0]);   // [m], [N]
 namespace membrane {
 
+/// Whether there is a bound, or why not.
 enum class BoundStatus {
-    certified,
+    certified,      ///< the bound is proven
     not_convex,     ///< convexity could not be shown up to the estimated equilibrium
     not_converged,  ///< the iteration ended too far from the equilibrium for a bound
     contact,        ///< a tool touches: the bound needs the `Equilibrium` as an argument
@@ -23,8 +24,8 @@ enum class BoundStatus {
 
 /// An enclosure of a force: within `radius` of `centre` [N].
 struct ForceEnclosure {
-    Vector3<double> centre = Vector3<double>::Zero();
-    double radius = std::numeric_limits<double>::infinity();
+    Vector3<double> centre = Vector3<double>::Zero();         ///< [N]
+    double radius = std::numeric_limits<double>::infinity();  ///< [N]; infinite: not enclosed
 
     /// Upper bound of the distance to `force` [N].
     template <class Force>
@@ -35,7 +36,7 @@ struct ForceEnclosure {
 
 /// The bound at a state. The span belongs to the `ErrorBound` and is valid until its next call.
 struct ErrorReport {
-    BoundStatus status = BoundStatus::invalid_input;
+    BoundStatus status = BoundStatus::invalid_input;  ///< the bounds below are proven only if this is `certified`
 
     /// If certified: exactly one equilibrium has every vertex within `position` of its current position; else infinite
     /// [m].
@@ -51,6 +52,7 @@ struct ErrorReport {
     double convexity = 0;     ///< lower bound of the smallest eigenvalue of the stiffness [N/m], if positive
     Index cg_iterations = 0;  ///< performed
 
+    /// Whether the bounds are proven.
     [[nodiscard]] bool certified() const noexcept { return status == BoundStatus::certified; }
 };
 

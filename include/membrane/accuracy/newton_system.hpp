@@ -23,10 +23,10 @@ namespace membrane {
 /// A quantity that depends on three vertices. After the step it is, to first order, zero if an equality, else not
 /// negative.
 struct ConstraintRow {
-    std::array<Index, 3> vertices;
-    std::array<Vector3<double>, 3> gradient;
-    double value;
-    bool equality;
+    std::array<Index, 3> vertices;            ///< on which it depends
+    std::array<Vector3<double>, 3> gradient;  ///< by the position of each vertex
+    double value;                             ///< before the step
+    bool equality;                            ///< whether it becomes zero, not only not negative
     double stiffening = 0;  ///< weight of half its square in the energy, if it is expected to become zero
 };
 
@@ -40,6 +40,7 @@ struct NewtonStep {
 /// multipliers come from the dual problem, whose size is the number of active rows.
 class NewtonSystem {
   public:
+    /// A system in which the vertices with a nonzero entry of `fixed` are fixed.
     explicit NewtonSystem(const std::vector<unsigned char>& fixed);
 
     /// Begins a problem in which fixed vertices take the steps `prescribed` (3 x V).
@@ -51,6 +52,7 @@ class NewtonSystem {
     /// Adds to F.
     void add_force(Index v, const Vector3<double>& force);
 
+    /// Adds a row to the problem.
     void add(const ConstraintRow& row);
 
     /// If H is not positive definite, it is shifted until it is; `scale` is a typical stiffness in H. A row without

@@ -25,7 +25,11 @@ class PointAttachments {
         terms_[count_++] = term;
         return true;
     }
+
+    /// Removes all points.
     void clear() noexcept { count_ = 0; }
+
+    /// Whether there is no point.
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
 
     /// Whether no corner with a weight belongs to two points, or is `fixed(v)`. The functions below require this.

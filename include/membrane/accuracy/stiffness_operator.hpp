@@ -16,15 +16,17 @@
 ///     stiffness.solve(problem, force, displacement, {.tolerance = 1e-3});     // displacement = H^-1 force
 namespace membrane {
 
+/// Options of `solve`.
 struct SolveOptions {
     double tolerance = 1e-3;  ///< of the residual, relative to the force
     Index iterations = 100;   ///< at the most, each a product with H
 };
 
+/// Result of `solve`.
 struct SolveReport {
     bool convex = true;      ///< no direction was found in which the energy does not grow
     bool converged = false;  ///< to the tolerance
-    Index iterations = 0;
+    Index iterations = 0;    ///< performed
 };
 
 /// Sum of a_v . b_v over all columns, always in the same order.

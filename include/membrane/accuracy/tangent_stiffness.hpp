@@ -16,6 +16,7 @@
 ///     if (feel.status == TangentStatus::found) largest_eigenvalue(feel.stiffness);  // [N/m]
 namespace membrane {
 
+/// Options of a `TangentStiffness`.
 struct TangentOptions {
     double tolerance = 1e-7;  ///< of residual forces on free vertices, relative to those at first
     Index iterations = 300;   ///< maximum number of products with the stiffness, for each of three directions
@@ -24,8 +25,9 @@ struct TangentOptions {
     void check() const;
 };
 
+/// Whether the stiffness was found, or why not.
 enum class TangentStatus {
-    found,
+    found,          ///< to the tolerance
     not_stable,     ///< the energy does not grow in some direction: free vertices would snap away
     not_converged,  ///< more iterations are needed
     contact,        ///< a tool touches: not supported
@@ -33,8 +35,9 @@ enum class TangentStatus {
     invalid_input,  ///< a number is not finite, an index is not a vertex, or counts do not match
 };
 
+/// Result of `compute`.
 struct TangentReport {
-    TangentStatus status = TangentStatus::invalid_input;
+    TangentStatus status = TangentStatus::invalid_input;  ///< the stiffness is valid only if this is `found`
     Symmetric3<double> stiffness;  ///< the reaction of the first constraint changes by -`stiffness` d [N/m]
     Index iterations = 0;          ///< in all three directions
 };

@@ -21,12 +21,13 @@ namespace membrane {
 /// A contact point of one of several tools. A corner or edge shared by triangles is one point, of the first of these
 /// triangles.
 struct ToolPoint : ContactPoint<double> {
-    std::size_t tool = 0;
+    std::size_t tool = 0;   ///< number of the tool
     double multiplier = 0;  ///< force along the normal [N]
 
     /// The part of the tool: 0 one end of the axis, 1 the other end, 2 the segment between them.
     [[nodiscard]] int part() const noexcept { return (std::min)(feature, 2); }
 
+    /// Barycentric weight of corner `k`.
     [[nodiscard]] double weight(std::size_t k) const noexcept { return weights[static_cast<Eigen::Index>(k)]; }
 
     /// Derivative of the gap by the position of corner `k`.

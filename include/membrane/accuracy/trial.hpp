@@ -90,7 +90,10 @@ class ToolTrajectory {
     ToolTrajectory(const TriangleMesh<Scalar>& mesh, const std::type_identity_t<std::span<const Tool<Scalar>>>& tools,
                    std::type_identity_t<Scalar> dt);
 
+    /// Number of tools.
     [[nodiscard]] Index ticks() const noexcept { return static_cast<Index>(tools_.size()); }
+
+    /// Length of a tick [s].
     [[nodiscard]] Scalar dt() const noexcept { return dt_; }
 
     /// The contact of the tick, and the attachment of the forceps. The contact is valid until the next call.
@@ -108,7 +111,7 @@ static_assert(LoadHistory<ToolTrajectory<float>, float> && LoadHistory<ToolTraje
 
 /// The equilibrium in one tick, with its reactions.
 struct ReferenceTick {
-    Index tick;
+    Index tick;                              ///< number of the tick
     Points<double> x;                        ///< 3 x V [m]
     std::vector<Vector3<double>> reactions;  ///< for each constraint in order [N]
     double force;                            ///< root of the sum of squares over the felt reactions [N]
@@ -138,6 +141,7 @@ struct TrialResult {
 
 /// Seconds of the steady clock. On a busy machine a clock of processor time is more reproducible.
 struct SteadySeconds {
+    /// Time since an arbitrary origin [s].
     [[nodiscard]] double operator()() const noexcept {
         return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
     }

@@ -62,6 +62,7 @@ struct ForceTable {
     void check() const;
 };
 
+/// Options of `fit`.
 struct FitOptions {
     double tolerance = 1e-6;        ///< of the constants, relative to each
     double step = 1e-3;             ///< of the finite differences, relative to each constant
@@ -70,7 +71,7 @@ struct FitOptions {
     double max_interval_ratio = 4;  ///< upper end over lower end, up to which a constant is identifiable
     /// Combinations of constants with a sensitivity up to this part of the largest one are not identifiable.
     double min_sensitivity = 1e-4;
-    Index max_iterations = 60;
+    Index max_iterations = 60;  ///< after which a fit is not `converged`
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
@@ -78,17 +79,21 @@ struct FitOptions {
 
 /// Confidence interval of a constant.
 struct Interval {
+    ///@{
+    /// In the unit of the constant.
     double lower, upper;
+    ///@}
 };
 
+/// Result of `fit`.
 struct Fit {
-    std::vector<double> constants;
+    std::vector<double> constants;    ///< fitted, in the order of their starts
     double misfit = 0;                ///< root mean square of the residuals, relative to the force, or to the deviation
     std::vector<Interval> intervals;  ///< 0 to infinity if the table does not bound the constant
     std::vector<bool> identifiable;   ///< for each constant; all false if not converged
     Eigen::MatrixXd correlation;  ///< of the constants' logarithms; near 1 or -1, only a combination is identifiable
     Index evaluations = 0;        ///< of the model at all depths
-    bool converged = false;
+    bool converged = false;       ///< to the tolerance
 };
 
 /// Minimises the sum of squared residuals. A residual is the logarithm of computed over measured force or, in a table

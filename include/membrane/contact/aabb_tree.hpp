@@ -24,16 +24,16 @@ struct SurfacePoint {
     Vector3<Scalar> barycentric;  ///< Exactly zero for corners that do not contribute.
     Vector3<Scalar> point;        ///< [m]
     Scalar squared_distance;      ///< [m^2]
-    Index nodes_visited;
+    Index nodes_visited;          ///< Boxes that the search tested.
 };
 
 /// The first intersection of a segment with the surface.
 template <Real Scalar>
 struct SurfaceHit {
-    Index triangle;   ///< `no_index`: no intersection.
-    Scalar fraction;  ///< 0 at the segment's start, 1 at its end.
-    Vector3<Scalar> barycentric;
-    Index nodes_visited;
+    Index triangle;               ///< `no_index`: no intersection.
+    Scalar fraction;              ///< 0 at the segment's start, 1 at its end.
+    Vector3<Scalar> barycentric;  ///< Of the intersection.
+    Index nodes_visited;          ///< Boxes that the search tested.
 };
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
@@ -75,6 +75,7 @@ class AabbTree {
     [[nodiscard]] SurfaceHit<Scalar> first_hit(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& from,
                                                const Vector3<Scalar>& to) const noexcept;
 
+    ///@{
     /// Calls `visit(Index f)` once for each triangle that intersects the sphere, the box between two corners, or the
     /// capsule around the segment from `p` to `q`, in a reproducible order. `visit` must not throw. Returns the number
     /// of boxes visited.
@@ -87,7 +88,9 @@ class AabbTree {
     template <class Visit>
     Index overlap_capsule(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& p, const Vector3<Scalar>& q,
                           Scalar radius, Visit&& visit) const noexcept;
+    ///@}
 
+    /// Size and shape of the tree.
     [[nodiscard]] const TreeStatistics& statistics() const noexcept { return boxes_.statistics(); }
 
     /// The box around all triangles below a node of `tree_shape`; node 0: around the surface.

@@ -9,6 +9,7 @@
 
 namespace membrane {
 
+/// Contact in this tick and in the last.
 enum class ContactPhase {
     none,     ///< no contact
     began,    ///< contact, but not in the last tick
@@ -18,8 +19,8 @@ enum class ContactPhase {
 
 /// A triangle that the tool touches.
 struct ContactTriangle {
-    Index triangle;
-    std::array<Index, 3> corners;
+    Index triangle;                ///< its index
+    std::array<Index, 3> corners;  ///< its vertices
 };
 
 /// The contact of the tool with the membrane: position, depth and phase.
@@ -28,7 +29,7 @@ struct ContactTriangle {
 ///     if (contact.touching()) std::printf("depth %g m\n", contact.depth);
 template <Real Scalar>
 struct Contact {
-    ContactPhase phase = ContactPhase::none;
+    ContactPhase phase = ContactPhase::none;                     ///< since when
     Index triangle = no_index;                                   ///< the active triangle: the one nearest to the tool
     std::array<Index, 3> corners{no_index, no_index, no_index};  ///< its vertices
     Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the contact point
@@ -53,7 +54,10 @@ struct Contact {
     bool has_all_points = true;  ///< false if `points` exceeded its capacity: a step refuses this contact
     bool closed = false;         ///< whether the surface is closed: its back is its inside
 
+    /// No contact: the phase is `none`, there are no triangles and no points.
     [[nodiscard]] static Contact none() noexcept { return {}; }
+
+    /// Whether there is contact in this tick.
     [[nodiscard]] bool touching() const noexcept {
         return phase == ContactPhase::began || phase == ContactPhase::ongoing;
     }

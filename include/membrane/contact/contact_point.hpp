@@ -18,10 +18,10 @@ template <Real Scalar>
 struct ContactPoint {
     Index triangle = no_index;  ///< with `feature`, identifies the point across steps
     int feature = 0;            ///< of the tool, see `feature_pairs`; custom constraints may number their points freely
-    std::array<Index, 3> corners{no_index, no_index, no_index};
-    Vector3<Scalar> weights = Vector3<Scalar>::Zero();  ///< barycentric, of the corners
-    Vector3<Scalar> normal = Vector3<Scalar>::Zero();   ///< unit vector from the surface to the tool; zero on its axis
-    Vector3<Scalar> force = Vector3<Scalar>::Zero();    ///< on the membrane [N]
+    std::array<Index, 3> corners{no_index, no_index, no_index};  ///< vertices of the triangle
+    Vector3<Scalar> weights = Vector3<Scalar>::Zero();           ///< barycentric, of the corners
+    Vector3<Scalar> normal = Vector3<Scalar>::Zero();  ///< unit vector from the surface to the tool; zero on its axis
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();   ///< on the membrane [N]
     bool on_fixed = false;  ///< whether a corner is fixed and takes part of the force; set by the solver
     bool by_plane = false;  ///< whether the tool is kept on its side of the triangle's plane, not of the triangle only
     Scalar side = 0;        ///< of the triangle, 1 or -1, if the tool is over its interior; 0: as in the last step

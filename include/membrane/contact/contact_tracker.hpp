@@ -28,6 +28,7 @@ namespace membrane {
 template <Real Scalar>
 class MovingBody;  // of moving_body.hpp
 
+/// Options of a `ContactTracker`.
 struct TrackerOptions {
     /// Added to the tool's radius in the search for triangles, and the smallest radius of a tool: a thinner one, a
     /// point too, counts as this thick [mean edges].

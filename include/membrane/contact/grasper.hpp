@@ -29,6 +29,7 @@ struct Grasp {
     Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< of the held point, on the rest surface [m]
     Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();     ///< of a moving body at the held point [m/s]
 
+    /// Whether a point is held.
     [[nodiscard]] bool holding() const noexcept { return triangle != no_index; }
 
     /// Displacement of the held point from `origin` [m]. @pre holding()
@@ -46,6 +47,7 @@ struct GraspOptions {
 template <Real Scalar>
 class Grasper {
   public:
+    /// Keeps a copy of the positions of `mesh`, the rest surface. Cost: O(V).
     explicit Grasper(const TriangleMesh<Scalar>& mesh, GraspOptions options = {})
         : origins_(mesh.positions()), options_(options) {}
 

@@ -28,13 +28,19 @@ class LocalSurface {
     /// Cost: O(V + F log F).
     explicit LocalSurface(const TriangleMesh<Scalar>& mesh);
 
+    /// Number of triangles F.
     [[nodiscard]] Index triangle_count() const noexcept { return static_cast<Index>(triangles_.cols()); }
+
+    /// Whether the surface has no border.
     [[nodiscard]] bool closed() const noexcept { return adjacency_.closed(); }
     [[nodiscard]] Scalar mean_edge() const noexcept { return mean_edge_; }  ///< [m]
 
+    /// Vertices of triangle `f`.
     [[nodiscard]] std::array<Index, 3> corners(Index f) const noexcept {
         return {triangles_(0, f), triangles_(1, f), triangles_(2, f)};
     }
+
+    /// Triangle `f` at the positions `x` [m].
     [[nodiscard]] Triangle<Scalar> triangle(const ConstPointsRef<Scalar>& x, Index f) const noexcept {
         return triangle_at(x, triangles_.col(f));
     }
@@ -42,11 +48,13 @@ class LocalSurface {
     /// Triangles with the corner `v`, in ascending order.
     [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return adjacency_.triangles_of(v); }
 
+    ///@{
     /// Calls `visit(g)` once for each triangle that shares a side with `f`; or a corner, including `f` itself.
     template <class Visit>
     void across_sides(Index f, Visit&& visit) const noexcept;
     template <class Visit>
     void around_corners(Index f, Visit&& visit) const noexcept;
+    ///@}
 
     /// The outward unit vector at the point `barycentric` of triangle `f`, see `pseudo_normal`.
     [[nodiscard]] Vector3<Scalar> outward(const ConstPointsRef<Scalar>& x, Index f,
@@ -70,12 +78,14 @@ class LocalSurface {
 
     using Wide = std::array<Index, Lanes<Scalar>::count>;  ///< triangles
 
+    ///@{
     /// In lane i the squared distance of triangle `some[i]` from `q`, or from the tool's axis [m^2]. Equals the results
     /// of `closest_point` and `nearest` bit for bit.
     [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                   const Vector3<Scalar>& q) const noexcept;
     [[nodiscard]] Lanes<Scalar> squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                   const Tool<Scalar>& tool) const noexcept;
+    ///@}
 
     /// In lane i the point of triangle `some[i]` nearest to `q`.
     [[nodiscard]] TrianglePoint<Lanes<Scalar>> closest_points(const ConstPointsRef<Scalar>& x, const Wide& some,

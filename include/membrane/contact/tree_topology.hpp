@@ -23,20 +23,33 @@ struct TreeTopology {
     /// Upper bound of the steps from the root to a node, for any mesh: see `tree_shape`.
     static constexpr Index max_depth = 63;
 
+    /// A set of triangles: a leaf, or the union of two children.
     struct Node {
         Index parent;  ///< `no_index` for the root.
         Index first;   ///< Of the two children, `first` and `first + 1`; for a leaf, its start in `triangles`.
         Index count;   ///< Number of a leaf's triangles; 0 for a node with children.
+
+        /// Whether the node has triangles of its own, and no children.
         [[nodiscard]] bool is_leaf() const noexcept { return count > 0; }
     };
     std::vector<Node> nodes;       ///< Depth first: children after their parent.
     std::vector<Index> triangles;  ///< Leaf by leaf, in ascending order within each.
 };
 
+/// Size and shape of a tree.
 struct TreeStatistics {
+    ///@{
+    /// Number of all nodes, and of those that are leaves.
     Index nodes, leaves;
+    ///@}
+
     Index depth;  ///< Steps from the root to the deepest leaf.
+
+    ///@{
+    /// [triangles]
     Index smallest_leaf, largest_leaf;
+    ///@}
+
     double mean_leaf;  ///< [triangles]
 };
 

@@ -26,6 +26,7 @@
 ///     const auto visited = boxes.search(x, key, limit, [&](membrane::Index f, const auto& triangle) { ... });
 namespace membrane {
 
+/// Options of a tree.
 struct TreeOptions {
     /// A set of fewer triangles is halved into two leaves [Liu07] 2.3. A low value tests fewer triangles; a high value
     /// tests fewer boxes and makes a refit cheaper. At least 1.
@@ -41,9 +42,11 @@ class WideBvh {
     /// O(F log F) for usual shapes. @throws InvalidInput if `balance_threshold` is below 1
     explicit WideBvh(const TriangleMesh<Scalar>& mesh, const TreeOptions& options = {});
 
+    ///@{
     /// Refits all boxes, or those around the vertices `moved`: see `AabbTree`.
     void refit(const ConstPointsRef<Scalar>& x) noexcept;
     void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
+    ///@}
 
     /// Calls `examine(Index f, triangle)` for each triangle with a key below `limit`, of boxes with a key below
     /// `limit`. Visits sibling boxes by ascending key; `examine` may lower the limit. `key(box)` is one number a box;
@@ -52,6 +55,7 @@ class WideBvh {
     [[nodiscard]] Index search(const ConstPointsRef<Scalar>& x, Key key, const Scalar& limit,
                                Examine examine) const noexcept;
 
+    /// Size and shape of the binary tree that the boxes were collapsed from.
     [[nodiscard]] const TreeStatistics& statistics() const noexcept { return statistics_; }
 
     /// The box around all triangles.

@@ -10,7 +10,7 @@
 
 /// Whether a point is inside a closed surface, also one with creases and folds.
 ///
-///     if (winding_number(surface, tree, x, tool.position) != 0) { /* the tool has tunnelled */ }
+///     if (winding_number(surface, tree, x, tool.position) != 0) tunnelled = true;
 namespace membrane {
 
 /// Winding number of a closed surface about `q`: 0 outside a valid surface, 1 inside. It changes only if `q` passes

@@ -37,20 +37,24 @@ using InvalidInputHandler = void (*)(const char* message);
 /// Called with the condition, file and line if a `MEMBRANE_ASSERT` fails. If it returns, the program is aborted.
 using AssertHandler = void (*)(const char* condition, const char* file, int line) noexcept;
 
+///@{
 /// Replaces the handler for the whole program and returns the previous one; null restores the default, which prints to
 /// stderr. Thread-safe.
 inline InvalidInputHandler set_invalid_input_handler(InvalidInputHandler handler) noexcept;
 inline AssertHandler set_assert_handler(AssertHandler handler) noexcept;
+///@}
 
 /// Whether `value` is neither infinite nor NaN, also under `-ffast-math`, where `std::isfinite` may always be true.
 template <Real Scalar>
 [[nodiscard]] bool is_finite(Scalar value) noexcept;
 
+///@{
 /// Whether all entries of a vector or matrix are finite.
 template <Real Scalar>
 [[nodiscard]] bool is_finite(const Vector3<Scalar>& vector) noexcept;
 template <class Derived>
 [[nodiscard]] bool is_finite(const Eigen::DenseBase<Derived>& values) noexcept;
+///@}
 
 /// Throws `InvalidInput` with the message "component: part part ...", the parts concatenated. Offline only.
 template <class... Parts>

@@ -26,9 +26,10 @@ class CompressedRows {
     template <class ForEachItem>
     CompressedRows(Index row_count, ForEachItem for_each_item);
 
+    /// Number of rows, empty ones included.
     [[nodiscard]] Index row_count() const noexcept { return static_cast<Index>(begin_.size() - 1); }
 
-    /// @pre 0 <= `row` < `row_count()` (asserted).
+    /// The items of a row, valid as long as the rows. @pre 0 <= `row` < `row_count()` (asserted).
     [[nodiscard]] std::span<const Item> operator[](Index row) const noexcept {
         MEMBRANE_ASSERT(row >= 0 && row < row_count());
         const auto r = static_cast<std::size_t>(row);

@@ -26,6 +26,7 @@ class DisjointSets {
         return i;
     }
 
+    /// Merges the sets of `i` and `j`. O(log count), amortised.
     void unite(std::size_t i, std::size_t j) noexcept {
         const auto [first, second] = std::minmax({find(i), find(j)});
         parent_[second] = first;

@@ -9,7 +9,7 @@
 
 /// Exact orientation predicates: signs of volumes and areas, consistent with each other.
 ///
-///     if (sign_of_volume(a, b, c, d) == 0) { /* the four points are exactly coplanar */ }
+///     if (sign_of_volume(a, b, c, d) == 0) coplanar = true;  // exactly
 ///
 /// Computed in floating point first; if the rounding error could change the sign, in exact arithmetic [Shewchuk97]. Not
 /// exact under `-ffast-math`, or if products of three differences overflow or underflow.

@@ -49,6 +49,7 @@ concept CheckedExecutor = detail::check_executor<E>();
 
 /// Runs all tasks on the calling thread, in order.
 struct OneThread {
+    /// Calls `task(i)` for `i` from 0 to `count` - 1.
     template <class Task>
     void operator()(Index count, const Task& task) const noexcept {
         for (Index i = 0; i < count; ++i) task(i);
@@ -87,6 +88,7 @@ class AnyExecutor {
     /// Whether all tasks are known to run on the calling thread, in order.
     [[nodiscard]] bool is_serial() const noexcept { return executor_ == nullptr; }
 
+    /// Runs the tasks on the wrapped executor.
     template <class Task>
     void operator()(Index count, const Task& task) const noexcept {
         if (is_serial()) return OneThread{}(count, task);

@@ -18,10 +18,14 @@ namespace membrane {
 template <Real Scalar>
 class Field {
   public:
-    Field() = default;
+    Field() = default;  ///< No value given.
+
+    ///@{
+    /// One number for all, or one for each; copied.
     Field(Scalar uniform) : values_{uniform}, uniform_{true} {}                 // NOLINT(google-explicit-constructor)
     Field(std::vector<Scalar> each) : values_(std::move(each)) {}               // NOLINT(google-explicit-constructor)
     Field(std::span<const Scalar> each) : values_(each.begin(), each.end()) {}  // NOLINT(google-explicit-constructor)
+    ///@}
 
     /// Whether a value was given.
     [[nodiscard]] bool given() const noexcept { return !values_.empty(); }

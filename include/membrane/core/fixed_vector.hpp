@@ -13,11 +13,13 @@ namespace membrane {
 /// capacity.)
 ///
 ///     FixedVector<ContactPoint<double>> points(4096);
-///     if (!points.try_push_back(point)) { /* full */ }
+///     if (!points.try_push_back(point)) return;  // full
 template <class Item>
 class FixedVector {
   public:
-    FixedVector() = default;
+    FixedVector() = default;  ///< Of capacity 0.
+
+    /// Empty. Allocates memory for `capacity` items and constructs them.
     explicit FixedVector(std::size_t capacity) : slots_(capacity) {}
 
     /// Appends `item`; returns false if the capacity is used up.
@@ -26,6 +28,8 @@ class FixedVector {
         slots_[count_++] = item;
         return true;
     }
+
+    /// Removes all items; the capacity stays.
     void clear() noexcept { count_ = 0; }
 
     /// Keeps the first `count` items. @pre `count` <= size() (asserted)
@@ -34,15 +38,20 @@ class FixedVector {
         count_ = count;
     }
 
+    ///@{
+    /// Number of items: the largest possible, the present one, and whether that is 0.
     [[nodiscard]] std::size_t capacity() const noexcept { return slots_.size(); }
     [[nodiscard]] std::size_t size() const noexcept { return count_; }
     [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
+    ///@}
 
-    /// Valid until the vector is assigned to or destroyed.
+    ///@{
+    /// All items. Valid until the vector is assigned to or destroyed.
     [[nodiscard]] std::span<Item> items() noexcept { return {slots_.data(), count_}; }
     [[nodiscard]] std::span<const Item> items() const noexcept { return {slots_.data(), count_}; }
+    ///@}
 
-    /// @pre `i` < size() (asserted)
+    /// Item number `i`. @pre `i` < size() (asserted)
     [[nodiscard]] const Item& operator[](std::size_t i) const noexcept {
         MEMBRANE_ASSERT(i < count_);
         return slots_[i];

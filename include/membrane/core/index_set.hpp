@@ -18,7 +18,7 @@ namespace membrane {
 ///     for (const Index f : found.items()) { ... }
 class IndexSet {
   public:
-    IndexSet() = default;
+    IndexSet() = default;  ///< An empty set for no indices.
 
     /// An empty set for indices from 0 to `size` - 1; allocates all its memory.
     explicit IndexSet(Index size) : mark_(static_cast<std::size_t>(size), 0), items_(mark_.size()) {}
@@ -31,6 +31,7 @@ class IndexSet {
         return true;
     }
 
+    /// Whether `i` is in the set. @pre 0 <= `i` < size (asserted)
     [[nodiscard]] bool contains(Index i) const noexcept {
         MEMBRANE_ASSERT(i >= 0 && static_cast<std::size_t>(i) < mark_.size());
         return mark_[static_cast<std::size_t>(i)] == current_;
@@ -38,14 +39,19 @@ class IndexSet {
 
     /// Indices in order of insertion; valid until the next change.
     [[nodiscard]] std::span<const Index> items() const noexcept { return items_.items(); }
+
+    ///@{
+    /// Number of items, and whether it is 0.
     [[nodiscard]] Index count() const noexcept { return static_cast<Index>(items_.size()); }
     [[nodiscard]] bool empty() const noexcept { return items_.empty(); }
+    ///@}
 
     /// Reorders the items from position `begin` on. @pre `order` holds the same items
     void reorder(std::size_t begin, std::span<const Index> order) noexcept {
         std::copy(order.begin(), order.end(), items_.items().begin() + static_cast<std::ptrdiff_t>(begin));
     }
 
+    /// Removes all items. Cost: O(1), amortised.
     void clear() noexcept {
         items_.clear();
         if (++current_ == 0) {  // after 2^32 calls old marks would count again

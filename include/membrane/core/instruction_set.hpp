@@ -22,6 +22,7 @@
 #define MEMBRANE_PORTABLE_LANES
 #endif
 
+/// Name of the instruction set, and of the inline namespace of the types packed in its registers.
 #if defined(MEMBRANE_PORTABLE_LANES)
 #define MEMBRANE_INSTRUCTION_SET portable
 #elif defined(__AVX512F__)
@@ -42,7 +43,9 @@
 #include <emmintrin.h>
 #endif
 
-// Small functions of the innermost loops are inlined even without optimisation, where a call costs more than they do.
+///@{
+/// Attributes of g++ and clang; empty, or `inline`, for other compilers. Small functions of the innermost loops are
+/// inlined even without optimisation, where a call costs more than they do.
 #if defined(__GNUC__) || defined(__clang__)
 #define MEMBRANE_INLINE __attribute__((always_inline)) inline
 #define MEMBRANE_INLINE_LAMBDA __attribute__((always_inline))
@@ -56,6 +59,7 @@
 #define MEMBRANE_FLATTEN
 #define MEMBRANE_ABI_TAG
 #endif
+///@}
 
 namespace membrane {
 
@@ -99,6 +103,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 
 #if !defined(MEMBRANE_PORTABLE_LANES)
 
+/// Size of a `Register`.
 #if defined(__AVX__)
 inline constexpr std::size_t register_bytes = 32;
 #else
@@ -108,7 +113,8 @@ inline constexpr std::size_t register_bytes = 16;
 /// A SIMD register of numbers, with the compiler's operators.
 template <Real Scalar, std::size_t bytes = register_bytes>
 struct Register {
-    static constexpr std::size_t size = bytes / sizeof(Scalar);
+    static constexpr std::size_t size = bytes / sizeof(Scalar);  ///< numbers in a register
+    /// The register.
     using Type __attribute__((vector_size(bytes))) = Scalar;
     using Mask = decltype(Type{} < Type{});  ///< all bits of a number, or none
 
@@ -118,6 +124,7 @@ struct Register {
     /// `yes` where `mask` is set, `no` elsewhere.
     [[nodiscard]] MEMBRANE_INLINE static Type choose(Mask mask, Type yes, Type no) noexcept { return mask ? yes : no; }
 
+    /// The magnitude of each number: clears its sign bit.
     [[nodiscard]] MEMBRANE_INLINE static Type absolute(Type a) noexcept {
         using One = std::conditional_t<sizeof(Scalar) == 4, std::int32_t, std::int64_t>;
         const Mask all_but_sign = (std::numeric_limits<One>::max)() - Mask{};
@@ -184,6 +191,7 @@ template <int... index, class Part>
 
 #else
 
+/// Size of a `Register`.
 inline constexpr std::size_t register_bytes = 16;
 
 /// Numbers in an array, with the operators of a SIMD register.

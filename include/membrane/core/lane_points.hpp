@@ -19,8 +19,13 @@ template <Real Scalar>
 struct alignas(4 * sizeof(Scalar)) PaddedPoint {
     std::array<Scalar, 4> number{};  ///< x, y, z and the extra number
 
+    /// x, y and z.
     [[nodiscard]] Vector3<Scalar> point() const noexcept { return {number[0], number[1], number[2]}; }
+
+    /// The fourth number.
     [[nodiscard]] Scalar extra() const noexcept { return number[3]; }
+
+    /// Sets all four numbers.
     void set(const Vector3<Scalar>& p, Scalar extra = 0) noexcept { number = {p.x(), p.y(), p.z(), extra}; }
 };
 
@@ -35,8 +40,10 @@ class PaddedVector {
     static constexpr std::size_t width = Registers::size, parts = 4 / width, last = parts - 1;
 
   public:
-    PaddedVector() noexcept : PaddedVector(Scalar(0)) {}          ///< Zero.
-    MEMBRANE_INLINE explicit PaddedVector(Scalar all) noexcept {  ///< Four times the same number.
+    PaddedVector() noexcept : PaddedVector(Scalar(0)) {}  ///< Zero.
+
+    /// Four times the same number.
+    MEMBRANE_INLINE explicit PaddedVector(Scalar all) noexcept {
         const Part part = Registers::all(all);
         parts_[0] = part;
         parts_[last] = part;
@@ -48,6 +55,8 @@ class PaddedVector {
         std::memcpy(vector.parts_, from, sizeof parts_);
         return vector;
     }
+
+    /// Writes four numbers from `to` on.
     MEMBRANE_INLINE void store(Scalar* to) const noexcept { std::memcpy(to, parts_, sizeof parts_); }
 
     /// Reads three numbers from `from` on, none beyond them; the fourth becomes zero.
@@ -65,6 +74,8 @@ class PaddedVector {
         return {parts_[0][0], parts_[0][1], parts_[2 / width][2 % width]};
     }
 
+    ///@{
+    /// Number by number.
     [[nodiscard]] MEMBRANE_INLINE friend PaddedVector operator+(const PaddedVector& a, const PaddedVector& b) noexcept {
         return {a.parts_[0] + b.parts_[0], a.parts_[last] + b.parts_[last]};
     }
@@ -74,7 +85,9 @@ class PaddedVector {
     [[nodiscard]] MEMBRANE_INLINE friend PaddedVector operator*(const PaddedVector& a, const PaddedVector& b) noexcept {
         return {a.parts_[0] * b.parts_[0], a.parts_[last] * b.parts_[last]};
     }
+    ///@}
 
+    ///@{
     /// `membrane::smaller` and `larger` of each number.
     [[nodiscard]] MEMBRANE_INLINE friend PaddedVector smaller(const PaddedVector& a, const PaddedVector& b) noexcept {
         return {Registers::choose(b.parts_[0] < a.parts_[0], b.parts_[0], a.parts_[0]),
@@ -84,6 +97,7 @@ class PaddedVector {
         return {Registers::choose(a.parts_[0] < b.parts_[0], b.parts_[0], a.parts_[0]),
                 Registers::choose(a.parts_[last] < b.parts_[last], b.parts_[last], a.parts_[last])};
     }
+    ///@}
 
     /// The sum of all four numbers.
     [[nodiscard]] MEMBRANE_INLINE Scalar sum() const noexcept {
@@ -127,15 +141,17 @@ void scatter(const Vector3<Lanes<Scalar>>& points, PaddedPoint<Scalar>* rows, co
 /// Padded points, one a lane.
 template <Real Scalar>
 struct PaddedLanes {
-    Vector3<Lanes<Scalar>> point;
-    Lanes<Scalar> extra;
+    Vector3<Lanes<Scalar>> point;  ///< x, y and z
+    Lanes<Scalar> extra;           ///< the fourth numbers
 };
 
+///@{
 /// `gather` and `scatter` with the extra number.
 template <Real Scalar>
 [[nodiscard]] PaddedLanes<Scalar> gather_padded(const PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
 template <Real Scalar>
 void scatter_padded(const PaddedLanes<Scalar>& points, PaddedPoint<Scalar>* rows, const Index* begins) noexcept;
+///@}
 
 namespace detail {
 

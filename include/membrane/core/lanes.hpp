@@ -26,14 +26,16 @@ class Lanes {
     static constexpr std::size_t width = Registers::size;
 
   public:
-    using Each = Scalar;
-    static constexpr std::size_t count = 32 / sizeof(Scalar);
+    using Each = Scalar;                                       ///< type of one lane
+    static constexpr std::size_t count = 32 / sizeof(Scalar);  ///< number of lanes
 
     /// One register; `parts` of them hold all lanes, one or two.
     using Part = typename Registers::Type;
-    static constexpr std::size_t parts = count / width;
+    static constexpr std::size_t parts = count / width;  ///< number of registers
 
-    Lanes() = default;
+    Lanes() = default;  ///< Not initialised.
+
+    /// The same number in each lane.
     MEMBRANE_INLINE Lanes(Scalar all) noexcept {  // NOLINT(google-explicit-constructor): one number for all lanes
         const Part part = Registers::all(all);
         parts_[0] = part;
@@ -62,14 +64,26 @@ class Lanes {
         }
         return lanes;
     }
+
+    /// Writes `count` numbers, one after the other.
     MEMBRANE_INLINE void store(Scalar* to) const noexcept { std::memcpy(to, parts_, sizeof parts_); }
+
+    /// The number in lane i, by value.
     [[nodiscard]] MEMBRANE_INLINE Scalar operator[](std::size_t i) const noexcept {
         return parts_[i / width][i % width];
     }
+
+    /// Sets the number in lane i.
     MEMBRANE_INLINE void set(std::size_t i, Scalar value) noexcept { parts_[i / width][i % width] = value; }
+
+    ///@{
+    /// Register i, the lanes from i times `count` / `parts` on.
     [[nodiscard]] MEMBRANE_INLINE Part& part(std::size_t i) noexcept { return parts_[i]; }
     [[nodiscard]] MEMBRANE_INLINE const Part& part(std::size_t i) const noexcept { return parts_[i]; }
+    ///@}
 
+    ///@{
+    /// Lane by lane.
     [[nodiscard]] MEMBRANE_INLINE friend Lanes operator+(const Lanes& a, const Lanes& b) noexcept {
         return {a.parts_[0] + b.parts_[0], a.parts_[last] + b.parts_[last]};
     }
@@ -87,17 +101,23 @@ class Lanes {
     MEMBRANE_INLINE Lanes& operator-=(const Lanes& b) noexcept { return *this = *this - b; }
     MEMBRANE_INLINE Lanes& operator*=(const Lanes& b) noexcept { return *this = *this * b; }
     MEMBRANE_INLINE Lanes& operator/=(const Lanes& b) noexcept { return *this = *this / b; }
+    ///@}
 
     /// A boolean for each lane.
     class Mask {
       public:
-        using PartMask = typename Registers::Mask;
+        using PartMask = typename Registers::Mask;  ///< booleans of one register
 
-        Mask() = default;
+        Mask() = default;  ///< Not initialised.
+
+        /// From the masks of the first and the last register, the same mask twice if there is one register.
         MEMBRANE_INLINE Mask(const PartMask& first_part, const PartMask& last_part) noexcept {
             parts_[0] = first_part;
             parts_[last] = last_part;
         }
+
+        ///@{
+        /// Lane by lane.
         [[nodiscard]] MEMBRANE_INLINE friend Mask operator&(const Mask& a, const Mask& b) noexcept {
             return {a.parts_[0] & b.parts_[0], a.parts_[last] & b.parts_[last]};
         }
@@ -105,7 +125,12 @@ class Lanes {
             return {a.parts_[0] | b.parts_[0], a.parts_[last] | b.parts_[last]};
         }
         [[nodiscard]] MEMBRANE_INLINE Mask operator!() const noexcept { return {~parts_[0], ~parts_[last]}; }
+        ///@}
+
+        /// Whether the mask is set in every lane.
         [[nodiscard]] MEMBRANE_INLINE friend bool all(const Mask& mask) noexcept { return !any(!mask); }
+
+        /// Whether the mask is set in at least one lane.
         [[nodiscard]] MEMBRANE_INLINE friend bool any(const Mask& mask) noexcept { return bits(mask) != 0; }
 
         /// Lane i in bit i.
@@ -118,6 +143,8 @@ class Lanes {
         PartMask parts_[parts];
     };
 
+    ///@{
+    /// Lane by lane.
     [[nodiscard]] MEMBRANE_INLINE friend Mask operator<(const Lanes& a, const Lanes& b) noexcept {
         return {a.parts_[0] < b.parts_[0], a.parts_[last] < b.parts_[last]};
     }
@@ -129,7 +156,9 @@ class Lanes {
     [[nodiscard]] MEMBRANE_INLINE friend Mask operator!=(const Lanes& a, const Lanes& b) noexcept {
         return {a.parts_[0] != b.parts_[0], a.parts_[last] != b.parts_[last]};
     }
+    ///@}
 
+    /// The magnitude of each lane.
     [[nodiscard]] MEMBRANE_INLINE friend Lanes abs(const Lanes& a) noexcept {
         return {Registers::absolute(a.parts_[0]), Registers::absolute(a.parts_[last])};
     }
@@ -166,8 +195,12 @@ template <Number N, class Choice>
     else
         return N::choose(choice, yes, no);
 }
+
+///@{
+/// `any` and `all` of a mask, for one lane.
 [[nodiscard]] MEMBRANE_INLINE constexpr bool any(bool choice) noexcept { return choice; }
 [[nodiscard]] MEMBRANE_INLINE constexpr bool all(bool choice) noexcept { return choice; }
+///@}
 
 /// The square root of a number, or of every lane.
 template <Number N>
@@ -185,6 +218,7 @@ template <Number N, class F, class... Rest>
         return N::of([&](std::size_t i) { return f(a[i], rest[i]...); });
 }
 
+///@{
 /// `std::max` and `std::min` of every lane.
 template <Number N>
 [[nodiscard]] MEMBRANE_INLINE N larger(const N& a, const N& b) noexcept {
@@ -194,6 +228,7 @@ template <Number N>
 [[nodiscard]] MEMBRANE_INLINE N smaller(const N& a, const N& b) noexcept {
     return select(b < a, b, a);
 }
+///@}
 
 /// The unit vector along `a`; zero if `a` is zero.
 template <Number N>

@@ -18,13 +18,17 @@ struct RigidFrame {
     Vector3<Scalar> velocity = Vector3<Scalar>::Zero();                              ///< of the origin [m/s]
     Vector3<Scalar> angular_velocity = Vector3<Scalar>::Zero();                      ///< in the world [rad/s]
 
+    ///@{
+    /// A point [m]: rotated and translated.
     [[nodiscard]] Vector3<Scalar> point_to_body(const Vector3<Scalar>& world) const noexcept {
         return vector_to_body(world - origin);
     }
     [[nodiscard]] Vector3<Scalar> point_to_world(const Vector3<Scalar>& body) const noexcept {
         return origin + vector_to_world(body);
     }
+    ///@}
 
+    ///@{
     /// A force, an axis or a normal: rotated, not translated.
     [[nodiscard]] Vector3<Scalar> vector_to_body(const Vector3<Scalar>& world) const noexcept {
         return {dot(point(rotation, 0), world), dot(point(rotation, 1), world), dot(point(rotation, 2), world)};
@@ -32,6 +36,7 @@ struct RigidFrame {
     [[nodiscard]] Vector3<Scalar> vector_to_world(const Vector3<Scalar>& body) const noexcept {
         return point(rotation, 0) * body.x() + point(rotation, 1) * body.y() + point(rotation, 2) * body.z();
     }
+    ///@}
 
     /// World velocity [m/s] of a point that moves with the body, at `position` in the world [m].
     [[nodiscard]] Vector3<Scalar> velocity_at(const Vector3<Scalar>& position) const noexcept {

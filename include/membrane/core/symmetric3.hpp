@@ -15,8 +15,13 @@ namespace membrane {
 ///     const auto displacement = inverse(stiffness) * force;                          // [m]
 template <Number Scalar>
 struct Symmetric3 {
+    ///@{
+    /// The entries; each off the diagonal stands for two.
     Scalar xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
+    ///@}
 
+    ///@{
+    /// Sum, multiple, and product with a vector.
     MEMBRANE_INLINE Symmetric3& operator+=(const Symmetric3& b) noexcept {
         xx += b.xx, yy += b.yy, zz += b.zz, xy += b.xy, xz += b.xz, yz += b.yz;
         return *this;
@@ -29,6 +34,9 @@ struct Symmetric3 {
         return {(a.xx * b[0] + a.xy * b[1]) + a.xz * b[2], (a.xy * b[0] + a.yy * b[1]) + a.yz * b[2],
                 (a.xz * b[0] + a.yz * b[1]) + a.zz * b[2]};
     }
+    ///@}
+
+    /// Sum of the diagonal, which is the sum of the eigenvalues.
     [[nodiscard]] MEMBRANE_INLINE Scalar trace() const noexcept { return (xx + yy) + zz; }
 };
 

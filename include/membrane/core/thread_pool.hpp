@@ -26,10 +26,11 @@ class ThreadPool {
     /// `threads` includes the calling thread.
     /// @throws InvalidInput if `threads` is below 1; std::system_error if the system cannot start a thread
     explicit ThreadPool(int threads = (std::max)(1, static_cast<int>(std::thread::hardware_concurrency())));
-    ~ThreadPool();
+    ~ThreadPool();  ///< Joins the threads.
     ThreadPool(const ThreadPool&) = delete;
     ThreadPool& operator=(const ThreadPool&) = delete;
 
+    /// Number of threads, the calling one included.
     [[nodiscard]] int threads() const noexcept { return static_cast<int>(workers_.size()) + 1; }
 
     /// Calls `task(i)` once for each `i` from 0 to `count` - 1. Online, except for waking sleeping threads.

@@ -17,6 +17,7 @@ namespace membrane {
 template <class Slot>
 class TripleBuffer {
   public:
+    /// Copies `each` to the three slots. None is published.
     explicit TripleBuffer(const Slot& each = Slot()) : slots_{{{each}, {each}, {each}}} {}
 
     /// The writer's slot: after each `publish` a different one, with its old contents.

@@ -65,16 +65,24 @@ template <Number N>
 class Vector3 : public detail::ThreeByOne<N> {
   public:
     Vector3() = default;  ///< Not initialised.
+
+    /// From its coordinates.
     MEMBRANE_INLINE constexpr Vector3(const N& x, const N& y, const N& z) noexcept : number_{x, y, z} {}
 
+    /// From an Eigen expression of three rows and one column.
     template <detail::Column<N> Derived>
     Vector3(const Eigen::MatrixBase<Derived>& column) noexcept {  // NOLINT(google-explicit-constructor)
         const Eigen::Matrix<N, 3, 1> value = column;
         *this = Vector3(value.coeff(0), value.coeff(1), value.coeff(2));
     }
+
+    /// The same three numbers as an Eigen vector.
     [[nodiscard]] Eigen::Matrix<N, 3, 1> eigen() const noexcept { return *this; }
 
     // NOLINTBEGIN(readability-identifier-naming): Eigen's names
+
+    ///@{
+    /// Vectors of equal numbers, and unit vectors along the axes.
     [[nodiscard]] static constexpr Vector3 Constant(const N& all) noexcept { return {all, all, all}; }
     [[nodiscard]] static constexpr Vector3 Zero() noexcept { return {0, 0, 0}; }
     [[nodiscard]] static constexpr Vector3 Ones() noexcept { return {1, 1, 1}; }
@@ -84,22 +92,36 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] static constexpr Vector3 UnitX() noexcept { return {1, 0, 0}; }
     [[nodiscard]] static constexpr Vector3 UnitY() noexcept { return {0, 1, 0}; }
     [[nodiscard]] static constexpr Vector3 UnitZ() noexcept { return {0, 0, 1}; }
+    ///@}
 
+    ///@{
+    /// A coordinate.
     [[nodiscard]] MEMBRANE_INLINE constexpr N& x() noexcept { return number_[0]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr N& y() noexcept { return number_[1]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr N& z() noexcept { return number_[2]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N& x() const noexcept { return number_[0]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N& y() const noexcept { return number_[1]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N& z() const noexcept { return number_[2]; }
+    ///@}
+
+    ///@{
+    /// Coordinate `k`, 0 to 2.
     [[nodiscard]] MEMBRANE_INLINE constexpr N& operator[](std::integral auto k) noexcept { return number_[k]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N& operator[](std::integral auto k) const noexcept {
         return number_[k];
     }
+    ///@}
+
+    ///@{
+    /// The coordinates as three contiguous numbers.
     [[nodiscard]] MEMBRANE_INLINE constexpr N* data() noexcept { return number_; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N* data() const noexcept { return number_; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N* begin() const noexcept { return number_; }
     [[nodiscard]] MEMBRANE_INLINE constexpr const N* end() const noexcept { return number_ + 3; }
+    ///@}
 
+    ///@{
+    /// Sums, multiples, and products with Eigen matrices, which are Eigen's.
     [[nodiscard]] MEMBRANE_INLINE friend constexpr Vector3 operator+(const Vector3& a, const Vector3& b) noexcept {
         return {a.number_[0] + b.number_[0], a.number_[1] + b.number_[1], a.number_[2] + b.number_[2]};
     }
@@ -126,6 +148,9 @@ class Vector3 : public detail::ThreeByOne<N> {
                                                           const Eigen::Matrix<N, 1, 3>& row) noexcept {
         return a.eigen() * row;
     }
+    ///@}
+
+    ///@{
     /// For comma initialisers: `x << columns, a, b`.
     template <class Matrix>
     friend Eigen::CommaInitializer<Matrix>& operator,(Eigen::CommaInitializer<Matrix>& list, const Vector3& a) {
@@ -135,15 +160,24 @@ class Vector3 : public detail::ThreeByOne<N> {
     friend Eigen::CommaInitializer<Matrix>& operator,(Eigen::CommaInitializer<Matrix>&& list, const Vector3& a) {
         return list, a.eigen();
     }
+    ///@}
+
+    ///@{
+    /// In place.
     MEMBRANE_INLINE constexpr Vector3& operator+=(const Vector3& b) noexcept { return *this = *this + b; }
     MEMBRANE_INLINE constexpr Vector3& operator-=(const Vector3& b) noexcept { return *this = *this - b; }
     MEMBRANE_INLINE constexpr Vector3& operator*=(const N& s) noexcept { return *this = *this * s; }
     MEMBRANE_INLINE constexpr Vector3& operator/=(const N& s) noexcept { return *this = *this / s; }
     MEMBRANE_INLINE constexpr void setZero() noexcept { *this = Zero(); }
+    ///@}
+
+    /// Whether all three numbers are equal; -0 equals 0.
     [[nodiscard]] MEMBRANE_INLINE friend constexpr bool operator==(const Vector3& a, const Vector3& b) noexcept {
         return a.number_[0] == b.number_[0] && a.number_[1] == b.number_[1] && a.number_[2] == b.number_[2];
     }
 
+    ///@{
+    /// Products and lengths. Terms are added in the order (x + y) + z.
     [[nodiscard]] MEMBRANE_INLINE constexpr N dot(const Vector3& b) const noexcept {
         return (number_[0] * b.number_[0] + number_[1] * b.number_[1]) + number_[2] * b.number_[2];
     }
@@ -157,9 +191,13 @@ class Vector3 : public detail::ThreeByOne<N> {
         using std::sqrt;
         return sqrt(squaredNorm());
     }
-    /// @pre not zero
+    ///@}
+
+    /// At unit length. @pre not zero
     [[nodiscard]] MEMBRANE_INLINE Vector3 normalized() const noexcept { return *this / norm(); }
 
+    ///@{
+    /// Sum, least and greatest of the three numbers.
     [[nodiscard]] MEMBRANE_INLINE constexpr N sum() const noexcept { return (number_[0] + number_[1]) + number_[2]; }
     [[nodiscard]] MEMBRANE_INLINE constexpr N minCoeff() const noexcept {
         return (std::min)((std::min)(number_[0], number_[1]), number_[2]);
@@ -167,11 +205,16 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] MEMBRANE_INLINE constexpr N maxCoeff() const noexcept {
         return (std::max)((std::max)(number_[0], number_[1]), number_[2]);
     }
+    ///@}
+
     /// Whether no number exceeds `tolerance` in magnitude.
     [[nodiscard]] bool isZero(const N& tolerance) const noexcept {
         return std::abs(number_[0]) <= tolerance && std::abs(number_[1]) <= tolerance &&
                std::abs(number_[2]) <= tolerance;
     }
+
+    ///@{
+    /// Number by number.
     [[nodiscard]] MEMBRANE_INLINE Vector3 cwiseAbs() const noexcept {
         return {std::abs(number_[0]), std::abs(number_[1]), std::abs(number_[2])};
     }
@@ -189,7 +232,9 @@ class Vector3 : public detail::ThreeByOne<N> {
     [[nodiscard]] MEMBRANE_INLINE constexpr Vector3 cwiseQuotient(const Vector3& b) const noexcept {
         return {number_[0] / b.number_[0], number_[1] / b.number_[1], number_[2] / b.number_[2]};
     }
+    ///@}
 
+    /// Each number converted to `To`, as by `static_cast`.
     template <Number To>
     [[nodiscard]] MEMBRANE_INLINE constexpr Vector3<To> cast() const noexcept {
         return {static_cast<To>(number_[0]), static_cast<To>(number_[1]), static_cast<To>(number_[2])};
@@ -202,6 +247,8 @@ class Vector3 : public detail::ThreeByOne<N> {
     N number_[3];
 };
 
+///@{
+/// Products and lengths, as the members of the same name. Terms are added in the order (x + y) + z.
 template <Number N>
 [[nodiscard]] MEMBRANE_INLINE constexpr N dot(const Vector3<N>& a, const Vector3<N>& b) noexcept {
     return a.dot(b);
@@ -221,6 +268,7 @@ template <Number N>
 [[nodiscard]] MEMBRANE_INLINE constexpr Vector3<N> cross(const Vector3<N>& a, const Vector3<N>& b) noexcept {
     return a.cross(b);
 }
+///@}
 
 /// Whether each number of `a` is at most that of `b`.
 template <Real Scalar>

@@ -15,6 +15,7 @@
 ///     device.write(feel({tool, contact, report}));
 namespace membrane {
 
+/// Options of `ContactFriction`.
 struct FrictionOptions {
     double coefficient;  ///< of Coulomb friction: largest ratio of tangential to normal force
     double stiffness;    ///< tangential stiffness while the tool sticks, at the device [N/m]
@@ -38,6 +39,7 @@ class ContactFriction {
           coefficient_(static_cast<Scalar>(options.coefficient)),
           stiffness_(static_cast<Scalar>(options.stiffness)) {}
 
+    /// Force of the policy plus friction [N]. Once a tick, online.
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& state) noexcept;
 
     /// Whether the tool slipped in the last tick.

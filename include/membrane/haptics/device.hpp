@@ -72,6 +72,7 @@ struct Waypoint {
 static_assert(std::is_default_constructible_v<Waypoint<float>>);
 static_assert(std::is_default_constructible_v<Waypoint<double>>);
 
+/// Options of a `ScriptedDevice`.
 struct ScriptedDeviceOptions {
     double tick = 1e-3;  ///< time from one `read` to the next [s]
     double radius = 0;   ///< of the tool [m]
@@ -143,15 +144,23 @@ concept CheckedHand = detail::check_hand<H, Scalar>();
 template <Real Scalar>
 class IdealHand {
   public:
+    /// At `position` [m], at rest.
     void reset_to(const Vector3<Scalar>& position) noexcept { set_target(position, Vector3<Scalar>::Zero()); }
+
+    /// Is at `target` [m] with `velocity` [m/s] from now on.
     void set_target(const Vector3<Scalar>& target, const Vector3<Scalar>& velocity) noexcept {
         position_ = target;
         velocity_ = velocity;
     }
+
+    /// Does nothing: the force does not move this hand.
     void advance(const Vector3<Scalar>& /*force*/, Scalar /*dt*/) const noexcept {}
 
+    ///@{
+    /// Position [m] and velocity [m/s] of the last target.
     [[nodiscard]] const Vector3<Scalar>& position() const noexcept { return position_; }
     [[nodiscard]] const Vector3<Scalar>& velocity() const noexcept { return velocity_; }
+    ///@}
 
   private:
     Vector3<Scalar> position_ = Vector3<Scalar>::Zero(), velocity_ = Vector3<Scalar>::Zero();
@@ -176,6 +185,7 @@ class ScriptedDevice {
     /// The tool now; advances time by one tick. After the script's end, returns the last position.
     [[nodiscard]] Tool<Scalar> read() noexcept;
 
+    /// Keeps `force` [N] for `force()`.
     void write(const Vector3<Scalar>& force) noexcept { force_ = force; }
 
     /// The last written force [N].

@@ -14,7 +14,7 @@ namespace membrane {
 
 /// Data of a device. If damping or friction is not known, zero is conservative.
 struct DeviceProfile {
-    std::string_view name;
+    std::string_view name;     ///< for messages
     double peak_force;         ///< largest force for a short time [N]
     double continuous_force;   ///< largest force for unlimited time [N]; the peak: the device limits heating itself
     double stiffness;          ///< largest stiffness it can render [N/m]
@@ -48,6 +48,7 @@ inline constexpr DeviceProfile phantom_desktop{.name = "PHANTOM Desktop",
                                                .friction = 0.06,
                                                .resolution = 23e-6};
 
+/// SensAble PHANTOM Premium 1.5.
 inline constexpr DeviceProfile premium_1_5{.name = "PHANTOM Premium 1.5",
                                            .peak_force = 8.5,
                                            .continuous_force = 1.4,
@@ -56,6 +57,7 @@ inline constexpr DeviceProfile premium_1_5{.name = "PHANTOM Premium 1.5",
                                            .friction = 0.04,
                                            .resolution = 30e-6};
 
+/// SensAble PHANTOM Premium 3.0.
 inline constexpr DeviceProfile premium_3_0{.name = "PHANTOM Premium 3.0",
                                            .peak_force = 22,
                                            .continuous_force = 3,
@@ -63,11 +65,13 @@ inline constexpr DeviceProfile premium_3_0{.name = "PHANTOM Premium 3.0",
                                            .friction = 0.2,
                                            .resolution = 20e-6};
 
+///@{
 /// Force Dimension publishes one force, without a time limit, and no friction. Without friction a resolution would rule
 /// out every stiffness, so the resolution is neglected.
 inline constexpr DeviceProfile omega{.name = "omega", .peak_force = 12, .continuous_force = 12, .stiffness = 5000};
 inline constexpr DeviceProfile delta{.name = "delta", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
 inline constexpr DeviceProfile sigma{.name = "sigma", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
+///@}
 
 }  // namespace devices
 

@@ -13,6 +13,7 @@
 ///     device.write(feel({tool, contact, report}));                           // each tick
 namespace membrane {
 
+/// Options of an `ExtrapolatedReaction`.
 struct ExtrapolationOptions {
     double scale = 1;  ///< force at the hand over force at the tissue
 };
@@ -25,6 +26,7 @@ struct ExtrapolationOptions {
 template <Real Scalar>
 class ExtrapolatedReaction {
   public:
+    /// Before the first solve the force is zero.
     explicit ExtrapolatedReaction(const ExtrapolationOptions& options = {}) noexcept
         : scale_(static_cast<Scalar>(options.scale)) {}
 
@@ -36,6 +38,7 @@ class ExtrapolatedReaction {
         position_ = position;
     }
 
+    /// The force on the hand [N], see `ForcePolicy`. Online.
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& state) const noexcept;
 
   private:

@@ -40,12 +40,14 @@ struct ActiveLimits {
     bool heat = false;   ///< thermal limit of its motors
     bool slew = false;   ///< rate of change of the force
 
+    /// Whether at least one limit changed the force.
     [[nodiscard]] bool any() const noexcept { return fault || faded || peak || heat || slew; }
 };
 
 /// Factor on the force by the age of the solver's state: 1 up to `max_state_age`, then down to 0 in `fade_time`.
 class Watchdog {
   public:
+    /// Both in seconds.
     Watchdog(double max_state_age, double fade_time) noexcept : max_state_age_(max_state_age), fade_time_(fade_time) {}
 
     /// `state`: a number that changes with each solve; `dt` since the last call [s].
@@ -60,9 +62,13 @@ class Watchdog {
 /// Factor on the force: falls to the allowed value at once and rises to it slowly.
 class SoftStart {
   public:
+    /// `time`: from 0 to 1 [s].
     explicit SoftStart(double time) noexcept : time_(time) {}
 
+    /// The factor after `dt` [s], at most `allowed`.
     double update(double allowed, double dt) noexcept;
+
+    /// The last factor, 0 to 1.
     [[nodiscard]] double gain() const noexcept { return gain_; }
 
   private:
@@ -77,12 +83,18 @@ class SoftStart {
 /// rise up to the square of peak over continuous force.
 class MotorThermalModel {
   public:
+    /// Cold motors.
     explicit MotorThermalModel(const DeviceProfile& device) noexcept
         : peak_(device.peak_force), continuous_(device.continuous_force), time_(device.thermal_time) {}
 
     /// Adds a `force` [N] held for `dt` [s].
     void add(double force, double dt) noexcept;
+
+    /// 0 cold, 1 the final value under the continuous force.
     [[nodiscard]] double thermal_load() const noexcept { return thermal_load_; }
+
+    /// Largest force that the load allows [N]: the peak force up to a load of 0.75, from there falling linearly to the
+    /// continuous force at a load of 1.
     [[nodiscard]] double max_force() const noexcept;
 
   private:
@@ -131,6 +143,8 @@ class ForceLimiter {
     [[nodiscard]] double thermal_load() const noexcept { return heat_.thermal_load(); }
     /// Factor of watchdog and soft start on the force, 0 to 1.
     [[nodiscard]] double gain() const noexcept { return soft_start_.gain(); }
+
+    /// The device whose limits apply.
     [[nodiscard]] const DeviceProfile& device() const noexcept { return device_; }
 
     /// As new, except for the thermal load. For a replay construct a new limiter.

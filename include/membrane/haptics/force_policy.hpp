@@ -18,10 +18,10 @@ namespace membrane {
 /// State of the loop at the end of a tick.
 template <Real Scalar>
 struct HapticState {
-    Tool<Scalar> tool;
-    Contact<Scalar> contact;
-    StepReport<Scalar> report;
-    Grasp<Scalar> grasp = {};
+    Tool<Scalar> tool;          ///< of this tick, as the device returned it
+    Contact<Scalar> contact;    ///< of this tick
+    StepReport<Scalar> report;  ///< of the last step
+    Grasp<Scalar> grasp = {};   ///< of this tick; no point is held if left out
 };
 
 /// The force on the hand [N]. Requirements that the compiler cannot check: it is finite for every finite state, and it
@@ -72,6 +72,8 @@ struct SpringDamperForce {
     double damping = 0;  ///< mu [N s/m]
 
     // For braced states of double or float. Templates, so that they cost no compile time unless called.
+    ///@{
+    /// The force on the hand [N], see `ForcePolicy`. Online.
     template <int = 0>
     [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept {
         return force(state);
@@ -80,6 +82,7 @@ struct SpringDamperForce {
     [[nodiscard]] Vector3<float> operator()(const HapticState<float>& state) const noexcept {
         return force(state);
     }
+    ///@}
 
   private:
     template <Real Scalar>
@@ -91,8 +94,10 @@ struct SpringDamperForce {
 /// gains no energy. If a step has loads, pins or the tool of a second hand, write a policy that sums the
 /// `report.reactions` of one hand.
 struct ReactionForce {
-    double scale = 1;
+    double scale = 1;  ///< force at the hand over force at the tissue
 
+    ///@{
+    /// The force on the hand [N], see `ForcePolicy`. Online.
     template <int = 0>
     [[nodiscard]] Vector3<double> operator()(const HapticState<double>& state) const noexcept {
         return force(state);
@@ -101,6 +106,7 @@ struct ReactionForce {
     [[nodiscard]] Vector3<float> operator()(const HapticState<float>& state) const noexcept {
         return force(state);
     }
+    ///@}
 
   private:
     template <Real Scalar>

@@ -12,6 +12,7 @@
 ///     device.write(feel({tool, contact, report, grasp}));                    // tool.time must be set
 namespace membrane {
 
+/// Options of a `GraspTransition`.
 struct TransitionOptions {
     double duration = 0.1;  ///< of the change from one force law to the other [s]
 
@@ -31,6 +32,7 @@ class GraspTransition {
     explicit GraspTransition(Policy policy, const TransitionOptions& options = {})
         : policy_((options.check(), std::move(policy))), duration_(static_cast<Scalar>(options.duration)) {}
 
+    /// Force of the policy, continuous where a grasp begins or ends [N]. Once a tick, online.
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& state) noexcept;
 
     /// Whether the force is between the two laws.

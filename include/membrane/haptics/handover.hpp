@@ -31,13 +31,14 @@ struct Stamp {
     std::uint64_t number = 0;  ///< from 1 on; 0 before the first
     double time = 0;           ///< [s]
 
+    /// Time since the publish [s], by the same clock.
     [[nodiscard]] double age(double now) const noexcept { return now - time; }
 };
 
 /// A published value with its stamp.
 template <class T>
 struct Snapshot : Stamp {
-    T value{};
+    T value{};  ///< the default before the first publish
 };
 
 /// The latest value that one thread publishes for one other thread: a pose, a force. The reader skips older values.

@@ -60,7 +60,7 @@ struct Dissipation {
 
 /// Result of `passivity`.
 struct PassivityReport {
-    bool passive = false;
+    bool passive = false;          ///< whether the loop as given is passive
     double max_stiffness = 0;      ///< largest passive K, all else equal, at most the device's [N/m]; 0: none above 0
     double damping_needed = 0;     ///< by the loop as given [N s/m]
     double damping_available = 0;  ///< of device and hand, and of friction as far as it is counted [N s/m]
@@ -112,6 +112,8 @@ class PassivityObserver {
     [[nodiscard]] double energy_in() const noexcept { return energy_in_; }
     /// Smallest `energy` so far [J].
     [[nodiscard]] double min_energy() const noexcept { return min_energy_; }
+
+    /// As new: all energies are zero.
     void reset() noexcept { *this = PassivityObserver(damping_, friction_); }
 
   private:

@@ -29,7 +29,7 @@ namespace membrane {
 /// One tick: the tool that the device returned, and the force written to it.
 template <Real Scalar>
 struct RecordedTick {
-    Tool<Scalar> tool;
+    Tool<Scalar> tool;                                ///< as the device returned it
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
 };
 
@@ -37,10 +37,11 @@ struct RecordedTick {
 template <Real Scalar>
 [[nodiscard]] bool identical(const RecordedTick<Scalar>& a, const RecordedTick<Scalar>& b) noexcept;
 
+/// Ticks of one run, in order.
 template <Real Scalar>
 struct Recording {
-    Index vertex_count = 0;  ///< of the membrane; guards against a replay with another mesh
-    std::vector<RecordedTick<Scalar>> ticks = {};
+    Index vertex_count = 0;                        ///< of the membrane; guards against a replay with another mesh
+    std::vector<RecordedTick<Scalar>> ticks = {};  ///< one a tick, from the first
 };
 
 /// Records a run into memory allocated at construction. Values that are not finite are recorded unchanged.
@@ -63,6 +64,7 @@ class Recorder {
         }
     }
 
+    /// Number of recorded ticks.
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
 
     /// Number of ticks that exceeded the capacity.
@@ -108,9 +110,11 @@ class ReplayDevice {
         if (differing_++ == 0) first_difference_ = next_ - 1;
     }
 
+    ///@{
     /// Number of forces so far that differed from the recorded ones in any bit, and the tick of the first difference.
     [[nodiscard]] std::size_t differing() const noexcept { return differing_; }
     [[nodiscard]] std::size_t first_difference() const noexcept { return first_difference_; }
+    ///@}
 
     /// Returns to the first tick.
     void reset() noexcept { next_ = differing_ = first_difference_ = 0; }

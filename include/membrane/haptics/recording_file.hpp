@@ -28,6 +28,7 @@
 /// checksums, so it also detects lost or reordered ticks.
 namespace membrane {
 
+/// Version of the format, in each file.
 inline constexpr std::uint32_t recording_version = 1;
 
 /// Write errors are in the state of the stream.

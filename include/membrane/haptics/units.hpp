@@ -21,20 +21,28 @@ namespace membrane {
 template <class Unit, class Value>
 class In {
   public:
+    /// `value`, a number in this unit.
     explicit In(Value value) noexcept : value_(std::move(value)) {}
 
+    /// The number, without its unit.
     [[nodiscard]] const Value& value() const noexcept { return value_; }
 
+    ///@{
+    /// Sums, multiples and comparison of one unit.
     [[nodiscard]] friend In operator+(const In& a, const In& b) noexcept { return In(a.value_ + b.value_); }
     [[nodiscard]] friend In operator-(const In& a, const In& b) noexcept { return In(a.value_ - b.value_); }
     [[nodiscard]] friend In operator*(double times, const In& a) noexcept { return In(times * a.value_); }
     [[nodiscard]] friend bool operator==(const In& a, const In& b) noexcept { return a.value_ == b.value_; }
+    ///@}
 
   private:
     Value value_;
 };
 
+/// Names of the units, for `In`.
 namespace unit {
+///@{
+/// A unit.
 struct Metre;
 struct Millimetre;
 struct MetrePerSecond;
@@ -42,8 +50,11 @@ struct MillimetrePerSecond;
 struct Newton;
 struct NewtonPerMetre;
 struct NewtonPerMillimetre;
+///@}
 }  // namespace unit
 
+///@{
+/// Positions, velocities, forces and stiffnesses with their units.
 using Metres = In<unit::Metre, Vector3<double>>;
 using Millimetres = In<unit::Millimetre, Vector3<double>>;
 using MetresPerSecond = In<unit::MetrePerSecond, Vector3<double>>;
@@ -51,8 +62,10 @@ using MillimetresPerSecond = In<unit::MillimetrePerSecond, Vector3<double>>;
 using Newtons = In<unit::Newton, Vector3<double>>;
 using NewtonsPerMetre = In<unit::NewtonPerMetre, double>;
 using NewtonsPerMillimetre = In<unit::NewtonPerMillimetre, double>;
+///@}
 
-// Correctly rounded: 1000 is exact in floating point, 0.001 is not.
+///@{
+/// The same quantity in the other unit. Correctly rounded: 1000 is exact in floating point, 0.001 is not.
 [[nodiscard]] inline Metres in_metres(const Millimetres& a) noexcept { return Metres(a.value() / 1000); }
 [[nodiscard]] inline Millimetres in_millimetres(const Metres& a) noexcept { return Millimetres(a.value() * 1000); }
 [[nodiscard]] inline MetresPerSecond in_metres(const MillimetresPerSecond& a) noexcept {
@@ -67,6 +80,7 @@ using NewtonsPerMillimetre = In<unit::NewtonPerMillimetre, double>;
 [[nodiscard]] inline NewtonsPerMillimetre in_millimetres(NewtonsPerMetre a) noexcept {
     return NewtonsPerMillimetre(a.value() / 1000);
 }
+///@}
 
 /// A force at the device and in the scene, and the scale between them, so that neither is taken for the other.
 struct FeltForce {
@@ -85,12 +99,16 @@ struct DeviceScale {
     /// @throws InvalidInput if a scale is not finite and positive
     void check() const;
 
+    ///@{
+    /// From the device to the scene: scaled by `motion`, then transformed by `device`.
     [[nodiscard]] Metres to_scene(const Millimetres& position) const noexcept {
         return Metres(device.point_to_world(motion * in_metres(position).value()));
     }
     [[nodiscard]] MetresPerSecond to_scene(const MillimetresPerSecond& velocity) const noexcept {
         return MetresPerSecond(device.vector_to_world(motion * in_metres(velocity).value()));
     }
+    ///@}
+
     /// The tool of the scene; the caller sets radius, axis, time and grasping.
     [[nodiscard]] Tool<double> to_scene(const Millimetres& position,
                                         const MillimetresPerSecond& velocity) const noexcept {
@@ -99,6 +117,8 @@ struct DeviceScale {
         tool.velocity = to_scene(velocity).value();
         return tool;
     }
+
+    /// From the scene to the device: scaled by `force`, then rotated into the frame of `device`.
     [[nodiscard]] FeltForce to_device(const Newtons& scene_force) const noexcept {
         return {Newtons(device.vector_to_body(force * scene_force.value())), scene_force, force};
     }

@@ -18,6 +18,7 @@
 ///     device.write(coupling.force());                                        // [N]
 namespace membrane {
 
+/// Options of a `VirtualCoupling`.
 struct CouplingOptions {
     double stiffness;    ///< of the spring between hand and tool [N/m]
     double damping = 0;  ///< of the motion of the tool, see `min_damping` [N s/m]

@@ -17,6 +17,7 @@
 ///     near.representative()[v];  // the lowest vertex at the position of v, possibly v itself
 namespace membrane {
 
+/// Groups of vertices at equal positions, and pairs at nearly equal ones.
 class CoincidentVertices {
   public:
     /// Compares the points `vertices` of `x` [m], which must be finite; all others count as distinct. O(n log n).

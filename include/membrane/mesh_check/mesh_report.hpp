@@ -20,17 +20,22 @@ namespace membrane {
 
 /// One defect and its location.
 struct MeshFinding {
-    MeshDefect defect;
-    std::vector<Index> vertices, triangles;  ///< Those concerned; empty if it is the whole mesh.
-    std::string text;                        ///< Says what was found and what is expected.
+    MeshDefect defect;  ///< Its kind.
+    ///@{
+    /// Those concerned; empty if it is the whole mesh.
+    std::vector<Index> vertices, triangles;
+    ///@}
+    std::string text;  ///< Says what was found and what is expected.
 };
 
+/// Facts and defects of a mesh.
 struct MeshReport {
-    SurfaceFacts facts;
+    SurfaceFacts facts;                                   ///< Of the triangles with three different vertices.
     std::vector<MeshFinding> findings;                    ///< In the order of the search; limited for each kind.
     std::array<std::size_t, mesh_defect_count> counts{};  ///< Of each kind, listed or not.
     bool complete = true;                                 ///< False: a search stopped early, there may be more.
 
+    /// Number of defects of one kind, listed or not.
     [[nodiscard]] std::size_t count(MeshDefect defect) const noexcept {
         return counts[static_cast<std::size_t>(defect)];
     }

@@ -50,17 +50,24 @@ struct RepairOptions {
 
 /// Number of vertices or triangles that each option has changed.
 struct RepairReport {
+    ///@{
+    /// Of the option `weld`, `drop_repeated`, `drop_zero_area`, `drop_duplicates`, `orient`, `split_vertices`,
+    /// `flip_inward`, `drop_isolated`.
     Index welded = 0, repeated = 0, zero_area = 0, duplicates = 0, turned = 0, split = 0, flipped = 0, isolated = 0;
+    ///@}
     bool complete = true;  ///< False: the search for pairs within `weld` reached its limit, some may not be welded.
 };
 
+/// A repaired mesh, and where its vertices and triangles come from.
 template <Real Scalar>
 struct RepairedMesh {
-    Points<Scalar> positions;
-    Triangles triangles;
+    Points<Scalar> positions;  ///< 3 x V [m]
+    Triangles triangles;       ///< 3 x F
+    ///@{
     /// Index in the input of each vertex (welded: the lowest; split off: the one it was split from) and triangle.
     std::vector<Index> vertices, source_triangles;
-    RepairReport report;
+    ///@}
+    RepairReport report;  ///< What was changed.
 };
 
 /// The mesh after the repairs of `options`, without other changes. Kept vertices keep their order and their positions,

@@ -22,9 +22,20 @@
 namespace membrane {
 
 /// Orientation of the closed components.
-enum class Facing : std::uint8_t { unknown, outward, inward, both };
+enum class Facing : std::uint8_t {
+    unknown,  ///< No component is closed.
+    outward,  ///< All face outward.
+    inward,   ///< All face inward.
+    both,     ///< Some face outward, others inward.
+};
 
-enum class LengthUnit : std::uint8_t { unknown, metre, millimetre, micrometre };
+/// A unit of length.
+enum class LengthUnit : std::uint8_t {
+    unknown,     ///< None of the others.
+    metre,       ///< [m]
+    millimetre,  ///< 1e-3 m
+    micrometre,  ///< 1e-6 m
+};
 
 /// Facts of the triangles with three different vertices. Lengths, angles, area and volume count usable coordinates
 /// only.
@@ -37,31 +48,38 @@ struct SurfaceFacts {
     Index border_edges = 0;           ///< Edges with one triangle; 0 if the surface is closed.
     Index genus = no_index;           ///< Handles, of all components together; `no_index` if the mesh has errors.
     Facing facing = Facing::unknown;  ///< Of the closed components; `unknown` if there is none.
-    double shortest_edge = 0, mean_edge = 0, max_edge = 0;  ///< [m]
-    double smallest_angle = 0, largest_angle = 0;           ///< Between two sides [rad].
-    double area = 0;                                        ///< [m^2]
-    double volume = 0;                                      ///< Of the closed components, negative if inward [m^3].
-    Vector3<double> size = Vector3<double>::Zero();         ///< Along the axes [m].
+    ///@{
+    /// Length of an edge [m].
+    double shortest_edge = 0, mean_edge = 0, max_edge = 0;
+    ///@}
+    ///@{
+    /// Between two sides of a triangle [rad].
+    double smallest_angle = 0, largest_angle = 0;
+    ///@}
+    double area = 0;                                 ///< [m^2]
+    double volume = 0;                               ///< Of the closed components, negative if inward [m^3].
+    Vector3<double> size = Vector3<double>::Zero();  ///< Along the axes [m].
     /// The unit in which the surface is 1 mm to 2 m large: an estimate.
     LengthUnit likely_unit = LengthUnit::unknown;
 
+    /// Whether there are triangles, and no border.
     [[nodiscard]] bool closed() const noexcept { return triangles > 0 && border_edges == 0; }
 };
 
 /// A connected component: triangles joined by edges.
 struct SurfaceComponent {
-    Index first_triangle = no_index;
-    Index triangle_count = 0;
-    bool closed = true;  ///< Each edge has two triangles, which run along it in opposite directions.
-    double area = 0;     ///< [m^2]
-    double volume = 0;   ///< If closed [m^3].
-    Aabb<double> extent;
+    Index first_triangle = no_index;  ///< The lowest index of its triangles.
+    Index triangle_count = 0;         ///< Number of its triangles.
+    bool closed = true;               ///< Each edge has two triangles, which run along it in opposite directions.
+    double area = 0;                  ///< [m^2]
+    double volume = 0;                ///< If closed [m^3].
+    Aabb<double> extent;              ///< The box around it [m].
 };
 
 /// The connected components, in order of their first triangles.
 struct SurfaceParts {
-    std::vector<SurfaceComponent> parts;
-    std::vector<Index> part_of;  ///< Component of each triangle; `no_index` for triangles without half-edges.
+    std::vector<SurfaceComponent> parts;  ///< One for each component.
+    std::vector<Index> part_of;           ///< Component of each triangle; `no_index` for triangles without half-edges.
 };
 
 /// The connected components of the triangles with half-edges in `sides`. `finite` says which triangles have only usable

@@ -34,6 +34,7 @@
 ///     std::cout << report.facts.components << " components, " << report.facts.borders << " borders\n";
 namespace membrane {
 
+/// Options of `validate`.
 struct ValidateOptions {
     /// Vertices at most this far from each other or from a border edge count as unjoined [m]. Default: the larger of a
     /// millionth of the mean edge and four times the spacing of floating-point numbers at the largest coordinate.
@@ -66,6 +67,7 @@ template <class S, std::size_t m, std::integral I, std::size_t n>
                     detail::by_threes("validate", corners, "triangles"), options);
 }
 
+/// Validates a mesh that `TriangleMesh` has accepted: its findings are warnings.
 template <Real Scalar>
 [[nodiscard]] MeshReport validate(const TriangleMesh<Scalar>& mesh, const ValidateOptions& options = {}) {
     return validate(mesh.positions(), mesh.triangles(), options);

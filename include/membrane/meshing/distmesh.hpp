@@ -24,6 +24,7 @@
 ///                                             .bounds = membrane::Bounds{{-1, -1, -1}, {1, 1, 1}}});
 namespace membrane {
 
+/// Options of `distmesh`.
 struct DistMeshOptions {
     EdgeLength edge_length = {};         ///< Target length [m], or a function of the position. Required.
     std::optional<Bounds> bounds = {};   ///< Box around the surface [m]; required if the body has no bounds of its own.

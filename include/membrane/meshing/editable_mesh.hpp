@@ -26,23 +26,31 @@ class EditableMesh {
     /// O(F log F).
     inline explicit EditableMesh(const TriangleMesh<double>& mesh);
 
+    ///@{
     /// Counts include collapsed elements.
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(side_from_.size()); }
     [[nodiscard]] Index side_count() const noexcept { return static_cast<Index>(from_.size()); }
+    ///@}
 
+    ///@{
     /// Whether the vertex is in a triangle; whether the side's triangle still exists.
     [[nodiscard]] bool is_vertex(Index v) const noexcept { return side_from_[at(v)] != no_index; }
     [[nodiscard]] bool exists(Index side) const noexcept { return from_[at(side)] != no_index; }
+    ///@}
 
+    ///@{
     /// In the side's triangle: the next side, the previous side, and the three vertices: first, second, apex.
     [[nodiscard]] static Index next(Index side) noexcept { return side % 3 == 2 ? side - 2 : side + 1; }
     [[nodiscard]] static Index last(Index side) noexcept { return side % 3 == 0 ? side + 2 : side - 1; }
     [[nodiscard]] Index from(Index side) const noexcept { return from_[at(side)]; }
     [[nodiscard]] Index to(Index side) const noexcept { return from_[at(next(side))]; }
     [[nodiscard]] Index apex(Index side) const noexcept { return from_[at(last(side))]; }
+    ///@}
 
     /// The other side of the edge; `no_index` at a border.
     [[nodiscard]] Index twin(Index side) const noexcept { return twin_[at(side)]; }
+
+    /// Whether vertex `v` is on the border.
     [[nodiscard]] bool is_border(Index v) const noexcept { return twin(side_from_[at(v)]) == no_index; }
 
     /// Calls `visit(side)` for the outgoing side of `v` in each of its triangles, counter-clockwise, from border to
@@ -53,7 +61,10 @@ class EditableMesh {
     /// Whether an edge joins the two vertices. Linear in the triangles around `v`.
     [[nodiscard]] inline bool has_edge(Index v, Index w) const;
 
+    /// Position of vertex `v` [m].
     [[nodiscard]] const Vector3<double>& position(Index v) const noexcept { return positions_[at(v)]; }
+
+    /// Moves vertex `v` to the position `to` [m].
     void move(Index v, const Vector3<double>& to) noexcept { positions_[at(v)] = to; }
 
     /// Replaces the edge by the other diagonal of its two triangles; `side` is then the new edge. If the edge is at a

@@ -19,8 +19,10 @@ namespace membrane {
 /// The part of a body's surface that lies within another body; its border is where the two surfaces meet.
 template <SignedDistance Body, SignedDistance Within>
 struct Trimmed {
-    Body body;
-    Within within;
+    Body body;      ///< whose surface it is
+    Within within;  ///< outside of which there is no surface
+
+    /// The box that the bounds of both have in common [m].
     [[nodiscard]] Bounds bounds() const { return bounds_of(body).within(bounds_of(within)); }
 };
 
@@ -41,6 +43,7 @@ template <SignedDistance Body, SignedDistance Within>
 
 /// All of space: `Within` of a surface without a border.
 struct Everywhere {
+    /// Negative: every point is inside.
     [[nodiscard]] double operator()(const Vector3<double>&) const noexcept { return -1; }
 };
 
@@ -54,16 +57,20 @@ struct OnSurface {
 template <SignedDistance Body, SignedDistance Within = Everywhere>
 class LevelSurface {
   public:
-    static constexpr bool has_border = !std::same_as<Within, Everywhere>;
+    static constexpr bool has_border = !std::same_as<Within, Everywhere>;  ///< whether another body trims the surface
 
+    ///@{
     /// `bounds` [m] only set the difference step of gradients and the tolerance.
     LevelSurface(const Body& body, const Bounds& bounds) : LevelSurface(trimmed(body, Within{}), bounds) {}
     LevelSurface(const Trimmed<Body, Within>& surface, const Bounds& bounds)
         : surface_(surface), size_(norm<double>(bounds.high - bounds.low)) {}
+    ///@}
 
+    ///@{
     /// Signed distance to the body [m]; to the body that trims it [m].
     [[nodiscard]] double distance(const Vector3<double>& p) const { return surface_.body(p); }
     [[nodiscard]] double beyond_border(const Vector3<double>& p) const { return surface_.within(p); }
+    ///@}
 
     /// Largest distance of a projected point from the surface [m]: 1e-10 of the size of the bounds. Most points are
     /// much closer.

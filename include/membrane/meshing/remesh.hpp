@@ -22,9 +22,13 @@ namespace membrane {
 /// Target length of the edges [m]: a constant, or a function of the position.
 class EdgeLength {
   public:
-    EdgeLength() = default;
+    EdgeLength() = default;  ///< No length: options refuse it.
+
+    /// The same length everywhere [m].
     EdgeLength(double everywhere)  // NOLINT(google-explicit-constructor)
         : at_([everywhere](const Vector3<double>&) { return everywhere; }) {}
+
+    /// `at(p)`: the length at the position `p` [m].
     template <class At>
         requires(!std::same_as<At, EdgeLength> && std::is_invocable_r_v<double, const At&, const Vector3<double>&>)
     EdgeLength(At at) : at_(std::move(at)) {}  // NOLINT(google-explicit-constructor)
@@ -45,8 +49,8 @@ class EdgeLength {
 struct RemeshProgress {
     Index iteration;   ///< 1 to the limit.
     Index iterations;  ///< The limit.
-    Index vertices;
-    double movement;  ///< Largest displacement in this iteration, relative to the target length there.
+    Index vertices;    ///< Number of vertices now.
+    double movement;   ///< Largest displacement in this iteration, relative to the target length there.
 };
 
 /// `mesh`, whose vertices are on `surface`, with edges close to the target `length` and even angles.

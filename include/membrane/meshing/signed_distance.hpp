@@ -50,15 +50,23 @@ concept GivesGradient = SignedDistance<D> && requires(const D& distance, const V
 
 /// An axis-aligned box that contains a body [m]. Infinite where the body is.
 struct Bounds {
+    ///@{
+    /// Corners of least and greatest coordinates [m].
     Vector3<double> low = Vector3<double>::Constant(-std::numeric_limits<double>::infinity());
     Vector3<double> high = Vector3<double>::Constant(std::numeric_limits<double>::infinity());
+    ///@}
 
+    /// The box with each face moved outward by `by` [m].
     [[nodiscard]] Bounds grown(double by) const noexcept {
         return {low - Vector3<double>::Constant(by), high + Vector3<double>::Constant(by)};
     }
+
+    /// The box that both have in common.
     [[nodiscard]] Bounds within(const Bounds& other) const noexcept {
         return {low.cwiseMax(other.low), high.cwiseMin(other.high)};
     }
+
+    /// The smallest box that contains both.
     [[nodiscard]] Bounds around(const Bounds& other) const noexcept {
         return {low.cwiseMin(other.low), high.cwiseMax(other.high)};
     }
@@ -84,41 +92,51 @@ template <SignedDistance D>
 // The bodies below are true distances, except near the intersection of two surfaces: there `united` is not inside,
 // `intersection` and `difference` are not outside.
 
+/// A ball.
 struct Ball {
     Vector3<double> centre = Vector3<double>::Zero();  ///< [m]
     double radius = 1;                                 ///< [m]
 
+    ///@{
+    /// Signed distance to the surface [m], its gradient, and the box around the body.
     [[nodiscard]] double operator()(const Vector3<double>& p) const { return norm<double>(p - centre) - radius; }
     [[nodiscard]] Vector3<double> gradient(const Vector3<double>& p) const {
         return direction<double>(p - centre, Vector3<double>::UnitZ());
     }
     [[nodiscard]] Bounds bounds() const { return Bounds{centre, centre}.grown(radius); }
+    ///@}
 };
 
-/// With its axes along x, y and z.
+/// An ellipsoid with its axes along x, y and z.
 struct Ellipsoid {
     Vector3<double> centre = Vector3<double>::Zero();  ///< [m]
     Vector3<double> radii = Vector3<double>::Ones();   ///< Half the length of each axis [m].
 
+    ///@{
+    /// Signed distance to the surface [m], its gradient, and the box around the body.
     [[nodiscard]] inline double operator()(const Vector3<double>& p) const;
     [[nodiscard]] inline Vector3<double> gradient(const Vector3<double>& p) const;
     [[nodiscard]] Bounds bounds() const { return {centre - radii, centre + radii}; }
+    ///@}
 
     /// The point of the surface nearest to `p` [m]. Newton's method on the multiplier of the ellipsoid's equation, from
     /// the side on which it never overshoots [Eberly13].
     [[nodiscard]] inline Vector3<double> nearest(const Vector3<double>& p) const;
 };
 
-/// With its edges along x, y and z. The mesher does not put vertices on the edges: triangles cut them off.
+/// A cuboid with its edges along x, y and z. The mesher does not put vertices on the edges: triangles cut them off.
 struct Cuboid {
     Vector3<double> centre = Vector3<double>::Zero();            ///< [m]
     Vector3<double> half_size = Vector3<double>::Constant(0.5);  ///< From the centre to the faces [m].
 
+    ///@{
+    /// Signed distance to the surface [m], and the box around the body.
     [[nodiscard]] double operator()(const Vector3<double>& p) const {
         const Vector3<double> beyond = (p - centre).cwiseAbs() - half_size;
         return norm<double>(beyond.cwiseMax(Vector3<double>::Zero())) + (std::min)(beyond.maxCoeff(), 0.0);
     }
     [[nodiscard]] Bounds bounds() const { return {centre - half_size, centre + half_size}; }
+    ///@}
 };
 
 /// All points within `radius` of the segment from `start` to `end`.
@@ -127,6 +145,8 @@ struct Capsule {
     Vector3<double> end = Vector3<double>::UnitZ();   ///< [m]
     double radius = 0.5;                              ///< [m]
 
+    ///@{
+    /// Signed distance to the surface [m], and the box around the body.
     [[nodiscard]] double operator()(const Vector3<double>& p) const {
         const Vector3<double> axis = end - start, offset = p - start;
         const double length = squared_norm(axis);
@@ -134,6 +154,7 @@ struct Capsule {
         return norm<double>(offset - along * axis) - radius;
     }
     [[nodiscard]] Bounds bounds() const { return Bounds{start, start}.around({end, end}).grown(radius); }
+    ///@}
 };
 
 /// The half-space behind a plane, for `intersection` and `trimmed`.
@@ -141,42 +162,74 @@ struct HalfSpace {
     Vector3<double> point = Vector3<double>::Zero();    ///< Of the plane [m].
     Vector3<double> normal = Vector3<double>::UnitZ();  ///< Out of the body, of any length.
 
+    ///@{
+    /// Signed distance to the plane [m], and its gradient.
     [[nodiscard]] double operator()(const Vector3<double>& p) const { return dot<double>(gradient(p), p - point); }
     [[nodiscard]] Vector3<double> gradient(const Vector3<double>&) const {
         return direction<double>(normal, Vector3<double>::UnitZ());
     }
+    ///@}
 };
 
+/// Two bodies as one.
 template <SignedDistance A, SignedDistance B>
 struct Union {
+    ///@{
+    /// A body.
     A a;
     B b;
+    ///@}
+
+    ///@{
+    /// Signed distance to the surface, near the intersection of both a bound of it [m]; the box around the body.
     [[nodiscard]] double operator()(const Vector3<double>& p) const { return (std::min<double>)(a(p), b(p)); }
     [[nodiscard]] Bounds bounds() const { return bounds_of(a).around(bounds_of(b)); }
+    ///@}
 };
 
+/// The part that two bodies have in common.
 template <SignedDistance A, SignedDistance B>
 struct Intersection {
+    ///@{
+    /// A body.
     A a;
     B b;
+    ///@}
+
+    ///@{
+    /// Signed distance to the surface, near the intersection of both a bound of it [m]; the box around the body.
     [[nodiscard]] double operator()(const Vector3<double>& p) const { return (std::max<double>)(a(p), b(p)); }
     [[nodiscard]] Bounds bounds() const { return bounds_of(a).within(bounds_of(b)); }
+    ///@}
 };
 
+/// The part of one body that is not in another.
 template <SignedDistance A, SignedDistance B>
 struct Difference {
+    ///@{
+    /// A body, and the one that is taken away from it.
     A a;
     B b;
+    ///@}
+
+    ///@{
+    /// Signed distance to the surface, near the intersection of both a bound of it [m]; the box around the body.
     [[nodiscard]] double operator()(const Vector3<double>& p) const { return (std::max<double>)(a(p), -b(p)); }
     [[nodiscard]] Bounds bounds() const { return bounds_of(a); }
+    ///@}
 };
 
+/// A body with its surface moved outward.
 template <SignedDistance A>
 struct Offset {
-    A body;
-    double by;
+    A body;     ///< before the displacement
+    double by;  ///< distance between the surfaces, negative inward [m]
+
+    ///@{
+    /// Signed distance to the displaced surface [m], and the box around the displaced body.
     [[nodiscard]] double operator()(const Vector3<double>& p) const { return body(p) - by; }
     [[nodiscard]] Bounds bounds() const { return bounds_of(body).grown(by); }
+    ///@}
 };
 
 /// The points in `a`, in `b` or in both.

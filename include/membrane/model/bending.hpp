@@ -36,11 +36,13 @@ namespace membrane {
 /// leaves out the term that vanishes at rest, the only one that may be negative.
 template <Number Scalar>
 struct Hinge {
-    static constexpr std::size_t corner_count = 4;
+    static constexpr std::size_t corner_count = 4;  ///< two of the edge, two apexes
 
     Scalar stiffness;  ///< [N m]
     Scalar rest;       ///< [rad]
 
+    ///@{
+    /// As `Element` requires.
     template <Number N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 4>& x, std::size_t i) const noexcept;
     template <Number N>
@@ -50,6 +52,7 @@ struct Hinge {
                                                 const Vector3<N>& displacement) const noexcept;
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 4>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
+    ///@}
 };
 
 /// A hinge at each edge between two triangles of `mesh`, whose shape is the rest shape, for a flexural rigidity D [N

@@ -39,6 +39,7 @@ struct EnergyChange {
     Scalar change = 0;  ///< [J]
     Scalar size = 0;    ///< of the summed terms: times epsilon, the rounding error [J]
 
+    /// Adds changes and sizes: of the elements at one vertex.
     EnergyChange& operator+=(const EnergyChange& other) noexcept {
         change += other.change, size += other.size;
         return *this;

@@ -56,8 +56,8 @@ concept Element = std::copyable<E> && requires(const E& element, const Corners<d
 /// An element and its vertices.
 template <class E>
 struct ElementInstance {
-    std::array<Index, E::corner_count> corners;
-    E element;
+    std::array<Index, E::corner_count> corners;  ///< vertices, in the order of the element
+    E element;                                   ///< the constants
 
     /// Positions of its corners.
     template <class Positions>
@@ -132,15 +132,18 @@ concept CheckedElement = detail::check_element<E>();
 template <Real Scalar_, CheckedElement Each>
 class Elements {
   public:
-    using Scalar = Scalar_;
-    static constexpr std::size_t corner_count = Each::corner_count;
-    using Instance = ElementInstance<Each>;
+    using Scalar = Scalar_;                                          ///< of the constants and forces
+    static constexpr std::size_t corner_count = Each::corner_count;  ///< vertices of one element
+    using Instance = ElementInstance<Each>;                          ///< one element with its vertices
 
     /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, or whose force or stiffness
     /// at rest is not finite: a triangle is too thin, or a constant too large, for the scalar. Cost: linear.
     Elements(const TriangleMesh<Scalar>& mesh, std::vector<Instance> all);
 
+    /// Number of vertices of the mesh.
     [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
+
+    /// All elements, in the order in which they were given.
     [[nodiscard]] std::span<const Instance> all() const noexcept { return all_; }
 
     /// Calls `act(instance)` for each element.

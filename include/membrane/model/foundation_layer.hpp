@@ -46,12 +46,20 @@ class FoundationSprings {
     /// @throws InvalidInput for a constant that is negative, not finite, missing, or of the wrong count
     FoundationSprings(const TriangleMesh<Scalar>& mesh, const FoundationOptions<Scalar>& options);
 
+    ///@{
+    /// Positions [m] and unit normals of the mesh, 3 x V.
     [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
     [[nodiscard]] const Points<Scalar>& normals() const noexcept { return normals_; }
+    ///@}
+
+    ///@{
+    /// Constants of vertex `v`: [N/m], [N/m] and [s].
     [[nodiscard]] Scalar normal_stiffness(Index v) const noexcept { return constants(v).normal; }
     [[nodiscard]] Scalar tangential_stiffness(Index v) const noexcept { return constants(v).tangential; }
     [[nodiscard]] Scalar recovery_time(Index v) const noexcept { return constants(v).time; }
+    ///@}
 
+    /// As `FoundationModel` requires.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                                Scalar dt) const noexcept {
         const auto& k = constants(v);

@@ -41,7 +41,11 @@ static_assert(std::is_default_constructible_v<NetworkOptions<double>>);
 /// One spring of the network.
 template <Real Scalar>
 struct Spring {
+    ///@{
+    /// Vertices at its ends.
     Index first, second;
+    ///@}
+
     Scalar stiffness;    ///< [N/m]
     Scalar rest_length;  ///< [m]
 };
@@ -49,7 +53,7 @@ struct Spring {
 /// One spring, from the vertex at one end.
 template <Real Scalar>
 struct SpringEnd {
-    Index other;
+    Index other;         ///< vertex at the other end
     Scalar stiffness;    ///< [N/m]
     Scalar rest_length;  ///< [m]
 };
@@ -65,7 +69,11 @@ template <Real Scalar, class Positions>
 /// direction [N/m].
 template <Number Scalar>
 struct SpringStiffness {
+    ///@{
+    /// [N/m]
     Scalar along, across;
+    ///@}
+
     Vector3<Scalar> direction;  ///< to the other end; zero if the length is zero
 };
 
@@ -89,11 +97,14 @@ struct SpringEdge {
     Scalar divisor;        ///< the length, or 1 if it is 0 [m]
     Scalar per_length;     ///< 1 / divisor [1/m]
 
-    SpringEdge() = default;
+    SpringEdge() = default;  ///< Not initialised.
+
+    /// From the vector to the other end [m].
     MEMBRANE_INLINE explicit SpringEdge(const Vector3<Scalar>& to) noexcept
         : edge(to), length(norm(to)), divisor(select(length != 0, length, Scalar(1))), per_length(1 / divisor) {}
 };
 
+///@{
 /// Force of a spring of this stiffness [N/m] and rest length [m] on the vertex where its edge vector starts.
 template <Number Scalar, class Law>
 [[nodiscard]] MEMBRANE_INLINE SpringForce<Scalar> spring_force(const Law& law, const SpringEdge<Scalar>& to,
@@ -113,6 +124,7 @@ template <Number Scalar, class Law>
                                                                const Scalar& rest_length) noexcept {
     return spring_force(law, SpringEdge<Scalar>(edge), stiffness, rest_length);
 }
+///@}
 
 /// Adds the force and the stiffness of a spring to those on a vertex.
 template <Number Scalar>
@@ -127,9 +139,13 @@ template <Number Scalar>
 struct CurvedSum {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
     Scalar stiffness = 0;                             ///< [N/m]
-    Symmetric3<Scalar> dyads;                   ///< sum of r u u^T, r the stiffness reduction across a spring [N/m]
-    Scalar size_force = 1, size_stiffness = 0;  ///< the quotient is the smallest size [N], [N/m]
+    Symmetric3<Scalar> dyads;  ///< sum of r u u^T, r the stiffness reduction across a spring [N/m]
+    ///@{
+    /// The quotient is the smallest size: [N] over [N/m].
+    Scalar size_force = 1, size_stiffness = 0;
+    ///@}
 
+    /// The sum as an `EnergyMajoriser`.
     [[nodiscard]] MEMBRANE_INLINE EnergyMajoriser<Scalar> total() const noexcept {
         EnergyMajoriser<Scalar> sum{force, stiffness, diagonal3(dyads.trace())};
         sum.stiffness_reduction += Scalar(-1) * dyads;
@@ -138,6 +154,8 @@ struct CurvedSum {
         return sum;
     }
 };
+
+/// Adds a spring.
 template <Number Scalar>
 MEMBRANE_INLINE void add(CurvedSum<Scalar>& sum, const SpringForce<Scalar>& spring) noexcept {
     const Scalar stiffness = larger(spring.along, spring.across);
@@ -157,6 +175,8 @@ inline void add(Symmetric3<Scalar>& sum, const SpringStiffness<Scalar>& spring) 
     sum += diagonal3(spring.across);
     sum += outer<Scalar>(spring.along - spring.across, spring.direction);
 }
+
+/// A spring's stiffness as a 3 x 3 block [N/m].
 template <Number Scalar>
 [[nodiscard]] Symmetric3<Scalar> block_of(const SpringStiffness<Scalar>& spring) noexcept {
     Symmetric3<Scalar> block;
@@ -184,18 +204,21 @@ template <Number Scalar>
 /// A spring as an `Element`, between its two ends.
 template <Real Scalar, class Law>
 struct SpringElement {
-    static constexpr std::size_t corner_count = 2;
+    static constexpr std::size_t corner_count = 2;  ///< its ends
 
     const Law* law;      ///< must outlive this
     Scalar stiffness;    ///< [N/m]
     Scalar rest_length;  ///< [m]
 
+    /// Force of the spring on the vertex where its `edge` vector starts.
     template <Real N>
     [[nodiscard]] SpringForce<N> force_along(const Vector3<N>& edge) const noexcept {
         static_assert(SpringLaw<Law, N>,
                       "a law must take SpringState of the scalar it is asked in: an equilibrium is found in double");
         return spring_force<N>(*law, edge, static_cast<N>(stiffness), static_cast<N>(rest_length));
     }
+
+    /// The law at this length [m].
     template <Real N>
     [[nodiscard]] SpringResponse<N> response(N length) const noexcept {
         constexpr N shortest = (std::numeric_limits<N>::min)();  // no law is called with a smaller length
@@ -203,6 +226,8 @@ struct SpringElement {
             SpringState<N>{static_cast<N>(stiffness), static_cast<N>(rest_length), (std::max)(length, shortest)});
     }
 
+    ///@{
+    /// As `Element` requires.
     template <Real N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 2>& x, std::size_t i) const noexcept {
         const auto spring = force_along<N>(x[1 - i] - x[i]);
@@ -227,6 +252,7 @@ struct SpringElement {
         const auto block = block_of<double>(force_along<double>(x[1] - x[0]));
         return dense(i == j ? block : -1.0 * block);
     }
+    ///@}
 };
 static_assert(Element<SpringElement<float, LinearSpring>> && Element<SpringElement<double, ExponentialSpring>>);
 
@@ -234,16 +260,22 @@ static_assert(Element<SpringElement<float, LinearSpring>> && Element<SpringEleme
 template <Real Scalar_, CheckedSpringLaw<Scalar_> Law>
 class MassSpringNetwork {
   public:
-    using Scalar = Scalar_;
+    using Scalar = Scalar_;  ///< of the constants and forces
 
-    static constexpr bool never_stiffens = membrane::never_stiffens<Law>();
+    static constexpr bool never_stiffens = membrane::never_stiffens<Law>();  ///< that of the law
 
+    /// A spring for each edge of `mesh`; keeps a copy of `law`, and not the mesh.
     /// @throws InvalidInput for a number that is negative, not finite, missing, or of the wrong count. Cost: O(V + F
     /// log F).
     MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law, const NetworkOptions<Scalar>& options);
 
+    /// Number of vertices V.
     [[nodiscard]] Index vertex_count() const noexcept { return ends_.row_count(); }
+
+    /// All springs, by ascending ends; none of stiffness zero.
     [[nodiscard]] std::span<const Spring<Scalar>> springs() const noexcept { return springs_; }
+
+    /// The law of all springs.
     [[nodiscard]] const Law& law() const noexcept { return law_; }
 
     /// The springs of vertex `v`, by ascending vertex at the other end.
@@ -255,16 +287,17 @@ class MassSpringNetwork {
         for (const auto& spring : springs_) act(instance(spring));
     }
 
+    ///@{
+    /// As `ElasticNetwork` requires: constants of vertex `v`. @pre `has_masses()` for `mass`
     [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const noexcept { return ends_[v]; }
 
     [[nodiscard]] bool pinned(Index v) const noexcept { return pinned_[static_cast<std::size_t>(v)] != 0; }
     [[nodiscard]] bool has_masses() const noexcept { return !mass_.empty(); }
-    [[nodiscard]] Scalar mass(Index v) const noexcept {
-        return mass_[static_cast<std::size_t>(v)];
-    }  ///< @pre has_masses()
+    [[nodiscard]] Scalar mass(Index v) const noexcept { return mass_[static_cast<std::size_t>(v)]; }
     [[nodiscard]] Scalar viscosity(Index v) const noexcept {
         return viscosity_.empty() ? Scalar(0) : viscosity_[static_cast<std::size_t>(v)];
     }
+    ///@}
 
     /// Calls `act(force)` with the `SpringForce` of each spring of vertex `v` at positions `x`.
     template <class Act>

@@ -52,7 +52,10 @@ struct FoundationLayer {
 
 /// Published constants of a tissue: typical ones, and the range of the measurements.
 struct MaterialRange {
+    ///@{
+    /// Typical constants, and the lower and upper ends of the range.
     Material typical, least, most;
+    ///@}
 };
 
 /// Tissues of the human eye. They stiffen when stretched, and differ between eyes and between experiments: these

@@ -36,11 +36,13 @@ template <Real Number, Real Scalar>
 template <class Volume, Real Scalar>
 class MovingFoundation {
   public:
+    /// Keeps references to both.
     MovingFoundation(const MovingBody<Scalar>& body, const Volume& volume) noexcept : body_(&body), volume_(&volume) {}
 
     /// The body, with which a solver carries the membrane along.
     [[nodiscard]] const MovingBody<Scalar>& body() const noexcept { return *body_; }
 
+    /// As `FoundationModel` requires; [N] and [N/m] in the frame of `position`.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                                Scalar dt) const noexcept {
         const LocalFrame frame(*body_, v);
@@ -67,6 +69,7 @@ class MovingFoundation {
     }
     { return body_->anchors(); }
 
+    /// Hessian of the energy of the model at vertex `v`, rotated with the body [N/m]. Exists if the model has one.
     template <Real Number = Scalar>
     [[nodiscard]] Symmetric3<Number> hessian(Index v) const noexcept requires requires(const Volume& volume) {
         volume.hessian(v);
@@ -81,6 +84,7 @@ class MovingFoundation {
         }
     }
 
+    /// Energy of the model at vertex `v` [J]. Exists if the model has one.
     [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept requires
         requires(const Volume& volume) {
         volume.energy(v, position);

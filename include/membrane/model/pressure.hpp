@@ -23,10 +23,12 @@ namespace membrane {
 /// if the border is pinned, the loads of all triangles together have an energy, -pressure times volume.
 template <Number Scalar>
 struct PressureLoad {
-    static constexpr std::size_t corner_count = 3;
+    static constexpr std::size_t corner_count = 3;  ///< the triangle's
 
     Scalar pressure;  ///< [Pa], positive from inside
 
+    ///@{
+    /// As `Element` requires.
     template <Number N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 3>& x, std::size_t i) const noexcept {
         const Vector3<N>&next = x[(i + 1) % 3], &last = x[(i + 2) % 3];
@@ -44,15 +46,18 @@ struct PressureLoad {
     }
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 3>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
+    ///@}
 };
 
 /// A constant force on one vertex.
 template <Number Scalar>
 struct DeadLoad {
-    static constexpr std::size_t corner_count = 1;
+    static constexpr std::size_t corner_count = 1;  ///< the vertex
 
     Vector3<Scalar> force;  ///< [N]
 
+    ///@{
+    /// As `Element` requires.
     template <Number N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 1>&, std::size_t) const noexcept {
         return {force.template cast<N>()};
@@ -70,6 +75,7 @@ struct DeadLoad {
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 1>&, std::size_t, std::size_t) const noexcept {
         return Eigen::Matrix3d::Zero();
     }
+    ///@}
 };
 
 /// `pascal` on every triangle of `mesh`. By Laplace's law a sphere of radius r balances it with a tension of

@@ -18,9 +18,13 @@ namespace membrane {
 /// Lengths over which the displacement by a point force decays, sqrt(biaxial stiffness over foundation stiffness) [m]:
 /// of a force along the normal by the normal stiffness, of one along the surface by the tangential stiffness.
 struct DecayLengths {
+    ///@{
+    /// [m]
     double normal, tangential;
+    ///@}
 };
 
+/// The decay lengths of a membrane of this material on this foundation.
 /// @throws InvalidInput for a material or a foundation out of its range
 [[nodiscard]] inline DecayLengths decay_lengths(const Material& material, const FoundationLayer& foundation);
 

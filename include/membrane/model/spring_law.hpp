@@ -72,8 +72,9 @@ template <class Law>
 
 /// Tension proportional to the elongation, [Liu07] 2.2: k (l - r).
 struct LinearSpring {
-    static constexpr bool never_stiffens = true;
+    static constexpr bool never_stiffens = true;  ///< see `never_stiffens`
 
+    /// Tension [N], stiffness [N/m] and energy [J].
     template <Number Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
         const Scalar elongation = spring.length - spring.rest_length;
@@ -85,6 +86,7 @@ struct LinearSpring {
 /// Linear in stretch, slack if shorter than at rest, like fibres and thin tissue that wrinkles: k max(l - r, 0). A
 /// membrane of such springs has no force against compression; its foundation has.
 struct TensionSpring {
+    /// Tension [N], stiffness [N/m] and energy [J].
     template <Number Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept {
         const auto elongation = larger<Scalar>(spring.length - spring.rest_length, Scalar(0));
@@ -102,6 +104,7 @@ struct ExponentialSpring {
     double stiffening = 10;     ///< a; the stiffness grows e-fold for a strain of 1/a
     double strain_limit = 0.5;  ///< from here on the stiffness is constant
 
+    /// Tension [N], stiffness [N/m] and energy [J]. Calls exp unless the rest length is zero.
     template <Real Scalar>
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept;
 

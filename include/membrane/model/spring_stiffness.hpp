@@ -45,6 +45,7 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] std::vector<Scalar> vertex_masses(const TriangleMesh<Scalar>& mesh, const Material& material);
 
+///@{
 /// Stiffnesses of the layer under each vertex [N/m]: those of the foundation times the vertex's area.
 /// @throws InvalidInput for a foundation out of its range
 template <Real Scalar>
@@ -53,6 +54,7 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] std::vector<Scalar> tangential_stiffnesses(const TriangleMesh<Scalar>& mesh,
                                                          const FoundationLayer& foundation);
+///@}
 
 /// Mean length of the edges [m]. O(F log F).
 template <Real Scalar>

@@ -26,12 +26,13 @@ namespace membrane {
 template <class Springs, class... Kinds>
 class Tissue {
   public:
-    using Scalar = typename Springs::Scalar;
-    static constexpr bool never_stiffens = false;
+    using Scalar = typename Springs::Scalar;       ///< that of the springs
+    static constexpr bool never_stiffens = false;  ///< elements may stiffen: updates need a line search
 
     /// Keeps copies. @throws InvalidInput for elements of another mesh than the springs'. Linear.
     explicit Tissue(const Springs& springs, const Kinds&... kinds);
 
+    /// The springs, without the elements.
     [[nodiscard]] const Springs& springs() const noexcept { return springs_; }
 
     /// Calls `act(elements)` for each kind.
@@ -49,24 +50,30 @@ class Tissue {
 
     /// A vertex whose position changes the force on another.
     struct Neighbour {
-        Index other;
+        Index other;  ///< the other vertex
     };
-    [[nodiscard]] std::span<const Neighbour> neighbours(Index v) const noexcept { return neighbours_[v]; }
 
+    ///@{
+    /// As `ElasticNetwork` requires. Masses, viscosities and pins are those of the springs. The tolerance is the
+    /// largest of springs and elements.
+    [[nodiscard]] std::span<const Neighbour> neighbours(Index v) const noexcept { return neighbours_[v]; }
     [[nodiscard]] Index vertex_count() const noexcept { return springs_.vertex_count(); }
     [[nodiscard]] bool pinned(Index v) const noexcept { return springs_.pinned(v); }
     [[nodiscard]] bool has_masses() const noexcept { return springs_.has_masses(); }
     [[nodiscard]] Scalar mass(Index v) const noexcept { return springs_.mass(v); }
     [[nodiscard]] Scalar viscosity(Index v) const noexcept { return springs_.viscosity(v); }
     [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
+    ///@}
 
+    ///@{
+    /// Sums over springs and elements at vertex `v`. Elements contribute their Hessian at `x` to the majoriser; its
+    /// `size` is that of the springs.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
-
-    /// Elements contribute their Hessian at `x`; `size` is that of the springs.
     [[nodiscard]] EnergyMajoriser<Scalar> majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
     [[nodiscard]] Symmetric3<Scalar> hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
     [[nodiscard]] EnergyChange<Scalar> energy_change(Index v, const Vector3<Scalar>& displacement,
                                                      const ConstPointsRef<Scalar>& x) const noexcept;
+    ///@}
 
   private:
     template <class Act>

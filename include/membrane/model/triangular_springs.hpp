@@ -23,11 +23,13 @@ namespace membrane {
 /// triangles, for any shape. Like that material it collapses if compressed to less than about 60 %.
 template <Number Scalar>
 struct TriangularSpring {
-    static constexpr std::size_t corner_count = 3;
+    static constexpr std::size_t corner_count = 3;  ///< the triangle's
 
     Symmetric3<Scalar> stiffness;  ///< K [N/m^3]
     Vector3<Scalar> rest;          ///< L_k^2, edge k is opposite of corner k [m^2]
 
+    ///@{
+    /// As `Element` requires.
     template <Number N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 3>& x, std::size_t i) const noexcept;
     template <Number N>
@@ -37,6 +39,7 @@ struct TriangularSpring {
                                                 const Vector3<N>& displacement) const noexcept;
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 3>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
+    ///@}
 
     /// Mean of the two principal tensions, force per current width [N/m].
     template <Number N>

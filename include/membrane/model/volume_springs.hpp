@@ -64,6 +64,7 @@ concept CheckedFoundationModel = detail::check_foundation_model<Volume, Scalar>(
 
 /// No body under the membrane: no force, at no cost.
 struct NoFoundation {
+    /// Zero.
     template <Real Scalar>
     [[nodiscard]] VertexForce<Scalar> force_on(Index, const std::type_identity_t<Vector3<Scalar>>&,
                                                const std::type_identity_t<Vector3<Scalar>>&, Scalar) const noexcept {
@@ -119,11 +120,16 @@ class VirtualVolumeSprings {
     /// @throws InvalidInput for a constant that is negative, not finite, missing, or of the wrong count
     VirtualVolumeSprings(const TriangleMesh<Scalar>& mesh, const VolumeSpringOptions<Scalar>& options);
 
+    /// Anchors, 3 x V [m].
     [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
+
+    ///@{
+    /// Constants of vertex `v`: k'_s [N/m] and k'_d [N s/m].
     [[nodiscard]] Scalar stiffness(Index v) const noexcept { return stiffness_[static_cast<std::size_t>(v)]; }
     [[nodiscard]] Scalar damping(Index v) const noexcept {
         return damping_.empty() ? Scalar(0) : damping_[static_cast<std::size_t>(v)];
     }
+    ///@}
 
     /// The spring of vertex `v`, which was at `start` when the tick of length `dt` [s] began.
     [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept {
@@ -132,6 +138,8 @@ class VirtualVolumeSprings {
         if (d == 0) return {anchor, stiffness(v), 0, 0};
         return {anchor, stiffness(v), d / dt, norm<Scalar>(start - anchor)};
     }
+
+    /// As `FoundationModel` requires.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                                Scalar dt) const noexcept {
         if (damping(v) == 0) return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.elastic_pull(position);

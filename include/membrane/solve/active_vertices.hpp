@@ -27,6 +27,7 @@ namespace membrane {
 /// whose neighbours move.
 class ActiveVertices {
   public:
+    /// All asleep, without a queue. Cost: O(V) memory.
     explicit ActiveVertices(Index vertex_count);
 
     /// Begins a step: builds the queue if the seeds have changed, and lists the active vertices: the queue, then those
@@ -36,9 +37,13 @@ class ActiveVertices {
     template <class Network, class Options>
     void begin_step(const Network& network, std::span<const Index> seeds, const Options& options) noexcept;
 
+    ///@{
     /// This step's vertices in the order of their updates, and the first of them, which are layer 0.
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return active_.items(); }
     [[nodiscard]] std::span<const Index> contact_layer() const noexcept { return vertices().first(layer_0().size()); }
+    ///@}
+
+    /// This step's queue.
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return queue_; }
 
     /// Number of the first `vertices` that are in the queue.
@@ -73,6 +78,7 @@ class ActiveVertices {
     template <class Network, class IsBalanced>
     [[nodiscard]] bool end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept;
 
+    /// Makes all asleep, and the queue empty. The next step builds it anew.
     void clear() noexcept;
 
   private:

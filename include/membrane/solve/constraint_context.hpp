@@ -42,16 +42,22 @@ class ConstraintContext {
         if (state_.is_fixed(v)) state_.clear_response(v);
     }
 
+    ///@{
     /// Position of `v` now, and at the start of the step [m].
     [[nodiscard]] Vector3<Scalar> position(Index v) const noexcept {
         return state_.loaded.contains(v) ? state_.position_of(v) : start(v);
     }
     [[nodiscard]] Vector3<Scalar> start(Index v) const noexcept { return point(x_, v); }
+    ///@}
 
+    ///@{
     /// Prescribes `target` [m] for `v` until the step ends; without a target, its start position. A pinned vertex does
     /// not move; without a target a prescribed vertex does not move either.
     void prescribe(Index v, const Vector3<Scalar>& target) noexcept;
     void prescribe(Index v) noexcept;
+    ///@}
+
+    /// Whether a constraint prescribes the position of `v` in this step.
     [[nodiscard]] bool prescribed(Index v) const noexcept { return state_.prescribed.contains(v); }
 
     /// Whether `v` is pinned or prescribed: in this step only `prescribe` moves it.
@@ -97,6 +103,7 @@ class ConstraintContext {
     /// Adds a point of this constraint, and keeps it for the next step; beyond the capacity the step is refused.
     void add_point(const ContactPoint<Scalar>& point) noexcept;
 
+    ///@{
     /// The points of this constraint, in this step and in the last one.
     [[nodiscard]] std::span<ContactPoint<Scalar>> points() noexcept {
         return state_.point_ranges[constraint_].of(state_.points.items());
@@ -108,25 +115,37 @@ class ConstraintContext {
         return state_.previous_ranges[constraint_].of(
             std::span<const ContactPoint<Scalar>>(state_.previous_points.items()));
     }
+    ///@}
 
     // For the solver and `ToolContact`.
 
+    ///@{
+    /// The state of the solver's step.
     [[nodiscard]] StepState<Scalar>& state() noexcept { return state_; }
     [[nodiscard]] const StepState<Scalar>& state() const noexcept { return state_; }
+    ///@}
+
+    ///@{
+    /// Number of the constraint whose points `points` and `add_point` refer to.
     void select_constraint(std::size_t constraint) noexcept { constraint_ = constraint; }
     [[nodiscard]] std::size_t constraint() const noexcept { return constraint_; }
+    ///@}
 
     /// Begins the points of the selected constraint.
     void begin_points() noexcept { state_.point_ranges[constraint_] = {state_.points.size(), state_.points.size()}; }
 
+    /// Loads the position of `v`, unless it has been loaded in this step.
     void load(Index v) noexcept {
         if (!state_.loaded.contains(v)) state_.load(v, x_, Pins{*this});
     }
+
+    /// Moves `v` to `target` [m].
     void set_position(Index v, const Vector3<Scalar>& target) noexcept {
         load(v);
         state_.set_position(v, target);
     }
 
+    ///@{
     /// The position to which `go_back` moves `v`: that at the call of `keep`, or at the start of the step.
     void keep(Index v) noexcept {
         load(v);
@@ -140,6 +159,7 @@ class ConstraintContext {
     [[nodiscard]] Vector3<Scalar> kept(Index v) const noexcept {
         return state_.kept.contains(v) ? state_.row(state_.anchor, v).point() : start(v);
     }
+    ///@}
 
     /// Moves all free vertices back towards their kept positions, by `part` of the distance, 0 to 1.
     void go_back(Scalar part) noexcept {
@@ -156,10 +176,14 @@ class ConstraintContext {
         if (!state_.pressed_supports.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
         return state_.support_force(v) / stiffness;
     }
+
+    /// Compliance of a fixed vertex under tools [m/N]; zero for other vertices.
     [[nodiscard]] Scalar support_compliance(Index v) const noexcept {
         const Scalar stiffness = state_.support_stiffness(v);
         return fixed(v) && stiffness > 0 ? 1 / stiffness : Scalar(0);
     }
+
+    /// Sets the stiffness of a fixed vertex against tools [N/m].
     void set_support(Index v, Scalar stiffness) noexcept { state_.row(state_.support, v).number[3] = stiffness; }
 
     /// Adds to the force of the tools on `v` [N], if it is fixed.

@@ -19,6 +19,7 @@ namespace membrane {
 
 /// A point of the membrane with a target or a load, or a tool that the surface stays outside of. In double.
 struct ConstraintTerm {
+    /// Which of the members below have a meaning.
     enum class Kind : unsigned char {
         pin,               ///< the vertex does not move; no force enters there
         prescribe_vertex,  ///< the vertex is at `target`
@@ -27,15 +28,17 @@ struct ConstraintTerm {
         press,             ///< the surface stays outside `tool`, in the contact `contact`
     };
 
-    Kind kind = Kind::pin;
+    Kind kind = Kind::pin;                                       ///< what the term does
     std::array<Index, 3> corners{no_index, no_index, no_index};  ///< of the point's triangle; a vertex is all three
     Vector3<double> weights = {1, 0, 0};                         ///< of the corners
     Vector3<double> target = Vector3<double>::Zero();            ///< [m]
     Vector3<double> force = Vector3<double>::Zero();             ///< [N]
-    Tool<double> tool = {};
-    Contact<double> contact = {};
+    Tool<double> tool = {};                                      ///< of `press`
+    Contact<double> contact = {};                                ///< of `press`
     std::size_t constraint = 0;  ///< number of the constraint; a collector of terms sets it
 
+    ///@{
+    /// A term of the kind of this name; `target` in [m], `force` in [N].
     [[nodiscard]] static ConstraintTerm pin(Index v) noexcept;
     [[nodiscard]] static ConstraintTerm prescribe(Index v, const Vector3<double>& target) noexcept;
     [[nodiscard]] static ConstraintTerm prescribe(const std::array<Index, 3>& corners, const Vector3<double>& weights,
@@ -43,10 +46,12 @@ struct ConstraintTerm {
     [[nodiscard]] static ConstraintTerm load(const std::array<Index, 3>& corners, const Vector3<double>& weights,
                                              const Vector3<double>& force) noexcept;
     [[nodiscard]] static ConstraintTerm press(const Tool<double>& tool, const Contact<double>& contact) noexcept;
+    ///@}
 
     /// Whether the position of a point is prescribed.
     [[nodiscard]] bool prescribes() const noexcept { return kind != Kind::load && kind != Kind::press; }
 
+    /// Weight of corner `k`.
     [[nodiscard]] double weight(std::size_t k) const noexcept { return weights[static_cast<Eigen::Index>(k)]; }
 
     /// The point's position if the vertices are at `x` (3 x V [m]); for another vertex field `x`, its value at the
@@ -60,6 +65,8 @@ struct ConstraintTerm {
     [[nodiscard]] double share(std::size_t k) const noexcept { return weight(k) / squared_norm(weights); }
 };
 
+///@{
+/// Adds to `terms` what the constraint demands, see above.
 template <Real Scalar, class Terms>
 void describe(const VertexAttachment<Scalar>& attachment, Terms& terms) {
     terms.add(ConstraintTerm::prescribe(attachment.vertex, attachment.target.template cast<double>()));
@@ -100,6 +107,7 @@ void describe(const ToolContact<Scalar>& press, Terms& terms) {
     contact.radius = press.contact.radius;
     terms.add(ConstraintTerm::press(tool, contact));
 }
+///@}
 
 namespace detail {
 

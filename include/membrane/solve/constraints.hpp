@@ -80,9 +80,13 @@ concept CheckedConstraint = detail::check_constraint<C, Scalar>();
 template <Real Scalar>
 class ConstraintRef {
   public:
+    /// Keeps a reference to `constraint`.
     template <Constraint<Scalar> C>
     explicit ConstraintRef(const C& constraint) noexcept : constraint_(&constraint), calls_(&calls_of<C>) {}
 
+    ///@{
+    /// As `Constraint` requires. Where the constraint has no `driving_input` or no `prescribe`, returns none, does
+    /// nothing.
     [[nodiscard]] bool valid() const noexcept { return calls_->valid(constraint_); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return calls_->driving_input(constraint_); }
     void prescribe(ConstraintContext<Scalar>& context) const noexcept { calls_->prescribe(constraint_, context); }
@@ -93,6 +97,7 @@ class ConstraintRef {
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& done) const noexcept {
         return calls_->reaction(constraint_, done);
     }
+    ///@}
 
   private:
     struct Calls {
@@ -135,9 +140,11 @@ class ConstraintRef {
 template <Real Scalar>
 class ConstraintList {
   public:
+    /// Keeps references to both.
     ConstraintList(ConstraintContext<Scalar>& context, std::span<const ConstraintRef<Scalar>> constraints) noexcept
         : context_(context), constraints_(constraints) {}
 
+    /// Whether all constraints are valid.
     [[nodiscard]] bool valid() const noexcept {
         return std::all_of(constraints_.begin(), constraints_.end(), [](const auto& c) { return c.valid(); });
     }
@@ -153,6 +160,7 @@ class ConstraintList {
             constraint.begin(context_);
         });
     }
+    /// Enforces all constraints; returns whether one was violated.
     [[nodiscard]] bool enforce() const noexcept {
         bool changed = false;
         for_each([&](const auto& constraint, std::size_t) { changed |= constraint.enforce(context_); });
@@ -185,11 +193,13 @@ class ConstraintList {
 /// Attaches a point of a triangle to `target`; the corners are otherwise free.
 template <Real Scalar>
 struct PointAttachment {
-    Index triangle = no_index;  ///< `no_index`: no attachment
-    std::array<Index, 3> corners{no_index, no_index, no_index};
-    Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();
-    Vector3<Scalar> target = Vector3<Scalar>::Zero();  ///< [m]
+    Index triangle = no_index;                                   ///< `no_index`: no attachment
+    std::array<Index, 3> corners{no_index, no_index, no_index};  ///< vertices of the triangle
+    Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the point
+    Vector3<Scalar> target = Vector3<Scalar>::Zero();            ///< [m]
 
+    ///@{
+    /// As `Constraint` requires.
     [[nodiscard]] bool valid() const noexcept;
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
         return triangle == no_index ? DrivingInput<Scalar>() : InputSample<Scalar>{target};
@@ -197,14 +207,17 @@ struct PointAttachment {
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>& context) const noexcept;
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
+    ///@}
 };
 
 /// Attaches a vertex to `target`.
 template <Real Scalar>
 struct VertexAttachment {
-    Index vertex;
+    Index vertex;            ///< that is attached
     Vector3<Scalar> target;  ///< [m]
 
+    ///@{
+    /// As `Constraint` requires.
     [[nodiscard]] bool valid() const noexcept { return is_finite(target); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return InputSample<Scalar>{target}; }
     void prescribe(ConstraintContext<Scalar>& context) const noexcept {
@@ -215,6 +228,7 @@ struct VertexAttachment {
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept {
         return context.residual_force(vertex);
     }
+    ///@}
 };
 
 /// Fixes vertices at their positions. No force enters there: they seed no queue. The reaction is the sum over the
@@ -222,6 +236,8 @@ struct VertexAttachment {
 struct PinnedVertices {
     std::span<const Index> vertices;  ///< owned by the caller
 
+    ///@{
+    /// As `Constraint` requires.
     [[nodiscard]] bool valid() const noexcept { return true; }
     template <Real Scalar>
     void prescribe(ConstraintContext<Scalar>& context) const noexcept;
@@ -235,15 +251,18 @@ struct PinnedVertices {
     }
     template <Real Scalar>
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
+    ///@}
 };
 
 /// An external force on a point of a triangle, F^ext of [Liu07] (1).
 template <Real Scalar>
 struct PointLoad {
-    std::array<Index, 3> corners;
-    Vector3<Scalar> barycentric;
-    Vector3<Scalar> force;  ///< [N]
+    std::array<Index, 3> corners;  ///< vertices of the triangle
+    Vector3<Scalar> barycentric;   ///< of the point
+    Vector3<Scalar> force;         ///< [N]
 
+    ///@{
+    /// As `Constraint` requires.
     [[nodiscard]] bool valid() const noexcept;
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
         return InputSample<Scalar>{.at = force, .is_force = true};
@@ -251,6 +270,7 @@ struct PointLoad {
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>&) const noexcept { return false; }
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>&) const noexcept { return -force; }
+    ///@}
 };
 
 /// The point that forceps hold follows the tool.
@@ -268,6 +288,7 @@ template <class Target>
 /// `vertices` keep their positions; the span must outlive the step.
 [[nodiscard]] inline PinnedVertices pin(std::span<const Index> vertices) noexcept { return {vertices}; }
 
+///@{
 /// `force` [N] acts on the point `barycentric` of the triangle with the vertices `corners`.
 template <Real Scalar>
 [[nodiscard]] PointLoad<Scalar> load(const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric,
@@ -279,6 +300,7 @@ template <class Force>
                                                      const Vector3<typename Force::Scalar>& barycentric,
                                                      const Eigen::MatrixBase<Force>& force) noexcept {
     return {corners, barycentric, force};
+    ///@}
 }
 
 namespace detail {

@@ -43,12 +43,15 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// last `locate`. The memory layout is the same for every instruction set.
 template <Real Scalar>
 struct alignas(32) ContactPack {
-    using Wide = Lanes<Scalar>;
-    static constexpr std::size_t lanes = Wide::count;
+    using Wide = Lanes<Scalar>;                        ///< a number for each point
+    static constexpr std::size_t lanes = Wide::count;  ///< largest number of points
 
     /// Force and stiffness of the points on their corners.
     struct Load {
+        ///@{
+        /// Barycentric weights of the corners, and the unit normal.
         Vector3<Wide> weights, normal;
+        ///@}
         Wide force;               ///< multiplier [N], 0 or more
         Vector3<Wide> stiffness;  ///< added to each corner along the normal [N/m]
     };
@@ -66,10 +69,10 @@ struct alignas(32) ContactPack {
     std::array<Index, lanes> point;                  ///< number of the contact point in the step
     std::array<unsigned char, lanes> turn;           ///< number of the point's corner that is corner 0 here
     std::size_t size = 0;                            ///< lanes in use
-    ContactKind kind = ContactKind::end;
-    bool on_fixed = false;   ///< whether a corner of a point is fixed
-    bool has_sides = false;  ///< whether the side of a point is known
-    bool acts = true;        ///< whether a point pressed or penetrated in the last pass over all packs
+    ContactKind kind = ContactKind::end;             ///< of all its points
+    bool on_fixed = false;                           ///< whether a corner of a point is fixed
+    bool has_sides = false;                          ///< whether the side of a point is known
+    bool acts = true;  ///< whether a point pressed or penetrated in the last pass over all packs
 };
 
 /// Contact points in packs, for all constraints of a step. A point joins the first pack of its kind with a free lane
@@ -77,15 +80,23 @@ struct alignas(32) ContactPack {
 template <Real Scalar>
 class ContactPacks {
   public:
+    /// Allocates for `capacity` packs.
     ContactPacks(Index vertex_count, std::size_t capacity)
         : packs_(capacity),
           colours_(static_cast<std::size_t>(vertex_count), 0),
           unused_row_(numbers_in_point * vertex_count) {}
 
+    /// Removes all packs.
     void clear() noexcept { packs_.clear(); }
+
+    /// Number of packs.
     [[nodiscard]] std::size_t size() const noexcept { return packs_.size(); }
+
+    ///@{
+    /// All packs, valid until one is added.
     [[nodiscard]] std::span<ContactPack<Scalar>> items() noexcept { return packs_.items(); }
     [[nodiscard]] std::span<const ContactPack<Scalar>> items() const noexcept { return packs_.items(); }
+    ///@}
 
     /// Appends packs of these points, whose forces are in the rows of forces; the first is number `first` of all. The
     /// capacity in packs is that in points. Cost: linear in the points.

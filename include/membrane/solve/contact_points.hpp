@@ -25,7 +25,11 @@ namespace membrane {
 /// The tool in contact.
 template <Real Scalar>
 struct ContactTool {
+    ///@{
+    /// End of the tool's axis, and the vector to its other end [m].
     Vector3<Scalar> position, axis;
+    ///@}
+
     Vector3<Scalar> axis_point;  ///< nearest to the contact [m]
     Scalar radius;               ///< [m]
 };

@@ -20,8 +20,9 @@ namespace membrane {
 template <class Now>
 class Deadline {
   public:
-    using Time = std::remove_cvref_t<std::invoke_result_t<const Now&>>;
+    using Time = std::remove_cvref_t<std::invoke_result_t<const Now&>>;  ///< a number or a time point
 
+    /// The time `at` of the clock `now`.
     Deadline(Now now, Time at) : now_(std::move(now)), at_(at) {}
 
     /// Time left [s]; negative after the deadline.
@@ -48,7 +49,7 @@ struct StepCosts {
     double update = 0;       ///< [s]
     double enforcement = 0;  ///< in updates
     double residual = 4;     ///< of one residual force at the end, in updates; the initial value is a guess
-    bool known = false;
+    bool known = false;      ///< whether `residual` was measured
 };
 
 /// The time budget of a step: no limit, or until a deadline less the recent cost of the residual forces at the end. The
@@ -64,6 +65,7 @@ class TimeBudget {
           left_of_([](const void* of) { return static_cast<const Deadline<Now>*>(of)->left(); }),
           costs_(&costs) {}
 
+    /// Whether there is a deadline.
     [[nodiscard]] bool limited() const noexcept { return deadline_ != nullptr; }
 
     /// Begins the updates; at the end of the step the residual forces of `vertices` are evaluated.
@@ -71,8 +73,11 @@ class TimeBudget {
         set_residual_count(vertices);
         if (limited()) left_ = left_of_(deadline_);
     }
+
+    /// Sets the number of residual forces at the end of the step.
     void set_residual_count(std::size_t vertices) { residual_count_ = static_cast<double>(vertices); }
 
+    ///@{
     /// Whether there is time for a contact iteration of so many updates, or for a batch beyond layer 0. The first of
     /// each is always made, so that the membrane reaches its equilibrium.
     [[nodiscard]] bool has_time_for_contact(std::size_t updates) {
@@ -82,14 +87,20 @@ class TimeBudget {
     [[nodiscard]] bool has_time_for_batch() {
         return !limited() || std::exchange(first_batch_, false) || has_time_for(updates_in_batch);
     }
+    ///@}
+
+    /// Whether there is time to enforce the constraints once more.
     [[nodiscard]] bool has_time_to_enforce() const { return !limited() || has_time_for(costs_->enforcement); }
 
+    /// Counts `count` vertex updates, which took the time since the last call.
     void updated(std::size_t count) {
         if (!limited() || count == 0) return;
         time_ += lap();
         updates_ += static_cast<double>(count);
         if (time_ > 0) costs_->update = time_ / updates_;
     }
+
+    /// Counts one enforcement, which took the time since the last call.
     void enforced() {
         if (limited()) costs_->enforcement = in_updates(lap());
     }

@@ -47,7 +47,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 template <Real Scalar>
 class PackedVertices {
   public:
-    using Wide = Lanes<Scalar>;
+    using Wide = Lanes<Scalar>;  ///< a number for each vertex of a pack
 
     /// Allocates for `capacity` vertices; fewer may fit if more than half of the lanes stay unused.
     template <ElasticNetwork<Scalar> Network>
@@ -68,11 +68,13 @@ class PackedVertices {
     /// Number of packs.
     [[nodiscard]] std::size_t count() const noexcept { return packs_.size(); }
 
+    ///@{
     /// The vertices of pack `p`, and the position of the first in pack order.
     [[nodiscard]] std::span<const Index> vertices(std::size_t p) const noexcept {
         return members_.items().subspan(packs_[p].first, packs_[p].size);
     }
     [[nodiscard]] std::size_t first_of(std::size_t p) const noexcept { return packs_[p].first; }
+    ///@}
 
     /// The first pack whose first vertex is at position `first` or later in pack order.
     [[nodiscard]] std::size_t pack_from(std::size_t first) const noexcept {
@@ -99,7 +101,12 @@ class PackedVertices {
     /// Number of free vertices of pack `p`.
     [[nodiscard]] Index free_count(std::size_t p) const noexcept { return terms_[p].free_count; }
 
-    enum class Outcome : unsigned char { at_rest, moved, too_far };
+    /// What an update did to a pack.
+    enum class Outcome : unsigned char {
+        at_rest,  ///< no force was above the tolerance
+        moved,    ///< at least one vertex moved
+        too_far,  ///< a displacement may be unstable: nothing moved
+    };
 
     /// Updates the vertices of packs `begin` to `end`, the end excluded, all of one group, by `rule`. With
     /// `in_contact`, adds the forces of constraints and stores the compliance of each vertex. If a displacement may be

@@ -22,7 +22,7 @@ template <Real Scalar>
 struct InputSample {
     Vector3<Scalar> at;                                        ///< a position [m], or a force [N]
     Scalar longest = std::numeric_limits<Scalar>::infinity();  ///< largest change in a tick that is extrapolated
-    bool is_force = false;
+    bool is_force = false;                                     ///< whether `at` is a force
 };
 
 /// Empty if the constraint does not act.

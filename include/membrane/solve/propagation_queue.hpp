@@ -20,6 +20,7 @@ namespace membrane {
 /// breadth-first, or by groups.
 class PropagationQueue {
   public:
+    /// An empty queue. Cost: O(V) memory.
     explicit PropagationQueue(Index vertex_count)
         : reached_(vertex_count), layer_ends_(static_cast<std::size_t>(vertex_count)), colouring_(vertex_count) {}
 
@@ -42,7 +43,10 @@ class PropagationQueue {
     /// Ends of the groups in `vertices`; empty before `group` is called.
     [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return colouring_.ends(); }
 
+    /// All vertices of the queue, layer by layer.
     [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
+
+    /// Whether `v` is in the queue.
     [[nodiscard]] bool contains(Index v) const noexcept { return reached_.contains(v); }
 
     /// Number of layers: at most one more than `layers`, fewer if the mesh ends before.
@@ -56,6 +60,7 @@ class PropagationQueue {
         return vertices().subspan(begin, layer_ends_[at] - begin);
     }
 
+    /// Removes all vertices.
     void clear() noexcept {
         reached_.clear();
         layer_ends_.clear();

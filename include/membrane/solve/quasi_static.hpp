@@ -94,7 +94,7 @@ class QuasiStaticSolver {
     /// Wakes vertices that were moved, or whose anchors were moved, by other means than a step of this solver. Ignores
     /// an index that is no vertex. Not needed for the motion of a `MovingBody`.
     void wake(std::span<const Index> vertices) noexcept;
-    void wake_all() noexcept;
+    void wake_all() noexcept;  ///< `wake` for every vertex. Cost: O(V).
 
     /// Resets the solver to a new one, to the bit: a membrane out of equilibrium does not move until woken. Cost: O(V).
     void reset() noexcept;

@@ -10,7 +10,7 @@
 ///
 ///     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
 ///     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
-///     if (report.status != membrane::StepStatus::advanced) { /* nothing has moved */ }
+///     if (report.status != membrane::StepStatus::advanced) return;  // nothing has moved
 namespace membrane {
 
 /// Order of the vertex updates: the layers from the contact outward, and in each layer
@@ -28,7 +28,7 @@ struct SolverOptions {
     bool adaptive_layers = false;  ///< adds a layer, up to `layers`, while a force on it exceeds `force_tolerance`
     Index sweeps = 2;              ///< passes over the queue in each step
     Index contact_iterations = 3;  ///< updates of layer 0 in each sweep at most: vertices in contact converge last
-    UpdateOrder order = UpdateOrder::colour_layers;
+    UpdateOrder order = UpdateOrder::colour_layers;  ///< of the vertices in a sweep
     bool predict = true;  ///< a step extrapolates the last displacements, if the last step was complete
     Index max_vertex_updates = unlimited;  ///< in a step; layer 0, prescribed vertices and one more are always updated
     Scalar force_tolerance = 0;  ///< residual force of a vertex in equilibrium [N]; 0: the network's, above rounding
@@ -40,6 +40,7 @@ struct SolverOptions {
     void check() const;
 };
 
+/// Whether a step advanced, or why it was refused.
 enum class StepStatus {
     advanced,                 ///< the positions are the new ones
     bad_time_step,            ///< dt is not finite, positive and a normal number: nothing has moved
@@ -51,7 +52,7 @@ enum class StepStatus {
 /// The report of a step. The spans are the solver's and valid until its next step.
 template <Real Scalar>
 struct StepReport {
-    StepStatus status = StepStatus::advanced;
+    StepStatus status = StepStatus::advanced;  ///< whether the step advanced
     /// No residual force exceeds `force_tolerance` on the vertices that the step may move: those of the queue, and with
     /// `adaptive_layers` those of the whole membrane.
     bool converged = false;

@@ -28,10 +28,10 @@ concept Compliance = std::same_as<C, Scalar> || std::same_as<C, Symmetric3<Scala
 template <Number Scalar>
 struct VertexState : EnergyMajoriser<Scalar> {
     Scalar contact_stiffness = 0;  ///< the part of `stiffness` that acts along `contact_normal` alone [N/m]
-    Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();
-    Scalar mass = 0;           ///< [kg], zero where the network has none
-    Each<Scalar> dt = 0;       ///< [s]
-    bool constrained = false;  ///< a constraint acts on it
+    Vector3<Scalar> contact_normal = Vector3<Scalar>::Zero();  ///< unit vector; zero without contact
+    Scalar mass = 0;                                           ///< [kg], zero where the network has none
+    Each<Scalar> dt = 0;                                       ///< [s]
+    bool constrained = false;                                  ///< a constraint acts on it
 };
 
 /// A step rule: the compliance of a vertex [m/N], a number, or a `Symmetric3` for a rule whose displacements are not
@@ -77,8 +77,9 @@ inline constexpr bool is_descent_rule = requires {
 /// The rule as published, [Liu07] (4): dx = F dt^2 / m. It converges while dt^2 / m stays below 2 over the largest
 /// eigenvalue of the 3 x 3 block of every vertex; the solver refuses a step beyond that.
 struct MassStep {
-    static constexpr bool needs_mass = true;
+    static constexpr bool needs_mass = true;  ///< a network without masses is refused
 
+    /// dt^2 / m [m/N].
     template <Number Scalar>
     [[nodiscard]] Scalar compliance(const VertexState<Scalar>& vertex) const noexcept {
         return vertex.dt * vertex.dt / vertex.mass;
@@ -99,10 +100,11 @@ template <Number Scalar>
 /// foundation and damping, less the work of the constraints' forces) for 0 < omega < 2: at the displacement s F it is
 /// at most E - s F^2 + s^2 F^2 stiffness / 2, which is below E for 0 < s < 2 / stiffness.
 struct SafeStep {
-    static constexpr bool guarantees_descent = true;
+    static constexpr bool guarantees_descent = true;  ///< no update raises the energy
 
     double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and beyond 1 may oscillate
 
+    /// omega / stiffness [m/N]; zero without stiffness.
     template <Number Scalar>
     [[nodiscard]] Scalar compliance(const VertexState<Scalar>& vertex) const noexcept {
         const auto resists = vertex.stiffness > 0;
@@ -124,10 +126,14 @@ struct SafeStep {
 /// and H is the Hessian of the energy, without the compression of short springs across their edges. If a contact adds a
 /// stiffness s along a normal n, s n n^T is added to H.
 struct BlockStep {
+    ///@{
+    /// No update raises the energy; the state has the members of `EnergyMajoriser`.
     static constexpr bool guarantees_descent = true, needs_majoriser = true;
+    ///@}
 
     double omega = 1;  ///< 0 to 2, both excluded; larger spreads a change faster, and may oscillate
 
+    /// omega H^-1 [m/N].
     template <Number Scalar>
     [[nodiscard]] Symmetric3<Scalar> compliance(const VertexState<Scalar>& vertex) const noexcept;
 

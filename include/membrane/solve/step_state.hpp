@@ -19,8 +19,12 @@ namespace membrane {
 
 /// The range of one constraint in a list shared by all.
 struct ListRange {
+    ///@{
+    /// First item, and one beyond the last.
     std::size_t begin = 0, end = 0;
+    ///@}
 
+    /// The items of this range.
     template <class Item>
     [[nodiscard]] std::span<Item> of(std::span<Item> items) const noexcept {
         return items.subspan(begin, end - begin);
@@ -40,10 +44,12 @@ struct StepState {
     /// The largest number of constraints of one step.
     static constexpr std::size_t max_constraints = 16;
 
-    using Rows = std::vector<PaddedPoint<Scalar>>;
+    using Rows = std::vector<PaddedPoint<Scalar>>;  ///< a row for each vertex
 
+    /// Allocates all memory. Cost: O(V + `max_contact_points`).
     StepState(Index vertex_count, Index max_contact_points);
 
+    /// Number of vertices V.
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed.size()); }
 
     /// The positions as a 3 x V matrix [m].
@@ -52,12 +58,13 @@ struct StepState {
         return Map(position.front().number.data(), 3, vertex_count(), Eigen::OuterStride<>(numbers_in_point));
     }
 
-    void begin_step() noexcept;  ///< Unloads all vertices, clears all forces.
-    void end_step() noexcept;    ///< Keeps the contact points of this step for the next one.
-    void reset_points() noexcept;
-    void reset() noexcept;                                              ///< As new.
+    void begin_step() noexcept;    ///< Unloads all vertices, clears all forces.
+    void end_step() noexcept;      ///< Keeps the contact points of this step for the next one.
+    void reset_points() noexcept;  ///< Drops the contact points of the last step.
+    void reset() noexcept;         ///< As new.
     void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< Rotates the kept vectors with the body.
 
+    ///@{
     /// The first of the previous points whose first corner is `v`, and the next one with this corner; or `no_index`.
     [[nodiscard]] Index previous_at(Index v) const noexcept {
         return v >= 0 && v < vertex_count() ? first_previous[static_cast<std::size_t>(v)] : no_index;
@@ -65,6 +72,7 @@ struct StepState {
     [[nodiscard]] Index next_previous(Index point) const noexcept {
         return next_of_same_corner[static_cast<std::size_t>(point)];
     }
+    ///@}
 
     /// Loads the position of `v` from `x`, unless it has been loaded in this step.
     template <class Network>
@@ -80,43 +88,57 @@ struct StepState {
         }
         for (const Index v : forced.items()) row(force, v) = {};
     }
+
+    /// Whether a loaded vertex is pinned or prescribed.
     [[nodiscard]] bool is_fixed(Index v) const noexcept { return fixed[static_cast<std::size_t>(v)] != 0; }
 
+    ///@{
+    /// The row of vertex `v`.
     [[nodiscard]] static PaddedPoint<Scalar>& row(Rows& rows, Index v) noexcept {
         return rows[static_cast<std::size_t>(v)];
     }
     [[nodiscard]] static const PaddedPoint<Scalar>& row(const Rows& rows, Index v) noexcept {
         return rows[static_cast<std::size_t>(v)];
     }
+    ///@}
 
+    ///@{
     /// Position of `v` [m].
     [[nodiscard]] Vector3<Scalar> position_of(Index v) const noexcept { return row(position, v).point(); }
     void set_position(Index v, const Vector3<Scalar>& p) noexcept {
         Scalar* number = row(position, v).number.data();
         number[0] = p.x(), number[1] = p.y(), number[2] = p.z();
     }
+    ///@}
 
+    ///@{
     /// The force of the constraints on `v` [N], and the stiffness that contact adds along it [N/m].
     [[nodiscard]] Vector3<Scalar> constraint_force(Index v) const noexcept { return row(force, v).point(); }
     [[nodiscard]] Scalar contact_stiffness(Index v) const noexcept {
         return (std::max)(row(force, v).extra(), Scalar(0));  // a sum of differences, which may be negative by rounding
     }
+    ///@}
 
+    ///@{
     /// The force of the tools on a fixed vertex [N], and its stiffness against them, 0 before a contact near it [N/m].
     [[nodiscard]] Vector3<Scalar> support_force(Index v) const noexcept { return row(support, v).point(); }
     [[nodiscard]] Scalar support_stiffness(Index v) const noexcept { return row(support, v).extra(); }
     void set_support_stiffness(Index v, Scalar stiffness) noexcept { row(support, v).number[3] = stiffness; }
+    ///@}
 
+    ///@{
     /// The residual force on `v` at the end of the step, and its norm without damping [N].
     [[nodiscard]] Vector3<Scalar> residual_force(Index v) const noexcept { return row(residual, v).point(); }
     [[nodiscard]] Scalar unbalanced_force(Index v) const noexcept { return row(residual, v).extra(); }
     void set_residual(Index v, const Vector3<Scalar>& all, Scalar unbalanced) noexcept {
         row(residual, v).set(all, unbalanced);
     }
+    ///@}
 
     /// Lower bound of the compliance of `v`, by its last update [m/N].
     [[nodiscard]] Scalar compliance(Index v) const noexcept { return row(position, v).extra(); }
 
+    ///@{
     /// Results of the last update of `v` in layer 0: its compliance [m/N], and by `set_internal` its internal force [N]
     /// and internal stiffness [N/m], without contacts.
     [[nodiscard]] Symmetric3<Scalar> compliance_block(Index v) const noexcept {
@@ -130,11 +152,15 @@ struct StepState {
         row(response, 2 * v + 1).number[1] = block.yz;
         row(position, v).number[3] = least;
     }
+    ///@}
+
     /// Sets the response of `v` to zero.
     void clear_response(Index v) noexcept {
         row(response, 2 * v) = row(response, 2 * v + 1) = {};
         row(position, v).number[3] = 0;
     }
+
+    /// Sets the internal force [N] and stiffness [N/m] of `v`, see `compliance_block`.
     void set_internal(Index v, Scalar size, Scalar stiffness) noexcept {
         row(response, 2 * v + 1).number[2] = size;
         row(response, 2 * v + 1).number[3] = stiffness;
@@ -149,21 +175,33 @@ struct StepState {
     Rows anchor;    ///< positions to which `kept` vertices go back [m]
     std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
 
+    ///@{
+    /// Vertices whose positions are loaded, that are seeds, that constraints prescribe, or on which their forces act.
     IndexSet loaded, seeds, prescribed, forced;
-    IndexSet pressed_supports;         // fixed vertices that a tool presses on
-    IndexSet kept;                     // vertices with an `anchor`
-    std::vector<unsigned char> fixed;  // of loaded vertices: pinned or prescribed
+    ///@}
+    IndexSet pressed_supports;         ///< fixed vertices that a tool presses on
+    IndexSet kept;                     ///< vertices with an `anchor`
+    std::vector<unsigned char> fixed;  ///< of loaded vertices: pinned or prescribed
 
+    ///@{
+    /// Contact points of all constraints, of this step and of the last one.
     FixedVector<ContactPoint<Scalar>> points, previous_points;
-    std::vector<Index> first_previous;       // of each vertex, the last previous point of which it is the first corner
-    std::vector<Index> next_of_same_corner;  // of each previous point
+    ///@}
+    std::vector<Index> first_previous;  ///< of each vertex, the last previous point of which it is the first corner
+    std::vector<Index> next_of_same_corner;  ///< of each previous point
+    ///@{
+    /// Range of each constraint in `points` and in `previous_points`.
     std::array<ListRange, max_constraints> point_ranges{}, previous_ranges{};
-    ContactPacks<Scalar> packs;
-    std::array<ListRange, max_constraints> pack_ranges{};
-    IndexSet candidates;  // vertices that must not pass a tool: they are kept
+    ///@}
+    ContactPacks<Scalar> packs;                            ///< of `points`
+    std::array<ListRange, max_constraints> pack_ranges{};  ///< range of each constraint in `packs`
+    IndexSet candidates;                                   ///< vertices that must not pass a tool: they are kept
 
-    Scalar force_tolerance = 0;
+    Scalar force_tolerance = 0;  ///< a negligible change of force [N]
+    ///@{
+    /// A constraint found its input invalid; the contact points exceed the capacity.
     bool invalid = false, full = false;
+    ///@}
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET

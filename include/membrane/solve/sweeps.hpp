@@ -27,6 +27,8 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 ///     const bool finite = sweeps.evaluate_residuals();
 template <class Scalar, class Rule, class Network, class Volume>
 struct Sweeps {
+    ///@{
+    /// Parts of the step, all but the budget the caller's.
     const StepInput<Scalar, Network, Volume>& scene;
     const Rule& rule;
     const SolverOptions<Scalar>& options;
@@ -36,14 +38,17 @@ struct Sweeps {
     const ConstraintList<Scalar>& constraints;
     StepReport<Scalar>& report;
     TimeBudget budget;
-    std::size_t resume;  // number beyond layer 0 of the vertex at which time ran out, in the last step or in this one
+    ///@}
 
-    std::size_t in_packs = 0;          // number of active vertices in packs
-    std::size_t forces_seen = 0;       // number of vertices with a force of a constraint so far
-    bool constraints_hold = false;     // the last enforcement found no violation, and nothing has moved since
-    bool constraints_changed = false;  // by the final enforcement, or there was no time for it
-    bool stopped = false;              // time ran out beyond layer 0
+    std::size_t resume;  ///< number beyond layer 0 of the vertex at which time ran out, in the last step or in this one
 
+    std::size_t in_packs = 0;          ///< number of active vertices in packs
+    std::size_t forces_seen = 0;       ///< number of vertices with a force of a constraint so far
+    bool constraints_hold = false;     ///< the last enforcement found no violation, and nothing has moved since
+    bool constraints_changed = false;  ///< by the final enforcement, or there was no time for it
+    bool stopped = false;              ///< time ran out beyond layer 0
+
+    /// Whether vertices may be updated in packs.
     static constexpr bool can_use_lanes = UpdatesInLanes<Scalar, Rule, Network, Volume>;
 
     /// Loads the positions of the active vertices and their neighbours.

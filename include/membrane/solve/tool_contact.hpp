@@ -37,9 +37,11 @@ namespace membrane {
 /// planes of the triangles that it touches: on a convex edge or corner it is too far out, by less than its radius.
 template <Real Scalar>
 struct ToolContact {
-    Tool<Scalar> tool;
-    Contact<Scalar> contact;
+    Tool<Scalar> tool;        ///< that presses
+    Contact<Scalar> contact;  ///< of this tool in this tick
 
+    ///@{
+    /// As `Constraint` requires.
     [[nodiscard]] bool valid() const noexcept { return is_valid(tool) && is_valid(contact); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept {
         if (!contact.touching() || contact.tunnelled) return {};
@@ -51,6 +53,7 @@ struct ToolContact {
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept {
         return reaction_at_points(context);
     }
+    ///@}
 
   private:
     using Context = ConstraintContext<Scalar>;

@@ -19,6 +19,7 @@ namespace membrane {
 ///     for (const std::size_t end : groups.ends()) { ... }
 class VertexColouring {
   public:
+    /// No groups. Cost: O(V) memory.
     explicit VertexColouring(Index vertex_count)
         : ends_(static_cast<std::size_t>(vertex_count)),
           group_of_(static_cast<std::size_t>(vertex_count), no_index),
@@ -33,6 +34,7 @@ class VertexColouring {
     /// End of each group in the set, where the next one begins.
     [[nodiscard]] std::span<const std::size_t> ends() const noexcept { return ends_.items(); }
 
+    /// Removes all groups.
     void clear() noexcept { ends_.clear(); }
 
   private:

@@ -25,26 +25,27 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// The input of one step, and the current positions.
 template <class Scalar, class Network, class Volume>
 struct StepInput {
-    const ConstPointsRef<Scalar>& start;
-    const ConstPointsRef<Scalar>& x;  // now
-    Scalar dt;
-    const Network& network;
-    const Volume& volume;
-    StepState<Scalar>& state;
+    const ConstPointsRef<Scalar>& start;  ///< positions when the step began, 3 x V [m]
+    const ConstPointsRef<Scalar>& x;      ///< positions now, 3 x V [m]
+    Scalar dt;                            ///< [s]
+    const Network& network;               ///< springs and elements
+    const Volume& volume;                 ///< the foundation
+    StepState<Scalar>& state;             ///< of the solver
 };
 
 /// The displacement of a vertex, or of several, by a rule.
 template <Number N, class Compliance>
 struct VertexMove {
-    using YesNo = decltype(N() < N());
+    using YesNo = decltype(N() < N());  ///< a truth value for each vertex
 
-    Compliance compliance;  ///< [m/N]
-    N least;                ///< lower bound of the compliance in any direction [m/N]
-    Vector3<N> displacement;
-    YesNo moves;          ///< whether the force is above the tolerance
-    YesNo may_overshoot;  ///< whether the displacement may be unstable, by the stiffness bound
+    Compliance compliance;    ///< [m/N]
+    N least;                  ///< lower bound of the compliance in any direction [m/N]
+    Vector3<N> displacement;  ///< [m]
+    YesNo moves;              ///< whether the force is above the tolerance
+    YesNo may_overshoot;      ///< whether the displacement may be unstable, by the stiffness bound
 };
 
+///@{
 /// A compliance as a 3 x 3 block.
 template <Number N>
 [[nodiscard]] const Symmetric3<N>& as_block(const Symmetric3<N>& block) noexcept {
@@ -54,7 +55,9 @@ template <Number N>
 [[nodiscard]] Symmetric3<N> as_block(const N& number) noexcept {
     return diagonal3(number);
 }
+///@}
 
+/// The displacement of `vertex` by `rule`: compliance times force; zero if the force is at most `force_tolerance` [N].
 template <class Rule, Number N>
 [[nodiscard]] MEMBRANE_INLINE auto move_of(const Rule& rule, const VertexState<N>& vertex,
                                            Each<N> force_tolerance) noexcept {

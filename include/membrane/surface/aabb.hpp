@@ -12,19 +12,24 @@
 ///
 ///     membrane::Aabb<double> box;
 ///     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) box.include(point(x, v));
-///     if (squared_distance(box, tool.position) > tool.radius * tool.radius) { /* the tool contacts nothing */ }
+///     if (squared_distance(box, tool.position) > tool.radius * tool.radius) return;  // no contact
 namespace membrane {
 
 /// The points between two corners, borders included [m]; empty until a point or box is included. With `Lanes`: several
 /// boxes.
 template <Number N>
 struct Aabb {
+    ///@{
+    /// Corners of least and greatest coordinates [m].
     Vector3<N> low = Vector3<N>::Constant((std::numeric_limits<Each<N>>::max)());
     Vector3<N> high = Vector3<N>::Constant(std::numeric_limits<Each<N>>::lowest());
+    ///@}
 
-    /// Grows to contain `p`; NaN coordinates are ignored.
+    ///@{
+    /// Grows to contain a point or a box; NaN coordinates are ignored.
     void include(const Vector3<N>& p) noexcept;
     void include(const Aabb& other) noexcept;
+    ///@}
 };
 
 /// The smallest box around a triangle.
@@ -43,11 +48,13 @@ template <Number N>
 template <Real Scalar>
 [[nodiscard]] Scalar gap_between(const Aabb<Scalar>& a, const Aabb<Scalar>& b) noexcept;
 
+///@{
 /// Whether the point, or another box that is not empty, lies within the box.
 template <Real Scalar>
 [[nodiscard]] bool contains(const Aabb<Scalar>& box, const Vector3<Scalar>& p) noexcept;
 template <Real Scalar>
 [[nodiscard]] bool contains(const Aabb<Scalar>& box, const Aabb<Scalar>& other) noexcept;
+///@}
 
 /// Squared distance from `q` to the box, 0 inside [m^2].
 template <Number N>
@@ -61,7 +68,7 @@ template <Real Scalar>
 template <Real Scalar>
 class CapsuleQuery {
   public:
-    static constexpr Scalar never = 2;
+    static constexpr Scalar never = 2;  ///< fraction of a box that is not hit
 
     /// Around the segment between two points. The boxes to test must lie in `all`: its size sets by how much the
     /// capsule is thickened, so that rounding errors never make it miss a box.

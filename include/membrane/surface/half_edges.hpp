@@ -19,12 +19,16 @@ namespace membrane {
 
 /// One side of one triangle, oriented as its edge.
 struct HalfEdge {
-    Index first, second;  ///< The edge's vertices, first < second.
-    Index apex;           ///< The triangle's third vertex.
-    Index triangle;
-    Index side;    ///< The triangle's side: from its corner `side` to the next.
-    bool forward;  ///< Whether the triangle runs from `first` to `second`.
+    ///@{
+    /// The edge's vertices, first < second.
+    Index first, second;
+    ///@}
+    Index apex;      ///< The triangle's third vertex.
+    Index triangle;  ///< The triangle that has this side.
+    Index side;      ///< The triangle's side: from its corner `side` to the next.
+    bool forward;    ///< Whether the triangle runs from `first` to `second`.
 
+    /// By edge, then apex, then triangle.
     friend constexpr auto operator<=>(const HalfEdge&, const HalfEdge&) = default;
 };
 

@@ -15,16 +15,16 @@ namespace membrane {
 
 /// The kinds of defects. Those up to `non_manifold_vertex` are errors: `TriangleMesh` refuses them.
 enum class MeshDefect : std::uint8_t {
-    no_vertices,
-    no_triangles,
-    index_out_of_range,
-    repeated_vertex,  ///< A triangle names a vertex twice.
-    coordinate_not_finite,
-    coordinate_too_large,  ///< Squares of areas overflow.
-    too_small,             ///< Squares of areas vanish.
-    too_coarse,            ///< So far from 0, floating point does not resolve the edges.
-    all_at_one_point,
-    all_on_one_line,
+    no_vertices,               ///< There are no positions.
+    no_triangles,              ///< There are positions only.
+    index_out_of_range,        ///< A triangle names a vertex that does not exist.
+    repeated_vertex,           ///< A triangle names a vertex twice.
+    coordinate_not_finite,     ///< A coordinate is infinite or NaN.
+    coordinate_too_large,      ///< Squares of areas overflow.
+    too_small,                 ///< Squares of areas vanish.
+    too_coarse,                ///< So far from 0, floating point does not resolve the edges.
+    all_at_one_point,          ///< All positions are equal.
+    all_on_one_line,           ///< No triangle has an area.
     duplicate_triangle,        ///< Two triangles have the same vertices in the same orientation,
     double_sided_triangle,     ///< or in opposite orientation.
     non_manifold_edge,         ///< An edge of three triangles or more.
@@ -40,20 +40,23 @@ enum class MeshDefect : std::uint8_t {
     isolated_vertex,             ///< No triangle references it.
     missing_triangle,            ///< A border of three edges.
     t_junction,                  ///< A vertex of the border on the middle of an edge of the border.
-    several_components,
-    no_volume,          ///< Closed and flat.
-    inward,             ///< Closed, and its triangles run clockwise seen from outside.
-    nested_components,  ///< One closed component inside another.
-    self_intersection,  ///< Triangles intersect outside their common vertices and edges.
+    several_components,          ///< Parts that no edge connects.
+    no_volume,                   ///< Closed and flat.
+    inward,                      ///< Closed, and its triangles run clockwise seen from outside.
+    nested_components,           ///< One closed component inside another.
+    self_intersection,           ///< Triangles intersect outside their common vertices and edges.
 };
 
+/// Number of kinds of defects.
 inline constexpr std::size_t mesh_defect_count = static_cast<std::size_t>(MeshDefect::self_intersection) + 1;
 
+/// What follows from a defect.
 enum class Severity : std::uint8_t {
     error,    ///< `TriangleMesh` refuses the mesh.
     warning,  ///< The mesh is accepted unchanged and may behave in an unwanted manner.
 };
 
+/// An error up to `non_manifold_vertex`, a warning beyond.
 [[nodiscard]] constexpr Severity severity(MeshDefect defect) noexcept {
     return defect <= MeshDefect::non_manifold_vertex ? Severity::error : Severity::warning;
 }

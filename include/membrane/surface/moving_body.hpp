@@ -56,6 +56,7 @@ class MovingBody {
     /// @pre as many anchors as vertices (asserted)
     [[nodiscard]] bool move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept;
 
+    /// Present anchors, 3 x V [m].
     [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
 
     /// Unit normals at the vertices of the surface of the anchors, 3 x V.

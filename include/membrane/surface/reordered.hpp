@@ -19,7 +19,7 @@ namespace membrane {
 /// A mesh, and the former indices of its vertices and triangles.
 template <Real Scalar>
 struct ReorderedMesh {
-    TriangleMesh<Scalar> mesh;
+    TriangleMesh<Scalar> mesh;           ///< with new indices
     std::vector<Index> source_vertex;    ///< former index of vertex v
     std::vector<Index> triangle_before;  ///< former index of triangle f
 };

@@ -18,11 +18,13 @@
 ///     const auto cornea = membrane::spherical_cap({.radius = 7.8e-3, .diameter = 11.7e-3, .rings = 12});
 namespace membrane {
 
+/// Options of `icosphere`.
 struct IcosphereOptions {
     double radius = 0.01;    ///< [m]
     Index subdivisions = 3;  ///< 0 to 9. Each multiplies the triangles by four and halves the edges.
 };
 
+/// Options of `sheet`.
 struct SheetOptions {
     double width = 0.1;   ///< Along x [m].
     double height = 0.1;  ///< Along y [m].
@@ -30,11 +32,13 @@ struct SheetOptions {
     Index rows = 20;      ///< Of squares, 1 to 1000.
 };
 
+/// Options of `disc`.
 struct DiscOptions {
     double radius = 0.05;  ///< [m]
     Index rings = 12;      ///< 1 to 1000. Edges are about radius / rings long.
 };
 
+/// Options of `spherical_cap`.
 struct SphericalCapOptions {
     double radius = 7.8e-3;     ///< Of the sphere, here a cornea's [m].
     double diameter = 11.7e-3;  ///< Of the rim, at most twice the radius [m].

@@ -13,7 +13,7 @@
 ///
 ///     const auto triangle = membrane::triangle_at(x, mesh.triangles().col(f));
 ///     const auto nearest  = membrane::closest_point(triangle, tool.position);
-///     if (nearest.squared_distance < radius * radius) { /* the tool contacts at nearest.point */ }
+///     if (nearest.squared_distance < radius * radius) touched = nearest.point;
 ///
 /// All functions are pure, do not allocate and cost a bounded number of operations. Differences are taken first, so
 /// accuracy depends on the size of the triangle and the distances, not on the position of the origin. Triangles without
@@ -23,7 +23,10 @@ namespace membrane {
 /// Three corners, counter-clockwise seen from outside [m]. With `Lanes`: several triangles.
 template <Number N>
 struct Triangle {
+    ///@{
+    /// A corner [m].
     Vector3<N> a, b, c;
+    ///@}
 };
 
 /// A point of a triangle and its squared distance from the query. With `Lanes`: of several triangles.
@@ -37,15 +40,15 @@ struct TrianglePoint {
 /// A point of a segment and the point of a triangle nearest to it.
 template <Real Scalar>
 struct SegmentPair {
-    Scalar fraction;  ///< 0 at the segment's start, 1 at its end.
-    TrianglePoint<Scalar> on_triangle;
+    Scalar fraction;                    ///< 0 at the segment's start, 1 at its end.
+    TrianglePoint<Scalar> on_triangle;  ///< The point of the triangle.
 };
 
 /// Where a segment enters a triangle.
 template <Real Scalar>
 struct SegmentHit {
-    Scalar fraction;  ///< 0 at the segment's start, 1 at its end.
-    Vector3<Scalar> barycentric;
+    Scalar fraction;              ///< 0 at the segment's start, 1 at its end.
+    Vector3<Scalar> barycentric;  ///< Weights of a, b, c: sum 1.
 };
 
 /// The triangle whose corners are the points `corners[0..2]` of `x`.

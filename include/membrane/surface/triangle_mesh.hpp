@@ -44,8 +44,11 @@ class TriangleMesh {
     template <std::integral I, std::size_t n>
     TriangleMesh(std::span<const Scalar> xyz, std::span<I, n> corners);
 
+    ///@{
+    /// Number of vertices V, number of triangles F.
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(positions_.cols()); }
     [[nodiscard]] Index triangle_count() const noexcept { return static_cast<Index>(triangles_.cols()); }
+    ///@}
 
     /// 3 x V [m].
     [[nodiscard]] const Points<Scalar>& positions() const noexcept { return positions_; }
