@@ -8,6 +8,7 @@
 
 #include "support/specimen.hpp"
 
+// [law]
 /// Soft until stretched by `slack`, ten times as stiff from there on.
 struct Collagen {
     double slack = 0.04;  ///< Strain at which the fibres are straight.
@@ -22,6 +23,7 @@ struct Collagen {
     }
 };
 static_assert(membrane::SpringLaw<Collagen, double>);
+// [/law]
 
 /// Force [N] that holds the middle of a membrane `height` [m] above its rest position, with a clamped rim.
 template <class Law>

@@ -129,8 +129,8 @@ TEST_CASE_METHOD(AtRest, "pages: moving body") {
     const membrane::Points<double> anchors = 1.001 * mesh.positions();
     membrane::Points<double> x = mesh.positions();
     // [moving]
-    auto body = membrane::MovingBody(mesh);
-    if (!body.move_to(anchors, dt, x)) return;  // each tick: 3 x V [m], or a pose; false: not finite, nothing has moved
+    auto body = membrane::MovingBody(mesh);     // and const auto smooth = membrane::SmoothContact(mesh);
+    if (!body.move_to(anchors, dt, x)) return;  // each tick: 3 x V [m]; a rigid motion: body.move_to(pose, x)
     tree.refit(x);
     const auto contact = tracker.update(tree, x, tool, body);
     const auto grasp = grasper.update(contact, x, tool, body);
@@ -436,7 +436,7 @@ TEST_CASE_METHOD(Touched, "pages: status") {
     // [status]
     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     if (report.status != membrane::StepStatus::advanced) {
-        device.write({});  // no force; x is unchanged, and the next valid input goes on from it
+        device.write({});  // no force, which no limit delays; x is unchanged, and the next valid input goes on from it
     } else {
         device.write(feel({tool, contact, report}));  // converged or not: the state of this tick
     }
@@ -447,9 +447,12 @@ TEST_CASE_METHOD(Touched, "pages: status") {
 TEST_CASE_METHOD(Touched, "pages: rigid body") {
     membrane::ScriptedDevice<double> device({{.time = 0, .position = {0, 0, 0.0308}}}, {.tick = 1e-3, .radius = 1e-3});
     const Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-    const Eigen::Vector3d origin(0, 0, 0.02);
+    const Eigen::Vector3d origin(0, 0, 0.02), velocity(0.1, 0, 0), spin(0, 0, 1);
     // [rigid_body]
-    membrane::RigidFrame<double> eye{.rotation = rotation, .origin = origin};  // its pose in this tick
+    const membrane::RigidFrame<double> eye{.rotation = rotation,  // its pose in this tick, from the body to the world
+                                           .origin = origin,
+                                           .velocity = velocity,       // [m/s], for forces with damping
+                                           .angular_velocity = spin};  // [rad/s]
     const auto seen = membrane::to_body_frame(device.read(), eye);
     const auto contact = tracker.update(tree, x, seen);
     const auto report = solver.step(x, dt, network, foundation, press(seen, contact));
@@ -477,4 +480,18 @@ TEST_CASE("pages: fit") {
     // [/fit]
     CHECK(found.constants[0] == Approx(40).epsilon(0.02));  // by which the table was made
     CHECK(found.constants[1] == Approx(8).epsilon(0.02));
+}
+
+TEST_CASE_METHOD(Touched, "pages: two tools") {
+    auto second_tracker = membrane::ContactTracker<double>(mesh);
+    const membrane::Tool<double> second{.position = {0, 0.0108, 0}, .radius = 1e-3};
+    // [two_tools]
+    const auto first_contact = tracker.update(tree, x, tool);  // a tracker for each tool, one tree
+    const auto second_contact = second_tracker.update(tree, x, second);
+    const auto report =
+        solver.step(x, dt, network, foundation, press(tool, first_contact), press(second, second_contact));
+    const auto on_first = report.reactions[0], on_second = report.reactions[1];  // [N], in the order of the arguments
+    // [/two_tools]
+    CHECK(on_first.z() > 0);
+    CHECK(on_second.y() > 0);
 }
