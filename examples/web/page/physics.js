@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: MIT
+//
+// The two workers: one runs the loop, the other finds equilibria. Each membrane gets new ones, so that no membrane can
+// leave anything behind.
+import module from "../../../build/web/membrane.wasm.js";
+import equilibriumSource from "./equilibrium.worker.js";
+import physicsSource from "./physics.worker.js";
+
+// A page that was opened as a file may start a worker only from a blob.
+function start(source, receive) {
+  const url = URL.createObjectURL(new Blob([module, source], { type: "text/javascript" }));
+  const worker = new Worker(url);
+  URL.revokeObjectURL(url);
+  worker.onmessage = ({ data }) => receive(data);
+  return worker;
+}
+
+export class Physics {
+  // `on` has a function for each message of the loop, and `equilibrium` for those of the other worker.
+  constructor(mesh, settings, on) {
+    this.measuring = false;
+    this.loop = start(physicsSource, (message) => on[message.type](message));
+    this.equilibria = start(equilibriumSource, (message) => {
+      this.measuring = false;
+      on.equilibrium(message);
+    });
+    for (const worker of [this.loop, this.equilibria]) worker.postMessage({ type: "build", mesh, settings });
+  }
+
+  send(message) {
+    this.loop.postMessage(message);
+  }
+
+  measure(moment, at) {
+    this.measuring = true;
+    this.equilibria.postMessage({ type: "measure", moment, at }, [moment.positions.buffer]);
+  }
+
+  end() {
+    this.loop.terminate();
+    this.equilibria.terminate();
+  }
+}

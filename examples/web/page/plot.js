@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+//
+// The force of the last seconds, a point for each tick, and the forces of the equilibria that were found.
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
+
+const seconds = 5;
+
+export class Plot {
+  constructor(parent) {
+    this.parent = parent;
+    this.clear();
+    const colour = (name) => () => getComputedStyle(parent).getPropertyValue(name);
+    const axis = { stroke: colour("--quiet"), grid: { stroke: colour("--line"), width: 1 }, ticks: { show: false } };
+    this.chart = new uPlot(
+      {
+        width: 100,
+        height: 100,
+        cursor: { show: false },
+        scales: {
+          x: { time: false, range: () => [this.time - seconds, this.time] },
+          y: { range: (_, low, high) => [0, Math.max(10, 1.15 * (high || 0))] },
+        },
+        axes: [
+          { ...axis, size: 26, values: (_, splits) => splits.map((t) => (t < 0 ? "" : `${t} s`)) },
+          { ...axis, size: 62, values: (_, splits) => splits.map((f) => `${f} mN`) },
+        ],
+        series: [
+          {},
+          { stroke: colour("--accent"), width: 2, points: { show: false } },
+          { stroke: colour("--tool"), fill: colour("--tool"), paths: () => null, points: { show: true, size: 6 } },
+        ],
+      },
+      [[], [], []],
+      parent,
+    );
+    new ResizeObserver(() => this.resize()).observe(parent);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.chart.redraw());
+  }
+
+  clear() {
+    this.time = 0; // [s]
+    this.ticks = [[], [], []]; // time [s], force, force of the equilibrium [mN]
+  }
+
+  resize() {
+    const style = getComputedStyle(this.parent);
+    const width = this.parent.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight);
+    this.chart.setSize({ width, height: this.parent.clientHeight - parseFloat(style.paddingBottom) });
+  }
+
+  // The forces of the ticks of a frame [N].
+  add(forces) {
+    const [times, values, exact] = this.ticks;
+    for (const force of forces) {
+      this.time += 1e-3;
+      times.push(this.time);
+      values.push(1e3 * force);
+      exact.push(null);
+    }
+    const old = times.length - 1000 * seconds;
+    if (old > 500) for (const list of this.ticks) list.splice(0, old);
+    this.chart.setData(this.ticks);
+  }
+
+  // The force of an equilibrium at a past time [N].
+  addExact(time, force) {
+    const [times, , exact] = this.ticks;
+    const i = times.length - 1 - Math.round(1e3 * (this.time - time));
+    if (i >= 0) exact[i] = 1e3 * force;
+  }
+}
