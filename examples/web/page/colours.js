@@ -7,7 +7,7 @@ const channels = stops.map((stop) => [16, 8, 0].map((shift) => ((stop >> shift) 
 // three.js computes in linear light.
 const linear = channels.map((colour) => colour.map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)));
 
-export const gradient = `linear-gradient(to right, ${stops.map((stop) => `#${stop.toString(16)}`).join(", ")})`;
+export const gradient = `linear-gradient(to right, ${stops.map((stop) => `#${stop.toString(16).padStart(6, "0")}`).join(", ")})`;
 
 // Writes the colour of `value`, 0 to 1, at `index` of an array of colours.
 export function paint(colours, index, value) {

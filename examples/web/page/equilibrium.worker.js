@@ -14,10 +14,9 @@ const handlers = {
     else loop = kind === "sphere" ? membrane.sphere(subdivisions, settings) : membrane[kind](settings);
   },
 
-  measure(membrane, { moment, at }) {
-    const begin = performance.now();
+  measure(membrane, { moment, time }) {
     const exact = loop.equilibrium(moment, moment.positions);
-    postMessage({ exact, reaction: moment.reaction, at, seconds: (performance.now() - begin) / 1000 });
+    postMessage({ exact, reaction: moment.reaction, time });
   },
 };
 

@@ -18,26 +18,35 @@ function start(source, receive) {
 export class Physics {
   // `on` has a function for each message of the loop, and `equilibrium` for those of the other worker.
   constructor(mesh, settings, on) {
+    this.on = on;
     this.measuring = false;
+    this.build = { type: "build", mesh, settings };
     this.loop = start(physicsSource, (message) => on[message.type](message));
-    this.equilibria = start(equilibriumSource, (message) => {
-      this.measuring = false;
-      on.equilibrium(message);
-    });
-    for (const worker of [this.loop, this.equilibria]) worker.postMessage({ type: "build", mesh, settings });
+    this.loop.postMessage(this.build);
   }
 
   send(message) {
     this.loop.postMessage(message);
   }
 
-  measure(moment, at) {
+  // Finds the equilibrium of a moment at `time`. The worker starts with the first, after the page is up.
+  measure(moment, time) {
+    this.equilibria ??= this.startEquilibria();
     this.measuring = true;
-    this.equilibria.postMessage({ type: "measure", moment, at }, [moment.positions.buffer]);
+    this.equilibria.postMessage({ type: "measure", moment, time }, [moment.positions.buffer]);
+  }
+
+  startEquilibria() {
+    const worker = start(equilibriumSource, (message) => {
+      this.measuring = false;
+      this.on.equilibrium(message);
+    });
+    worker.postMessage(this.build);
+    return worker;
   }
 
   end() {
     this.loop.terminate();
-    this.equilibria.terminate();
+    this.equilibria?.terminate();
   }
 }

@@ -41,7 +41,7 @@ const handlers = {
   },
 
   // A displayed frame: the ticks since the last one, at most as long as `budget` [ms].
-  frame({ ticks, budget, target, place, close, moment }) {
+  frame({ ticks, elapsed, budget, target, place, close, moment }) {
     let left = 0;
     let done = ticks;
     if (replaying) {
@@ -55,6 +55,7 @@ const handlers = {
     const state = {
       type: "frame",
       done,
+      elapsed,
       left,
       positions: new Float32Array(loop.positions()),
       normals: new Float32Array(loop.normals()),

@@ -44,10 +44,14 @@ export class Scene {
     this.scene.add(this.camera, new THREE.HemisphereLight(0xffffff, 0x9aa4b2, 1.6));
 
     const orange = new THREE.MeshStandardMaterial({ color: 0xd9691e, roughness: 0.45 });
+    const steel = new THREE.MeshStandardMaterial({ color: 0x8b95a3, roughness: 0.35, transparent: true, opacity: 0.82 });
     this.membrane = new THREE.Group();
-    this.tool = new THREE.Mesh(new THREE.SphereGeometry(1, 32, 24), orange.clone());
-    Object.assign(this.tool.material, { transparent: true, opacity: 0.82, color: new THREE.Color(0x8b95a3) });
+    this.tool = new THREE.Mesh(new THREE.SphereGeometry(1, 32, 24), steel);
     this.arrow = arrowOf(orange);
+    orange.depthTest = false; // the force is seen through tool and membrane
+    orange.transparent = true;
+    this.arrow.shaft.renderOrder = 1;
+    this.arrow.head.renderOrder = 2;
     this.scene.add(this.membrane, this.tool, this.arrow);
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     this.resize();
@@ -58,7 +62,7 @@ export class Scene {
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / Math.max(height, 1);
-    this.camera.fov = this.camera.aspect < 1 ? 42 : 32;
+    this.camera.fov = this.camera.aspect < 1 ? 46 : 34;
     this.camera.updateProjectionMatrix();
   }
 
@@ -114,7 +118,7 @@ export class Scene {
     still.computeBoundingSphere();
     const middle = still.boundingSphere.center.clone().divideScalar(size);
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).add(new THREE.Vector3(1.5, -4.2, 2.6));
+    this.camera.position.copy(middle).add(new THREE.Vector3(1.1, -3.4, 2.2));
     this.controls.update();
     this.tool.scale.setScalar(radius / size);
     this.tool.visible = false;
@@ -201,6 +205,7 @@ export class Scene {
   }
 
   draw() {
+    this.controls.update();
     this.renderer.render(this.scene, this.camera);
   }
 }

@@ -18,12 +18,9 @@ export class TickTimes {
     this.done = 0;
   }
 
-  // Real time that has passed [ms].
-  elapsed(milliseconds) {
-    this.due = 0.98 * this.due + milliseconds;
-  }
-
-  add(times) {
+  // The times of the ticks of a frame, and the real time since the last frame [ms].
+  add(times, elapsed) {
+    this.due = 0.98 * this.due + elapsed;
     this.done = 0.98 * this.done + times.length;
     const mean = times.reduce((sum, time) => sum + time, 0) / times.length;
     for (const time of times) {
