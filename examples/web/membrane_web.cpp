@@ -103,7 +103,8 @@ class Loop {
         std::fill(layers_.begin(), layers_.end(), std::uint8_t{0});
         const auto& queue = session_.queue();
         for (Index k = 0; k < queue.layer_count(); ++k)
-            for (const Index v : queue.layer(k)) layers_[static_cast<std::size_t>(v)] = static_cast<std::uint8_t>(k + 1);
+            for (const Index v : queue.layer(k))
+                layers_[static_cast<std::size_t>(v)] = static_cast<std::uint8_t>(k + 1);
         return view(layers_);
     }
 
@@ -152,8 +153,8 @@ class Loop {
     Session session_;
     Hand hand_;
     bool placed_ = true, recording_ = false;
-    std::vector<Row> rows_, script_;  // recorded, and to be replayed
-    std::size_t next_ = 0;            // of `script_`
+    std::vector<Row> rows_, script_;      // recorded, and to be replayed
+    std::size_t next_ = 0;                // of `script_`
     std::vector<double> forces_, times_;  // of each tick of the frame [N], [ms]
     std::vector<std::uint8_t> layers_;
     std::vector<Index> touched_;
@@ -173,8 +174,8 @@ struct Surface {
 
 Findings validate(const val& xyz, const val& corners) {
     const Surface surface(xyz, corners);
-    const auto report = membrane::validate(std::span(surface.numbers), std::span(surface.indices),
-                                           {.max_findings_per_kind = 5});
+    const auto report =
+        membrane::validate(std::span(surface.numbers), std::span(surface.indices), {.max_findings_per_kind = 5});
     return {report.valid(), to_string(report)};
 }
 
@@ -188,7 +189,10 @@ Loop* of_surface(const val& xyz, const val& corners, const Settings& settings) {
 
 template <class Array>
 void bind_triple(const char* name) {
-    value_array<Array>(name).element(emscripten::index<0>()).element(emscripten::index<1>()).element(emscripten::index<2>());
+    value_array<Array>(name)
+        .element(emscripten::index<0>())
+        .element(emscripten::index<1>())
+        .element(emscripten::index<2>());
 }
 
 bool touching(const membrane::Contact<double>& contact) { return contact.touching(); }

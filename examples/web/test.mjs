@@ -30,7 +30,7 @@ const browser = await chromium.launch({
 
 async function open(options = {}) {
   const page = await browser.newPage({ viewport: { width: 900, height: 600 }, ...options });
-  page.on("console", (message) => complaints.push(message.text()));
+  page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
   page.on("pageerror", (error) => complaints.push(String(error)));
   await page.goto(page_url);
   await page.waitForFunction(() => window.membrane?.state.frames > 0);
@@ -47,10 +47,10 @@ async function at(page, x, y) {
   return [box.x + x * box.width, box.y + y * box.height];
 }
 
-async function choose(page, id, value) {
-  await page.selectOption(`#${id}`, value);
-  await page.waitForTimeout(300);
-  await page.waitForFunction(() => window.membrane.state.time > 0.1);
+async function choose(page, mesh) {
+  const { vertices } = await state(page);
+  await page.selectOption("#mesh", mesh);
+  await page.waitForFunction((before) => window.membrane.state.vertices !== before, vertices);
 }
 
 const pick = (page, id, value) => page.locator(`#${id} label:has([value=${value}])`).click();
@@ -67,9 +67,9 @@ async function stroke(page, path, { wait = 400 } = {}) {
 }
 
 const path = [
-  [0.5, 0.35],
-  [0.6, 0.4],
-  [0.45, 0.45],
+  [0.5, 0.46],
+  [0.6, 0.45],
+  [0.45, 0.5],
 ];
 
 async function testFirstPress() {
@@ -166,13 +166,13 @@ async function testFiles() {
   }
   check("bad files are refused", size((await state(page)).force) === 0);
   await page.setInputFiles("#file", lens.pathname);
-  await page.waitForFunction(() => window.membrane.state.positions.length !== 3 * 642);
+  await page.waitForFunction(() => window.membrane.state.vertices !== 642);
   const [x, y] = await at(page, 0.5, 0.45);
   await page.touchscreen.tap(x, y);
   await page.locator("#view").focus();
   await page.keyboard.down("Space");
   await page.waitForFunction(() => Math.hypot(...window.membrane.state.force) > 0.001);
-  check("a mesh file is pressed by key", true, `${(await state(page)).positions.length / 3} vertices`);
+  check("a mesh file is pressed by key", true, `${(await state(page)).vertices} vertices`);
   await picture(page, "file_on_a_phone");
   await page.keyboard.up("Space");
   await page.close();
@@ -181,13 +181,10 @@ async function testFiles() {
 async function testMembranes() {
   const page = await open({ colorScheme: "dark" });
   for (const mesh of ["sphere 2", "sphere 4", "sphere 5", "lens", "cornea"]) {
-    await choose(page, "mesh", mesh);
+    await choose(page, mesh);
     await stroke(page, path, { wait: 300 });
     const { force, speed } = await state(page);
     check(`${mesh} is pressed`, size(force) > 1e-3, `${size(force).toFixed(4)} N, ${(100 * speed).toFixed(0)} % of real time`);
-    if (mesh === "lens") {
-      await pick(page, "colour", "contact").catch(() => {});
-    }
     await page.mouse.up();
   }
   await pick(page, "colour", "layers");
@@ -205,13 +202,19 @@ async function testMembranes() {
 async function testMishaps() {
   const page = await open();
   await stroke(page, path.slice(0, 1));
-  const devtools = await page.context().newCDPSession(page);
   const before = (await state(page)).time;
-  await devtools.send("Page.setWebLifecycleState", { state: "frozen" });
-  await new Promise((resolve) => setTimeout(resolve, 3000));
-  await devtools.send("Page.setWebLifecycleState", { state: "active" });
+  await page.evaluate(() => {  // as in a hidden tab, no frame is displayed
+    window.displayed = window.requestAnimationFrame;
+    window.requestAnimationFrame = (frame) => (window.held = frame);
+  });
+  await page.waitForTimeout(3000);
+  await page.evaluate(() => {
+    window.requestAnimationFrame = window.displayed;
+    window.requestAnimationFrame(window.held);
+  });
+  await page.waitForTimeout(300);
   const passedTime = (await state(page)).time - before;
-  check("a hidden page stops the time [s]", passedTime < 1, passedTime);
+  check("a hidden page stops the time [s]", passedTime < 1.5, passedTime);
   await page.waitForTimeout(500);
   check("the press goes on", size((await state(page)).force) > 0.01);
 

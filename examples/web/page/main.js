@@ -11,8 +11,8 @@ import { Scene } from "./scene.js";
 import { TickTimes } from "./tick_times.js";
 
 const maxTicks = 250; // of a frame: after a pause the membrane goes on where it was
-const budget = 40; // for the ticks of a frame [ms]
-const measureInterval = 0.5; // between equilibria, at least [s]
+const [minBudget, maxBudget] = [40, 100]; // for the ticks of a frame [ms]
+const measureInterval = 0.2; // between equilibria, at least [s]
 
 let physics; // of the present membrane, once it is built
 let radius; // of its tool [m]
@@ -23,7 +23,6 @@ let frames = 0;
 let waiting = false; // for a frame of the loop
 let last = 0; // time up to which ticks were asked for [ms]
 let measured = 0; // simulated time of the last equilibrium [s]
-let error = null; // of the force there, relative
 
 const view = document.getElementById("view");
 const panel = new Panel({
@@ -49,7 +48,7 @@ function open(mesh, name) {
       waiting = false;
       radius = message.radius;
       scene.build(message);
-      panel.begin(message.size);
+      panel.begin(mesh, name, message.size);
       times.clear();
       setRecording(false, null);
       beginAtRest();
@@ -106,6 +105,7 @@ function advance(now) {
   last = now - elapsed + ticks;
   const moment = !physics.measuring && plot.time > measured + measureInterval;
   if (moment) measured = plot.time;
+  const budget = Math.min(Math.max(elapsed, minBudget), maxBudget);
   waiting = true;
   physics.send({ type: "frame", ticks, elapsed, budget, moment, ...hand.frame(radius) });
 }
@@ -123,13 +123,13 @@ function show(message) {
 }
 
 function showError({ exact, reaction, time }) {
-  error = null;
+  let error = null; // of the force, relative
   if (exact) {
     const force = Math.hypot(...exact);
-    plot.addExact(time, force);
     error = force > 0 ? Math.hypot(...exact.map((f, k) => f - reaction[k])) / force : 0;
+    plot.addExact(time, force, error);
   }
-  panel.showError(error);
+  panel.showError(error, plot.worstError());
   probe?.measured(error);
 }
 
@@ -163,7 +163,9 @@ function replayTo(ticks) {
 }
 window.membrane = {
   get state() {
-    return { ...state, frames, error, recording, time: plot.time, ...times.summary() };
+    const { force, touching, holding, positions } = state ?? { force: [0, 0, 0], positions: [] };
+    const vertices = positions.length / 3;
+    return { force, touching, holding, vertices, frames, recording, time: plot.time, ...times.summary() };
   },
   csv: () => csvOf(rows),
   replayTo,

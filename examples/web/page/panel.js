@@ -30,7 +30,8 @@ export class Panel {
     });
     changed("mesh", ({ value, selectedOptions }) => {
       const [kind, subdivisions] = value.split(" ");
-      on.mesh({ kind, subdivisions: Number(subdivisions) }, selectedOptions[0].text);
+      const mesh = kind === "file" ? this.fileMesh : { kind, subdivisions: Number(subdivisions) };
+      on.mesh(mesh, selectedOptions[0].text);
     });
     changed("file", (input) => {
       on.file(input.files[0]);
@@ -74,11 +75,16 @@ export class Panel {
     element("notice").querySelector("pre").textContent = text;
   }
 
-  // Another membrane.
-  begin(size) {
+  // Another membrane, of this size [m].
+  begin(mesh, name, size) {
     this.size = size;
     element("depth").dispatchEvent(new Event("input"));
-    element("error").textContent = "–";
+    element("error").textContent = element("worstError").textContent = "–";
+    if (mesh.kind === "file") {
+      const option = element("mesh").querySelector("[value=file]");
+      Object.assign(option, { text: name, hidden: false, selected: true });
+      this.fileMesh = mesh;
+    }
     this.showScale();
   }
 
@@ -97,11 +103,11 @@ export class Panel {
     if (newtons > 0) element("hint").classList.add("done");
   }
 
-  // The error of the force, relative; null without an equilibrium.
-  showError(error) {
-    const percent = 100 * error;
-    element("error").textContent =
-      error === null ? "no equilibrium found" : percent < 0.01 ? "below 0.01 %" : `${percent.toPrecision(2)} %`;
+  // Relative errors of the force; null without an equilibrium.
+  showError(error, worst) {
+    const text = (value) => (value < 1e-4 ? "below 0.01 %" : `${(100 * value).toPrecision(2)} %`);
+    element("error").textContent = error === null ? "no equilibrium" : text(error);
+    element("worstError").textContent = worst >= 0 ? text(worst) : "–";
   }
 
   showTimes({ median, p99, worst, speed }) {

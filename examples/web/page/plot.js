@@ -40,13 +40,17 @@ export class Plot {
 
   clear() {
     this.time = 0; // [s]
+    this.errors = [];
     this.ticks = [[], [], []]; // time [s], force, force of the equilibrium [mN]
   }
 
   resize() {
     const style = getComputedStyle(this.parent);
-    const width = this.parent.clientWidth - parseFloat(style.paddingLeft) - parseFloat(style.paddingRight);
-    this.chart.setSize({ width, height: this.parent.clientHeight - parseFloat(style.paddingBottom) });
+    const padding = (...sides) => sides.reduce((sum, side) => sum + parseFloat(style[`padding${side}`]), 0);
+    this.chart.setSize({
+      width: this.parent.clientWidth - padding("Left", "Right"),
+      height: this.parent.clientHeight - padding("Top", "Bottom"),
+    });
   }
 
   // The forces of the ticks of a frame [N].
@@ -63,10 +67,16 @@ export class Plot {
     this.chart.setData(this.ticks);
   }
 
-  // The force of an equilibrium at a past time [N].
-  addExact(time, force) {
+  // The force of an equilibrium at a past time [N], and the relative error of the tick.
+  addExact(time, force, error) {
     const [times, , exact] = this.ticks;
     const i = times.length - 1 - Math.round(1e3 * (this.time - time));
     if (i >= 0) exact[i] = 1e3 * force;
+    this.errors = this.errors.filter((other) => other.time > this.time - seconds).concat({ time, error });
+  }
+
+  // The largest error of the seconds in the plot.
+  worstError() {
+    return Math.max(...this.errors.map(({ error }) => error));
   }
 }

@@ -5,8 +5,8 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { paint } from "./colours.js";
 
-const arrowScale = 12; // length for each newton
-const maxArrow = 2;
+const arrowScale = 5; // length for each newton
+const maxArrow = 1.5;
 const maxVerticesWithEdges = 3000;
 const up = new THREE.Vector3(0, 1, 0);
 
@@ -156,30 +156,26 @@ export class Scene {
     position.array.set(state.positions);
     normal.array.set(state.normals);
     position.needsUpdate = normal.needsUpdate = true;
-    const largest = this.paint(state, colour);
+    this.paint(state, colour);
     this.mark(colour === "contact" ? state.contact : []);
     this.tool.visible = true;
     this.tool.position.fromArray(state.tool).divideScalar(this.size);
     this.point(new THREE.Vector3().fromArray(state.force));
-    return largest;
   }
 
-  // Colours the vertices; returns the largest displacement [m].
+  // Colours the vertices.
   paint({ positions, layers }, colour) {
     const { color } = this.surface.geometry.attributes;
     const { rest, size } = this;
-    const layerCount = colour === "layers" ? Math.max(...new Set(layers), 1) : 1;
-    let largest = 0;
+    const layerCount = layers.reduce((a, b) => Math.max(a, b), 1);
     for (let v = 0; v < rest.length / 3; ++v) {
       const i = 3 * v;
       const moved = Math.hypot(positions[i] - rest[i], positions[i + 1] - rest[i + 1], positions[i + 2] - rest[i + 2]);
-      largest = Math.max(largest, moved);
       if (colour === "displacement") paint(color.array, v, moved / (0.3 * size));
       else if (colour === "layers") paint(color.array, v, layers[v] > 0 ? 1 - (layers[v] - 1) / layerCount : 0);
       else paint(color.array, v, 0);
     }
     color.needsUpdate = true;
-    return largest;
   }
 
   mark(contact) {
@@ -194,12 +190,11 @@ export class Scene {
   // The arrow of the force, from the tool's centre.
   point(force) {
     const length = Math.min(arrowScale * force.length(), maxArrow);
-    this.arrow.visible = length > 0.01;
+    this.arrow.visible = length > 0.005;
     if (!this.arrow.visible) return;
-    const shaft = length;
-    this.arrow.shaft.scale.y = shaft;
-    this.arrow.shaft.position.y = shaft / 2;
-    this.arrow.head.position.y = shaft + 0.08;
+    this.arrow.shaft.scale.y = length;
+    this.arrow.shaft.position.y = length / 2;
+    this.arrow.head.position.y = length + 0.08;
     this.arrow.position.copy(this.tool.position);
     this.arrow.quaternion.setFromUnitVectors(up, force.normalize());
   }
