@@ -152,7 +152,7 @@ class Loop {
 
     Session session_;
     Hand hand_;
-    bool placed_ = true, recording_ = false;
+    bool placed_ = false, recording_ = false;
     std::vector<Row> rows_, script_;      // recorded, and to be replayed
     std::size_t next_ = 0;                // of `script_`
     std::vector<double> forces_, times_;  // of each tick of the frame [N], [ms]

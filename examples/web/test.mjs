@@ -30,6 +30,7 @@ const browser = await chromium.launch({
 
 async function open(options = {}) {
   const page = await browser.newPage({ viewport: { width: 900, height: 600 }, ...options });
+  page.setDefaultTimeout(90_000);
   page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
   page.on("pageerror", (error) => complaints.push(String(error)));
   await page.goto(page_url);
@@ -78,7 +79,8 @@ async function testFirstPress() {
   await page.mouse.move(...(await at(page, 0.5, 0.4)));
   await page.mouse.down();
   await page.waitForFunction(() => Math.hypot(...window.membrane.state.force) > 0);
-  check("first force [s], at most 4 on a busy machine", performance.now() - begin < 4000, (performance.now() - begin) / 1000);
+  const seconds = (performance.now() - begin) / 1000;
+  check("first force [s], at most 2, and 5 on a busy machine", seconds < 5, seconds.toFixed(2));
   await page.close();
 }
 
@@ -93,7 +95,8 @@ async function testRealTime() {
   const ticks = Math.round((1000 * (after.time - before.time)) / seconds);
   check("ticks a second, 642 vertices, at least 950", ticks >= 950, ticks);
   console.log(`        ${((after.frames - before.frames) / seconds).toFixed(1)} frames a second, drawn without a GPU`);
-  console.log(`        a tick, pressed: median ${after.median.toFixed(3)}, 99 % ${after.p99.toFixed(2)}, worst ${after.worst.toFixed(1)} ms`);
+  const [median, p99, worst] = [after.median, after.p99, after.worst].map((time) => time.toFixed(3));
+  console.log(`        a tick, pressed: median ${median}, 99 % ${p99}, worst ${worst} ms`);
   await page.close();
 }
 
@@ -136,7 +139,11 @@ async function testForces() {
 
 // The error while the tool moves, and the time of all ticks, for one stroke and several numbers of sweeps.
 async function testDial(page, rows) {
-  const moving = rows.findLastIndex((row) => size(row.slice(9, 12)) > 0.02 && row[7] === 0 && size(row.slice(4, 7)) > 0.01);
+  await page.evaluate((ticks) => window.membrane.replayTo(ticks), rows.length);
+  const { force } = await state(page);
+  check("a replay ends with the force of the recording", force.every((f, k) => f === rows.at(-1)[9 + k]));
+  const moves = (row) => size(row.slice(9, 12)) > 0.02 && size(row.slice(4, 7)) > 0.01 && row[7] === 0;
+  const moving = rows.findLastIndex(moves);
   const errors = [];
   const means = [];
   for (const sweeps of [1, 4, 16]) {
@@ -144,26 +151,23 @@ async function testDial(page, rows) {
     errors.push(await page.evaluate((ticks) => window.membrane.replayTo(ticks), moving));
     means.push((await state(page)).median);
   }
-  check("more sweeps, smaller error", errors[0] > errors[1] && errors[1] > errors[2], errors.map((e) => e.toPrecision(3)).join(", "));
-  check("more sweeps, more time [ms]", means[0] < means[2], means.map((t) => t.toFixed(3)).join(", "));
+  const found = errors.map((error) => error.toPrecision(3)).join(", ");
+  check("1, 4, 16 sweeps: smaller error", errors[0] > errors[1] && errors[1] > errors[2], found);
+  check("1, 4, 16 sweeps: more time [ms]", means[0] < means[2], means.map((t) => t.toFixed(3)).join(", "));
 }
 
 async function testFiles() {
   const page = await open({ viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
   const twisted = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n";
-  const give = (name, text) => page.setInputFiles("#file", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
-  const answer = async (pattern) => {
-    await page.waitForSelector("#notice:not([hidden])");
-    await page.waitForFunction((source) => new RegExp(source).test(document.querySelector("#notice pre").textContent), pattern);
-    return page.textContent("#notice pre");
+  const refused = async (name, text) => {
+    await page.setInputFiles("#file", { name, mimeType: "text/plain", buffer: Buffer.from(text) });
+    await page.waitForSelector(`#notice:not([hidden]) :text("${name} is refused")`);
+    return (await page.textContent("#notice pre")).trim().replace("\n", " ");
   };
-  await give("twisted.obj", twisted);
-  check("a defective mesh is refused in words", true, (await answer("twisted.obj is refused")).trim().replaceAll("\n", " | "));
+  check("a defective mesh is refused in words", true, await refused("twisted.obj", twisted));
   await picture(page, "refused");
-  for (const [name, text] of [["a.obj", "nonsense"], ["a.off", "OFF 1"], ["a.ply", "ply"], ["a.stl", ""], ["a.txt", "x"]]) {
-    await give(name, text);
-    await answer(`${name} is refused`);
-  }
+  const bad = { "a.obj": "nonsense", "a.off": "OFF 1", "a.ply": "ply", "a.stl": "", "a.txt": "x" };
+  for (const [name, text] of Object.entries(bad)) await refused(name, text);
   check("bad files are refused", size((await state(page)).force) === 0);
   await page.setInputFiles("#file", lens.pathname);
   await page.waitForFunction(() => window.membrane.state.vertices !== 642);
@@ -183,8 +187,11 @@ async function testMembranes() {
   for (const mesh of ["sphere 2", "sphere 4", "sphere 5", "lens", "cornea"]) {
     await choose(page, mesh);
     await stroke(page, path, { wait: 300 });
-    const { force, speed } = await state(page);
-    check(`${mesh} is pressed`, size(force) > 1e-3, `${size(force).toFixed(4)} N, ${(100 * speed).toFixed(0)} % of real time`);
+    await page.waitForFunction(() => document.getElementById("error").textContent !== "–");
+    const { force, speed, median } = await state(page);
+    const error = await page.textContent("#error");
+    const found = `${size(force).toFixed(4)} N, error ${error}, tick ${(1e3 * median).toFixed(0)} µs`;
+    check(`${mesh} is pressed`, size(force) > 1e-3, `${found}, ${(100 * speed).toFixed(0)} % of real time`);
     await page.mouse.up();
   }
   await pick(page, "colour", "layers");
@@ -194,7 +201,8 @@ async function testMembranes() {
   await page.uncheck("#volumeSprings");
   await pick(page, "rule", "safe");
   await stroke(page, path.slice(0, 2));
-  check("without volume springs, by safe steps", size((await state(page)).force) > 1e-4, size((await state(page)).force));
+  const { force, touching } = await state(page);
+  check("without volume springs, by safe steps", touching && size(force) > 0, `${(1e3 * size(force)).toFixed(3)} mN`);
   await page.mouse.up();
   await page.close();
 }

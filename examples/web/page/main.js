@@ -53,6 +53,7 @@ function open(mesh, name) {
       setRecording(false, null);
       beginAtRest();
       if (message.findings) panel.notice(`${name} is accepted, with warnings.\n${message.findings}`);
+      else if (mesh.kind === "file") panel.hint(`${name} has no defect. It is scaled to 20 mm across.`);
     },
     refused({ text }) {
       next.end();
@@ -119,7 +120,7 @@ function show(message) {
   times.add(message.times, message.elapsed);
   if (message.moment && message.touching) physics.measure(message.moment, plot.time);
   scene.show(message, panel.options.colour);
-  panel.showForce(Math.hypot(...message.force));
+  panel.showForce(Math.hypot(...message.force), message.left > 0);
 }
 
 function showError({ exact, reaction, time }) {

@@ -88,6 +88,11 @@ export class Panel {
     this.showScale();
   }
 
+  hint(text) {
+    element("hint").textContent = text;
+    element("hint").classList.remove("done");
+  }
+
   showScale() {
     const labels = {
       displacement: ["0", `${(300 * this.size).toFixed(1)} mm`],
@@ -98,14 +103,15 @@ export class Panel {
     element("scale").querySelectorAll("span").forEach((span, i) => (span.textContent = labels[i]));
   }
 
-  showForce(newtons) {
+  showForce(newtons, replaying) {
     element("force").textContent = `${newtons.toFixed(4)} N`;
+    element("caption").textContent = replaying ? "force on the hand, replayed" : "force on the hand";
     if (newtons > 0) element("hint").classList.add("done");
   }
 
   // Relative errors of the force; null without an equilibrium.
   showError(error, worst) {
-    const text = (value) => (value < 1e-4 ? "below 0.01 %" : `${(100 * value).toPrecision(2)} %`);
+    const text = (value) => (value < 1e-4 ? "below 0.01 %" : `${Number((100 * value).toPrecision(2))} %`);
     element("error").textContent = error === null ? "no equilibrium" : text(error);
     element("worstError").textContent = worst >= 0 ? text(worst) : "–";
   }

@@ -7,9 +7,11 @@ let membrane; // the module
 let loop;
 let mesh; // what the loop was built from
 let replaying = false;
+let placed = false; // whether the pointer has put the tool anywhere yet
 
 function built({ settings }) {
   loop?.delete();
+  placed = false;
   const { kind, subdivisions, positions, triangles } = mesh;
   loop = {
     sphere: () => membrane.sphere(subdivisions, settings),
@@ -48,7 +50,8 @@ const handlers = {
       left = loop.replay(ticks, budget);
       replaying = left > 0;
     } else {
-      if (place) loop.place(place);
+      if (place || !placed) loop.place(place ?? target);
+      placed = true;
       done = loop.run(ticks, budget, target, close);
     }
     const now = loop.moment();
@@ -87,7 +90,6 @@ const handlers = {
   replay(message) {
     built(message);
     loop.load(message.rows);
-    loop.startRecording();
     replaying = true;
   },
 };
