@@ -23,8 +23,11 @@ const { outputFiles } = buildSync({
 });
 const text = (name) => outputFiles.find(({ path }) => path.endsWith(name)).text.trim();
 
+const style = `<style>${text("main.css")}${text("style.css")}</style>`;
+const script = `<script>${text("main.js").replaceAll("</script", "<\\/script")}</script>`;
+
 // Functions as replacements: `$` has no meaning in their results.
 const html = readFileSync(join(page, "index.html"), "utf8")
-  .replace('<link rel="stylesheet" href="style.css">', () => `<style>${text("main.css")}${text("style.css")}</style>`)
-  .replace('<script src="main.js"></script>', () => `<script>${text("main.js").replaceAll("</script", "<\\/script")}</script>`);
+  .replace('<link rel="stylesheet" href="style.css">', () => style)
+  .replace('<script src="main.js"></script>', () => script);
 writeFileSync(output, html);

@@ -7,8 +7,8 @@
 
 namespace web {
 
-/// A pointer moves in jumps, one for each displayed frame; a hand does not. The tool follows the pointer as a critically
-/// damped oscillator with a limited speed, so that its velocity is continuous at 1 kHz.
+/// A pointer jumps from displayed frame to displayed frame; a hand does not. The tool follows the pointer as a
+/// critically damped oscillator with a limited speed, so that its velocity is continuous at 1 kHz.
 class Hand {
   public:
     Hand(double radius, double max_speed) : max_speed_(max_speed) { tool_.radius = radius; }

@@ -5,9 +5,11 @@ const stops = [0xf3f1ee, 0xd9dfe8, 0xa6bddb, 0x74a9cf, 0x3690c0, 0x0570b0, 0x045
 
 const channels = stops.map((stop) => [16, 8, 0].map((shift) => ((stop >> shift) & 255) / 255));
 // three.js computes in linear light.
-const linear = channels.map((colour) => colour.map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)));
+const toLinear = (c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
+const linear = channels.map((colour) => colour.map(toLinear));
 
-export const gradient = `linear-gradient(to right, ${stops.map((stop) => `#${stop.toString(16).padStart(6, "0")}`).join(", ")})`;
+const css = stops.map((stop) => `#${stop.toString(16).padStart(6, "0")}`);
+export const gradient = `linear-gradient(to right, ${css.join(", ")})`;
 
 // Writes the colour of `value`, 0 to 1, at `index` of an array of colours.
 export function paint(colours, index, value) {

@@ -99,7 +99,7 @@ export class Hand {
     if (dx !== 0 || dy !== 0) this.moveTo(this.x + dx, this.y + dy);
   }
 
-  // What the loop needs for a frame: target [m], whether to put the tool there without a path, and to close the forceps.
+  // For a frame of the loop: the target [m], where to put the tool without a path, and whether to close the forceps.
   frame(radius) {
     if (!this.aim) {
       const box = this.canvas.getBoundingClientRect();

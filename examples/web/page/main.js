@@ -12,7 +12,6 @@ import { TickTimes } from "./tick_times.js";
 
 const maxTicks = 250; // of a frame: after a pause the membrane goes on where it was
 const [minBudget, maxBudget] = [40, 100]; // for the ticks of a frame [ms]
-const measureInterval = 0.2; // between equilibria, at least [s]
 
 let physics; // of the present membrane, once it is built
 let radius; // of its tool [m]
@@ -22,7 +21,6 @@ let state = null; // of the last frame
 let frames = 0;
 let waiting = false; // for a frame of the loop
 let last = 0; // time up to which ticks were asked for [ms]
-let measured = 0; // simulated time of the last equilibrium [s]
 
 const view = document.getElementById("view");
 const panel = new Panel({
@@ -82,7 +80,6 @@ async function openFile(file) {
 function beginAtRest() {
   hand.reset();
   plot.clear();
-  measured = 0;
 }
 
 // Begins a recording or a replay.
@@ -104,11 +101,9 @@ function advance(now) {
   const ticks = Math.round(elapsed);
   if (ticks === 0) return;
   last = now - elapsed + ticks;
-  const moment = !physics.measuring && plot.time > measured + measureInterval;
-  if (moment) measured = plot.time;
   const budget = Math.min(Math.max(elapsed, minBudget), maxBudget);
   waiting = true;
-  physics.send({ type: "frame", ticks, elapsed, budget, moment, ...hand.frame(radius) });
+  physics.send({ type: "frame", ticks, elapsed, budget, moment: physics.idle, ...hand.frame(radius) });
 }
 
 function show(message) {
@@ -119,6 +114,7 @@ function show(message) {
   plot.add(message.forces);
   times.add(message.times, message.elapsed);
   if (message.moment && message.touching) physics.measure(message.moment, plot.time);
+  else if (message.moment) probe?.measured({ error: null, reaction: message.force });
   scene.show(message, panel.options.colour);
   panel.showForce(Math.hypot(...message.force), message.left > 0);
 }
@@ -131,7 +127,7 @@ function showError({ exact, reaction, time }) {
     plot.addExact(time, force, error);
   }
   panel.showError(error, plot.worstError());
-  probe?.measured(error);
+  probe?.measured({ error, reaction });
 }
 
 function frame(now) {
@@ -141,8 +137,8 @@ function frame(now) {
   scene.draw();
 }
 
-// For tests: replays the first ticks of the recording with the present settings, and returns the error of the force
-// there.
+// For tests: replays the first ticks of the recording with the present settings, and returns the reaction of the
+// membrane there [N] and its relative error.
 let probe = null;
 function replayTo(ticks) {
   return new Promise((resolve) => {

@@ -20,6 +20,7 @@ export class Physics {
   constructor(mesh, settings, on) {
     this.on = on;
     this.measuring = false;
+    this.next = 0; // time of the next measurement, at least [ms]
     this.build = { type: "build", mesh, settings };
     this.loop = start(physicsSource, (message) => on[message.type](message));
     this.loop.postMessage(this.build);
@@ -29,16 +30,24 @@ export class Physics {
     this.loop.postMessage(message);
   }
 
+  // Whether a measurement may begin: they take a quarter of a processor at most.
+  get idle() {
+    return !this.measuring && performance.now() > this.next;
+  }
+
   // Finds the equilibrium of a moment at `time`. The worker starts with the first, after the page is up.
   measure(moment, time) {
     this.equilibria ??= this.startEquilibria();
     this.measuring = true;
+    this.begun = performance.now();
     this.equilibria.postMessage({ type: "measure", moment, time }, [moment.positions.buffer]);
   }
 
   startEquilibria() {
     const worker = start(equilibriumSource, (message) => {
+      const now = performance.now();
       this.measuring = false;
+      this.next = now + 3 * (now - this.begun);
       this.on.equilibrium(message);
     });
     worker.postMessage(this.build);

@@ -24,7 +24,8 @@ function built({ settings }) {
 const handlers = {
   build(message) {
     mesh = message.mesh;
-    const findings = mesh.kind === "file" ? membrane.validate(mesh.positions, mesh.triangles) : { valid: true, text: "" };
+    const findings =
+      mesh.kind === "file" ? membrane.validate(mesh.positions, mesh.triangles) : { valid: true, text: "" };
     if (!findings.valid) return postMessage({ type: "refused", text: findings.text });
     built(message);
     postMessage({

@@ -44,7 +44,8 @@ export class Scene {
     this.scene.add(this.camera, new THREE.HemisphereLight(0xffffff, 0x9aa4b2, 1.6));
 
     const orange = new THREE.MeshStandardMaterial({ color: 0xd9691e, roughness: 0.45 });
-    const steel = new THREE.MeshStandardMaterial({ color: 0x8b95a3, roughness: 0.35, transparent: true, opacity: 0.82 });
+    const steel = new THREE.MeshStandardMaterial({ color: 0x8b95a3, roughness: 0.35 });
+    Object.assign(steel, { transparent: true, opacity: 0.82 });
     this.membrane = new THREE.Group();
     this.tool = new THREE.Mesh(new THREE.SphereGeometry(1, 32, 24), steel);
     this.arrow = arrowOf(orange);
