@@ -1,33 +1,33 @@
 // SPDX-License-Identifier: MIT
 //
-// build.mjs MODULE.wasm PAGE.html: bundles page, worker and module into one file.
-import { readFileSync, writeFileSync } from 'node:fs';
-import { createRequire } from 'node:module';
-import path from 'node:path';
-import { fileURLToPath } from 'node:url';
+// Puts the page into one file: `node build.mjs OUTPUT`, where node_modules are beside the output.
+import { readFileSync, writeFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
 
-const [, , module, target] = process.argv;
-const packages = path.resolve('node_modules');
-const { build } = createRequire(path.join(packages, 'x'))('esbuild');
-const page = path.join(path.dirname(fileURLToPath(import.meta.url)), 'page');
+const output = process.argv[2];
+const page = join(dirname(fileURLToPath(import.meta.url)), "page");
+const { buildSync } = createRequire(join(output))("esbuild");
 
-async function bundle(file, define = {}) {
-    const result = await build({
-        entryPoints: [path.join(page, file)], bundle: true, minify: true, write: false, format: 'iife', define,
-        nodePaths: [packages], legalComments: 'none',
-    });
-    return result.outputFiles[0].text;
-}
-
-const worker = await bundle('worker.js');
-const script = await bundle('main.js', {
-    WORKER: JSON.stringify(worker),
-    MODULE: JSON.stringify(readFileSync(module).toString('base64')),
+const { outputFiles } = buildSync({
+  entryPoints: [join(page, "main.js"), join(page, "style.css")],
+  outdir: dirname(output),
+  bundle: true,
+  minify: true,
+  write: false,
+  nodePaths: [join(dirname(output), "node_modules")],
+  loader: { ".worker.js": "text", ".wasm.js": "text" },
+  legalComments: "inline",
+  charset: "utf8",
 });
-const style = readFileSync(path.join(page, 'style.css'), 'utf8') +
-    readFileSync(path.join(packages, 'uplot/dist/uPlot.min.css'), 'utf8');
-const html = readFileSync(path.join(page, 'index.html'), 'utf8')
-    .replace('/* STYLE */', () => style)
-    .replace('/* SCRIPT */', () => script.replaceAll('</script', '<\\/script'));
-writeFileSync(target, html);
-console.log(`${target}: ${(html.length / 1e6).toFixed(2)} MB`);
+const text = (name) => outputFiles.find(({ path }) => path.endsWith(name)).text.trim();
+
+const style = `<style>${text("main.css")}${text("style.css")}</style>`;
+const script = `<script>${text("main.js").replaceAll("</script", "<\\/script")}</script>`;
+
+// Functions as replacements: `$` has no meaning in their results.
+const html = readFileSync(join(page, "index.html"), "utf8")
+  .replace('<link rel="stylesheet" href="style.css">', () => style)
+  .replace('<script src="main.js"></script>', () => script);
+writeFileSync(output, html);

@@ -1,172 +1,268 @@
 // SPDX-License-Identifier: MIT
 //
-// README's loop as functions for a page: one membrane, one tool that presses and grasps. Numbers cross by pointers into
-// the memory that module and page share. No exceptions: a mesh from a file is validated before it is built.
-#include <cstdint>
-#include <optional>
+// The loop of the page for JavaScript: a worker moves a `Loop` by the ticks of each displayed frame.
+#include <cstring>
 #include <string>
-#include <utility>
-#include <variant>
-#include <vector>
 
+#include <emscripten.h>
+#include <emscripten/bind.h>
 #include <membrane/accuracy/equilibrium.hpp>
-#include <membrane/membrane.hpp>
-#include <membrane/mesh_check/repair.hpp>
 #include <membrane/mesh_check/validate.hpp>
+
+#include "hand.hpp"
+#include "recording.hpp"
+
+using namespace emscripten;
+using namespace web;
+
+// The module is compiled without exceptions: invalid input becomes an error of JavaScript.
+EM_JS(void, throw_error, (const char* message), { throw new Error(UTF8ToString(message)); });
 
 namespace {
 
-using Network = membrane::MassSpringNetwork<double, membrane::LinearSpring>;
-using BlockSolver = decltype(membrane::QuasiStaticSolver(std::declval<Network>(), {}, membrane::BlockStep{}));
-using SafeSolver = decltype(membrane::QuasiStaticSolver(std::declval<Network>(), {}, membrane::SafeStep{}));
-
-constexpr double dt = 1e-3;  // [s]
-
-/// What a tick gives, as the page reads it: 8 numbers of 8 bytes.
-struct Tick {
-    double force[3];  ///< of the membrane on the tool [N]
-    double depth;     ///< [m]
-    double touching, holding, advanced, vertex_updates;
-};
-
-/// The membrane and all that a loop has.
-struct Scene {
-    explicit Scene(membrane::TriangleMesh<double> surface)
-        : mesh(std::move(surface)),
-          network(mesh, {}, {.stiffness = 40.0, .pinned = membrane::border(mesh)}),
-          foundation(mesh, {.stiffness = 8.0, .damping = 0.02}),
-          solver(std::in_place_type<BlockSolver>, network),
-          tree(mesh),
-          tracker(mesh),
-          grasper(mesh),
-          normals(mesh),
-          x(mesh.positions()) {}
-
-    void set_options(int layers, int sweeps, bool safe_step, bool volume_springs) {
-        const membrane::SolverOptions<double> options{.layers = layers, .sweeps = sweeps};
-        if (safe_step) {
-            solver.emplace<SafeSolver>(network, options, membrane::SafeStep{});
-        } else {
-            solver.emplace<BlockSolver>(network, options, membrane::BlockStep{});
-        }
-        foundation = {mesh, {.stiffness = volume_springs ? 8.0 : 0.0, .damping = volume_springs ? 0.02 : 0.0}};
-    }
-
-    Tick tick(const membrane::Tool<double>& tool) {
-        const auto contact = tracker.update(tree, x, tool);
-        const auto grasp = grasper.update(contact, x, tool);
-        const auto report = std::visit(
-            [&](auto& s) { return s.step(x, dt, network, foundation, press(tool, contact, grasp), pull(tool, grasp)); },
-            solver);
-        tree.refit(x, report.moved);
-        normals.update(x, report.moved);
-        const auto force = report.total_reaction();
-        return {{force.x(), force.y(), force.z()},
-                contact.depth,
-                contact.touching() ? 1.0 : 0.0,
-                grasp.holding() ? 1.0 : 0.0,
-                report.status == membrane::StepStatus::advanced ? 1.0 : 0.0,
-                static_cast<double>(report.vertex_updates)};
-    }
-
-    /// The force on the tool of the last tick if its step were solved to the end, without viscosity.
-    Tick equilibrium(const membrane::Tool<double>& tool) {
-        const auto contact = tracker.update(tree, x, tool);
-        const auto grasp = grasper.update(contact, x, tool);
-        const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact, grasp),
-                                                membrane::pull(tool, grasp));
-        const membrane::Vector3<double> force = rest.reactions[0] + rest.reactions[1];
-        return {{force.x(), force.y(), force.z()}, contact.depth, 0, 0, rest.converged ? 1.0 : 0.0, 0};
-    }
-
-    membrane::TriangleMesh<double> mesh;
-    Network network;
-    membrane::VirtualVolumeSprings<double> foundation;
-    std::variant<BlockSolver, SafeSolver> solver;
-    membrane::AabbTree<double> tree;
-    membrane::ContactTracker<double> tracker;
-    membrane::Grasper<double> grasper;
-    membrane::VertexNormals<double> normals;
-    membrane::Points<double> x;
-};
-
-std::optional<Scene> scene;
-Tick last{};
-std::string text;
-membrane::Points<double> points;  // a mesh from a file
-membrane::Triangles triangles;
-
-/// A lens capsule: the shape of an ellipsoid with half axes of 4.5, 4.5 and 2 mm.
-membrane::TriangleMesh<double> lens() {
-    const auto sphere = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
-    membrane::Points<double> x = sphere.positions();
-    x.row(0) *= 4.5e-3;
-    x.row(1) *= 4.5e-3;
-    x.row(2) *= 2e-3;
-    return membrane::TriangleMesh(x, sphere.triangles());
+template <class Number>
+val view(const std::vector<Number>& numbers) {
+    return val(typed_memory_view(numbers.size(), numbers.data()));
 }
 
-membrane::Tool<double> tool_at(double x, double y, double z, double vx, double vy, double vz, double radius,
-                               bool grasping) {
-    return {.position = {x, y, z}, .radius = radius, .velocity = {vx, vy, vz}, .grasping = grasping};
+template <class Matrix>
+val view(const Matrix& numbers) {
+    return val(typed_memory_view(static_cast<std::size_t>(numbers.size()), numbers.data()));
+}
+
+class Loop {
+  public:
+    explicit Loop(Mesh mesh, const Settings& settings)
+        : session_(std::move(mesh), settings),
+          hand_(tool_radius(session_.mesh()), 12 * size_of(session_.mesh())),
+          layers_(static_cast<std::size_t>(session_.mesh().vertex_count())) {}
+
+    void configure(const Settings& settings) { session_.configure(settings); }
+
+    void place(const Vector3& position) {
+        hand_.place(position);
+        session_.lift_tool();
+        placed_ = true;
+    }
+
+    /// Up to `ticks` ticks toward `target` within `budget` [ms]; returns how many. The forceps close at the membrane.
+    int run(int ticks, double budget, const Vector3& target, bool close) {
+        begin_frame();
+        const double begin = emscripten_get_now();
+        double before = begin;
+        int done = 0;
+        while (done < ticks && before - begin < budget) {
+            const auto& last = session_.moment();
+            hand_.follow(target, close && (last.tool.grasping || last.contact.touching()), dt);
+            before = tick(hand_.tool(), std::exchange(placed_, false), before);
+            ++done;
+        }
+        return done;
+    }
+
+    /// Up to `ticks` ticks of the recording, with the present settings; returns how many were left.
+    int replay(int ticks, double budget) {
+        begin_frame();
+        const double begin = emscripten_get_now();
+        double before = begin;
+        for (; ticks > 0 && next_ < script_.size() && before - begin < budget; --ticks) {
+            const Row& row = script_[next_++];
+            if (row.placed != 0) session_.lift_tool();
+            before = tick(tool_of(row, hand_.tool().radius), row.placed != 0, before);
+        }
+        return static_cast<int>(script_.size() - next_);
+    }
+
+    void start_recording() {
+        recording_ = true;
+        rows_.clear();
+        rows_.reserve(max_rows);
+    }
+    void stop_recording() { recording_ = false; }
+
+    /// Rows of a recording, to be replayed.
+    void load(const val& rows) {
+        const auto numbers = convertJSArrayToNumberVector<double>(rows);
+        script_.resize(numbers.size() / 16);
+        std::memcpy(script_.data(), numbers.data(), script_.size() * sizeof(Row));
+        next_ = 0;
+    }
+
+    [[nodiscard]] val rest() const { return view(session_.mesh().positions()); }
+    [[nodiscard]] val triangles() const { return view(session_.mesh().triangles()); }
+    [[nodiscard]] val positions() const { return view(session_.x()); }
+    [[nodiscard]] val normals() const { return view(session_.normals()); }
+    [[nodiscard]] val forces() const { return view(forces_); }
+    [[nodiscard]] val times() const { return view(times_); }
+    [[nodiscard]] val recording() const {
+        return val(typed_memory_view(16 * rows_.size(), reinterpret_cast<const double*>(rows_.data())));
+    }
+
+    /// For each vertex 1 + the number of its layer in the queue; 0 outside.
+    [[nodiscard]] val layers() {
+        std::fill(layers_.begin(), layers_.end(), std::uint8_t{0});
+        const auto& queue = session_.queue();
+        for (Index k = 0; k < queue.layer_count(); ++k)
+            for (const Index v : queue.layer(k))
+                layers_[static_cast<std::size_t>(v)] = static_cast<std::uint8_t>(k + 1);
+        return view(layers_);
+    }
+
+    /// Triangles with a contact force.
+    [[nodiscard]] val contact_triangles() {
+        touched_.clear();
+        for (const auto& point : session_.contact_points())
+            if (!point.force.isZero(0)) touched_.push_back(point.triangle);
+        return view(touched_);
+    }
+
+    [[nodiscard]] Moment moment() const { return session_.moment(); }
+    [[nodiscard]] Vector3 force() const { return session_.force(); }
+    [[nodiscard]] double radius() const { return hand_.tool().radius; }
+    [[nodiscard]] double size() const { return size_of(session_.mesh()); }
+
+    /// The reaction in the equilibrium of `moment` near `positions` [N]; null if none was found.
+    [[nodiscard]] val equilibrium(const Moment& moment, const val& positions) {
+        session_.configure(moment.settings);
+        const auto numbers = convertJSArrayToNumberVector<double>(positions);
+        const Eigen::Map<const membrane::Points<double>> x(numbers.data(), 3, session_.mesh().vertex_count());
+        const auto& [settings, tool, contact, grasp, reaction] = moment;
+        const auto exact =
+            membrane::equilibrium<double>(x, session_.mesh(), session_.network_now(), session_.foundation_now(), {},
+                                          press(tool, contact, grasp), pull(tool, grasp));
+        return exact.converged ? val(Vector3(exact.reactions[0] + exact.reactions[1])) : val::null();
+    }
+
+  private:
+    static constexpr std::size_t max_rows = 60'000;  // a minute
+
+    void begin_frame() {
+        forces_.clear();
+        times_.clear();
+    }
+
+    double tick(const membrane::Tool<double>& tool, bool placed, double before) {
+        session_.step(tool);
+        const double after = emscripten_get_now();
+        times_.push_back(after - before);
+        forces_.push_back(membrane::norm(session_.force()));
+        if (recording_ && rows_.size() < max_rows) rows_.push_back(row_of(session_, placed));
+        return after;
+    }
+
+    Session session_;
+    Hand hand_;
+    bool placed_ = false, recording_ = false;
+    std::vector<Row> rows_, script_;      // recorded, and to be replayed
+    std::size_t next_ = 0;                // of `script_`
+    std::vector<double> forces_, times_;  // of each tick of the frame [N], [ms]
+    std::vector<std::uint8_t> layers_;
+    std::vector<Index> touched_;
+};
+
+struct Findings {
+    bool valid = false;
+    std::string text;
+};
+
+struct Surface {
+    explicit Surface(const val& xyz, const val& corners)
+        : numbers(convertJSArrayToNumberVector<double>(xyz)), indices(convertJSArrayToNumberVector<Index>(corners)) {}
+    std::vector<double> numbers;
+    std::vector<Index> indices;
+};
+
+Findings validate(const val& xyz, const val& corners) {
+    const Surface surface(xyz, corners);
+    const auto report =
+        membrane::validate(std::span(surface.numbers), std::span(surface.indices), {.max_findings_per_kind = 5});
+    return {report.valid(), to_string(report)};
+}
+
+Loop* of_sphere(int subdivisions, const Settings& settings) { return new Loop(sphere(subdivisions), settings); }
+Loop* of_cornea(const Settings& settings) { return new Loop(cornea(), settings); }
+Loop* of_lens(const Settings& settings) { return new Loop(lens(), settings); }
+Loop* of_surface(const val& xyz, const val& corners, const Settings& settings) {
+    const Surface surface(xyz, corners);
+    return new Loop(Mesh(std::span(surface.numbers), std::span(surface.indices)), settings);
+}
+
+template <class Array>
+void bind_triple(const char* name) {
+    value_array<Array>(name)
+        .element(emscripten::index<0>())
+        .element(emscripten::index<1>())
+        .element(emscripten::index<2>());
+}
+
+bool touching(const membrane::Contact<double>& contact) { return contact.touching(); }
+void set_touching(membrane::Contact<double>& contact, bool touching) {
+    contact.phase = touching ? membrane::ContactPhase::ongoing : membrane::ContactPhase::none;
 }
 
 }  // namespace
 
-extern "C" {
+EMSCRIPTEN_BINDINGS(membrane) {
+    membrane::set_invalid_input_handler([](const char* message) { throw_error(message); });
 
-/// Spheres of 162, 642, 2,562 and 10,242 vertices for 2 to 5; 0 a cornea with its rim pinned, 1 a lens capsule.
-void build(int shape) {
-    if (shape == 0) {
-        scene.emplace(membrane::spherical_cap({.radius = 7.8e-3, .diameter = 11.7e-3, .rings = 14}));
-    } else if (shape == 1) {
-        scene.emplace(lens());
-    } else {
-        scene.emplace(membrane::icosphere<double>({.radius = 10e-3, .subdivisions = shape}));
-    }
-}
+    bind_triple<Vector3>("Vector3");
+    bind_triple<std::array<Index, 3>>("Corners");
+    value_object<Settings>("Settings")
+        .field("layers", &Settings::layers)
+        .field("sweeps", &Settings::sweeps)
+        .field("safeStep", &Settings::safe_step)
+        .field("volumeSprings", &Settings::volume_springs);
+    using Tool = membrane::Tool<double>;
+    value_object<Tool>("Tool").field("position", &Tool::position).field("radius", &Tool::radius);
+    using Contact = membrane::Contact<double>;
+    value_object<Contact>("Contact")  // what an equilibrium needs of it
+        .field("touching", &touching, &set_touching)
+        .field("corners", &Contact::corners)
+        .field("point", &Contact::point)
+        .field("normal", &Contact::normal)
+        .field("axisPoint", &Contact::axis_point)
+        .field("gap", &Contact::gap)
+        .field("detectionDistance", &Contact::detection_distance)
+        .field("radius", &Contact::radius);
+    using Grasp = membrane::Grasp<double>;
+    value_object<Grasp>("Grasp")
+        .field("triangle", &Grasp::triangle)
+        .field("corners", &Grasp::corners)
+        .field("barycentric", &Grasp::barycentric)
+        .field("offset", &Grasp::offset);
+    value_object<Moment>("Moment")
+        .field("settings", &Moment::settings)
+        .field("tool", &Moment::tool)
+        .field("contact", &Moment::contact)
+        .field("grasp", &Moment::grasp)
+        .field("reaction", &Moment::reaction);
+    value_object<Findings>("Findings").field("valid", &Findings::valid).field("text", &Findings::text);
 
-double* file_points(int count) { return (points.resize(3, count), points.data()); }
-std::int32_t* file_triangles(int count) { return (triangles.resize(3, count), triangles.data()); }
-
-/// Builds the mesh in `file_points` and `file_triangles`: corners at the same position joined, triangles turned outward, 20 mm
-/// wide. Returns 0, or 1 if it is refused; `message` then says why.
-int build_file() {
-    if (!membrane::is_finite(points)) return (text = to_string(membrane::validate(points, triangles)), 1);
-    const auto repaired =
-        membrane::repair(points, triangles, {.weld = 0.0, .drop_repeated = true, .orient = true, .flip_inward = true});
-    membrane::Points<double> x = repaired.positions;
-    const auto report = membrane::validate(x, repaired.triangles);
-    text = to_string(report);
-    if (!report.valid()) return 1;
-    const Eigen::Vector3d low = x.rowwise().minCoeff(), high = x.rowwise().maxCoeff();
-    x = (0.02 / (high - low).maxCoeff()) * (x.colwise() - (low + high) / 2);
-    scene.emplace(membrane::TriangleMesh(x, repaired.triangles));
-    return 0;
-}
-
-const char* message() { return text.c_str(); }
-int vertex_count() { return scene->mesh.vertex_count(); }
-int triangle_count() { return scene->mesh.triangle_count(); }
-const std::int32_t* triangle_data() { return scene->mesh.triangles().data(); }
-const double* rest_data() { return scene->mesh.positions().data(); }
-double* position_data() { return scene->x.data(); }
-const double* normal_data() { return scene->normals.values().data(); }
-
-void set_options(int layers, int sweeps, int safe_step, int volume_springs) {
-    scene->set_options(layers, sweeps, safe_step != 0, volume_springs != 0);
-}
-
-const Tick* tick(double x, double y, double z, double vx, double vy, double vz, double radius, int grasping) {
-    last = scene->tick(tool_at(x, y, z, vx, vy, vz, radius, grasping != 0));
-    return &last;
-}
-
-/// In a module of its own, whose `position_data` the page has filled with those of the loop.
-const Tick* equilibrium(double x, double y, double z, double radius, int grasping) {
-    scene->tree.refit(scene->x);
-    scene->tracker.reset();
-    last = scene->equilibrium(tool_at(x, y, z, 0, 0, 0, radius, grasping != 0));
-    return &last;
-}
+    function("validate", &validate);
+    function("sphere", &of_sphere, allow_raw_pointers());
+    function("cornea", &of_cornea, allow_raw_pointers());
+    function("lens", &of_lens, allow_raw_pointers());
+    function("surface", &of_surface, allow_raw_pointers());
+    class_<Loop>("Loop")
+        .function("configure", &Loop::configure)
+        .function("place", &Loop::place)
+        .function("run", &Loop::run)
+        .function("replay", &Loop::replay)
+        .function("startRecording", &Loop::start_recording)
+        .function("stopRecording", &Loop::stop_recording)
+        .function("load", &Loop::load)
+        .function("rest", &Loop::rest)
+        .function("triangles", &Loop::triangles)
+        .function("positions", &Loop::positions)
+        .function("normals", &Loop::normals)
+        .function("forces", &Loop::forces)
+        .function("times", &Loop::times)
+        .function("recording", &Loop::recording)
+        .function("layers", &Loop::layers)
+        .function("contactTriangles", &Loop::contact_triangles)
+        .function("moment", &Loop::moment)
+        .function("force", &Loop::force)
+        .function("radius", &Loop::radius)
+        .function("size", &Loop::size)
+        .function("equilibrium", &Loop::equilibrium);
 }

@@ -1,20 +1,33 @@
 // SPDX-License-Identifier: MIT
 //
-// The page's loop as a native program: replays the tool of a recording on a sphere of 642 vertices and prints the forces.
-#include <array>
+// Replays a recording of the page natively: `replay MESH < recording.csv`, MESH a sphere's subdivisions, `cornea` or
+// `lens`. Prints the force of each tick [N], with all its digits.
 #include <cstdio>
+#include <iostream>
+#include <string>
 
-#include "membrane_web.cpp"
+#include "recording.hpp"
 
-int main() {
-    build(3);
-    set_options(6, 2, 0, 1);
-    std::array<double, 3> before{0, 0, 1}, now{};
-    int grasping = 0;
-    while (std::scanf("%lf %lf %lf %d", &now[0], &now[1], &now[2], &grasping) == 4) {
-        const auto velocity = [&](std::size_t k) { return (now[k] - before[k]) / dt; };
-        const Tick* result = tick(now[0], now[1], now[2], velocity(0), velocity(1), velocity(2), 2e-3, grasping);
-        std::printf("%.17g %.17g %.17g\n", result->force[0], result->force[1], result->force[2]);
-        before = now;
+using namespace web;
+
+int main(int argc, char** argv) {
+    const std::string name = argc > 1 ? argv[1] : "3";
+    Session session(name == "cornea" ? cornea() : name == "lens" ? lens() : sphere(std::stoi(name)));
+    std::string line;
+    std::getline(std::cin, line);  // names of the columns
+    while (std::getline(std::cin, line)) {
+        Row row;
+        auto* number = &row.time;
+        const char* at = line.c_str();
+        for (int i = 0; i < 16; ++i) {
+            char* end = nullptr;
+            number[i] = std::strtod(at, &end);
+            at = end + (*end == ',');
+        }
+        session.configure(settings_of(row));
+        if (row.placed != 0) session.lift_tool();
+        session.step(tool_of(row, tool_radius(session.mesh())));
+        const Vector3& force = session.force();
+        std::printf("%.17g,%.17g,%.17g\n", force[0], force[1], force[2]);
     }
 }

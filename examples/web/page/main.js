@@ -1,297 +1,175 @@
 // SPDX-License-Identifier: MIT
 //
-// Joins the parts: pointer and keys move the tool, the worker computes, the view draws.
-import { OBJLoader } from 'three/addons/loaders/OBJLoader.js';
-import { PLYLoader } from 'three/addons/loaders/PLYLoader.js';
-import { STLLoader } from 'three/addons/loaders/STLLoader.js';
-import { Plot } from './plot.js';
-import { View } from './view.js';
+// Each displayed frame asks the loop for the ticks since the last one, and draws the state after the last tick.
+import { Hand } from "./hand.js";
+import { readMesh } from "./mesh_file.js";
+import { Panel } from "./panel.js";
+import { Physics } from "./physics.js";
+import { Plot } from "./plot.js";
+import { csvOf, save } from "./recording.js";
+import { Scene } from "./scene.js";
+import { TickTimes } from "./tick_times.js";
 
-/* global WORKER, MODULE: the bundled worker's source, and the module of C++ in base 64 */
-const bytes = Uint8Array.from(atob(MODULE), (c) => c.charCodeAt(0)).buffer;
-const workerAddress = URL.createObjectURL(new Blob([WORKER], { type: 'text/javascript' }));
-const [loop, solver] = [new Worker(workerAddress), new Worker(workerAddress)];
+const maxTicks = 250; // of a frame: after a pause the membrane goes on where it was
+const [minBudget, maxBudget] = [40, 100]; // for the ticks of a frame [ms]
 
-const $ = (id) => document.getElementById(id);
-const view = new View($('view'));
-const plot = new Plot($('plot'));
-const radius = 2e-3;     // of the tool [m]
-const above = 0.3e-3;    // how far above the membrane a press begins [m]
-const longestPull = 5e-3;
-const statistics = 100;  // batches of ticks
+let physics; // of the present membrane, once it is built
+let radius; // of its tool [m]
+let recording = false;
+let rows = null; // of the last recording
+let state = null; // of the last frame
+let frames = 0;
+let waiting = false; // for a frame of the loop
+let last = 0; // time up to which ticks were asked for [ms]
 
-let state = null;
-let touch = null;        // the point and normal under the tool, while it is down
-let times = [];
-let record = [];
-let waiting = false;     // for an equilibrium
-let replayed = [];
-let asked = null;        // the force whose equilibrium is being computed
-let error = NaN;         // of the last one [%]
-
-const options = () => ({
-    layers: Number($('layers').value),
-    sweeps: Number($('sweeps').value),
-    safeStep: $('rule').value === 'safe',
-    volumeSprings: $('springs').checked,
+const view = document.getElementById("view");
+const panel = new Panel({
+  mesh: open,
+  file: openFile,
+  settings: () => physics?.send({ type: "configure", settings: panel.settings }),
+  record: () => (recording ? physics.send({ type: "stop" }) : begin({ type: "record" })),
+  replay: () => begin({ type: "replay", rows }),
+  download: () => save(csvOf(rows), "membrane.csv"),
 });
-const both = (message) => [loop, solver].forEach((worker) => worker.postMessage(message));
-const add = (p, n, s) => p.map((x, k) => x + s * n[k]);
-const pulls = () => document.querySelector('input[name=mode]:checked').value === 'pull';
-const depth = () => 1e-3 * Number($('depth').value);
+const scene = new Scene(view);
+const hand = new Hand(view, scene, panel.options);
+const plot = new Plot(document.getElementById("plot"));
+const times = new TickTimes();
 
-// ---- The tool
-
-function touchDown(hit) {
-    touch = { ...hit, pulls: pulls() };
-    loop.postMessage({ command: 'place', tool: { position: add(hit.point, hit.normal, radius + above), radius, grasping: 0 } });
-    aim();
+// Changes to the membrane `mesh`, unless the library refuses it.
+function open(mesh, name) {
+  panel.notice("");
+  const next = new Physics(mesh, panel.settings, {
+    built(message) {
+      physics?.end();
+      physics = next;
+      waiting = false;
+      radius = message.radius;
+      scene.build(message);
+      panel.begin(mesh, name, message.size);
+      times.clear();
+      setRecording(false, null);
+      beginAtRest();
+      if (message.findings) panel.notice(`${name} is accepted, with warnings.\n${message.findings}`);
+      else if (mesh.kind === "file") panel.hint(`${name} has no defect. It is scaled to 20 mm across.`);
+    },
+    refused({ text }) {
+      next.end();
+      panel.notice(`${name} is refused.\n${text}`);
+    },
+    failed({ text }) {
+      if (physics !== next) next.end();
+      waiting = false;
+      panel.notice(`${name}: ${text}`);
+    },
+    frame: show,
+    recorded: (message) => setRecording(false, message.rows),
+    equilibrium: showError,
+  });
 }
 
-// A press goes to its depth below the shape at rest; a pull dips in, closes, and follows the pointer outward.
-function aim() {
-    const { point, normal } = touch;
-    if (!touch.pulls) {
-        loop.postMessage({ command: 'aim', position: add(point, normal, radius - depth()), grasping: 0 });
-    } else if (!touch.held) {
-        loop.postMessage({ command: 'aim', position: add(point, normal, radius - 0.3e-3), grasping: 0 });
-    } else {
-        loop.postMessage({ command: 'aim', position: touch.held, grasping: 1 });
-    }
+async function openFile(file) {
+  if (!file) return;
+  try {
+    open(await readMesh(file), file.name);
+  } catch (refusal) {
+    panel.notice(`${file.name} is refused: ${refusal.message}.`);
+  }
 }
 
-function lift() {
-    if (!touch) return;
-    const { point, normal } = touch;
-    touch = null;
-    loop.postMessage({ command: 'aim', position: add(point, normal, radius + 5e-3), grasping: 0 });
+function beginAtRest() {
+  hand.reset();
+  plot.clear();
 }
 
-function pointerAt(event) {
-    const box = $('view').getBoundingClientRect();
-    return [2 * (event.clientX - box.left) / box.width - 1, 1 - 2 * (event.clientY - box.top) / box.height];
+// Begins a recording or a replay.
+function begin(message) {
+  physics.send({ ...message, settings: panel.settings });
+  if (message.type === "record") setRecording(true, null);
+  beginAtRest();
 }
 
-$('view').addEventListener('pointerdown', (event) => {
-    const hit = event.button === 0 && view.surfaceAt(...pointerAt(event));
-    view.controls.enabled = !hit;
-    if (!hit) return;
-    $('view').setPointerCapture(event.pointerId);
-    $('hint').hidden = true;
-    touchDown(hit);
-}, { capture: true });
-
-$('view').addEventListener('pointermove', (event) => {
-    if (!touch) return;
-    const pointer = pointerAt(event);
-    if (touch.pulls) {
-        const moved = view.spaceAt(...pointer, touch.distance).map((x, k) => x - touch.point[k]);
-        const length = Math.hypot(...moved), limit = Math.min(1, longestPull / length);
-        const start = add(touch.point, touch.normal, radius - 0.3e-3);
-        touch.held = add(add(start, moved, limit), touch.normal, 0.5 * limit * length);
-    } else {
-        Object.assign(touch, view.surfaceAt(...pointer));
-    }
-    aim();
-});
-
-for (const name of ['pointerup', 'pointercancel']) {
-    $('view').addEventListener(name, () => {
-        lift();
-        view.controls.enabled = true;
-    });
+function setRecording(on, recorded) {
+  recording = on;
+  rows = recorded;
+  panel.showRecording(recording, rows);
 }
 
-$('view').addEventListener('keydown', ({ key, preventDefault }) => {
-    const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-    if (key in steps) {
-        const [x, y] = touch?.keys ?? [0, 0];
-        const keys = [x + 0.02 * steps[key][0], y + 0.02 * steps[key][1]];
-        const hit = view.surfaceAt(...keys);
-        if (!hit) return;
-        if (touch) Object.assign(touch, hit, { keys });
-        else touchDown(hit);
-        touch.keys = keys;
-        aim();
-    } else if (key === '+' || key === '-') {
-        $('depth').value = Number($('depth').value) + (key === '+' ? 0.1 : -0.1);
-        showDial();
-        if (touch) aim();
-    } else if (key === 'Escape') {
-        lift();
-    }
-});
-
-// ---- The dial
-
-function showDial() {
-    $('depth_value').textContent = `${$('depth').value} mm`;
-    for (const id of ['layers', 'sweeps']) $(`${id}_value`).textContent = $(id).value;
+// Asks the loop for the ticks since the last frame.
+function advance(now) {
+  const elapsed = Math.min(now - last, maxTicks);
+  const ticks = Math.round(elapsed);
+  if (ticks === 0) return;
+  last = now - elapsed + ticks;
+  const budget = Math.min(Math.max(elapsed, minBudget), maxBudget);
+  waiting = true;
+  physics.send({ type: "frame", ticks, elapsed, budget, moment: physics.idle, ...hand.frame(radius) });
 }
 
-for (const id of ['layers', 'sweeps', 'rule', 'springs', 'depth']) {
-    $(id).addEventListener('input', () => {
-        showDial();
-        if (id !== 'depth') {
-            both({ command: 'options', options: options() });
-            times = [];
-        } else if (touch) {
-            aim();
-        }
-    });
+function show(message) {
+  waiting = false;
+  state = message;
+  ++frames;
+  hand.holding = message.holding;
+  plot.add(message.forces);
+  times.add(message.times, message.elapsed);
+  if (message.moment && message.touching) physics.measure(message.moment, plot.time);
+  else if (message.moment) probe?.measured({ error: null, reaction: message.force });
+  scene.show(message, panel.options.colour);
+  panel.showForce(Math.hypot(...message.force), message.left > 0);
 }
 
-$('shape').addEventListener('change', () => both({ command: 'build', shape: Number($('shape').value) }));
-$('reset').addEventListener('click', () => both({ command: 'build', shape: Number($('shape').value) }));
-
-// ---- Recording
-
-$('record').addEventListener('click', () => {
-    const on = $('record').getAttribute('aria-pressed') === 'false';
-    $('record').setAttribute('aria-pressed', on);
-    if (on) loop.postMessage({ command: 'build', shape: Number($('shape').value) });
-    loop.postMessage({ command: 'record', on });
-});
-
-const play = (path) => loop.postMessage({ command: 'replay', shape: Number($('shape').value), path });
-
-$('replay').addEventListener('click', () => {
-    play(record.map((row) => row.slice(1, 5)));
-});
-
-$('download').addEventListener('click', () => {
-    const header = 'time_s,x_m,y_m,z_m,grasping,force_x_N,force_y_N,force_z_N,depth_m\n';
-    const blob = new Blob([header + record.map((row) => `${row.join(',')}\n`).join('')], { type: 'text/csv' });
-    const link = Object.assign(document.createElement('a'), { href: URL.createObjectURL(blob), download: 'membrane.csv' });
-    link.click();
-    URL.revokeObjectURL(link.href);
-});
-
-// ---- Files
-
-function notice(text) {
-    $('notice').textContent = text;
-    $('notice').hidden = text === '';
+function showError({ exact, reaction, time }) {
+  let error = null; // of the force, relative
+  if (exact) {
+    const force = Math.hypot(...exact);
+    error = force > 0 ? Math.hypot(...exact.map((f, k) => f - reaction[k])) / force : 0;
+    plot.addExact(time, force, error);
+  }
+  panel.showError(error, plot.worstError());
+  probe?.measured({ error, reaction });
 }
 
-// Positions of all triangles, three corners each: corners at the same position are joined in C++.
-function soup(geometry) {
-    const { array } = (geometry.index ? geometry.toNonIndexed() : geometry).attributes.position;
-    return [...array];
+function frame(now) {
+  requestAnimationFrame(frame);
+  if (physics && !waiting && probe) probe.start();
+  else if (physics && !waiting) advance(now);
+  scene.draw();
 }
 
-async function readFile(file) {
-    const kind = file.name.split('.').pop().toLowerCase();
-    const content = await file.arrayBuffer();
-    const points = [];
-    if (kind === 'obj') {
-        new OBJLoader().parse(new TextDecoder().decode(content)).traverse((o) => o.isMesh && points.push(...soup(o.geometry)));
-    } else if (kind === 'ply') {
-        points.push(...soup(new PLYLoader().parse(content)));
-    } else if (kind === 'stl') {
-        points.push(...soup(new STLLoader().parse(content)));
-    } else {
-        throw new Error('only OBJ, PLY and STL are read here');
-    }
-    if (points.length === 0) throw new Error('it has no triangles');
-    return points;
+// For tests: replays the first ticks of the recording with the present settings, and returns the reaction of the
+// membrane there [N] and its relative error.
+let probe = null;
+function replayTo(ticks) {
+  return new Promise((resolve) => {
+    probe = {
+      start() {
+        if (physics.measuring) return;
+        begin({ type: "replay", rows });
+        waiting = true;
+        physics.send({ type: "frame", ticks, elapsed: ticks, budget: Infinity, moment: true });
+        this.measured = (value) => {
+          probe = null;
+          resolve(value);
+        };
+        this.start = () => {};
+      },
+      measured() {},
+    };
+  });
 }
-
-addEventListener('dragover', (event) => event.preventDefault());
-addEventListener('drop', async (event) => {
-    event.preventDefault();
-    const [file] = event.dataTransfer.files;
-    if (file) await open(file);
-});
-
-async function open(file) {
-    try {
-        const points = await readFile(file);
-        both({ command: 'buildFile', points, triangles: points.slice(0, points.length / 3).map((_, i) => i) });
-    } catch (error) {
-        notice(`${file.name} is refused: ${error.message}`);
-    }
-}
-
-// ---- What comes back
-
-loop.onmessage = ({ data }) => {
-    if (data.built) {
-        state = null;
-        touch = null;
-        view.setMesh(data.built);
-        plot.clear();
-    } else if (data.findings) {
-        const { refused, findings } = data.findings;
-        notice(`${refused ? 'The mesh is refused.\n' : ''}${findings}`);
-    } else if (data.recorded) {
-        record = data.recorded;
-        for (const id of ['replay', 'download']) $(id).disabled = record.length === 0;
-    } else if (data.replayed) {
-        replayed = data.replayed;
-    } else {
-        show(data.state);
-    }
+window.membrane = {
+  get state() {
+    const { force, touching, holding, positions } = state ?? { force: [0, 0, 0], positions: [] };
+    const vertices = positions.length / 3;
+    return { force, touching, holding, vertices, frames, recording, time: plot.time, ...times.summary() };
+  },
+  csv: () => csvOf(rows),
+  replayTo,
 };
 
-solver.onmessage = ({ data }) => {
-    if (!data.equilibrium) return;
-    waiting = false;
-    const { force, valid } = data.equilibrium;
-    error = 100 * Math.hypot(...force.map((f, k) => f - asked[k])) / Math.hypot(...force);
-    $('error').textContent = !valid ? '-' : error < 0.01 ? 'less than 0.01 %' : `${error.toFixed(error < 1 ? 2 : 1)} %`;
-};
-
-const quantile = (sorted, share) => `${sorted[Math.floor(share * (sorted.length - 1))].toFixed(0)} µs`;
-
-function show(next) {
-    state = next;
-    times.push(...next.times);
-    times.splice(0, times.length - statistics);
-    view.update(next, 1e-3 * 2);
-    plot.add(next.time, next.forces);
-    $('force').textContent = (1e3 * Math.hypot(...(next.result?.force ?? [0]))).toFixed(1);
-    if (times.length > 10) {
-        const sorted = [...times].sort((a, b) => a - b);
-        $('median').textContent = quantile(sorted, 0.5);
-        $('p99').textContent = quantile(sorted, 0.99);
-        $('worst').textContent = quantile(sorted, 1);
-    }
-    if (touch?.pulls && !touch.held && next.result?.touching) {
-        touch.held = next.tool.position;
-        aim();
-    }
-}
-
-function askForEquilibrium() {
-    if (waiting) return;
-    if (!state?.result?.touching || state.result.holding) {
-        $('error').textContent = '-';
-        return;
-    }
-    waiting = true;
-    asked = state.result.force;
-    solver.postMessage({ command: 'equilibrium', positions: state.positions, tool: state.tool });
-}
-
-function frame() {
-    loop.postMessage({ command: 'frame' });
-    if (view.membrane) view.draw();
-    requestAnimationFrame(frame);
-}
-
-document.addEventListener('visibilitychange', () => loop.postMessage({ command: 'run', running: !document.hidden }));
-$('view').addEventListener('webglcontextlost', (event) => {
-    event.preventDefault();
-    notice('The graphics context is lost; the picture returns when the browser restores it.');
-});
-$('view').addEventListener('webglcontextrestored', () => notice(''));
-
-showDial();
-both({ command: 'start', bytes, shape: Number($('shape').value), options: options() });
-solver.postMessage({ command: 'run', running: false });
-setInterval(askForEquilibrium, 500);
+view.addEventListener("webglcontextlost", () => panel.notice("The browser has lost the graphics context."));
+view.addEventListener("webglcontextrestored", () => panel.notice(""));
+setInterval(() => panel.showTimes(times.summary()), 500);
+document.getElementById("mesh").dispatchEvent(new Event("change"));
 requestAnimationFrame(frame);
-
-/// For tests: what a person sees as numbers.
-window.membrane = { state: () => state, record: () => record, replayed: () => replayed, error: () => error, open, play };

@@ -1,39 +1,82 @@
 // SPDX-License-Identifier: MIT
 //
-// The force of the last five seconds.
-import uPlot from 'uplot';
+// The force of the last seconds, a point for each tick, and the forces of the equilibria that were found.
+import uPlot from "uplot";
+import "uplot/dist/uPlot.min.css";
 
-const seconds = 5, every = 10;  // one sample in ten ticks
+const seconds = 5;
 
 export class Plot {
-    constructor(element) {
-        this.times = [];
-        this.forces = [];
-        const ink = getComputedStyle(document.body).getPropertyValue('--soft');
-        const axis = { stroke: ink, grid: { stroke: `${ink}33`, width: 1 }, ticks: { show: false } };
-        this.plot = new uPlot({
-            width: element.clientWidth, height: 130, cursor: { show: false }, legend: { show: false },
-            scales: { x: { time: false }, y: { range: (_, low, high) => [0, Math.max(10, 1.1 * high)] } },
-            axes: [{ ...axis, show: false }, { ...axis, size: 38 }],
-            series: [{}, { stroke: getComputedStyle(document.body).getPropertyValue('--accent'), width: 1.5 }],
-        }, [[], []], element);
-        addEventListener('resize', () => this.plot.setSize({ width: element.clientWidth, height: 130 }));
-    }
+  constructor(parent) {
+    this.parent = parent;
+    this.clear();
+    const colour = (name) => () => getComputedStyle(parent).getPropertyValue(name);
+    const axis = { stroke: colour("--quiet"), grid: { stroke: colour("--line"), width: 1 }, ticks: { show: false } };
+    this.chart = new uPlot(
+      {
+        width: 100,
+        height: 100,
+        cursor: { show: false },
+        scales: {
+          x: { time: false, range: () => [this.time - seconds, this.time] },
+          y: { range: (_, low, high) => [0, Math.max(10, 1.15 * (high || 0))] },
+        },
+        axes: [
+          { ...axis, size: 26, values: (_, splits) => splits.map((t) => (t < 0 ? "" : `${t} s`)) },
+          { ...axis, size: 62, values: (_, splits) => splits.map((f) => `${f} mN`) },
+        ],
+        series: [
+          {},
+          { stroke: colour("--accent"), width: 2, points: { show: false } },
+          { stroke: colour("--tool"), fill: colour("--tool"), paths: () => null, points: { show: true, size: 6 } },
+        ],
+      },
+      [[], [], []],
+      parent,
+    );
+    new ResizeObserver(() => this.resize()).observe(parent);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.chart.redraw());
+  }
 
-    add(time, forces) {
-        for (let i = (forces.length - 1) % every; i < forces.length; i += every) {
-            this.times.push(time - 1e-3 * (forces.length - 1 - i));
-            this.forces.push(1e3 * forces[i]);
-        }
-        const first = this.times.findIndex((t) => t > time - seconds);
-        this.times.splice(0, first);
-        this.forces.splice(0, first);
-        this.plot.setData([this.times, this.forces]);
-        this.plot.setScale('x', { min: time - seconds, max: time });
-    }
+  clear() {
+    this.time = 0; // [s]
+    this.errors = [];
+    this.ticks = [[], [], []]; // time [s], force, force of the equilibrium [mN]
+  }
 
-    clear() {
-        this.times = [];
-        this.forces = [];
+  resize() {
+    const style = getComputedStyle(this.parent);
+    const padding = (...sides) => sides.reduce((sum, side) => sum + parseFloat(style[`padding${side}`]), 0);
+    this.chart.setSize({
+      width: this.parent.clientWidth - padding("Left", "Right"),
+      height: this.parent.clientHeight - padding("Top", "Bottom"),
+    });
+  }
+
+  // The forces of the ticks of a frame [N].
+  add(forces) {
+    const [times, values, exact] = this.ticks;
+    for (const force of forces) {
+      this.time += 1e-3;
+      times.push(this.time);
+      values.push(1e3 * force);
+      exact.push(null);
     }
+    const old = times.length - 1000 * seconds;
+    if (old > 500) for (const list of this.ticks) list.splice(0, old);
+    this.chart.setData(this.ticks);
+  }
+
+  // The force of an equilibrium at a past time [N], and the relative error of the tick.
+  addExact(time, force, error) {
+    const [times, , exact] = this.ticks;
+    const i = times.length - 1 - Math.round(1e3 * (this.time - time));
+    if (i >= 0) exact[i] = 1e3 * force;
+    this.errors = this.errors.filter((other) => other.time > this.time - seconds).concat({ time, error });
+  }
+
+  // The largest error of the seconds in the plot.
+  worstError() {
+    return Math.max(...this.errors.map(({ error }) => error));
+  }
 }

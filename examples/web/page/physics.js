@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+//
+// The two workers: one runs the loop, the other finds equilibria. Each membrane gets new ones, so that no membrane can
+// leave anything behind.
+import module from "../../../build/web/membrane.wasm.js";
+import equilibriumSource from "./equilibrium.worker.js";
+import physicsSource from "./physics.worker.js";
+
+// A page that was opened as a file may start a worker only from a blob.
+function start(source, receive) {
+  const url = URL.createObjectURL(new Blob([module, source], { type: "text/javascript" }));
+  const worker = new Worker(url);
+  URL.revokeObjectURL(url);
+  worker.onmessage = ({ data }) => receive(data);
+  return worker;
+}
+
+export class Physics {
+  // `on` has a function for each message of the loop, and `equilibrium` for those of the other worker.
+  constructor(mesh, settings, on) {
+    this.on = on;
+    this.measuring = false;
+    this.next = 0; // time of the next measurement, at least [ms]
+    this.build = { type: "build", mesh, settings };
+    this.loop = start(physicsSource, (message) => on[message.type](message));
+    this.loop.postMessage(this.build);
+  }
+
+  send(message) {
+    this.loop.postMessage(message);
+  }
+
+  // Whether a measurement may begin: they take a quarter of a processor at most.
+  get idle() {
+    return !this.measuring && performance.now() > this.next;
+  }
+
+  // Finds the equilibrium of a moment at `time`. The worker starts with the first, after the page is up.
+  measure(moment, time) {
+    this.equilibria ??= this.startEquilibria();
+    this.measuring = true;
+    this.begun = performance.now();
+    this.equilibria.postMessage({ type: "measure", moment, time }, [moment.positions.buffer]);
+  }
+
+  startEquilibria() {
+    const worker = start(equilibriumSource, (message) => {
+      const now = performance.now();
+      this.measuring = false;
+      this.next = now + 3 * (now - this.begun);
+      this.on.equilibrium(message);
+    });
+    worker.postMessage(this.build);
+    return worker;
+  }
+
+  end() {
+    this.loop.terminate();
+    this.equilibria?.terminate();
+  }
+}
