@@ -36,7 +36,7 @@ template <class Network, class Volume>
         const membrane::Vector3<double> here = x.col(v);
         state.force.col(v) = -network.force_on(v, x).force - volume.force_on(v, here, here, 1.0).force;
         double sum = 0;
-        network.for_each_pull(v, x, [&](const auto& spring) { sum += spring.tension * spring.length; });
+        network.for_each_force(v, x, [&](const auto& spring) { sum += spring.tension * spring.length; });
         state.tension[v] = area[v] > 0 ? sum / (4 * area[v]) : 0;
     }
     return state;

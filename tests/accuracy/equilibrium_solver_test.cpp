@@ -52,7 +52,7 @@ TEST_CASE("increments lead to the same place, each in few iterations", "[equilib
     CHECK((one.x - ten.x).cwiseAbs().maxCoeff() < 1e-13);
     CHECK((one.reactions[0] - ten.reactions[0]).norm() < 1e-13);
     CHECK(ten.iterations <= 60);
-    CHECK(one.overlap == 0);
+    CHECK(one.penetration == 0);
 }
 
 TEST_CASE("a looser tolerance takes fewer iterations and keeps its word", "[equilibrium_solver]") {

@@ -164,7 +164,7 @@ TEMPLATE_TEST_CASE("each kind that can be repaired is, and nothing else", "[mesh
             ++turned;
         }
         result = repaired(bad, {.orient = true});
-        CHECK(result.report.turned == turned);
+        CHECK(result.report.reversed == turned);
         CHECK(validate(result.positions, result.triangles).valid());
         CHECK(validate(result.positions, result.triangles).facts.volume ==
               Approx(validate(given.x, given.triangles).facts.volume));
@@ -257,7 +257,7 @@ TEMPLATE_TEST_CASE("triangles of a closed component are turned to face outward, 
             REQUIRE(same_turn(result.triangles.col(f), expected.col(f)));
         }
         for (std::size_t i = 0; i < closed.size(); ++i) turned += turned_of[i] == size_of[i] ? 0 : turned_of[i];
-        CHECK(result.report.turned == turned);
+        CHECK(result.report.reversed == turned);
         const auto outward = repaired(bad, {.orient = true, .flip_inward = true});
         CHECK(validate(outward.positions, outward.triangles).facts.facing == Facing::outward);
         CHECK(validate(outward.positions, outward.triangles).count(MeshDefect::inward) == 0);

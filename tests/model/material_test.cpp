@@ -51,15 +51,15 @@ TEST_CASE("moduli are those of Hooke's law", "[material]") {
 
 TEST_CASE("tissues are materials, typical ones within the range", "[material]") {
     for (const MaterialRange& tissue : {materials::cornea(), materials::lens_capsule(), materials::retina()}) {
-        for (const Material& material : {tissue.typical, tissue.least, tissue.most}) {
+        for (const Material& material : {tissue.typical, tissue.lower, tissue.upper}) {
             CHECK(test::refusal([&] { material.check(); }) == "");
         }
-        CHECK((tissue.least.young_modulus < tissue.typical.young_modulus));
-        CHECK((tissue.typical.young_modulus < tissue.most.young_modulus));
-        CHECK((tissue.least.thickness < tissue.typical.thickness && tissue.typical.thickness < tissue.most.thickness));
+        CHECK((tissue.lower.young_modulus < tissue.typical.young_modulus));
+        CHECK((tissue.typical.young_modulus < tissue.upper.young_modulus));
+        CHECK((tissue.lower.thickness < tissue.typical.thickness && tissue.typical.thickness < tissue.upper.thickness));
     }
     // [Fisher69] gives dyn/cm^2.
-    CHECK(materials::lens_capsule().most.young_modulus == Approx(6e7 * 1e-5 / 1e-4));
+    CHECK(materials::lens_capsule().upper.young_modulus == Approx(6e7 * 1e-5 / 1e-4));
 }
 
 TEST_CASE("materials and foundations that make no sense are refused by name", "[material][bad]") {

@@ -60,7 +60,7 @@ TEMPLATE_TEST_CASE("a reordered mesh is the same surface, each vertex and triang
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const auto mesh = test::random_surface<S>(random).mesh();
-        const auto [near, source_vertex, triangle_before] = reordered(mesh);
+        const auto [near, source_vertex, source_triangle] = reordered(mesh);
         const auto is_permutation = [](std::vector<Index> order, Index count) {
             std::sort(order.begin(), order.end());
             std::vector<Index> all(static_cast<std::size_t>(count));
@@ -68,16 +68,16 @@ TEMPLATE_TEST_CASE("a reordered mesh is the same surface, each vertex and triang
             return order == all;
         };
         REQUIRE(is_permutation(source_vertex, mesh.vertex_count()));
-        REQUIRE(is_permutation(triangle_before, mesh.triangle_count()));
+        REQUIRE(is_permutation(source_triangle, mesh.triangle_count()));
         REQUIRE(test::same_bits(near.positions(), Points<S>(mesh.positions()(Eigen::all, source_vertex))));
         Triangles back = near.triangles();
         for (Index& v : back.reshaped()) v = source_vertex[static_cast<std::size_t>(v)];
-        REQUIRE(back == mesh.triangles()(Eigen::all, triangle_before));
+        REQUIRE(back == mesh.triangles()(Eigen::all, source_triangle));
 
         // It is in order now, and comes to it from any other.
         const auto again = reordered(near);
         REQUIRE(std::is_sorted(again.source_vertex.begin(), again.source_vertex.end()));
-        REQUIRE(std::is_sorted(again.triangle_before.begin(), again.triangle_before.end()));
+        REQUIRE(std::is_sorted(again.source_triangle.begin(), again.source_triangle.end()));
         REQUIRE(test::same_bits(reordered(shuffled(mesh, random)).mesh.positions(), near.positions()));
     }
 }

@@ -241,7 +241,7 @@ inline ProblemStatus EquilibriumProblem::check_places() const noexcept {
 inline void EquilibriumProblem::forces(const Points<double>& y, Points<double>& force,
                                        std::vector<double>& magnitude) const noexcept {
     for (Index v = 0; v < vertex_count(); ++v) {
-        const Vector3<double> pull = foundation_[at(v)].elastic_pull(point(y, v)).force;
+        const Vector3<double> pull = foundation_[at(v)].elastic_force(point(y, v)).force;
         force.col(v) = pull + load_.col(v);
         magnitude[at(v)] = norm(pull) + norm(point(load_, v));
     }

@@ -37,7 +37,7 @@ struct Equilibrium {
     std::vector<Vector3<double>> reactions;  ///< for each constraint in order, the membrane's force on it [N]
     std::vector<ToolPoint> contacts;         ///< points with a contact force; numbers only the tools in contact, from 0
     double residual = 0;                     ///< largest unbalanced force on a free vertex [N]
-    double overlap = 0;                      ///< largest penetration of a tool [m]
+    double penetration = 0;                  ///< largest penetration of a tool [m]
     Index iterations = 0;                    ///< of Newton's method, in all increments
     bool converged = false;                  ///< forces balance, attachments are at their targets, no tool penetrates
 };

@@ -36,7 +36,7 @@ class EquilibriumSolver {
     struct State {
         ElasticState elastic;
         std::vector<ToolPoint> contacts;
-        double overlap = 0;
+        double penetration = 0;
     };
 
     [[nodiscard]] bool solve_increment();
@@ -119,7 +119,7 @@ Equilibrium EquilibriumSolver<ElasticModel>::run(std::size_t constraint_count) {
                  [](const ToolPoint& point) { return point.multiplier > 0; });
     for (auto& point : result.contacts) point.force = -point.multiplier * point.normal;
     result.residual = residual(here_);
-    result.overlap = here_.overlap;
+    result.penetration = here_.penetration;
     result.iterations = iterations_;
     return result;
 }
@@ -141,12 +141,12 @@ auto EquilibriumSolver<ElasticModel>::state_at(const Points<double>& x) -> State
     State state{elasticity_.at(x), tool_points(triangles_, x, goals_.tools, edge_ / 2)};
     std::erase_if(state.contacts, [&](const ToolPoint& point) { return !can_move(point.corners, point.weights); });
     for (auto& point : state.contacts) {
-        state.overlap = (std::max)(state.overlap, -point.gap);
+        state.penetration = (std::max)(state.penetration, -point.gap);
         const auto before = std::lower_bound(here_.contacts.begin(), here_.contacts.end(), point, is_before);
         if (before != here_.contacts.end() && !is_before(point, *before)) point.multiplier = before->multiplier;
     }
     for (const auto& tool : goals_.tools) {
-        if (is_pierced(triangles_, x, tool, fixed_)) state.overlap = (std::max)(state.overlap, tool.radius);
+        if (is_pierced(triangles_, x, tool, fixed_)) state.penetration = (std::max)(state.penetration, tool.radius);
     }
     return state;
 }
@@ -206,7 +206,7 @@ bool EquilibriumSolver<ElasticModel>::is_balanced() const {
     const double largest = (std::max)(here_.elastic.largest_force, goals_.loads.colwise().norm().maxCoeff());
     if (!(residual(here_) <= (std::max)(options_.tolerance * largest, stiffness_ * spacing_))) return false;
     const auto contacts = [&](const ToolPoint& p) { return p.multiplier == 0 || p.gap <= negligible_length(); };
-    return targets_reached() && here_.overlap <= negligible_length() &&
+    return targets_reached() && here_.penetration <= negligible_length() &&
            std::all_of(here_.contacts.begin(), here_.contacts.end(), contacts);
 }
 
@@ -235,19 +235,19 @@ void EquilibriumSolver<ElasticModel>::advance(const Points<double>& step) {
         }
         return state_at(x);
     };
-    const auto merit = [&](const State& state) { return residual(state) + stiffness_ * state.overlap; };
+    const auto merit = [&](const State& state) { return residual(state) + stiffness_ * state.penetration; };
     double part = collision_free_step(triangles_, here_.elastic.x, step, goals_.tools);
     State there = after(part);
     if (targets_reached()) {
         double multipliers = 0;
         for (const auto& point : here_.contacts) multipliers += point.multiplier;
         penalty_ = (std::max)(penalty_, 2 * multipliers);
-        const double slope = -applied(here_).cwiseProduct(step).sum() - penalty_ * here_.overlap;
+        const double slope = -applied(here_).cwiseProduct(step).sum() - penalty_ * here_.penetration;
         const auto improves = [&] {
             const double work = goals_.loads.cwiseProduct(there.elastic.x - here_.elastic.x).sum();
             const double energy = elasticity_.energy_change(here_.elastic, there.elastic) - work;
             const double noise = 1e-13 * (here_.elastic.energy + there.elastic.energy);
-            const double change = energy + penalty_ * (there.overlap - here_.overlap);
+            const double change = energy + penalty_ * (there.penetration - here_.penetration);
             return change <= 1e-4 * part * slope + noise || merit(there) <= merit(here_) / 2;
         };
         for (int i = 0; i < max_halvings && !improves(); ++i) {

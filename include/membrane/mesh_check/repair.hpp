@@ -53,7 +53,7 @@ struct RepairReport {
     ///@{
     /// Of the option `weld`, `drop_repeated`, `drop_zero_area`, `drop_duplicates`, `orient`, `split_vertices`,
     /// `flip_inward`, `drop_isolated`.
-    Index welded = 0, repeated = 0, zero_area = 0, duplicates = 0, turned = 0, split = 0, flipped = 0, isolated = 0;
+    Index welded = 0, repeated = 0, zero_area = 0, duplicates = 0, reversed = 0, split = 0, flipped = 0, isolated = 0;
     ///@}
     bool complete = true;  ///< False: the search for pairs within `weld` reached its limit, some may not be welded.
 };
@@ -97,7 +97,7 @@ template <class S, std::size_t m, std::integral I, std::size_t n>
     say("dropped", report.repeated, "triangles with a repeated vertex");
     say("dropped", report.zero_area, "triangles without area");
     say("dropped", report.duplicates, "duplicate triangles");
-    say("reversed", report.turned, "triangles");
+    say("reversed", report.reversed, "triangles");
     say("split off", report.split, "vertices");
     say("flipped", report.flipped, "inward triangles");
     say("dropped", report.isolated, "isolated vertices");
@@ -242,7 +242,7 @@ inline void Repair::orient(const std::vector<bool>& usable) {
         const SurfaceComponent& part = now.parts[static_cast<std::size_t>(p)];
         if (part.closed && part.volume < 0) turn_over(f);
     }
-    report_.turned = static_cast<Index>(std::count(turned.begin(), turned.end(), true));
+    report_.reversed = static_cast<Index>(std::count(turned.begin(), turned.end(), true));
 }
 
 inline void Repair::split_vertices() {

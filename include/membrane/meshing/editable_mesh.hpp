@@ -41,10 +41,10 @@ class EditableMesh {
     ///@{
     /// In the side's triangle: the next side, the previous side, and the three vertices: first, second, apex.
     [[nodiscard]] static Index next(Index side) noexcept { return side % 3 == 2 ? side - 2 : side + 1; }
-    [[nodiscard]] static Index last(Index side) noexcept { return side % 3 == 0 ? side + 2 : side - 1; }
+    [[nodiscard]] static Index prev(Index side) noexcept { return side % 3 == 0 ? side + 2 : side - 1; }
     [[nodiscard]] Index from(Index side) const noexcept { return from_[at(side)]; }
     [[nodiscard]] Index to(Index side) const noexcept { return from_[at(next(side))]; }
-    [[nodiscard]] Index apex(Index side) const noexcept { return from_[at(last(side))]; }
+    [[nodiscard]] Index apex(Index side) const noexcept { return from_[at(prev(side))]; }
     ///@}
 
     /// The other side of the edge; `no_index` at a border.
@@ -117,7 +117,7 @@ void EditableMesh::for_each_outgoing(Index v, Visit visit) const {
     Index side = first;
     do {
         visit(side);
-        side = twin(last(side));
+        side = twin(prev(side));
     } while (side != first && side != no_index);
 }
 
@@ -139,7 +139,7 @@ inline Index EditableMesh::add_triangle(Index a, Index b, Index c) {
 }
 
 inline void EditableMesh::remove_triangle(Index side) noexcept {
-    for (const Index gone : {side, next(side), last(side)}) from_[at(gone)] = no_index;
+    for (const Index gone : {side, next(side), prev(side)}) from_[at(gone)] = no_index;
 }
 
 /// Sets the first outgoing side of `v`, found from its outgoing `side`: at a border the one without a twin.
@@ -157,20 +157,20 @@ inline bool EditableMesh::flip(Index side) {
     if (other == no_index || has_edge(apex(side), apex(other))) return false;
     // Triangles a b c and b a d become d c a, whose first side is `side`, and c d b, whose first is `other`.
     const Index a = from(side), b = to(side), c = apex(side), d = apex(other);
-    const Index bc = twin(next(side)), ca = twin(last(side)), ad = twin(next(other)), db = twin(last(other));
+    const Index bc = twin(next(side)), ca = twin(prev(side)), ad = twin(next(other)), db = twin(prev(other));
     const auto turn = [&](Index first, Index p, Index q, Index r) {
         from_[at(first)] = p;
         from_[at(next(first))] = q;
-        from_[at(last(first))] = r;
+        from_[at(prev(first))] = r;
     };
     turn(side, d, c, a);
     turn(other, c, d, b);
     join(next(side), ca);
-    join(last(side), ad);
+    join(prev(side), ad);
     join(next(other), db);
-    join(last(other), bc);
-    begin_at_border(a, last(side));
-    begin_at_border(b, last(other));
+    join(prev(other), bc);
+    begin_at_border(a, prev(side));
+    begin_at_border(b, prev(other));
     begin_at_border(c, other);
     begin_at_border(d, side);
     return true;
@@ -186,8 +186,8 @@ inline Index EditableMesh::split(Index side, const Vector3<double>& p) {
         const Index far = add_triangle(middle, b, c);
         from_[at(next(near))] = middle;
         join(next(far), bc);
-        join(last(far), next(near));
-        begin_at_border(c, last(far));
+        join(prev(far), next(near));
+        begin_at_border(c, prev(far));
         return far;
     };
     const Index far = halve(side);
@@ -206,7 +206,7 @@ inline bool EditableMesh::can_collapse(Index side) const {
     const Index a = from(side), b = to(side), other = twin(side);
     const bool inner = other != no_index;
     if (inner && is_border(a)) return false;
-    if (!inner && twin(next(side)) == no_index && twin(last(side)) == no_index) return false;
+    if (!inner && twin(next(side)) == no_index && twin(prev(side)) == no_index) return false;
     bool valid = true;
     int around_a = 0, around_b = 0;
     for_each_outgoing(b, [&](Index) { ++around_b; });
@@ -216,7 +216,7 @@ inline bool EditableMesh::can_collapse(Index side) const {
     for_each_outgoing(a, [&](Index out) {
         ++around_a;
         check(to(out));
-        if (twin(last(out)) == no_index) check(apex(out));
+        if (twin(prev(out)) == no_index) check(apex(out));
     });
     return valid && !(inner && !is_border(b) && around_a == 3 && around_b == 3);
 }
@@ -235,7 +235,7 @@ inline bool EditableMesh::collapse(Index side) {
     std::vector<Seam> seams;
     for (const Index gone : {side, other}) {
         if (gone == no_index) continue;
-        seams.push_back({apex(gone), twin(next(gone)), twin(last(gone))});
+        seams.push_back({apex(gone), twin(next(gone)), twin(prev(gone))});
         join(seams.back().inward, seams.back().outward);
     }
     remove_triangle(side);

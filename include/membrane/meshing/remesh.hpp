@@ -203,7 +203,7 @@ void Remesher<Surface>::flip_to_delaunay() {
         if (mesh_.twin(side) == no_index || is_delaunay(side) || !may_flip(side) || !mesh_.flip(side)) continue;
         --left;
         const Index other = mesh_.twin(side);
-        pending.insert(pending.end(), {mesh_.next(side), mesh_.last(side), mesh_.next(other), mesh_.last(other)});
+        pending.insert(pending.end(), {mesh_.next(side), mesh_.prev(side), mesh_.next(other), mesh_.prev(other)});
     }
 }
 

@@ -301,7 +301,7 @@ class MassSpringNetwork {
 
     /// Calls `act(force)` with the `SpringForce` of each spring of vertex `v` at positions `x`.
     template <class Act>
-    void for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept;
+    void for_each_force(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept;
 
     /// Sum of the spring forces on vertex `v` at positions `x`.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
@@ -414,7 +414,7 @@ void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, c
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 template <class Act>
-void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
+void MassSpringNetwork<Scalar, Law>::for_each_force(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
     const Vector3<Scalar> here = point(x, v);
     for (const auto& end : springs_of(v)) {
         const Vector3<Scalar> edge = point(x, end.other) - here;
@@ -425,7 +425,7 @@ void MassSpringNetwork<Scalar, Law>::for_each_pull(Index v, const ConstPointsRef
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 VertexForce<Scalar> MassSpringNetwork<Scalar, Law>::force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
     VertexForce<Scalar> sum;
-    for_each_pull(v, x, [&](const SpringForce<Scalar>& spring) { add(sum, spring); });
+    for_each_force(v, x, [&](const SpringForce<Scalar>& spring) { add(sum, spring); });
     return sum;
 }
 
@@ -433,14 +433,14 @@ template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 EnergyMajoriser<Scalar> MassSpringNetwork<Scalar, Law>::majoriser(Index v,
                                                                   const ConstPointsRef<Scalar>& x) const noexcept {
     CurvedSum<Scalar> sum;
-    for_each_pull(v, x, [&](const SpringForce<Scalar>& spring) { add(sum, spring); });
+    for_each_force(v, x, [&](const SpringForce<Scalar>& spring) { add(sum, spring); });
     return sum.total();
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 Symmetric3<Scalar> MassSpringNetwork<Scalar, Law>::hessian(Index v, const ConstPointsRef<Scalar>& x) const noexcept {
     Symmetric3<Scalar> block;
-    for_each_pull(v, x, [&](const SpringForce<Scalar>& spring) { add(block, spring); });
+    for_each_force(v, x, [&](const SpringForce<Scalar>& spring) { add(block, spring); });
     return block;
 }
 

@@ -54,7 +54,7 @@ struct FoundationLayer {
 struct MaterialRange {
     ///@{
     /// Typical constants, and the lower and upper ends of the range.
-    Material typical, least, most;
+    Material typical, lower, upper;
     ///@}
 };
 

@@ -81,7 +81,7 @@ struct VolumeSpring {
     Scalar before = 0;                                 ///< its length when the tick began [m]
 
     /// Its force on the vertex at `position`, without damping.
-    [[nodiscard]] VertexForce<Scalar> elastic_pull(const Vector3<Scalar>& position) const noexcept {
+    [[nodiscard]] VertexForce<Scalar> elastic_force(const Vector3<Scalar>& position) const noexcept {
         return {-stiffness * (position - anchor), stiffness + rate};
     }
 
@@ -103,7 +103,7 @@ struct VolumeSpring {
 
     /// Elastic force and damping force.
     [[nodiscard]] VertexForce<Scalar> force_on(const Vector3<Scalar>& position) const noexcept {
-        auto sum = elastic_pull(position);
+        auto sum = elastic_force(position);
         if (any(rate != 0)) sum.force += damping_force(position);
         return sum;
     }
@@ -142,7 +142,7 @@ class VirtualVolumeSprings {
     /// As `FoundationModel` requires.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                                Scalar dt) const noexcept {
-        if (damping(v) == 0) return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.elastic_pull(position);
+        if (damping(v) == 0) return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.elastic_force(position);
         return spring(v, start, dt).force_on(position);
     }
 

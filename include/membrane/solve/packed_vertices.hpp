@@ -372,7 +372,7 @@ MEMBRANE_INLINE void PackedVertices<Scalar>::add_others(std::size_t p, const Vec
                                                         VertexForce<Wide>& others) const noexcept {
     if constexpr (!std::same_as<std::remove_cvref_t<decltype(scene.volume)>, NoFoundation>) {
         const auto& spring = terms_[p].spring;
-        const auto foundation = terms_[p].damps ? spring.force_on(here) : spring.elastic_pull(here);
+        const auto foundation = terms_[p].damps ? spring.force_on(here) : spring.elastic_force(here);
         others.force = in_contact ? Vector3<Wide>(foundation.force + others.force) : foundation.force;
         others.stiffness = in_contact ? Wide(foundation.stiffness + others.stiffness) : foundation.stiffness;
     }

@@ -12,7 +12,7 @@
 
 /// A mesh in an order in which elements close in space are close in memory.
 ///
-///     const auto [near, source_vertex, triangle_before] = membrane::reordered(mesh);
+///     const auto [near, source_vertex, source_triangle] = membrane::reordered(mesh);
 ///     for (membrane::Index v = 0; v < near.vertex_count(); ++v) colour_now[v] = colour[source_vertex[v]];
 namespace membrane {
 
@@ -21,7 +21,7 @@ template <Real Scalar>
 struct ReorderedMesh {
     TriangleMesh<Scalar> mesh;           ///< with new indices
     std::vector<Index> source_vertex;    ///< former index of vertex v
-    std::vector<Index> triangle_before;  ///< former index of triangle f
+    std::vector<Index> source_triangle;  ///< former index of triangle f
 };
 
 /// The surface with its vertices along a space-filling curve [Morton66], and its triangles by the first of their
