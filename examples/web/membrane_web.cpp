@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
 // The loop of the page for JavaScript: a worker moves a `Loop` by the ticks of each displayed frame.
+#include <algorithm>
 #include <cstring>
 #include <string>
 
@@ -47,30 +48,22 @@ class Loop {
 
     /// Up to `ticks` ticks toward `target` within `budget` [ms]; returns how many. The forceps close at the membrane.
     int run(int ticks, double budget, const Vector3& target, bool close) {
-        begin_frame();
-        const double begin = emscripten_get_now();
-        double before = begin;
-        int done = 0;
-        while (done < ticks && before - begin < budget) {
+        return run_frame(ticks, budget, [&] {
             const auto& last = session_.moment();
             hand_.follow(target, close && (last.tool.grasping || last.contact.touching()), dt);
-            before = tick(hand_.tool(), std::exchange(placed_, false), before);
-            ++done;
-        }
-        return done;
+            step(hand_.tool(), std::exchange(placed_, false));
+        });
     }
 
     /// Up to `ticks` ticks of the recording, with the present settings; returns how many were left.
     int replay(int ticks, double budget) {
-        begin_frame();
-        const double begin = emscripten_get_now();
-        double before = begin;
-        for (; ticks > 0 && next_ < script_.size() && before - begin < budget; --ticks) {
+        const auto left = [&] { return static_cast<int>(script_.size() - next_); };
+        run_frame(std::min(ticks, left()), budget, [&] {
             const Row& row = script_[next_++];
             if (row.placed != 0) session_.lift_tool();
-            before = tick(tool_of(row, hand_.tool().radius), row.placed != 0, before);
-        }
-        return static_cast<int>(script_.size() - next_);
+            step(tool_of(row, hand_.tool().radius), row.placed != 0);
+        });
+        return left();
     }
 
     void start_recording() {
@@ -83,7 +76,7 @@ class Loop {
     /// Rows of a recording, to be replayed.
     void load(const val& rows) {
         const auto numbers = convertJSArrayToNumberVector<double>(rows);
-        script_.resize(numbers.size() / 16);
+        script_.resize(numbers.size() / row_size);
         std::memcpy(script_.data(), numbers.data(), script_.size() * sizeof(Row));
         next_ = 0;
     }
@@ -95,7 +88,7 @@ class Loop {
     [[nodiscard]] val forces() const { return view(forces_); }
     [[nodiscard]] val times() const { return view(times_); }
     [[nodiscard]] val recording() const {
-        return val(typed_memory_view(16 * rows_.size(), reinterpret_cast<const double*>(rows_.data())));
+        return val(typed_memory_view(row_size * rows_.size(), reinterpret_cast<const double*>(rows_.data())));
     }
 
     /// For each vertex 1 + the number of its layer in the queue; 0 outside.
@@ -134,20 +127,30 @@ class Loop {
     }
 
   private:
-    static constexpr std::size_t max_rows = 60'000;  // a minute
+    static constexpr std::size_t max_rows = 60'000;                        // a minute
+    static constexpr std::size_t row_size = sizeof(Row) / sizeof(double);  // in numbers
 
-    void begin_frame() {
+    /// Up to `ticks` calls of `tick` within `budget` [ms], with force and time of each; returns how many.
+    template <class Tick>
+    int run_frame(int ticks, double budget, Tick tick) {
         forces_.clear();
         times_.clear();
+        const double begin = emscripten_get_now();
+        double before = begin;
+        int done = 0;
+        for (; done < ticks && before - begin < budget; ++done) {
+            tick();
+            const double after = emscripten_get_now();
+            times_.push_back(after - before);
+            forces_.push_back(membrane::norm(session_.force()));
+            before = after;
+        }
+        return done;
     }
 
-    double tick(const membrane::Tool<double>& tool, bool placed, double before) {
+    void step(const membrane::Tool<double>& tool, bool placed) {
         session_.step(tool);
-        const double after = emscripten_get_now();
-        times_.push_back(after - before);
-        forces_.push_back(membrane::norm(session_.force()));
         if (recording_ && rows_.size() < max_rows) rows_.push_back(row_of(session_, placed));
-        return after;
     }
 
     Session session_;
