@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: MIT
 //
-// The loop of the page for JavaScript: a worker moves a `Loop` by the ticks of each displayed frame.
+// The loop of the page for JavaScript.
 #include <algorithm>
 #include <cstring>
 #include <string>
 
 #include <emscripten.h>
 #include <emscripten/bind.h>
+#include <membrane/accuracy/choose_settings.hpp>
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/mesh_check/validate.hpp>
 
+#include "../support/surface_state.hpp"
 #include "hand.hpp"
 #include "recording.hpp"
 
@@ -31,12 +33,20 @@ val view(const Matrix& numbers) {
     return val(typed_memory_view(static_cast<std::size_t>(numbers.size()), numbers.data()));
 }
 
+/// What a stroke needs, by `choose_settings`.
+struct Choice {
+    Index layers = 0, sweeps = 0;
+    double force_error = 0, time = 0;  // as `membrane::TrialResult`
+    bool satisfied = false;
+};
+
 class Loop {
   public:
     explicit Loop(Mesh mesh, const Settings& settings)
         : session_(std::move(mesh), settings),
+          nodes_(membrane::tree_shape(session_.mesh(), membrane::TreeOptions{}.balance_threshold).nodes),
           hand_(tool_radius(session_.mesh()), 12 * size_of(session_.mesh())),
-          layers_(static_cast<std::size_t>(session_.mesh().vertex_count())) {}
+          target_(hand_.tool().position) {}
 
     void configure(const Settings& settings) { session_.configure(settings); }
 
@@ -44,26 +54,38 @@ class Loop {
         hand_.place(position);
         session_.lift_tool();
         placed_ = true;
+        if (touched_in_stroke_) last_stroke_.swap(stroke_);
+        touched_in_stroke_ = false;
+        stroke_.clear();
     }
 
-    /// Up to `ticks` ticks toward `target` within `budget` [ms]; returns how many. The forceps close at the membrane.
-    int run(int ticks, double budget, const Vector3& target, bool close) {
-        return run_frame(ticks, budget, [&] {
-            const auto& last = session_.moment();
-            hand_.follow(target, close && (last.tool.grasping || last.contact.touching()), dt);
-            step(hand_.tool(), std::exchange(placed_, false));
-        });
+    /// What the hand does from now on: it moves toward `target`, and closes the forceps at the membrane.
+    void aim(const Vector3& target, bool close) {
+        target_ = target;
+        close_ = close;
     }
 
-    /// Up to `ticks` ticks of the recording, with the present settings; returns how many were left.
-    int replay(int ticks, double budget) {
-        const auto left = [&] { return static_cast<int>(script_.size() - next_); };
-        run_frame(std::min(ticks, left()), budget, [&] {
-            const Row& row = script_[next_++];
-            if (row.placed != 0) session_.lift_tool();
-            step(tool_of(row, hand_.tool().radius), row.placed != 0);
-        });
-        return left();
+    /// Up to `ticks` ticks within `budget` [ms]: of the recording that is replayed, with the present settings, then of
+    /// the hand.
+    void run(int ticks, double budget) {
+        const double begin = emscripten_get_now();
+        double before = begin;
+        for (int done = 0; done < ticks && before - begin < budget; ++done) {
+            if (left() > 0)
+                replay();
+            else
+                follow();
+            const double after = emscripten_get_now();
+            times_.push_back(after - before);
+            forces_.push_back(membrane::norm(session_.force()));
+            before = after;
+        }
+    }
+
+    /// Forgets force and time of the ticks so far.
+    void begin_frame() {
+        forces_.clear();
+        times_.clear();
     }
 
     void start_recording() {
@@ -75,9 +97,7 @@ class Loop {
 
     /// Rows of a recording, to be replayed.
     void load(const val& rows) {
-        const auto numbers = convertJSArrayToNumberVector<double>(rows);
-        script_.resize(numbers.size() / row_size);
-        std::memcpy(script_.data(), numbers.data(), script_.size() * sizeof(Row));
+        script_ = rows_of(rows);
         next_ = 0;
     }
 
@@ -87,26 +107,55 @@ class Loop {
     [[nodiscard]] val normals() const { return view(session_.normals()); }
     [[nodiscard]] val forces() const { return view(forces_); }
     [[nodiscard]] val times() const { return view(times_); }
-    [[nodiscard]] val recording() const {
-        return val(typed_memory_view(row_size * rows_.size(), reinterpret_cast<const double*>(rows_.data())));
+    [[nodiscard]] val recording() const { return view_of_rows(rows_); }
+
+    /// The ticks since the tool was last put to where it pressed or pulled.
+    [[nodiscard]] val stroke() const { return view_of_rows(touched_in_stroke_ ? stroke_ : last_stroke_); }
+
+    /// Ticks of the recording that are still to be replayed.
+    [[nodiscard]] int left() const { return static_cast<int>(script_.size() - next_); }
+
+    /// A number for each vertex: `displacement` [m], `tension` [N/m], or `layers`: 1 in the first one of the queue,
+    /// less in the next ones, 0 outside.
+    [[nodiscard]] val values(const std::string& quantity) {
+        values_.setZero(session_.mesh().vertex_count());
+        if (quantity == "layers") {
+            const auto& queue = session_.queue();
+            for (Index k = 0; k < queue.layer_count(); ++k)
+                for (const Index v : queue.layer(k)) values_[v] = 1 - static_cast<float>(k) / queue.layer_count();
+        } else {
+            const auto state = examples::surface_state(session_.mesh(), session_.x(), session_.network_now(),
+                                                       session_.foundation_now());
+            if (quantity == "tension") values_ = state.tension.cast<float>();
+            if (quantity == "displacement") values_ = state.displacement.colwise().norm().cast<float>();
+        }
+        return view(values_);
     }
 
-    /// For each vertex 1 + the number of its layer in the queue; 0 outside.
-    [[nodiscard]] val layers() {
-        std::fill(layers_.begin(), layers_.end(), std::uint8_t{0});
-        const auto& queue = session_.queue();
-        for (Index k = 0; k < queue.layer_count(); ++k)
-            for (const Index v : queue.layer(k))
-                layers_[static_cast<std::size_t>(v)] = static_cast<std::uint8_t>(k + 1);
-        return view(layers_);
-    }
-
-    /// Triangles with a contact force.
+    /// Triangles with a contact force, then those that the tracker watches.
     [[nodiscard]] val contact_triangles() {
-        touched_.clear();
+        triangles_.clear();
         for (const auto& point : session_.contact_points())
-            if (!point.force.isZero(0)) touched_.push_back(point.triangle);
-        return view(touched_);
+            if (!point.force.isZero(0)) triangles_.push_back(point.triangle);
+        return view(triangles_);
+    }
+    [[nodiscard]] val tracked_triangles() {
+        triangles_.clear();
+        for (const auto& triangle : session_.moment().contact.triangles) triangles_.push_back(triangle.triangle);
+        return view(triangles_);
+    }
+
+    /// Two corners of each box of the tree that meets the tool.
+    [[nodiscard]] val tree_boxes() {
+        corners_.clear();
+        const auto& tool = hand_.tool();
+        for (std::size_t node = 0; node < nodes_.size(); ++node) {
+            const auto box = session_.tree().box(static_cast<Index>(node));
+            if (squared_distance(box, tool.position) > tool.radius * tool.radius) continue;
+            for (const Vector3& corner : {box.low, box.high})
+                for (int k = 0; k < 3; ++k) corners_.push_back(static_cast<float>(corner[k]));
+        }
+        return view(corners_);
     }
 
     [[nodiscard]] Moment moment() const { return session_.moment(); }
@@ -126,26 +175,55 @@ class Loop {
         return exact.converged ? val(Vector3(exact.reactions[0] + exact.reactions[1])) : val::null();
     }
 
+    /// Layers and sweeps for a stroke: the fastest with at most this relative error of the force, or if that is 0, the
+    /// most accurate with at most this time [s].
+    [[nodiscard]] Choice choose(const Settings& settings, const val& stroke, double force_error, double time) {
+        session_.configure(settings);
+        std::vector<membrane::Tool<double>> tools;
+        for (const Row& row : rows_of(stroke)) tools.push_back(tool_of(row, radius()));
+        const membrane::ToolTrajectory<double> trajectory(session_.mesh(), tools, dt);
+        const auto search = [&](const auto& rule) {
+            return membrane::choose_settings(
+                session_.mesh(), session_.network_now(), session_.foundation_now(), trajectory,
+                {.force_error = force_error, .time = time},
+                {.contact_iterations = {membrane::SolverOptions<double>{}.contact_iterations},
+                 .tick_stride = 25,
+                 .repetitions = 1},
+                rule);
+        };
+        const auto choice =
+            session_.settings().safe_step ? search(membrane::SafeStep{}) : search(membrane::BlockStep{});
+        return {choice.options.layers, choice.options.sweeps, choice.force_error, choice.time, choice.satisfied};
+    }
+
   private:
-    static constexpr std::size_t max_rows = 60'000;                        // a minute
+    static constexpr std::size_t max_rows = 60'000;                        // of a recording: a minute
+    static constexpr std::size_t stroke_rows = 1'000;                      // a second
     static constexpr std::size_t row_size = sizeof(Row) / sizeof(double);  // in numbers
 
-    /// Up to `ticks` calls of `tick` within `budget` [ms], with force and time of each; returns how many.
-    template <class Tick>
-    int run_frame(int ticks, double budget, Tick tick) {
-        forces_.clear();
-        times_.clear();
-        const double begin = emscripten_get_now();
-        double before = begin;
-        int done = 0;
-        for (; done < ticks && before - begin < budget; ++done) {
-            tick();
-            const double after = emscripten_get_now();
-            times_.push_back(after - before);
-            forces_.push_back(membrane::norm(session_.force()));
-            before = after;
-        }
-        return done;
+    static val view_of_rows(const std::vector<Row>& rows) {
+        return val(typed_memory_view(row_size * rows.size(), reinterpret_cast<const double*>(rows.data())));
+    }
+    static std::vector<Row> rows_of(const val& numbers) {
+        const auto read = convertJSArrayToNumberVector<double>(numbers);
+        std::vector<Row> rows(read.size() / row_size);
+        std::memcpy(rows.data(), read.data(), rows.size() * sizeof(Row));
+        return rows;
+    }
+
+    void replay() {
+        const Row& row = script_[next_++];
+        if (row.placed != 0) session_.lift_tool();
+        step(tool_of(row, hand_.tool().radius), row.placed != 0);
+    }
+
+    void follow() {
+        const auto& last = session_.moment();
+        hand_.follow(target_, close_ && (last.tool.grasping || last.contact.touching()), dt);
+        step(hand_.tool(), std::exchange(placed_, false));
+        if (stroke_.size() == stroke_rows) return;
+        stroke_.push_back(row_of(session_, false));
+        touched_in_stroke_ |= session_.moment().contact.touching();
     }
 
     void step(const membrane::Tool<double>& tool, bool placed) {
@@ -154,13 +232,19 @@ class Loop {
     }
 
     Session session_;
+    std::vector<membrane::TreeTopology::Node> nodes_;  // of the session's tree
     Hand hand_;
-    bool placed_ = false, recording_ = false;
-    std::vector<Row> rows_, script_;      // recorded, and to be replayed
-    std::size_t next_ = 0;                // of `script_`
+    Vector3 target_;  // [m]
+    bool close_ = false, placed_ = false, recording_ = false, touched_in_stroke_ = false;
+    std::vector<Row> rows_, script_;  // recorded, and to be replayed
+    std::size_t next_ = 0;            // of `script_`
+    std::vector<Row> stroke_, last_stroke_;
     std::vector<double> forces_, times_;  // of each tick of the frame [N], [ms]
-    std::vector<std::uint8_t> layers_;
-    std::vector<Index> touched_;
+
+    // What views are of.
+    Eigen::VectorXf values_;
+    std::vector<Index> triangles_;
+    std::vector<float> corners_;
 };
 
 struct Findings {
@@ -239,6 +323,12 @@ EMSCRIPTEN_BINDINGS(membrane) {
         .field("contact", &Moment::contact)
         .field("grasp", &Moment::grasp)
         .field("reaction", &Moment::reaction);
+    value_object<Choice>("Choice")
+        .field("layers", &Choice::layers)
+        .field("sweeps", &Choice::sweeps)
+        .field("forceError", &Choice::force_error)
+        .field("time", &Choice::time)
+        .field("satisfied", &Choice::satisfied);
     value_object<Findings>("Findings").field("valid", &Findings::valid).field("text", &Findings::text);
 
     function("validate", &validate);
@@ -249,8 +339,9 @@ EMSCRIPTEN_BINDINGS(membrane) {
     class_<Loop>("Loop")
         .function("configure", &Loop::configure)
         .function("place", &Loop::place)
+        .function("aim", &Loop::aim)
         .function("run", &Loop::run)
-        .function("replay", &Loop::replay)
+        .function("beginFrame", &Loop::begin_frame)
         .function("startRecording", &Loop::start_recording)
         .function("stopRecording", &Loop::stop_recording)
         .function("load", &Loop::load)
@@ -261,11 +352,16 @@ EMSCRIPTEN_BINDINGS(membrane) {
         .function("forces", &Loop::forces)
         .function("times", &Loop::times)
         .function("recording", &Loop::recording)
-        .function("layers", &Loop::layers)
+        .function("stroke", &Loop::stroke)
+        .function("left", &Loop::left)
+        .function("values", &Loop::values)
         .function("contactTriangles", &Loop::contact_triangles)
+        .function("trackedTriangles", &Loop::tracked_triangles)
+        .function("treeBoxes", &Loop::tree_boxes)
         .function("moment", &Loop::moment)
         .function("force", &Loop::force)
         .function("radius", &Loop::radius)
         .function("size", &Loop::size)
-        .function("equilibrium", &Loop::equilibrium);
+        .function("equilibrium", &Loop::equilibrium)
+        .function("choose", &Loop::choose);
 }

@@ -115,6 +115,7 @@ class Session {
     [[nodiscard]] const membrane::Points<double>& normals() const noexcept { return normals_.values(); }
     [[nodiscard]] const Vector3& force() const noexcept { return force_; }
     [[nodiscard]] const Moment& moment() const noexcept { return moment_; }
+    [[nodiscard]] const membrane::AabbTree<double>& tree() const noexcept { return tree_; }
     [[nodiscard]] const membrane::PropagationQueue& queue() const noexcept {
         return std::visit([](const auto& solver) -> const membrane::PropagationQueue& { return solver.queue(); },
                           solver_);

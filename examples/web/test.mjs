@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: MIT
 //
-// Drives build/web/membrane.html in Chromium: `node test.mjs FOLDER`, the folder with the page, the native program
-// `replay` and node_modules. Saves pictures there.
+// Drives build/web/membrane.html in Chromium: `node test.mjs FOLDER [--states]`, the folder with the page, the native
+// program `replay` and node_modules. Saves pictures there. --states: makes states/*.png anew.
 import { execFileSync } from "node:child_process";
-import { writeFileSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
-import { pathToFileURL } from "node:url";
+import { fileURLToPath, pathToFileURL } from "node:url";
 
 const folder = process.argv[2];
+const renew = process.argv.includes("--states");
 const { chromium } = createRequire(join(folder, "package.json"))("playwright-core");
 const page_url = pathToFileURL(join(folder, "membrane.html")).href;
-const lens = new URL("../data/lens.obj", import.meta.url);
+const near = (path) => fileURLToPath(new URL(path, import.meta.url));
 
 let passed = 0;
 let failed = 0;
@@ -30,7 +31,7 @@ const browser = await chromium.launch({
 
 async function open(options = {}) {
   const page = await browser.newPage({ viewport: { width: 800, height: 560 }, ...options });
-  page.setDefaultTimeout(90_000);
+  page.setDefaultTimeout(120_000);
   page.on("console", (message) => message.type() === "error" && complaints.push(message.text()));
   page.on("pageerror", (error) => complaints.push(String(error)));
   await page.goto(page_url);
@@ -42,6 +43,16 @@ const state = (page) => page.evaluate(() => window.membrane.state);
 const size = (force) => Math.hypot(...force);
 const picture = (page, name) => page.screenshot({ path: join(folder, `${name}.png`) });
 
+// Waits for a condition on the state of the page, in JavaScript.
+const until = (page, condition) => page.waitForFunction(`(({ ${Object.keys(names)} }) => ${condition})(membrane.state)`);
+const names = { force: 0, touching: 0, holding: 0, vertices: 0, frames: 0, recording: 0, left: 0, time: 0 };
+
+// Waits for some simulated time [s].
+async function simulate(page, seconds) {
+  const { time } = await state(page);
+  await until(page, `time > ${time + seconds}`);
+}
+
 // The point of the window at parts of the view's width and height.
 async function at(page, x, y) {
   const box = await page.locator("#view").boundingBox();
@@ -51,19 +62,20 @@ async function at(page, x, y) {
 async function choose(page, mesh) {
   const { vertices } = await state(page);
   await page.selectOption("#mesh", mesh);
-  await page.waitForFunction((before) => window.membrane.state.vertices !== before, vertices);
+  await until(page, `vertices !== ${vertices}`);
 }
 
 const pick = (page, id, value) => page.locator(`#${id} label:has([value=${value}])`).click();
 
 // Presses or pulls along a path of points of the view.
-async function stroke(page, path, { wait = 400 } = {}) {
+async function stroke(page, path) {
   await page.mouse.move(...(await at(page, ...path[0])));
   await page.mouse.down();
-  await page.waitForTimeout(wait);
+  await until(page, "touching");
+  await simulate(page, 0.3);
   for (const point of path.slice(1)) {
     await page.mouse.move(...(await at(page, ...point)), { steps: 12 });
-    await page.waitForTimeout(wait);
+    await simulate(page, 0.3);
   }
 }
 
@@ -74,13 +86,12 @@ const path = [
 ];
 
 async function testFirstPress() {
-  const begin = performance.now();
   const page = await open();
   await page.mouse.move(...(await at(page, 0.5, 0.4)));
   await page.mouse.down();
-  await page.waitForFunction(() => Math.hypot(...window.membrane.state.force) > 0);
-  const seconds = (performance.now() - begin) / 1000;
-  console.log(`        first force after ${seconds.toFixed(2)} s`);
+  await until(page, "Math.hypot(...force) > 0");
+  const opened = await page.evaluate(() => performance.now()); // since the page began to load [ms]
+  console.log(`        first force after ${(opened / 1000).toFixed(2)} s`);
   await page.close();
 }
 
@@ -120,10 +131,8 @@ async function testForces() {
   await page.mouse.up();
   await page.keyboard.up("Shift");
   await page.click("#record");
-  await page.waitForFunction(() => !window.membrane.state.recording);
+  await until(page, "!recording");
   const csv = await page.evaluate(() => window.membrane.csv());
-  writeFileSync(join(folder, "stroke.csv"), csv);
-
   const rows = csv.trim().split("\n").slice(1).map((line) => line.split(",").map(Number));
   const forces = rows.map((row) => row.slice(9, 12));
   const exact = native(csv);
@@ -132,28 +141,76 @@ async function testForces() {
   const same = forces.filter((force, i) => force.every((f, k) => f === exact[i][k])).length;
   check("the stroke presses and pulls", largest > 0.02 && rows.some((row) => row[7] === 1), `${largest} N`);
   check("force of the native program, within 1 % of the largest", difference <= 0.01, difference);
-  console.log(`        ${same} of ${forces.length} ticks have the same bits`);
+  check("and with the same bits", same === forces.length, `${same} of ${forces.length} ticks`);
+  await testReplay(page, csv, rows);
   await testDial(page, rows);
+  await testChoice(page);
   await page.close();
+}
+
+// The recording as a file replays to the end, and again by the button.
+async function testReplay(page, csv, rows) {
+  const download = page.waitForEvent("download");
+  await page.click("#download");
+  const file = join(folder, "stroke.csv");
+  await (await download).saveAs(file);
+  check("the download is the recording", readFileSync(file, "utf8") === csv);
+  await page.setInputFiles("#file", file);
+  await until(page, "left > 0");
+  await until(page, "left === 0");
+  const { time } = await state(page);
+  check("the file is replayed", time >= rows.length / 1000 - 0.001, `${time.toFixed(3)} s`);
+  const broken = Buffer.from(csv.replace(/\n[^,\n]*,/, "\nx,"));
+  await page.setInputFiles("#file", { name: "broken.csv", mimeType: "text/csv", buffer: broken });
+  await page.waitForSelector('#notice:not([hidden]) :text("broken.csv is refused: line 2")');
+  await page.click("#notice button");
 }
 
 // The error while the tool moves, and the time of all ticks, for one stroke and several numbers of sweeps.
 async function testDial(page, rows) {
-  const replayTo = (ticks) => page.evaluate((count) => window.membrane.replayTo(count), ticks);
+  const hold = (ticks) => page.evaluate((count) => window.membrane.hold(count), ticks);
   const moves = (row) => size(row.slice(9, 12)) > 0.02 && size(row.slice(4, 7)) > 0.01 && row[7] === 0;
   const moving = rows.findLastIndex(moves);
-  const { reaction } = await replayTo(moving + 1);
+  const { reaction } = await hold(moving + 1);
   check("a replay has the force of the recording", reaction.every((f, k) => f === rows[moving][9 + k]));
   const errors = [];
   const means = [];
   for (const sweeps of [1, 4, 16]) {
     await page.locator("#sweeps").fill(String(sweeps));
-    errors.push((await replayTo(moving + 1)).error);
+    errors.push((await hold(moving + 1)).error);
     means.push((await state(page)).median);
   }
   const found = errors.map((error) => error.toPrecision(3)).join(", ");
   check("1, 4, 16 sweeps: smaller error", errors[0] > errors[1] && errors[1] > errors[2], found);
   check("1, 4, 16 sweeps: more time [ms]", means[0] < means[2], means.map((t) => t.toFixed(3)).join(", "));
+}
+
+// Settings for a wanted error, and for a wanted time.
+async function testChoice(page) {
+  await page.selectOption("#mesh", "lens"); // a membrane that nobody has pressed
+  await page.waitForFunction(() => document.getElementById("choice").textContent === "");
+  await simulate(page, 0.1);
+  await page.click("#choose >> text=0.1 %");
+  await page.waitForSelector('#choice:text("Press or pull first")');
+  await page.selectOption("#mesh", "sphere 3");
+  await until(page, "vertices === 642");
+  await stroke(page, path);
+  await page.mouse.up();
+  const dials = () => page.evaluate(() => ["layers", "sweeps"].map((id) => Number(document.getElementById(id).value)));
+  const chosen = async (button) => {
+    await page.click(`#choose >> text="${button}"`);
+    await page.waitForFunction(() => document.querySelector("#choose button:not(:disabled)"));
+    return page.textContent("#choice");
+  };
+  for (const button of ["1 %", "0.1 %"]) {
+    const text = await chosen(button);
+    const found = Number(text.match(/^(below )?([\d.]+) %/)[2]);
+    const holds = /keeps the error/.test(text) && found <= parseFloat(button);
+    check(`layers and sweeps for ${button}`, holds, `${await dials()}: ${text}`);
+  }
+  const work = async (button) => (await chosen(button), (await dials()).reduce((a, b) => a * b));
+  const [little, much] = [await work("40 µs"), await work("80 µs")];
+  check("more layers and sweeps for more time", little <= much, `${little}, ${much}`);
 }
 
 async function testFiles() {
@@ -166,19 +223,53 @@ async function testFiles() {
   };
   check("a defective mesh is refused in words", true, await refused("twisted.obj", twisted));
   await picture(page, "refused");
-  const bad = { "a.obj": "nonsense", "a.off": "OFF 1 1e9 0", "a.ply": "ply", "a.stl": "", "a.txt": "x" };
+  const bad = { "a.obj": "nonsense", "a.off": "OFF 1 1e9 0", "a.ply": "ply", "a.stl": "", "a.txt": "x", "a.csv": "x" };
   for (const [name, text] of Object.entries(bad)) await refused(name, text);
   check("bad files are refused", size((await state(page)).force) === 0);
-  await page.setInputFiles("#file", lens.pathname);
-  await page.waitForFunction(() => window.membrane.state.vertices !== 642);
-  const [x, y] = await at(page, 0.5, 0.45);
-  await page.touchscreen.tap(x, y);
+
+  await page.evaluate((text) => {
+    const dataTransfer = new DataTransfer();
+    dataTransfer.items.add(new File([text], "lens.obj"));
+    dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
+  }, readFileSync(near("../data/lens.obj"), "utf8"));
+  await until(page, "vertices !== 642");
+  await page.touchscreen.tap(...(await at(page, 0.5, 0.45)));
   await page.locator("#view").focus();
   await page.keyboard.down("Space");
-  await page.waitForFunction(() => Math.hypot(...window.membrane.state.force) > 0.001);
-  check("a mesh file is pressed by key", true, `${(await state(page)).vertices} vertices`);
+  await until(page, "Math.hypot(...force) > 0.001");
+  check("a dropped mesh is pressed by key", true, `${(await state(page)).vertices} vertices`);
   await picture(page, "file_on_a_phone");
   await page.keyboard.up("Space");
+  await page.close();
+}
+
+async function testKeys() {
+  const page = await open();
+  await page.locator("#view").focus();
+  const depth = () => page.inputValue("#depth");
+  await page.keyboard.press("+");
+  check("+ makes the press deeper", Number(await depth()) === 2.5, await depth());
+  await page.keyboard.press("-");
+  check("- makes it less deep", Number(await depth()) === 2, await depth());
+  await page.keyboard.down("Space");
+  await until(page, "touching");
+  await simulate(page, 0.5);
+  const before = (await state(page)).force;
+  await page.keyboard.down("ArrowRight");
+  await simulate(page, 0.3);
+  await page.keyboard.up("ArrowRight");
+  await simulate(page, 0.3);
+  const after = (await state(page)).force;
+  const turned = Math.acos(before.reduce((sum, f, k) => sum + f * after[k], 0) / size(before) / size(after));
+  check("an arrow key moves the tool along", turned > 0.05, `the force turns by ${turned.toFixed(2)} rad`);
+  await page.keyboard.up("Space");
+  await until(page, "!touching");
+  await page.keyboard.press("g");
+  await page.keyboard.down("Space");
+  await until(page, "holding");
+  check("G takes the forceps", await page.isChecked("#mode [value=pull]"));
+  await page.keyboard.up("Space");
+  await until(page, "!holding");
   await page.close();
 }
 
@@ -186,7 +277,7 @@ async function testMembranes() {
   const page = await open({ colorScheme: "dark" });
   for (const mesh of ["sphere 2", "sphere 4", "sphere 5", "lens", "cornea"]) {
     await choose(page, mesh);
-    await stroke(page, path, { wait: 300 });
+    await stroke(page, path);
     await page.waitForFunction(() => document.getElementById("error").textContent !== "–");
     const { force, speed, median } = await state(page);
     const error = await page.textContent("#error");
@@ -194,10 +285,6 @@ async function testMembranes() {
     check(`${mesh} is pressed`, size(force) > 1e-3, `${found}, ${(100 * speed).toFixed(0)} % of real time`);
     await page.mouse.up();
   }
-  await pick(page, "colour", "layers");
-  await stroke(page, path.slice(0, 2));
-  await picture(page, "layers_dark");
-  await page.mouse.up();
   await page.uncheck("#volumeSprings");
   await pick(page, "rule", "safe");
   await stroke(page, path.slice(0, 2));
@@ -210,20 +297,19 @@ async function testMembranes() {
 async function testMishaps() {
   const page = await open();
   await stroke(page, path.slice(0, 1));
-  const before = (await state(page)).time;
-  await page.evaluate(() => {  // as in a hidden tab, no frame is displayed
-    window.displayed = window.requestAnimationFrame;
-    window.requestAnimationFrame = (frame) => (window.held = frame);
-  });
-  await page.waitForTimeout(3000);
-  await page.evaluate(() => {
-    window.requestAnimationFrame = window.displayed;
-    window.requestAnimationFrame(window.held);
-  });
+  const hide = (hidden) =>
+    page.evaluate((value) => {
+      Object.defineProperty(document, "hidden", { value, configurable: true });
+      document.dispatchEvent(new Event("visibilitychange"));
+    }, hidden);
+  await hide(true);
   await page.waitForTimeout(300);
+  const before = (await state(page)).time;
+  await page.waitForTimeout(2000);
   const passedTime = (await state(page)).time - before;
-  check("a hidden page stops the time [s]", passedTime < 1.5, passedTime);
-  await page.waitForTimeout(500);
+  check("a hidden page stops the time [s]", passedTime === 0, passedTime);
+  await hide(false);
+  await simulate(page, 0.3);
   check("the press goes on", size((await state(page)).force) > 0.01);
 
   await page.setViewportSize({ width: 500, height: 900 });
@@ -231,17 +317,97 @@ async function testMishaps() {
     window.lost = document.getElementById("view").getContext("webgl2").getExtension("WEBGL_lose_context");
     window.lost.loseContext();
   });
-  await page.waitForTimeout(300);
+  await page.waitForSelector("#notice:not([hidden])");
   await page.evaluate(() => window.lost.restoreContext());
-  await page.waitForTimeout(500);
+  await page.waitForSelector("#notice", { state: "hidden" });
   const { frames } = await state(page);
-  await page.waitForTimeout(500);
-  const noticed = await page.isVisible("#notice");
-  check("a lost graphics context comes back", (await state(page)).frames > frames && !noticed);
+  await until(page, `frames > ${frames + 3}`);
+  check("a lost graphics context comes back", true);
   await page.close();
 }
 
-const tests = [testFirstPress, testRealTime, testForces, testFiles, testMembranes, testMishaps];
+// A stroke on the sphere of 642 vertices as rows of a recording: down 3 mm in 200 ticks, then along the surface.
+function recordedStroke(grasping) {
+  const up = [0.36, -0.8, 0.48];
+  const along = [0.912, 0.384, -0.144];  // at right angles to `up`
+  const at = (tick) => {
+    const height = 13e-3 - 4e-3 * Math.min(tick / 200, 1);
+    const lift = grasping ? 4e-3 * Math.max(tick - 200, 0) / 200 : 0;
+    const slide = grasping ? 0 : 3e-3 * Math.max(tick - 200, 0) / 200;
+    return up.map((u, k) => u * (height + lift) + along[k] * (slide + lift));
+  };
+  return Array.from({ length: 400 }, (_, tick) => {
+    const [p, q] = [at(tick), at(tick + 1)];
+    const velocity = q.map((x, k) => (x - p[k]) / 1e-3);
+    const closed = Number(grasping && tick >= 190);
+    return [tick * 1e-3, ...p, ...velocity, closed, Number(tick === 0), 0, 0, 0, 6, 2, 0, 1];
+  }).flat();
+}
+
+const states = {
+  pressed: {},
+  pulled: { grasping: true, dark: true },
+  tension: { colour: "tension", contact: true },
+  layers: { colour: "layers" },
+  boxes: { boxes: true },
+};
+const maxDifference = 0.16; // of a colour channel in a pixel that counts as equal
+const maxPixels = 0.005; // part of the pixels that may differ by more
+
+// Part of the pixels by which two PNG files differ.
+function differing(page, a, b) {
+  const url = (png) => `data:image/png;base64,${png.toString("base64")}`;
+  const compare = async ([urls, limit]) => {
+    const pixels = async (source) => {
+      const image = new Image();
+      image.src = source;
+      await image.decode();
+      const canvas = new OffscreenCanvas(image.width, image.height).getContext("2d");
+      canvas.drawImage(image, 0, 0);
+      return canvas.getImageData(0, 0, image.width, image.height).data;
+    };
+    const [x, y] = [await pixels(urls[0]), await pixels(urls[1])];
+    if (x.length !== y.length) return 1;
+    let count = 0;
+    for (let i = 0; i < x.length; i += 4)
+      if ([0, 1, 2].some((k) => Math.abs(x[i + k] - y[i + k]) > 255 * limit)) ++count;
+    return (4 * count) / x.length;
+  };
+  return page.evaluate(compare, [[url(a), url(b)], maxDifference]);
+}
+
+// The picture of the whole page, for the gallery.
+async function drawPage(page, rows) {
+  const size = page.viewportSize();
+  await page.setViewportSize({ width: 1000, height: 860 });
+  for (let i = 0; i < 5; ++i) // until the browser has compiled the loop with optimization
+    await page.evaluate((numbers) => window.membrane.hold(400, Float64Array.from(numbers)), rows);
+  await page.waitForTimeout(1500); // until the hint has faded
+  await page.screenshot({ path: near("states/page.png") });
+  await page.setViewportSize(size);
+}
+
+async function testStates() {
+  for (const [name, { grasping = false, dark, colour, contact, boxes }] of Object.entries(states)) {
+    const page = await open({ viewport: { width: 700, height: 500 }, colorScheme: dark ? "dark" : "light" });
+    if (colour) await pick(page, "colour", colour);
+    if (contact) await page.check("#contact");
+    if (boxes) await page.check("#boxes");
+    await page.evaluate((rows) => window.membrane.hold(400, Float64Array.from(rows)), recordedStroke(grasping));
+    if (renew && name === "tension") await drawPage(page, recordedStroke(grasping));
+    await page.addStyleTag({ content: "#stage > :not(canvas) { visibility: hidden; }" });
+    const { frames } = await state(page);
+    await until(page, `frames > ${frames + 2}`);
+    const found = await page.locator("#view").screenshot({ path: join(folder, `state_${name}.png`) });
+    const kept = near(`states/${name}.png`);
+    if (renew) writeFileSync(kept, found);
+    const part = await differing(page, found, readFileSync(kept));
+    check(`picture of the state "${name}"`, part <= maxPixels, `${(100 * part).toFixed(2)} % of the pixels differ`);
+    await page.close();
+  }
+}
+
+const tests = [testFirstPress, testRealTime, testForces, testFiles, testKeys, testMembranes, testMishaps, testStates];
 try {
   for (const test of tests) await test();
 } catch (error) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Finds the equilibrium of a moment of the loop: the measure of its error. The text of the WebAssembly module stands in
-// front of this one.
+// Finds the equilibrium of a moment of the loop: the measure of its error; and settings for a stroke. The text of the
+// WebAssembly module stands in front of this one.
 const module = loadMembrane();
 
 let loop; // only its mesh and its constants are used
@@ -15,16 +15,22 @@ const handlers = {
   },
 
   measure(membrane, { moment, time }) {
-    const exact = loop.equilibrium(moment, moment.positions);
-    postMessage({ exact, reaction: moment.reaction, time });
+    let exact = null;
+    try {
+      exact = loop.equilibrium(moment, moment.positions);
+    } finally {
+      postMessage({ type: "equilibrium", exact, reaction: moment.reaction, build: moment.build, time });
+    }
+  },
+
+  choose(membrane, { settings, stroke, forceError, time }) {
+    let choice = null;
+    try {
+      choice = loop.choose(settings, stroke, forceError, time);
+    } finally {
+      postMessage({ type: "chosen", choice });
+    }
   },
 };
 
-onmessage = async ({ data }) => {
-  const membrane = await module;
-  try {
-    handlers[data.type](membrane, data);
-  } catch {
-    postMessage({ exact: null });
-  }
-};
+onmessage = async ({ data }) => handlers[data.type](await module, data);

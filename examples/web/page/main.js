@@ -1,17 +1,14 @@
 // SPDX-License-Identifier: MIT
 //
-// Each displayed frame asks the loop for the ticks since the last one, and draws the state after the last tick.
+// Each displayed frame tells the loop where the hand is, and draws the state after its last tick.
 import { Hand } from "./hand.js";
 import { readMesh } from "./mesh_file.js";
 import { Panel } from "./panel.js";
 import { Physics } from "./physics.js";
 import { Plot } from "./plot.js";
-import { csvOf, save } from "./recording.js";
+import { csvOf, rowsOf, save } from "./recording.js";
 import { Scene } from "./scene.js";
 import { TickTimes } from "./tick_times.js";
-
-const maxTicks = 250; // of a frame: after a pause the membrane goes on where it was
-const [minBudget, maxBudget] = [40, 100]; // for the ticks of a frame [ms]
 
 let physics; // of the present membrane, once it is built
 let radius; // of its tool [m]
@@ -19,14 +16,16 @@ let recording = false;
 let rows = null; // of the last recording
 let state = null; // of the last frame
 let frames = 0;
-let waiting = false; // for a frame of the loop
-let last = 0; // time up to which ticks were asked for [ms]
+let waiting = false; // for the state of the loop
+let requirement = null; // of the settings to choose
+let held = null; // for tests: who waits for the error of a tick
 
 const view = document.getElementById("view");
 const panel = new Panel({
   mesh: open,
   file: openFile,
   settings: () => physics?.send({ type: "configure", settings: panel.settings }),
+  choose: beginChoice,
   record: () => (recording ? physics.send({ type: "stop" }) : begin({ type: "record" })),
   replay: () => begin({ type: "replay", rows }),
   download: () => save(csvOf(rows), "membrane.csv"),
@@ -47,9 +46,9 @@ function open(mesh, name) {
       radius = message.radius;
       scene.build(message);
       panel.begin(mesh, name, message.size);
-      times.clear();
       setRecording(false, null);
       beginAtRest();
+      physics.send({ type: "hide", hidden: document.hidden });
       if (message.findings) panel.notice(`${name} is accepted, with warnings.\n${message.findings}`);
       else if (mesh.kind === "file") panel.hint(`${name} has no defect. It is scaled to 20 mm across.`);
     },
@@ -65,13 +64,20 @@ function open(mesh, name) {
     frame: show,
     recorded: (message) => setRecording(false, message.rows),
     equilibrium: showError,
+    stroke: choose,
+    chosen: (message) => panel.showChoice(message.choice, requirement),
   });
 }
 
 async function openFile(file) {
   if (!file) return;
   try {
-    open(await readMesh(file), file.name);
+    if (/\.csv$/i.test(file.name)) {
+      setRecording(false, rowsOf(await file.text()));
+      begin({ type: "replay", rows });
+    } else {
+      open(await readMesh(file), file.name);
+    }
   } catch (refusal) {
     panel.notice(`${file.name} is refused: ${refusal.message}.`);
   }
@@ -80,6 +86,7 @@ async function openFile(file) {
 function beginAtRest() {
   hand.reset();
   plot.clear();
+  times.clear();
 }
 
 // Begins a recording or a replay.
@@ -95,15 +102,22 @@ function setRecording(on, recorded) {
   panel.showRecording(recording, rows);
 }
 
-// Asks the loop for the ticks since the last frame.
-function advance(now) {
-  const elapsed = Math.min(now - last, maxTicks);
-  const ticks = Math.round(elapsed);
-  if (ticks === 0) return;
-  last = now - elapsed + ticks;
-  const budget = Math.min(Math.max(elapsed, minBudget), maxBudget);
+function beginChoice(asked) {
+  requirement = asked;
+  panel.showChoosing();
+  physics.send({ type: "stroke" });
+}
+
+function choose({ rows: stroke }) {
+  if (stroke.length > 0) physics.choose(stroke, panel.settings, requirement);
+  else panel.showChoice(null, requirement);
+}
+
+// Asks the loop for its state.
+function request() {
   waiting = true;
-  physics.send({ type: "frame", ticks, elapsed, budget, moment: physics.idle, ...hand.frame(radius) });
+  const { colour, show } = panel.options;
+  physics.send({ type: "frame", moment: physics.idle, colour, show, ...hand.frame(radius) });
 }
 
 function show(message) {
@@ -114,12 +128,11 @@ function show(message) {
   plot.add(message.forces);
   times.add(message.times, message.elapsed);
   if (message.moment && message.touching) physics.measure(message.moment, plot.time);
-  else if (message.moment) probe?.measured({ error: null, reaction: message.force });
-  scene.show(message, panel.options.colour);
+  scene.show(message, panel.scale());
   panel.showForce(Math.hypot(...message.force), message.left > 0);
 }
 
-function showError({ exact, reaction, time }) {
+function showError({ exact, reaction, build, time }) {
   let error = null; // of the force, relative
   if (exact) {
     const force = Math.hypot(...exact);
@@ -127,47 +140,34 @@ function showError({ exact, reaction, time }) {
     plot.addExact(time, force, error);
   }
   panel.showError(error, plot.worstError());
-  probe?.measured({ error, reaction });
+  if (held && build > held.build) held.resolve({ error, reaction });
 }
 
-function frame(now) {
+function frame() {
   requestAnimationFrame(frame);
-  if (physics && !waiting && probe) probe.start();
-  else if (physics && !waiting) advance(now);
+  if (physics && !waiting) request();
   scene.draw();
 }
 
-// For tests: replays the first ticks of the recording with the present settings, and returns the reaction of the
-// membrane there [N] and its relative error.
-let probe = null;
-function replayTo(ticks) {
-  return new Promise((resolve) => {
-    probe = {
-      start() {
-        if (physics.measuring) return;
-        begin({ type: "replay", rows });
-        waiting = true;
-        physics.send({ type: "frame", ticks, elapsed: ticks, budget: Infinity, moment: true });
-        this.measured = (value) => {
-          probe = null;
-          resolve(value);
-        };
-        this.start = () => {};
-      },
-      measured() {},
-    };
-  });
-}
 window.membrane = {
   get state() {
-    const { force, touching, holding, positions } = state ?? { force: [0, 0, 0], positions: [] };
+    const { force, touching, holding, positions, left } = state ?? { force: [0, 0, 0], positions: [] };
     const vertices = positions.length / 3;
-    return { force, touching, holding, vertices, frames, recording, time: plot.time, ...times.summary() };
+    return { force, touching, holding, vertices, frames, recording, left, time: plot.time, ...times.summary() };
   },
   csv: () => csvOf(rows),
-  replayTo,
+
+  // Replays the first ticks of a recording with the present settings and stays there. Returns the reaction of the
+  // membrane [N] and its relative error.
+  hold(ticks, recorded = rows) {
+    return new Promise((resolve) => {
+      held = { build: state.build, resolve };
+      begin({ type: "hold", rows: recorded, ticks });
+    });
+  },
 };
 
+document.addEventListener("visibilitychange", () => physics?.send({ type: "hide", hidden: document.hidden }));
 view.addEventListener("webglcontextlost", () => panel.notice("The browser has lost the graphics context."));
 view.addEventListener("webglcontextrestored", () => panel.notice(""));
 setInterval(() => panel.showTimes(times.summary()), 500);

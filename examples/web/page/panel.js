@@ -3,14 +3,18 @@
 // Inputs and outputs of the page.
 import { gradient } from "./colours.js";
 
+const maxTension = 10; // [N/m]
+
+const percent = (value) => (value < 1e-4 ? "below 0.01 %" : `${Number((100 * value).toPrecision(2))} %`);
 const element = (id) => document.getElementById(id);
 
 export class Panel {
-  options = { mode: "press", depth: 0.2, colour: "displacement" }; // depth [size of the membrane]
+  // depth [size of the membrane]
+  options = { mode: "press", depth: 0.2, colour: "displacement", show: { contact: false, boxes: false } };
   settings = { layers: 6, sweeps: 2, safeStep: false, volumeSprings: true };
   size = 0; // of the membrane [m]
 
-  // `on` has a function for each request: mesh, file, settings, record, replay, download.
+  // `on` has a function for each request: mesh, file, settings, choose, record, replay, download.
   constructor(on) {
     const { options, settings } = this;
     const set = (target, key, value) => {
@@ -28,6 +32,7 @@ export class Panel {
       set(options, "colour", value);
       this.showScale();
     });
+    for (const name of ["contact", "boxes"]) changed(name, ({ checked }) => set(options.show, name, checked));
     changed("mesh", ({ value, selectedOptions }) => {
       const [kind, subdivisions] = value.split(" ");
       const mesh = kind === "file" ? this.fileMesh : { kind, subdivisions: Number(subdivisions) };
@@ -37,6 +42,8 @@ export class Panel {
       on.file(input.files[0]);
       input.value = ""; // the same file may be opened again
     });
+    for (const button of element("choose").querySelectorAll("button"))
+      button.addEventListener("click", () => on.choose({ forceError: 0, time: 0, ...JSON.parse(button.value) }));
     for (const name of ["record", "replay", "download"]) element(name).addEventListener("click", () => on[name]());
     element("notice").querySelector("button").addEventListener("click", () => this.notice(""));
     element("view").addEventListener("keydown", ({ key }) => this.onKey(key.toLowerCase()));
@@ -80,6 +87,8 @@ export class Panel {
     this.size = size;
     element("depth").dispatchEvent(new Event("input"));
     element("error").textContent = element("worstError").textContent = "–";
+    element("choice").textContent = "";
+    this.enableChoice(true);
     if (mesh.kind === "file") {
       const option = element("mesh").querySelector("[value=file]");
       Object.assign(option, { text: name, hidden: false, selected: true });
@@ -93,13 +102,17 @@ export class Panel {
     element("hint").classList.remove("done");
   }
 
-  showScale() {
-    const labels = {
-      displacement: ["0", `${(300 * this.size).toFixed(1)} mm`],
-      layers: ["outside the queue", "layer 0"],
-      contact: ["orange: triangles with a contact force", ""],
+  // Of the colours: the value of the darkest, and what stands at the two ends.
+  scale() {
+    return {
+      displacement: { max: 0.3 * this.size, labels: ["0", `${(300 * this.size).toFixed(1)} mm`] },
+      tension: { max: maxTension, labels: ["0", `${maxTension} N/m`] },
+      layers: { max: 1, labels: ["outside the queue", "layer 0"] },
     }[this.options.colour];
-    element("scale").classList.toggle("plain", this.options.colour === "contact");
+  }
+
+  showScale() {
+    const { labels } = this.scale();
     element("scale").querySelectorAll("span").forEach((span, i) => (span.textContent = labels[i]));
   }
 
@@ -111,9 +124,34 @@ export class Panel {
 
   // Relative errors of the force; null without an equilibrium.
   showError(error, worst) {
-    const text = (value) => (value < 1e-4 ? "below 0.01 %" : `${Number((100 * value).toPrecision(2))} %`);
-    element("error").textContent = error === null ? "no equilibrium" : text(error);
-    element("worstError").textContent = worst >= 0 ? text(worst) : "–";
+    element("error").textContent = error === null ? "no equilibrium" : percent(error);
+    element("worstError").textContent = worst >= 0 ? percent(worst) : "–";
+  }
+
+  showChoosing() {
+    element("choice").textContent = "Settings are tried on your last stroke …";
+    this.enableChoice(false);
+  }
+
+  // What was chosen for the requirement; null if there was nothing to try.
+  showChoice(choice, { forceError }) {
+    this.enableChoice(true);
+    if (!choice) {
+      element("choice").textContent = "Press or pull first: settings are tried on your last stroke.";
+      return;
+    }
+    for (const name of ["layers", "sweeps"]) {
+      element(name).value = choice[name];
+      element(name).dispatchEvent(new Event("input"));
+    }
+    const result = `${percent(choice.forceError)} and ${(1e6 * choice.time).toFixed(0)} µs on your last stroke`;
+    const kept = forceError > 0 ? "the fastest that keeps the error" : "the most accurate that keeps the time";
+    const text = choice.satisfied ? kept : "no setting does what you ask, this comes closest";
+    element("choice").textContent = `${result}: ${text}.`;
+  }
+
+  enableChoice(enabled) {
+    for (const button of element("choose").querySelectorAll("button")) button.disabled = !enabled;
   }
 
   showTimes({ median, p99, worst, speed }) {

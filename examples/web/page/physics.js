@@ -16,10 +16,10 @@ function start(source, receive) {
 }
 
 export class Physics {
-  // `on` has a function for each message of the loop, and `equilibrium` for those of the other worker.
+  // `on` has a function for each type of message from the workers.
   constructor(mesh, settings, on) {
     this.on = on;
-    this.measuring = false;
+    this.busy = false; // the worker of equilibria
     this.next = 0; // time of the next measurement, at least [ms]
     this.build = { type: "build", mesh, settings };
     this.loop = start(physicsSource, (message) => on[message.type](message));
@@ -32,24 +32,35 @@ export class Physics {
 
   // Whether a measurement may begin: they take a quarter of a processor at most.
   get idle() {
-    return !this.measuring && performance.now() > this.next;
+    return !this.busy && performance.now() > this.next;
   }
 
-  // Finds the equilibrium of a moment at `time`. The worker starts with the first, after the page is up.
+  // Finds the equilibrium of a moment at `time`.
   measure(moment, time) {
+    this.compute({ type: "measure", moment, time }, [moment.positions.buffer]);
+  }
+
+  // Finds settings for a stroke.
+  choose(stroke, settings, requirement) {
+    this.compute({ type: "choose", stroke, settings, ...requirement }, [stroke.buffer]);
+  }
+
+  // The worker starts with the first request, after the page is up.
+  compute(message, buffers) {
     this.equilibria ??= this.startEquilibria();
-    this.measuring = true;
+    this.busy = true;
     this.begun = performance.now();
-    this.equilibria.postMessage({ type: "measure", moment, time }, [moment.positions.buffer]);
+    this.equilibria.postMessage(message, buffers);
   }
 
   startEquilibria() {
     const worker = start(equilibriumSource, (message) => {
       const now = performance.now();
-      this.measuring = false;
+      this.busy = false;
       this.next = now + 3 * (now - this.begun);
-      this.on.equilibrium(message);
+      this.on[message.type](message);
     });
+    worker.onerror = (event) => event.preventDefault(); // the answer has said so
     worker.postMessage(this.build);
     return worker;
   }

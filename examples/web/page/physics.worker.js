@@ -1,17 +1,26 @@
 // SPDX-License-Identifier: MIT
 //
-// Runs the loop of one membrane. The text of the WebAssembly module, `loadMembrane`, stands in front of this one.
+// Runs the loop of one membrane by its own clock: as many ticks as milliseconds have passed, however often the page is
+// drawn. The text of the WebAssembly module, `loadMembrane`, stands in front of this one.
+const maxPause = 100; // longer ones are not made up for: the membrane goes on where it was [ms]
+const budget = 25; // of ticks in a row: messages are read in between [ms]
+
 const module = loadMembrane();
 
 let membrane; // the module
 let loop;
 let mesh; // what the loop was built from
-let replaying = false;
-let placed = false; // whether the pointer has put the tool anywhere yet
+let builds = 0;
+let hidden = false; // no time passes while the page is hidden,
+let held = false; // or shows a tick of a recording,
+let aimed = false; // or the pointer has put the tool nowhere yet
+let last = 0; // time up to which ticks were made [ms]
+let lastFrame = 0; // [ms]
 
 function built({ settings }) {
   loop?.delete();
-  placed = false;
+  held = aimed = false;
+  ++builds;
   const { kind, subdivisions, positions, triangles } = mesh;
   loop = {
     sphere: () => membrane.sphere(subdivisions, settings),
@@ -19,6 +28,18 @@ function built({ settings }) {
     lens: () => membrane.lens(settings),
     file: () => membrane.surface(positions, triangles, settings),
   }[kind]();
+}
+
+function advance() {
+  const now = performance.now();
+  if (!loop || hidden || held || !aimed) {
+    last = now;
+    return;
+  }
+  const due = Math.min(now - last, maxPause);
+  const ticks = Math.floor(due);
+  last = now - due + ticks;
+  loop.run(ticks, budget);
 }
 
 const handlers = {
@@ -43,28 +64,30 @@ const handlers = {
     loop.configure(settings);
   },
 
-  // A displayed frame: the ticks since the last one, at most as long as `budget` [ms].
-  frame({ ticks, elapsed, budget, target, place, close, moment }) {
-    let left = 0;
-    let done = ticks;
-    if (replaying) {
-      left = loop.replay(ticks, budget);
-      replaying = left > 0;
-    } else {
-      if (place || !placed) loop.place(place ?? target);
-      placed = true;
-      done = loop.run(ticks, budget, target, close);
+  hide(message) {
+    hidden = message.hidden;
+  },
+
+  // For a displayed frame: where the hand is, and the state after the ticks since the last frame.
+  frame({ target, place, close, colour, show, moment }) {
+    if (!held) {
+      if (place || !aimed) loop.place(place ?? target);
+      loop.aim(target, close);
+      aimed = true;
     }
+    const begin = performance.now();
     const now = loop.moment();
     const state = {
       type: "frame",
-      done,
-      elapsed,
-      left,
+      build: builds,
+      elapsed: begin - lastFrame,
+      left: loop.left(),
       positions: new Float32Array(loop.positions()),
       normals: new Float32Array(loop.normals()),
-      layers: new Uint8Array(loop.layers()),
-      contact: new Uint32Array(loop.contactTriangles()),
+      values: new Float32Array(loop.values(colour)),
+      contact: show.contact ? new Uint32Array(loop.contactTriangles()) : [],
+      tracked: show.contact ? new Uint32Array(loop.trackedTriangles()) : [],
+      boxes: show.boxes ? new Float32Array(loop.treeBoxes()) : [],
       forces: new Float64Array(loop.forces()),
       times: new Float64Array(loop.times()),
       force: loop.force(),
@@ -72,13 +95,14 @@ const handlers = {
       touching: now.contact.touching,
       holding: now.grasp.triangle >= 0,
     };
-    if (moment) state.moment = { ...now, positions: new Float64Array(loop.positions()) };
-    postMessage(state, [state.positions.buffer, state.normals.buffer]);
+    if (moment) state.moment = { ...now, build: builds, positions: new Float64Array(loop.positions()) };
+    loop.beginFrame();
+    lastFrame = begin;
+    postMessage(state, [state.positions.buffer, state.normals.buffer, state.values.buffer]);
   },
 
   // A recording begins at rest, so that a replay can begin where it did.
   record(message) {
-    replaying = false;
     built(message);
     loop.startRecording();
   },
@@ -91,7 +115,18 @@ const handlers = {
   replay(message) {
     built(message);
     loop.load(message.rows);
-    replaying = true;
+  },
+
+  // Replays some ticks at once, and stays there.
+  hold(message) {
+    built(message);
+    held = true;
+    loop.load(message.rows);
+    loop.run(message.ticks, Infinity);
+  },
+
+  stroke() {
+    postMessage({ type: "stroke", rows: new Float64Array(loop.stroke()) });
   },
 };
 
@@ -103,3 +138,4 @@ onmessage = async ({ data }) => {
     postMessage({ type: "failed", text: error.message });
   }
 };
+setInterval(advance, 1);

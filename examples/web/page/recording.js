@@ -11,6 +11,15 @@ export function csvOf(rows) {
   return `${lines.join("\n")}\n`;
 }
 
+export function rowsOf(csv) {
+  const [header, ...lines] = csv.trim().split(/\r?\n/);
+  if (header !== names.join()) throw new Error("its columns are not those of a recording of this page");
+  const rows = lines.map((line) => line.split(",").map(Number));
+  const bad = rows.findIndex((row) => row.length !== names.length || !row.every(Number.isFinite));
+  if (bad >= 0) throw new Error(`line ${bad + 2} does not have ${names.length} numbers`);
+  return Float64Array.from(rows.flat());
+}
+
 export function save(text, name) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([text], { type: "text/csv" }));

@@ -91,11 +91,18 @@ export class Scene {
     });
     this.surface = new THREE.Mesh(geometry, skin);
 
-    this.touched = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ color: 0xd9691e }));
-    this.touched.material.side = THREE.DoubleSide;
-    this.touched.geometry.setAttribute("position", positions);
-    this.touched.geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(triangles.length), 1));
-    this.membrane.add(this.surface, this.touched);
+    const patch = (color) => {
+      const material = new THREE.MeshBasicMaterial({ color, side: THREE.DoubleSide });
+      const mesh = new THREE.Mesh(new THREE.BufferGeometry(), material);
+      mesh.geometry.setAttribute("position", positions);
+      mesh.geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(triangles.length), 1));
+      return mesh;
+    };
+    this.contact = patch(0xd9691e);
+    this.tracked = patch(0xf0c9a0);
+    this.boxes = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: 0x7b3294 }));
+    this.boxes.visible = false;
+    this.membrane.add(this.surface, this.contact, this.tracked, this.boxes);
     if (rest.length <= 3 * maxVerticesWithEdges) {
       const edges = new THREE.BufferGeometry();
       edges.setAttribute("position", positions);
@@ -152,40 +159,44 @@ export class Scene {
     return hit ? hit.multiplyScalar(this.size) : point.clone();
   }
 
-  show(state, colour) {
-    const { position, normal } = this.surface.geometry.attributes;
+  // Draws a state of the loop from now on; `max` is the value of the darkest colour.
+  show(state, { max }) {
+    const { position, normal, color } = this.surface.geometry.attributes;
     position.array.set(state.positions);
     normal.array.set(state.normals);
-    position.needsUpdate = normal.needsUpdate = true;
-    this.paint(state, colour);
-    this.mark(colour === "contact" ? state.contact : []);
+    state.values.forEach((value, v) => paint(color.array, v, value / max));
+    position.needsUpdate = normal.needsUpdate = color.needsUpdate = true;
+    this.mark(this.contact, state.contact);
+    const pressed = new Set(state.contact);
+    this.mark(this.tracked, state.tracked.filter((f) => !pressed.has(f)));
+    this.outline(state.boxes);
     this.tool.visible = true;
     this.tool.position.fromArray(state.tool).divideScalar(this.size);
     this.point(new THREE.Vector3().fromArray(state.force));
   }
 
-  // Colours the vertices.
-  paint({ positions, layers }, colour) {
-    const { color } = this.surface.geometry.attributes;
-    const { rest, size } = this;
-    const layerCount = layers.reduce((a, b) => Math.max(a, b), 1);
-    for (let v = 0; v < rest.length / 3; ++v) {
-      const i = 3 * v;
-      const moved = Math.hypot(positions[i] - rest[i], positions[i + 1] - rest[i + 1], positions[i + 2] - rest[i + 2]);
-      if (colour === "displacement") paint(color.array, v, moved / (0.3 * size));
-      else if (colour === "layers") paint(color.array, v, layers[v] > 0 ? 1 - (layers[v] - 1) / layerCount : 0);
-      else paint(color.array, v, 0);
-    }
-    color.needsUpdate = true;
-  }
-
-  mark(contact) {
-    const { geometry } = this.touched;
+  // Covers some triangles.
+  mark({ geometry }, marked) {
     let count = 0;
-    for (const f of contact)
+    for (const f of marked)
       for (let k = 0; k < 3; ++k) geometry.index.array[count++] = this.triangles[3 * f + k];
     geometry.index.needsUpdate = true;
     geometry.setDrawRange(0, count);
+  }
+
+  // Draws boxes, each by two corners.
+  outline(boxes) {
+    this.boxes.visible = boxes.length > 0;
+    const ends = [];
+    for (let i = 0; i < boxes.length; i += 6)
+      for (let corner = 0; corner < 8; ++corner)
+        for (const axis of [1, 2, 4])
+          if (!(corner & axis))
+            for (const end of [corner, corner | axis])
+              for (let k = 0; k < 3; ++k) ends.push(boxes[i + 3 * ((end >> k) & 1) + k]);
+    this.boxes.geometry.dispose();
+    this.boxes.geometry = new THREE.BufferGeometry();
+    this.boxes.geometry.setAttribute("position", new THREE.Float32BufferAttribute(ends, 3));
   }
 
   // The arrow of the force, from the tool's centre.
