@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
 // What README and chapters show beside the examples, as a user's program: nothing of the library's is known by its bare name.
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -116,7 +117,131 @@ std::vector<membrane::Tool<double>> stroke_of_ticks() {
     return tools;
 }
 
+/// Stands for the interface of a vendor, in its units.
+struct Driver {
+    double tick = 0;
+    double force[3] = {};
+    bool connected() const noexcept { return tick < 200; }
+    std::array<double, 3> millimetres() const noexcept { return {0, 0, 12 - 0.02 * tick}; }
+    std::array<double, 3> millimetres_per_second() const noexcept { return {0, 0, -20}; }
+    double seconds() const noexcept { return 1e-3 * tick; }
+    bool button() const noexcept { return false; }
+    void send(const double* newtons) noexcept {
+        std::copy_n(newtons, 3, force);
+        ++tick;
+    }
+};
+
+// [own_device]
+/// The device of a driver that counts in millimetres.
+class OwnDevice {
+  public:
+    explicit OwnDevice(Driver& driver) : driver_(driver) {}
+
+    bool running() const noexcept { return driver_.connected(); }
+    membrane::Tool<double> read() noexcept {
+        return {.position = metres(driver_.millimetres()),
+                .radius = 1e-3,
+                .velocity = metres(driver_.millimetres_per_second()),
+                .time = driver_.seconds(),
+                .grasping = driver_.button()};
+    }
+    void write(const membrane::Vector3<double>& force) noexcept { driver_.send(force.data()); }
+
+  private:
+    static membrane::Vector3<double> metres(const std::array<double, 3>& mm) noexcept {
+        return {1e-3 * mm[0], 1e-3 * mm[1], 1e-3 * mm[2]};
+    }
+    Driver& driver_;
+};
+static_assert(membrane::Device<OwnDevice, double>);
+// [/own_device]
+
 }  // namespace
+
+TEST_CASE_METHOD(Touched, "pages: device of one's own") {
+    Driver driver;
+    OwnDevice device(driver);
+    const membrane::ReactionForce reaction;
+    x = mesh.positions();
+    tracker.reset();
+    while (device.running()) {
+        const auto tool = device.read();
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+        tree.refit(x, report.moved);
+        device.write(reaction({tool, contact, report}));
+    }
+    CHECK(driver.force[2] > 0.01);
+}
+
+TEST_CASE_METHOD(AtRest, "pages: time steps of other lengths, and late ticks") {
+    const membrane::VirtualVolumeSprings<double> damped(mesh, {.stiffness = 40.0, .damping = 0.4});
+    const auto after = [&](const auto& foundation, double dt, int ticks) {
+        auto solver = membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = 2});
+        const membrane::AabbTree<double> tree(mesh);
+        membrane::ContactTracker<double> tracker(mesh);
+        auto x = mesh.positions();
+        const membrane::Tool<double> tool{.position = {0, 0, 0.0105}, .radius = 1e-3};
+        for (int i = 0; i < ticks; ++i) {
+            const auto contact = tracker.update(tree, x, tool);
+            const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+            REQUIRE(report.status == membrane::StepStatus::advanced);
+        }
+        return x;
+    };
+    CHECK(after(foundation, 1e-3, 5) == after(foundation, 16e-3, 5));  // nothing is damped
+    CHECK(after(damped, 1e-3, 5) != after(damped, 16e-3, 5));
+    const auto still = after(damped, 1e-3, 3000), coarse = after(damped, 16e-3, 3000), once = after(damped, 60.0, 3000);
+    CHECK((still - coarse).cwiseAbs().maxCoeff() < 1e-9);  // the same equilibrium [m]
+    CHECK((still - once).cwiseAbs().maxCoeff() < 1e-9);
+}
+
+TEST_CASE_METHOD(Touched, "pages: a tool that starts inside") {
+    x = mesh.positions();
+    tracker.reset();
+    tool.position = {0, 0, 0.008};
+    membrane::ForceLimiter limit(membrane::devices::touch);
+    const membrane::ReactionForce reaction;
+    double first = 0, last = 0;
+    for (int i = 0; i < 400; ++i) {
+        tool.time = i * dt;
+        const auto contact = tracker.update(tree, x, tool);
+        REQUIRE(contact.touching());
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+        REQUIRE(report.status == membrane::StepStatus::advanced);
+        tree.refit(x, report.moved);
+        last = limit(reaction({tool, contact, report}), tool.time, ++steps).norm();
+        if (i == 0) first = last;
+    }
+    CHECK(first < 0.05 * last);  // the force grows from zero
+    CHECK(std::sqrt(tree.closest_point(x, tool.position).squared_distance) > 0.99 * tool.radius);
+    CHECK(x.row(2).head(mesh.vertex_count()).maxCoeff() < 0.0101);
+}
+
+TEST_CASE_METHOD(Touched, "pages: several membranes") {
+    const membrane::Points<double> lower = mesh.positions().colwise() - Eigen::Vector3d(0, 0, 0.0005);
+    const membrane::TriangleMesh<double> other_mesh(lower, mesh.triangles());
+    const membrane::MassSpringNetwork<double, membrane::LinearSpring> other_network(other_mesh, {},
+                                                                                    {.stiffness = 40.0});
+    const membrane::VirtualVolumeSprings<double> other_foundation(other_mesh, {.stiffness = 40.0});
+    membrane::QuasiStaticSolver<double> other_solver(other_network);
+    membrane::AabbTree<double> other_tree(other_mesh);
+    membrane::ContactTracker<double> other_tracker(other_mesh);
+    membrane::Points<double> other_x = other_mesh.positions();
+    tool.position = {0, 0, 0.0100};
+    // [several]
+    const auto contact = tracker.update(tree, x, tool);
+    const auto other_contact = other_tracker.update(other_tree, other_x, tool);
+    const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+    const auto other_report =
+        other_solver.step(other_x, dt, other_network, other_foundation, press(tool, other_contact));
+    const auto force = report.total_reaction() + other_report.total_reaction();  // on the tool [N]
+    // [/several]
+    CHECK(report.total_reaction().z() > 0);
+    CHECK(other_report.total_reaction().z() > 0);
+    CHECK(force.z() > report.total_reaction().z());
+}
 
 TEST_CASE_METHOD(AtRest, "pages: moving body") {
     membrane::QuasiStaticSolver<double> solver(network);
