@@ -175,7 +175,7 @@ class Loop {
         return exact.converged ? val(Vector3(exact.reactions[0] + exact.reactions[1])) : val::null();
     }
 
-    /// Layers and sweeps for a stroke: the fastest with at most this relative error of the force, or if that is 0, the
+    /// Layers and sweeps for a stroke: the quickest with at most this relative error of the force, or if that is 0, the
     /// most accurate with at most this time [s].
     [[nodiscard]] Choice choose(const Settings& settings, const val& stroke, double force_error, double time) {
         session_.configure(settings);

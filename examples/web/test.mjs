@@ -187,7 +187,7 @@ async function testDial(page, rows) {
 
 // Settings for a wanted error, and for a wanted time.
 async function testChoice(page) {
-  await page.selectOption("#mesh", "lens"); // a membrane that nobody has pressed
+  await page.selectOption("#mesh", "lens"); // not pressed yet
   await page.waitForFunction(() => document.getElementById("choice").textContent === "");
   await simulate(page, 0.1);
   await page.click("#choose >> text=0.1 %");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Each displayed frame tells the loop where the hand is, and draws the state after its last tick.
+// Each displayed frame sends the hand to the loop, and draws the state after its last tick.
 import { Hand } from "./hand.js";
 import { readMesh } from "./mesh_file.js";
 import { Panel } from "./panel.js";

@@ -145,7 +145,7 @@ export class Panel {
       element(name).dispatchEvent(new Event("input"));
     }
     const result = `${percent(choice.forceError)} and ${(1e6 * choice.time).toFixed(0)} µs on your last stroke`;
-    const kept = forceError > 0 ? "the fastest that keeps the error" : "the most accurate that keeps the time";
+    const kept = forceError > 0 ? "the quickest that keeps the error" : "the most accurate that keeps the time";
     const text = choice.satisfied ? kept : "no setting does what you ask, this comes closest";
     element("choice").textContent = `${result}: ${text}.`;
   }

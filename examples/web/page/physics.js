@@ -60,7 +60,7 @@ export class Physics {
       this.next = now + 3 * (now - this.begun);
       this.on[message.type](message);
     });
-    worker.onerror = (event) => event.preventDefault(); // the answer has said so
+    worker.onerror = (event) => event.preventDefault(); // the message says it
     worker.postMessage(this.build);
     return worker;
   }
