@@ -84,6 +84,13 @@ class ContactTracker {
     /// Drops contact, tool and side. Later contacts equal those of a new tracker, bit for bit.
     void reset() noexcept;
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.near_, self.nearest_, self.nearest_square_, self.last_, self.last_tool_, self.pose_, self.side_,
+              self.slid_off_, self.origin_triangles_, self.ticks_, self.full_query_count_, self.rebound_ticks_);
+    }
+
   private:
     // The inputs of one update.
     struct Scene {
@@ -257,7 +264,8 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
     }
     last_tool_ = tool;
     last_ = contact;
-    last_.triangles = last_.candidates = {};
+    last_.triangles = last_.candidates = {};  // valid until the next update only
+    last_.points = {};
     return contact;
 }
 

@@ -67,6 +67,12 @@ class Grasper {
         closed_ = false;
     }
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.grasp_, self.pose_, self.closed_);
+    }
+
   private:
     Points<Scalar> origins_;
     GraspOptions options_;

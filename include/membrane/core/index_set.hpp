@@ -46,6 +46,9 @@ class IndexSet {
     [[nodiscard]] bool empty() const noexcept { return items_.empty(); }
     ///@}
 
+    /// Number of indices that may be inserted.
+    [[nodiscard]] std::size_t capacity() const noexcept { return mark_.size(); }
+
     /// Reorders the items from position `begin` on. @pre `order` holds the same items
     void reorder(std::size_t begin, std::span<const Index> order) noexcept {
         std::copy(order.begin(), order.end(), items_.items().begin() + static_cast<std::ptrdiff_t>(begin));

@@ -53,6 +53,12 @@ class Watchdog {
     /// `state`: a number that changes with each solve; `dt` since the last call [s].
     double update(std::uint64_t state, double dt) noexcept;
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.age_, self.state_);
+    }
+
   private:
     double max_state_age_, fade_time_;
     double age_ = 0;
@@ -70,6 +76,12 @@ class SoftStart {
 
     /// The last factor, 0 to 1.
     [[nodiscard]] double gain() const noexcept { return gain_; }
+
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.gain_);
+    }
 
   private:
     double time_;
@@ -96,6 +108,12 @@ class MotorThermalModel {
     /// Largest force that the load allows [N]: the peak force up to a load of 0.75, from there falling linearly to the
     /// continuous force at a load of 1.
     [[nodiscard]] double max_force() const noexcept;
+
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.thermal_load_);
+    }
 
   private:
     double peak_, continuous_, time_;
@@ -149,6 +167,12 @@ class ForceLimiter {
 
     /// As new, except for the thermal load. For a replay construct a new limiter.
     void reset() noexcept;
+
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.watchdog_, self.soft_start_, self.heat_, self.active_limits_, self.began_, self.time_, self.force_);
+    }
 
   private:
     double time_since_last(double now) noexcept;

@@ -81,6 +81,15 @@ class ActiveVertices {
     /// Makes all asleep, and the queue empty. The next step builds it anew.
     void clear() noexcept;
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        if constexpr (Visit::restores) self.clear();
+        visit(self.queue_, self.seeds_, self.awake_, self.dropped_, self.activated_, self.layers_, self.layers_before_,
+              self.order_, self.as_needed_, self.has_frontier_, self.queue_fits_, self.is_open_);
+        if constexpr (Visit::restores) self.has_new_queue_ = true;  // what was packed is of another queue
+    }
+
   private:
     template <class Network>
     void undo_step(const Network& network) noexcept;

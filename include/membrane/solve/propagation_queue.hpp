@@ -67,6 +67,12 @@ class PropagationQueue {
         colouring_.clear();
     }
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.reached_, self.layer_ends_, self.colouring_);
+    }
+
   private:
     IndexSet reached_;
     FixedVector<std::size_t> layer_ends_;

@@ -99,6 +99,14 @@ class QuasiStaticSolver {
     /// Resets the solver to a new one, to the bit: a membrane out of equilibrium does not move until woken. Cost: O(V).
     void reset() noexcept;
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.active_, self.state_, self.predictor_, self.last_prescribed_, self.woken_, self.moved_,
+              self.last_displacements_, self.complete_, self.pose_, self.deformations_, self.resume_, self.costs_);
+        if constexpr (Visit::restores) self.report_ = {};
+    }
+
     /// The contact points of constraint number `i` in the last step that advanced, with the force on each [N], whose
     /// sum is its reaction. Empty for a constraint without contact points, and after a
     /// step with unstable or infinite forces. Valid until the next step.

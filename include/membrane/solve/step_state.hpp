@@ -64,6 +64,15 @@ struct StepState {
     void reset() noexcept;         ///< As new.
     void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< Rotates the kept vectors with the body.
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        if constexpr (Visit::restores) self.reset();
+        visit(self.position, self.response, self.support, self.residual, self.loaded, self.pressed_supports,
+              self.previous_points, self.previous_ranges);
+        if constexpr (Visit::restores) self.index_previous_points();
+    }
+
     ///@{
     /// The first of the previous points whose first corner is `v`, and the next one with this corner; or `no_index`.
     [[nodiscard]] Index previous_at(Index v) const noexcept {
@@ -166,6 +175,9 @@ struct StepState {
         row(response, 2 * v + 1).number[3] = stiffness;
     }
 
+    /// Makes the previous points known to `previous_at`.
+    void index_previous_points() noexcept;
+
     // One row more than vertices, for unused lanes. Three numbers, and the fourth:
     Rows position;  ///< `position_of`, `compliance`
     Rows force;     ///< `constraint_force`, `contact_stiffness`
@@ -249,6 +261,11 @@ void StepState<Scalar>::end_step() noexcept {
     reset_points();
     std::swap(points, previous_points);
     std::swap(point_ranges, previous_ranges);
+    index_previous_points();
+}
+
+template <Real Scalar>
+void StepState<Scalar>::index_previous_points() noexcept {
     for (std::size_t i = 0; i < previous_points.size(); ++i) {
         const Index v = previous_points[i].corners[0];
         if (v < 0 || v >= vertex_count()) continue;

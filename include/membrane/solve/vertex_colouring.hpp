@@ -37,6 +37,12 @@ class VertexColouring {
     /// Removes all groups.
     void clear() noexcept { ends_.clear(); }
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.ends_);
+    }
+
   private:
     FixedVector<std::size_t> ends_;
     std::vector<Index> group_of_;  // of each vertex that is being ordered

@@ -80,6 +80,12 @@ class MovingBody {
     /// The anchors of the undeformed body: the positions of the mesh.
     [[nodiscard]] const Points<Scalar>& anchors_at_rest() const noexcept { return at_rest_; }
 
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.anchors_, self.normals_, self.previous_, self.pose_, self.rate_, self.deformed_, self.deformations_);
+    }
+
   private:
     [[nodiscard]] bool carry(const RigidFrame<Scalar>& pose, PointsRef<Scalar>& x) noexcept;
     [[nodiscard]] RigidFrame<Scalar> fit(const ConstPointsRef<Scalar>& anchors) const noexcept;
