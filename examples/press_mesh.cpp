@@ -11,8 +11,8 @@ int main(int argc, char** argv) {
     const auto mesh = membrane::TriangleMesh(points, triangles);                                            // [m]
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});  // [N/m]
     const auto foundation =
-        membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});    // [N/m], [N s/m]
-    const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};  // [N/m], [N s/m]
+        membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
+    const auto feel = membrane::ReactionForce{};                                    // the membrane's force on the tool
     auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);

@@ -52,11 +52,8 @@ class Loop {
 
     void place(const Vector3& position) {
         hand_.place(position);
-        session_.lift_tool();
+        lift_tool();
         placed_ = true;
-        if (touched_in_stroke_) last_stroke_.swap(stroke_);
-        touched_in_stroke_ = false;
-        stroke_.clear();
     }
 
     /// What the hand does from now on: it moves toward `target`, and closes the forceps at the membrane.
@@ -98,7 +95,7 @@ class Loop {
     /// Rows of a recording, to be replayed.
     void load(const val& rows) {
         script_ = rows_of(rows);
-        next_ = 0;
+        next_ = differing_ = 0;
     }
 
     [[nodiscard]] val rest() const { return view(session_.mesh().positions()); }
@@ -113,7 +110,10 @@ class Loop {
     [[nodiscard]] val stroke() const { return view_of_rows(touched_in_stroke_ ? stroke_ : last_stroke_); }
 
     /// Ticks of the recording that are still to be replayed.
-    [[nodiscard]] int left() const { return static_cast<int>(script_.size() - next_); }
+    [[nodiscard]] int left() const { return static_cast<int>(script_.size()) - next_; }
+
+    /// Replayed ticks whose force is not the recorded one, to the bit.
+    [[nodiscard]] int differing() const { return differing_; }
 
     /// A number for each vertex: `displacement` [m], `tension` [N/m], or `layers`: 1 in the first one of the queue,
     /// less in the next ones, 0 outside.
@@ -211,24 +211,32 @@ class Loop {
         return rows;
     }
 
+    /// The tool's next position begins a stroke.
+    void lift_tool() {
+        session_.lift_tool();
+        if (std::exchange(touched_in_stroke_, false)) last_stroke_.swap(stroke_);
+        stroke_.clear();
+    }
+
     void replay() {
-        const Row& row = script_[next_++];
-        if (row.placed != 0) session_.lift_tool();
+        const Row& row = script_[static_cast<std::size_t>(next_++)];
+        if (row.placed != 0) lift_tool();
         step(tool_of(row, hand_.tool().radius), row.placed != 0);
+        differing_ += session_.force() != Vector3(row.fx, row.fy, row.fz);
     }
 
     void follow() {
         const auto& last = session_.moment();
         hand_.follow(target_, close_ && (last.tool.grasping || last.contact.touching()), dt);
         step(hand_.tool(), std::exchange(placed_, false));
-        if (stroke_.size() == stroke_rows) return;
-        stroke_.push_back(row_of(session_, false));
-        touched_in_stroke_ |= session_.moment().contact.touching();
     }
 
     void step(const membrane::Tool<double>& tool, bool placed) {
         session_.step(tool);
         if (recording_ && rows_.size() < max_rows) rows_.push_back(row_of(session_, placed));
+        if (stroke_.size() == stroke_rows) return;
+        stroke_.push_back(row_of(session_, placed));
+        touched_in_stroke_ |= session_.moment().contact.touching();
     }
 
     Session session_;
@@ -237,7 +245,7 @@ class Loop {
     Vector3 target_;  // [m]
     bool close_ = false, placed_ = false, recording_ = false, touched_in_stroke_ = false;
     std::vector<Row> rows_, script_;  // recorded, and to be replayed
-    std::size_t next_ = 0;            // of `script_`
+    int next_ = 0, differing_ = 0;    // of `script_`
     std::vector<Row> stroke_, last_stroke_;
     std::vector<double> forces_, times_;  // of each tick of the frame [N], [ms]
 
@@ -354,6 +362,7 @@ EMSCRIPTEN_BINDINGS(membrane) {
         .function("recording", &Loop::recording)
         .function("stroke", &Loop::stroke)
         .function("left", &Loop::left)
+        .function("differing", &Loop::differing)
         .function("values", &Loop::values)
         .function("contactTriangles", &Loop::contact_triangles)
         .function("trackedTriangles", &Loop::tracked_triangles)

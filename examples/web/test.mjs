@@ -160,6 +160,12 @@ async function testReplay(page, csv, rows) {
   await until(page, "left === 0");
   const { time } = await state(page);
   check("the file is replayed", time >= rows.length / 1000 - 0.001, `${time.toFixed(3)} s`);
+  await page.waitForSelector('#caption:text("Replayed to the bit")');
+  await page.locator("#sweeps").fill("1");
+  await page.setInputFiles("#file", file);
+  await page.waitForSelector('#caption:text("ticks differ")');
+  check("a replay with other settings is called so", true, await page.textContent("#caption"));
+  await page.locator("#sweeps").fill("2");
   const broken = Buffer.from(csv.replace(/\n[^,\n]*,/, "\nx,"));
   await page.setInputFiles("#file", { name: "broken.csv", mimeType: "text/csv", buffer: broken });
   await page.waitForSelector('#notice:not([hidden]) :text("broken.csv is refused: line 2")');
@@ -263,6 +269,13 @@ async function testKeys() {
   await page.keyboard.up("ArrowRight");
   await page.keyboard.up("Space");
   await until(page, "!touching");
+  await page.keyboard.down("Space");
+  await until(page, "touching");
+  await page.keyboard.press("Tab");
+  await page.keyboard.up("Space");
+  await until(page, "!touching");
+  check("a tool is lifted when the view loses the focus", true);
+  await page.locator("#view").focus();
   await page.keyboard.press("g");
   await page.keyboard.down("Space");
   await until(page, "holding");
@@ -376,14 +389,13 @@ function differing(page, a, b) {
 }
 
 // The picture of the whole page, for the gallery.
-async function drawPage(page, rows) {
-  const size = page.viewportSize();
-  await page.setViewportSize({ width: 1000, height: 860 });
-  for (let i = 0; i < 5; ++i) // until the browser has compiled the loop with optimization
-    await page.evaluate((numbers) => window.membrane.hold(400, Float64Array.from(numbers)), rows);
-  await page.waitForTimeout(1500); // until the hint has faded
+async function drawPage() {
+  const page = await open({ viewport: { width: 1100, height: 860 } });
+  await page.check("#contact");
+  await stroke(page, [[0.62, 0.42], [0.54, 0.48]]);
+  await simulate(page, 3);
   await page.screenshot({ path: near("states/page.png") });
-  await page.setViewportSize(size);
+  await page.close();
 }
 
 async function testStates() {
@@ -393,7 +405,6 @@ async function testStates() {
     if (contact) await page.check("#contact");
     if (boxes) await page.check("#boxes");
     await page.evaluate((rows) => window.membrane.hold(400, Float64Array.from(rows)), recordedStroke(grasping));
-    if (renew && name === "tension") await drawPage(page, recordedStroke(grasping));
     await page.addStyleTag({ content: "#stage > :not(canvas) { visibility: hidden; }" });
     const { frames } = await state(page);
     await until(page, `frames > ${frames + 2}`);
@@ -406,6 +417,7 @@ async function testStates() {
   }
 }
 
+if (renew) await drawPage();
 const tests = [testFirstPress, testRealTime, testForces, testFiles, testKeys, testMembranes, testMishaps, testStates];
 try {
   for (const test of tests) await test();

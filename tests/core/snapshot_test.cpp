@@ -204,8 +204,8 @@ TEST_CASE("a buffer that is too small is refused", "[snapshot]") {
     const std::size_t size = saved(parts_of(loop)).size();
     CHECK(size <= snapshot_capacity(loop.solver, loop.tracker, loop.grasper, loop.x));
     std::vector<std::byte> buffer(size);
-    const auto save = [&](std::size_t room) {
-        return save_snapshot(std::span(buffer).first(room), loop.solver, loop.tracker, loop.grasper, loop.x);
+    const auto save = [&](std::size_t bytes) {
+        return save_snapshot(std::span(buffer).first(bytes), loop.solver, loop.tracker, loop.grasper, loop.x);
     };
     CHECK(save(size) == size);
     for (const std::size_t less : {size - 1, size / 2, std::size_t{24}, std::size_t{23}, std::size_t{0}}) {

@@ -197,6 +197,44 @@ TEST_CASE_METHOD(AtRest, "pages: time steps of other lengths, and late ticks") {
     CHECK((still - once).cwiseAbs().maxCoeff() < 1e-9);
 }
 
+TEST_CASE_METHOD(Touched, "pages: a long frame in parts") {
+    const auto exact = [&](const membrane::Vector3<double>& position) {
+        membrane::QuasiStaticSolver<double> solver(network, {.layers = membrane::unlimited, .sweeps = 50});
+        auto x = mesh.positions();
+        const membrane::Tool<double> there{.position = position, .radius = 1e-3};
+        membrane::ContactTracker<double> tracker(mesh);
+        membrane::AabbTree<double> tree(mesh);
+        double force = 0;
+        for (int i = 0; i < 20; ++i) {
+            const auto contact = tracker.update(tree, x, there);
+            const auto report = solver.step(x, dt, network, foundation, press(there, contact));
+            tree.refit(x, report.moved);
+            force = report.total_reaction().norm();
+        }
+        return force;
+    };
+    x = mesh.positions();
+    tracker.reset();
+    membrane::Vector3<double> before(0, 0, 0.0115), now = before;
+    for (const double height : {0.0109, 0.0103, 0.0096, 0.0104}) {  // the last two frames are far apart
+        now.z() = height;
+        const double frame = height == 0.0104 ? 0.25 : 1.0 / 60;
+        double force = 0;
+        // [substeps]
+        const int steps = static_cast<int>(std::ceil(frame / 2e-3));  // of a frame [s] in which the tool moves to `now`
+        for (int i = 1; i <= steps; ++i) {
+            tool.position = before + (now - before) * i / steps;
+            const auto contact = tracker.update(tree, x, tool);
+            const auto report = solver.step(x, frame / steps, network, foundation, press(tool, contact));
+            tree.refit(x, report.moved);
+            force = report.reactions[0].norm();
+        }
+        // [/substeps]
+        CHECK(force == Approx(exact(now)).epsilon(0.02));
+        before = now;
+    }
+}
+
 TEST_CASE_METHOD(Touched, "pages: a tool that starts inside") {
     x = mesh.positions();
     tracker.reset();
@@ -204,19 +242,31 @@ TEST_CASE_METHOD(Touched, "pages: a tool that starts inside") {
     membrane::ForceLimiter limit(membrane::devices::touch);
     const membrane::ReactionForce reaction;
     double first = 0, last = 0;
-    for (int i = 0; i < 400; ++i) {
+    bool clear = false;
+    membrane::ScriptedDevice<double> device({{.time = 0}}, {.tick = 1e-3});
+    for (int i = 0; i < 500; ++i) {
+        if (i >= 400) tool.position.z() += 1e-4;  // out
         tool.time = i * dt;
         const auto contact = tracker.update(tree, x, tool);
-        REQUIRE(contact.touching());
+        if (i < 400) REQUIRE(contact.touching());
         const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
         REQUIRE(report.status == membrane::StepStatus::advanced);
         tree.refit(x, report.moved);
-        last = limit(reaction({tool, contact, report}), tool.time, ++steps).norm();
+        const auto force = reaction({tool, contact, report});
+        // [clear]
+        clear = clear || !contact.touching();  // false at the start
+        device.write(clear ? force : membrane::Vector3<double>::Zero());
+        // [/clear]
+        REQUIRE(device.force().isZero(0));
+        if (i >= 400) continue;
+        last = limit(force, tool.time, ++steps).norm();
         if (i == 0) first = last;
+        if (i < 399) continue;
+        CHECK(std::sqrt(tree.closest_point(x, tool.position).squared_distance) > 0.99 * tool.radius);
+        CHECK(x.row(2).maxCoeff() < 0.0101);
     }
+    CHECK(clear);
     CHECK(first < 0.05 * last);  // the force grows from zero
-    CHECK(std::sqrt(tree.closest_point(x, tool.position).squared_distance) > 0.99 * tool.radius);
-    CHECK(x.row(2).head(mesh.vertex_count()).maxCoeff() < 0.0101);
 }
 
 TEST_CASE_METHOD(Touched, "pages: several membranes") {

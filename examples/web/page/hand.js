@@ -20,7 +20,7 @@ export class Hand {
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("keydown", (event) => this.onKey(event, true));
     canvas.addEventListener("keyup", (event) => this.onKey(event, false));
-    addEventListener("blur", () => this.release());
+    for (const target of [window, canvas]) target.addEventListener("blur", () => this.onBlur());
   }
 
   // For another membrane: the tool is above its middle as seen in the window.
@@ -76,6 +76,12 @@ export class Hand {
     if (this.down && event.pointerId !== this.pointer) return;
     if (!this.down && event.buttons !== 0) return; // turns the view
     this.moveTo(event.clientX, event.clientY);
+  }
+
+  // Keys that are let go elsewhere are not seen here.
+  onBlur() {
+    this.keys.clear();
+    this.release();
   }
 
   onKey(event, pressed) {

@@ -18,13 +18,17 @@ let state = null; // of the last frame
 let frames = 0;
 let waiting = false; // for the state of the loop
 let requirement = null; // of the settings to choose
-let held = null; // for tests: who waits for the error of a tick
+let replaying = false;
+let held = null; // for tests: waits for the error of a tick
 
 const view = document.getElementById("view");
 const panel = new Panel({
   mesh: open,
   file: openFile,
-  settings: () => physics?.send({ type: "configure", settings: panel.settings }),
+  settings() {
+    physics?.send({ type: "configure", settings: panel.settings });
+    plot?.clearErrors();
+  },
   choose: beginChoice,
   record: () => (recording ? physics.send({ type: "stop" }) : begin({ type: "record" })),
   replay: () => begin({ type: "replay", rows }),
@@ -32,7 +36,7 @@ const panel = new Panel({
 });
 const scene = new Scene(view);
 const hand = new Hand(view, scene, panel.options);
-const plot = new Plot(document.getElementById("plot"));
+var plot = new Plot(document.getElementById("plot"));
 const times = new TickTimes();
 
 // Changes to the membrane `mesh`, unless the library refuses it.
@@ -47,14 +51,16 @@ function open(mesh, name) {
       scene.build(message);
       panel.begin(mesh, name, message.size);
       setRecording(false, null);
+      replaying = false;
       beginAtRest();
       physics.send({ type: "hide", hidden: document.hidden });
       if (message.findings) panel.notice(`${name} is accepted, with warnings.\n${message.findings}`);
-      else if (mesh.kind === "file") panel.hint(`${name} has no defect. It is scaled to 20 mm across.`);
+      else if (mesh.kind !== "file") panel.hint();
+      else panel.hint(`${name} has no defect. It is scaled to 20 mm across.`);
     },
     refused({ text }) {
       next.end();
-      panel.notice(`${name} is refused.\n${text}`);
+      panel.notice(`${name} is refused.\n${text}The library's repair() corrects such defects, this page does not.`);
     },
     failed({ text }) {
       if (physics !== next) next.end();
@@ -72,7 +78,10 @@ function open(mesh, name) {
 async function openFile(file) {
   if (!file) return;
   try {
-    if (/\.csv$/i.test(file.name)) {
+    panel.notice("");
+    if (recording) {
+      panel.notice("Stop the recording first.");
+    } else if (/\.csv$/i.test(file.name)) {
       setRecording(false, rowsOf(await file.text()));
       begin({ type: "replay", rows });
     } else {
@@ -92,6 +101,7 @@ function beginAtRest() {
 // Begins a recording or a replay.
 function begin(message) {
   physics.send({ ...message, settings: panel.settings });
+  replaying = message.type === "replay";
   if (message.type === "record") setRecording(true, null);
   beginAtRest();
 }
@@ -129,7 +139,9 @@ function show(message) {
   times.add(message.times, message.elapsed);
   if (message.moment && message.touching) physics.measure(message.moment, plot.time);
   scene.show(message, panel.scale());
-  panel.showForce(Math.hypot(...message.force), message.left > 0);
+  panel.showForce(Math.hypot(...message.force), message.touching || message.holding);
+  panel.showReplay(message.left > 0 ? "runs" : replaying ? "ended" : "", message.differing);
+  if (plot.worstError() === null) panel.showError(undefined, null);
 }
 
 function showError({ exact, reaction, build, time }) {

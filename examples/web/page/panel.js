@@ -3,7 +3,8 @@
 // Inputs and outputs of the page.
 import { gradient } from "./colours.js";
 
-const maxTension = 10; // [N/m]
+const maxTension = 4; // [N/m]
+const pressFirst = "Press or pull first: settings are tried on your last stroke.";
 
 const percent = (value) => (value < 1e-4 ? "below 0.01 %" : `${Number((100 * value).toPrecision(2))} %`);
 const element = (id) => document.getElementById(id);
@@ -46,6 +47,7 @@ export class Panel {
       button.addEventListener("click", () => on.choose({ forceError: 0, time: 0, ...JSON.parse(button.value) }));
     for (const name of ["record", "replay", "download"]) element(name).addEventListener("click", () => on[name]());
     element("notice").querySelector("button").addEventListener("click", () => this.notice(""));
+    addEventListener("keydown", ({ key }) => key === "Escape" && this.notice(""));
     element("view").addEventListener("keydown", ({ key }) => this.onKey(key.toLowerCase()));
     element("scale").querySelector("i").style.background = gradient;
     this.listenToFiles(on);
@@ -97,7 +99,7 @@ export class Panel {
     this.showScale();
   }
 
-  hint(text) {
+  hint(text = "Drag on the membrane to press it. Drag beside it to turn the view.") {
     element("hint").textContent = text;
     element("hint").classList.remove("done");
   }
@@ -116,16 +118,23 @@ export class Panel {
     element("scale").querySelectorAll("span").forEach((span, i) => (span.textContent = labels[i]));
   }
 
-  showForce(newtons, replaying) {
+  showForce(newtons, touching) {
     element("force").textContent = `${newtons.toFixed(4)} N`;
-    element("caption").textContent = replaying ? "force on the hand, replayed" : "force on the hand";
     if (newtons > 0) element("hint").classList.add("done");
+    if (touching && element("choice").textContent === pressFirst) element("choice").textContent = "";
   }
 
-  // Relative errors of the force; null without an equilibrium.
+  // `differing`: replayed ticks that have other forces than the recording.
+  showReplay(phase, differing) {
+    const result = differing > 0 ? `${differing} ticks differ: other settings, or another membrane` : "to the bit";
+    const texts = { runs: ", replayed", ended: `. Replayed ${result}` };
+    element("caption").textContent = `force on the hand${texts[phase] ?? ""}`;
+  }
+
+  // Relative errors of the force: null without an equilibrium, undefined if none was asked for.
   showError(error, worst) {
-    element("error").textContent = error === null ? "no equilibrium" : percent(error);
-    element("worstError").textContent = worst >= 0 ? percent(worst) : "–";
+    element("error").textContent = error === null ? "no equilibrium" : error === undefined ? "–" : percent(error);
+    element("worstError").textContent = worst === null ? "–" : percent(worst);
   }
 
   showChoosing() {
@@ -137,7 +146,7 @@ export class Panel {
   showChoice(choice, { forceError }) {
     this.enableChoice(true);
     if (!choice) {
-      element("choice").textContent = "Press or pull first: settings are tried on your last stroke.";
+      element("choice").textContent = pressFirst;
       return;
     }
     for (const name of ["layers", "sweeps"]) {
@@ -162,6 +171,7 @@ export class Panel {
 
   showRecording(recording, available) {
     element("record").textContent = recording ? "Stop" : "Record";
+    element("mesh").disabled = element("file").disabled = recording; // a recording is of one membrane
     element("replay").disabled = element("download").disabled = recording || !available;
   }
 }

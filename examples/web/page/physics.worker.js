@@ -82,6 +82,7 @@ const handlers = {
       build: builds,
       elapsed: begin - lastFrame,
       left: loop.left(),
+      differing: loop.differing(),
       positions: new Float32Array(loop.positions()),
       normals: new Float32Array(loop.normals()),
       values: new Float32Array(loop.values(colour)),

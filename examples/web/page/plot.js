@@ -72,11 +72,16 @@ export class Plot {
     const [times, , exact] = this.ticks;
     const i = times.length - 1 - Math.round(1e3 * (this.time - time));
     if (i >= 0) exact[i] = 1e3 * force;
-    this.errors = this.errors.filter((other) => other.time > this.time - seconds).concat({ time, error });
+    this.errors.push({ time, error });
   }
 
-  // The largest error of the seconds in the plot.
+  // The largest error of the seconds in the plot; null without any.
   worstError() {
-    return Math.max(...this.errors.map(({ error }) => error));
+    this.errors = this.errors.filter(({ time }) => time > this.time - seconds);
+    return this.errors.length > 0 ? Math.max(...this.errors.map(({ error }) => error)) : null;
+  }
+
+  clearErrors() {
+    this.errors = [];
   }
 }

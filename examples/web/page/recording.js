@@ -17,6 +17,8 @@ export function rowsOf(csv) {
   const rows = lines.map((line) => line.split(",").map(Number));
   const bad = rows.findIndex((row) => row.length !== names.length || !row.every(Number.isFinite));
   if (bad >= 0) throw new Error(`line ${bad + 2} does not have ${names.length} numbers`);
+  const odd = rows.findIndex((row) => !(row[12] >= 0 && row[13] >= 1 && row[13] <= 1000));
+  if (odd >= 0) throw new Error(`line ${odd + 2} must have layers of 0 or more, and 1 to 1000 sweeps`);
   return Float64Array.from(rows.flat());
 }
 
