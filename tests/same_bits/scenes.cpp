@@ -2,19 +2,17 @@
 //
 // Runs 24 scenes in double and in float, and prints a hash of all positions, forces and reports after 1, 10, ... ticks:
 //
-//     scenes [--ticks 10000] [--threads 1] [--scene NAME] [--record FILE] [--replay FILE]
+//     scenes [--ticks 10000] [--threads 1] [--scene NAME]
 //
 // One line for each: scene, scalar, ticks, hash. The program itself calls no mathematical function but the square root,
 // whose result IEEE 754 determines.
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cinttypes>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -52,8 +50,8 @@ class Hash {
     void add(std::uint64_t word) noexcept {
         for (int shift = 0; shift < 64; shift += 8) value_ = (value_ ^ (word >> shift & 0xff)) * 0x100000001b3U;
     }
-    void add(double number) noexcept { add(std::bit_cast<std::uint64_t>(number + 0.0)); }  // -0 counts as 0
-    void add(float number) noexcept { add(std::uint64_t{std::bit_cast<std::uint32_t>(number + 0.0F)}); }
+    void add(double number) noexcept { add_bits<std::uint64_t>(number + 0.0); }  // -0 counts as 0
+    void add(float number) noexcept { add_bits<std::uint32_t>(number + 0.0F); }
     template <class Scalar>
     void add(const membrane::Vector3<Scalar>& v) noexcept {
         for (int k = 0; k < 3; ++k) add(v[k]);
@@ -61,6 +59,13 @@ class Hash {
     [[nodiscard]] std::uint64_t value() const noexcept { return value_; }
 
   private:
+    template <class Word, class Scalar>
+    void add_bits(Scalar number) noexcept {
+        Word word = 0;
+        std::memcpy(&word, &number, sizeof word);
+        add(std::uint64_t{word});
+    }
+
     std::uint64_t value_ = 0xcbf29ce484222325U;
 };
 
@@ -125,7 +130,7 @@ class Strokes {
     }
     void choose() {
         from_ = place();
-        to_ = flat_ ? from_ + 0.4 * (place() - from_) : from_ + 0.4 * (place() - from_);
+        to_ = from_ + 0.4 * (place() - from_);
         depth_ = random_.number(0.2, 1) * deepest_;
     }
 
@@ -137,7 +142,7 @@ class Strokes {
     int tick_ = 0;
 };
 
-/// A square sheet of 2 x 20 mm, 13 x 13 vertices.
+/// A square sheet of 20 mm, 13 x 13 vertices.
 template <class Scalar>
 membrane::TriangleMesh<Scalar> sheet() {
     constexpr Index n = 13;
