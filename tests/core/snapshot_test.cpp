@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 #include <memory>
+#include <sstream>
+#include <string>
 #include <tuple>
 #include <vector>
 
@@ -212,6 +214,57 @@ TEST_CASE("a buffer that is too small is refused", "[snapshot]") {
         CAPTURE(less);
         CHECK(save(less) == 0);
     }
+}
+
+TEMPLATE_TEST_CASE("a recording with snapshots is replayed from any of its ticks, from a file too", "[snapshot]",
+                   double, float) {
+    using S = TestType;
+    test::WholeLoop<S> loop(9);
+    const std::size_t bytes = snapshot_capacity(loop.solver, loop.tracker, loop.grasper, loop.x);
+    Recorder<S> recorder(1000, loop.mesh.vertex_count(), {.count = 12, .bytes = bytes});
+    const auto play = [&](auto& device, bool records) {
+        const auto tool = device.read();
+        if (records && recorder.size() % 100 == 50)
+            CHECK(recorder.add_snapshot(loop.solver, loop.tracker, loop.grasper, loop.x));
+        const auto contact = loop.tracker.update(loop.tree, loop.x, tool);
+        const auto grasp = loop.grasper.update(contact, loop.x, tool);
+        const auto report = loop.solver.step(loop.x, S(1e-3), loop.network, loop.foundation,
+                                             press(tool, contact, grasp), pull(tool, grasp));
+        loop.tree.refit(loop.x, report.moved);
+        const auto force = report.total_reaction();
+        if (records) recorder.add(tool, force);
+        device.write(force);
+    };
+    for (int i = 0; i < 1000; ++i) play(loop.device, true);
+    CHECK_FALSE(recorder.add_snapshot(loop.solver, loop.tracker, loop.grasper, loop.x));  // no tick is left
+
+    std::stringstream file;
+    write_recording(file, recorder.recording());
+    const std::string text = file.str();
+    ReplayDevice<S> again(read_recording<S>(file, loop.mesh.vertex_count()));
+    const auto start_from = [&](std::size_t tick) {
+        return again.start_from(tick, loop.solver, loop.tracker, loop.grasper, loop.x);
+    };
+    CHECK_FALSE(start_from(49));
+    CHECK_FALSE(again.start_from(70, loop.solver));
+    for (const std::size_t tick : {std::size_t{999}, std::size_t{50}, std::size_t{449}, std::size_t{650}}) {
+        CAPTURE(tick);
+        REQUIRE(start_from(tick));
+        CHECK(again.next_tick() == (tick - 50) / 100 * 100 + 50);
+        loop.tree.refit(loop.x);
+        while (again.running()) play(again, false);
+        CHECK(again.differing() == 0);
+    }
+
+    test::Random random(4);
+    for (int i = 0; i < cases(50); ++i) {  // from the end on, where the snapshots are
+        auto damaged = text;
+        damaged[text.size() - 1 - static_cast<std::size_t>(random.index(static_cast<Index>(text.size() / 2)))] ^= 4;
+        std::stringstream input(damaged);
+        CHECK_THROWS_AS(read_recording<S>(input), InvalidInput);
+    }
+    std::stringstream cut(text.substr(0, text.size() - 5));
+    CHECK_THROWS_WITH(read_recording<S>(cut), Catch::Contains("snapshot 9 of 10"));
 }
 
 namespace {

@@ -49,6 +49,10 @@
 #include <membrane/haptics/recording_file.hpp>
 // [/recording]
 
+// [snapshot]
+#include <membrane/core/snapshot.hpp>
+// [/snapshot]
+
 // [distmesh]
 #include <membrane/meshing/distmesh.hpp>
 // [/distmesh]
@@ -457,6 +461,40 @@ TEST_CASE_METHOD(Touched, "pages: two loops") {
     // [/handover]
     CHECK_FALSE(news.moved.empty());
     CHECK(shown == x);
+}
+
+TEST_CASE_METHOD(Touched, "pages: snapshot") {
+    membrane::ForceLimiter limit(membrane::devices::touch);
+    std::vector<double> forces;
+    const auto play = [&](int ticks) {
+        for (int i = 0; i < ticks; ++i) {
+            tool.time += dt;
+            tool.position.z() -= 1e-5;
+            contact = tracker.update(tree, x, tool);
+            const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+            tree.refit(x, report.moved);
+            forces.push_back(limit(feel({tool, contact, report}), tool.time, ++steps).norm());
+        }
+    };
+    play(10);
+    // [snapshot]
+    std::vector<std::byte> buffer(
+        membrane::snapshot_capacity(solver, tracker, limit, x, tool, steps));                   // before the loop
+    const auto size = membrane::save_snapshot(buffer, solver, tracker, limit, x, tool, steps);  // at any tick
+    // ... later, or in another program:
+    const auto go_back = [&] {
+        const auto snapshot = std::span(buffer).first(size);
+        if (!membrane::restore_snapshot(snapshot, solver, tracker, limit, x, tool, steps)) return false;
+        tree.refit(x);
+        return true;
+    };
+    // [/snapshot]
+    play(40);
+    REQUIRE(go_back());
+    play(40);
+    REQUIRE(forces.size() == 90);
+    CHECK(std::equal(forces.begin() + 10, forces.begin() + 50, forces.begin() + 50));
+    CHECK(forces.back() > 0);
 }
 
 TEST_CASE("pages: meshes from formulas") {

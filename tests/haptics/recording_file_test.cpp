@@ -118,8 +118,9 @@ TEST_CASE("a header that is not right is refused by name", "[recording][bad]") {
     CHECK(refused(good, 162) == name + "the membrane recorded must have 162 vertices, got 642");
     CHECK(refused<float>(good) == name + "numbers must be of 4 bytes, got 8");
     CHECK(refused(header(1, 4, 642, 0)) == name + "numbers must be of 8 bytes, got 4");
-    CHECK(refused(header(2, 8, 642, 0)) == name + "version must be 1, got 2");
-    CHECK(refused(header(0x01000000, 8, 642, 0)) == name + "version must be 1, got 16777216");  // the other byte order
+    CHECK(refused(header(3, 8, 642, 0)) == name + "version must be 1 or 2, got 3");
+    CHECK(refused(header(0x01000000, 8, 642, 0)) ==
+          name + "version must be 1 or 2, got 16777216");  // the other byte order
     CHECK(refused(header(1, 8, 0x80000000U, 0)) == name + "vertices must be at most 2147483647, got 2147483648");
     CHECK(refused("") == name + "the file must go on, but ends after 0 bytes, in the header");
     CHECK(refused("time,x,y,z\n0,0,0,0\n") == name + "byte 0 of a recording must be 137, got 116");

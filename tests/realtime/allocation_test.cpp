@@ -4,6 +4,7 @@
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,7 @@
 #include <membrane/accuracy/error_bound.hpp>
 #include <membrane/accuracy/factored_convexity.hpp>
 #include <membrane/accuracy/tangent_stiffness.hpp>
+#include <membrane/core/snapshot.hpp>
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/haptics/recording.hpp>
 
@@ -75,6 +77,28 @@ TEST_CASE("the guard counts whatever allocates", "[allocation]") {
               static_cast<void>(posix_memalign(&memory, 64, 64));
               freed(memory);
           }) == 1);
+}
+
+TEST_CASE("a snapshot is saved, recorded and restored without allocation", "[allocation]") {
+    const auto loop = std::make_unique<test::HapticLoop<double>>(7);
+    for (int i = 0; i < 500; ++i) loop->tick();
+    const auto visit = [&](auto act) {
+        return act(loop->solver, loop->tracker, loop->grasper, loop->paper, loop->limit, loop->x);
+    };
+    const std::size_t bytes = visit([](auto&... parts) { return snapshot_capacity(parts...); });
+    std::vector<std::byte> buffer(bytes);
+    Recorder<double> recorder(10, loop->mesh.vertex_count(), {.count = 2, .bytes = bytes});
+    std::size_t size = 0;
+    bool recorded = false, restored = false;
+    CHECK(allocated_by([&] {
+              size = visit([&](auto&... parts) { return save_snapshot(buffer, parts...); });
+              recorded = visit([&](auto&... parts) { return recorder.add_snapshot(parts...); });
+              restored =
+                  visit([&](auto&... parts) { return restore_snapshot(std::span(buffer).first(size), parts...); });
+          }) == 0);
+    CHECK(size > 0);
+    CHECK(recorded);
+    CHECK(restored);
 }
 
 TEST_CASE("a million ticks allocate nothing", "[allocation]") {

@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <iterator>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include <membrane/core/snapshot.hpp>
 #include <membrane/haptics/device.hpp>
 
 /// Recording of a run, tick by tick, and its replay. Files: `haptics/recording_file.hpp`.
@@ -37,20 +39,35 @@ struct RecordedTick {
 template <Real Scalar>
 [[nodiscard]] bool identical(const RecordedTick<Scalar>& a, const RecordedTick<Scalar>& b) noexcept;
 
+/// The state of a loop before a tick, see `core/snapshot.hpp`.
+struct RecordedSnapshot {
+    std::size_t tick = 0;          ///< number of the tick
+    std::vector<std::byte> state;  ///< as `save_snapshot` wrote it
+};
+
 /// Ticks of one run, in order.
 template <Real Scalar>
 struct Recording {
     Index vertex_count = 0;                        ///< of the membrane; guards against a replay with another mesh
     std::vector<RecordedTick<Scalar>> ticks = {};  ///< one a tick, from the first
+    std::vector<RecordedSnapshot> snapshots = {};  ///< in the order of their ticks
+};
+
+/// Memory of a `Recorder` for snapshots.
+struct SnapshotMemory {
+    std::size_t count = 0;  ///< of snapshots
+    std::size_t bytes = 0;  ///< of each: `snapshot_capacity` of the components
 };
 
 /// Records a run into memory allocated at construction. Values that are not finite are recorded unchanged.
 template <Real Scalar>
 class Recorder {
   public:
-    /// Capacity for `max_ticks`, 120 bytes each in `double`; every page is touched at construction.
+    /// Capacity for `max_ticks`, 120 bytes each in `double`, and for `snapshots`; every page is touched at construction.
     /// @throws InvalidInput if `max_ticks` is 0 or `vertex_count` is negative
-    explicit Recorder(std::size_t max_ticks, Index vertex_count) : ticks_(max_ticks), vertex_count_(vertex_count) {
+    explicit Recorder(std::size_t max_ticks, Index vertex_count, const SnapshotMemory& snapshots = {})
+        : ticks_(max_ticks), vertex_count_(vertex_count), snapshots_(snapshots.count) {
+        for (auto& snapshot : snapshots_) snapshot.state.resize(snapshots.bytes);
         if (max_ticks == 0) refuse("Recorder", "max_ticks must be positive, got 0");
         if (vertex_count < 0) refuse("Recorder", "vertex_count must not be negative, got ", vertex_count);
     }
@@ -64,6 +81,19 @@ class Recorder {
         }
     }
 
+    /// Keeps the state of the components before the next tick. Returns false if the memory for snapshots or ticks is used
+    /// up. Online. Cost: `save_snapshot`.
+    template <class... Components>
+    bool add_snapshot(const Components&... components) noexcept {
+        if (snapshot_count_ == snapshots_.size() || size_ == ticks_.size()) return false;
+        auto& snapshot = snapshots_[snapshot_count_];
+        const std::size_t size = save_snapshot(snapshot.state, components...);
+        if (size == 0) return false;
+        snapshot.tick = size_;
+        sizes_[snapshot_count_++] = size;
+        return true;
+    }
+
     /// Number of recorded ticks.
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
 
@@ -72,16 +102,24 @@ class Recorder {
 
     /// A copy of the ticks so far; not while another thread adds ticks.
     [[nodiscard]] Recording<Scalar> recording() const {
-        return {vertex_count_, {ticks_.begin(), ticks_.begin() + static_cast<std::ptrdiff_t>(size_)}};
+        Recording<Scalar> copy{vertex_count_, {ticks_.begin(), ticks_.begin() + static_cast<std::ptrdiff_t>(size_)}};
+        for (std::size_t i = 0; i < snapshot_count_; ++i) {
+            copy.snapshots.push_back(snapshots_[i]);
+            copy.snapshots.back().state.resize(sizes_[i]);
+        }
+        return copy;
     }
 
-    /// Removes all ticks and keeps the capacity.
-    void clear() noexcept { size_ = missed_ = 0; }
+    /// Removes all ticks and snapshots, and keeps the capacity.
+    void clear() noexcept { size_ = missed_ = snapshot_count_ = 0; }
 
   private:
     std::vector<RecordedTick<Scalar>> ticks_;
     Index vertex_count_;
     std::size_t size_ = 0, missed_ = 0;
+    std::vector<RecordedSnapshot> snapshots_;
+    std::vector<std::size_t> sizes_ = std::vector<std::size_t>(snapshots_.size());  // of snapshots in use [bytes]
+    std::size_t snapshot_count_ = 0;
 };
 
 /// A device that returns the tools of a recording in order, and compares the forces with the recorded ones.
@@ -89,7 +127,8 @@ template <Real Scalar>
 class ReplayDevice {
   public:
     /// @throws InvalidInput if the recording has no tick
-    explicit ReplayDevice(Recording<Scalar> recording) : ticks_(std::move(recording.ticks)) {
+    explicit ReplayDevice(Recording<Scalar> recording)
+        : ticks_(std::move(recording.ticks)), snapshots_(std::move(recording.snapshots)) {
         if (ticks_.empty()) refuse("ReplayDevice", "the recording must have a tick, got none");
     }
 
@@ -116,11 +155,27 @@ class ReplayDevice {
     [[nodiscard]] std::size_t first_difference() const noexcept { return first_difference_; }
     ///@}
 
+    /// Goes to the last snapshot at or before `tick`, with the components in the order in which they were saved. The
+    /// tree is then to be refitted. Returns false, and changes nothing, if there is no such snapshot or it is of other
+    /// components. Cost: `restore_snapshot`.
+    template <class... Components>
+    [[nodiscard]] bool start_from(std::size_t tick, Components&&... components) noexcept {
+        const auto later = [](std::size_t number, const RecordedSnapshot& other) { return number < other.tick; };
+        const auto end = std::upper_bound(snapshots_.begin(), snapshots_.end(), tick, later);
+        if (end == snapshots_.begin() || !restore_snapshot(std::prev(end)->state, components...)) return false;
+        next_ = std::prev(end)->tick;
+        return true;
+    }
+
+    /// Number of the tick that is read next.
+    [[nodiscard]] std::size_t next_tick() const noexcept { return next_; }
+
     /// Returns to the first tick.
     void reset() noexcept { next_ = differing_ = first_difference_ = 0; }
 
   private:
     std::vector<RecordedTick<Scalar>> ticks_;
+    std::vector<RecordedSnapshot> snapshots_;
     std::size_t next_ = 0, differing_ = 0, first_difference_ = 0;
 };
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include <membrane/haptics/recording.hpp>
 
@@ -24,12 +25,14 @@
 ///
 /// The file is little-endian on every machine: 8 bytes of magic; version, bytes of a number (4 or 8), vertices (4 bytes
 /// each); ticks (8 bytes); checksum. Then for each tick: 14 numbers (position, axis, radius, velocity, time, force;
-/// IEEE 754), a byte that is 1 while grasping, checksum. A checksum is the CRC-32 of everything before it except
-/// checksums, so it also detects lost or reordered ticks.
+/// IEEE 754), a byte that is 1 while grasping, checksum. In version 2, which a recording with snapshots has, their number
+/// and a checksum follow, then for each: tick, bytes (8 bytes each), the state as it is in memory, checksum. A checksum
+/// is the CRC-32 of everything before it except checksums, so it also detects lost or reordered ticks. A state is
+/// restored only where numbers have the same order of bytes.
 namespace membrane {
 
-/// Version of the format, in each file.
-inline constexpr std::uint32_t recording_version = 1;
+/// Version of the format: 1 without, 2 with snapshots.
+inline constexpr std::uint32_t recording_version = 2;
 
 /// Write errors are in the state of the stream.
 template <Real Scalar>
@@ -141,7 +144,7 @@ class RecordingReader {
 };
 
 struct RecordingHeader {
-    std::uint32_t vertex_count;
+    std::uint32_t version, vertex_count;
     std::uint64_t ticks;
 };
 
@@ -152,8 +155,9 @@ inline RecordingHeader read_header(RecordingReader& file, std::size_t scalar_siz
             refuse(reader_name, "byte ", i, " of a recording must be ", unsigned{recording_magic[i]}, ", got ", found);
         }
     }
-    if (const auto version = file.read<std::uint32_t>(); version != recording_version) {
-        refuse(reader_name, "version must be ", recording_version, ", got ", version);
+    const auto version = file.read<std::uint32_t>();
+    if (version < 1 || version > recording_version) {
+        refuse(reader_name, "version must be 1 or ", recording_version, ", got ", version);
     }
     if (const auto size = file.read<std::uint32_t>(); size != scalar_size) {
         refuse(reader_name, "numbers must be of ", scalar_size, " bytes, got ", size);
@@ -166,7 +170,7 @@ inline RecordingHeader read_header(RecordingReader& file, std::size_t scalar_siz
     if (vertex_count != no_index && static_cast<Index>(vertices) != vertex_count) {
         refuse(reader_name, "the membrane recorded must have ", vertex_count, " vertices, got ", vertices);
     }
-    return {vertices, ticks};
+    return {version, vertices, ticks};
 }
 
 template <Real Scalar>
@@ -182,13 +186,47 @@ template <Real Scalar>
     return tick_of(numbers, grasping == 1);
 }
 
+inline void write_snapshots(RecordingWriter& file, const std::vector<RecordedSnapshot>& snapshots) {
+    file.write(static_cast<std::uint64_t>(snapshots.size()));
+    file.write_checksum();
+    for (const auto& snapshot : snapshots) {
+        file.write(static_cast<std::uint64_t>(snapshot.tick));
+        file.write(static_cast<std::uint64_t>(snapshot.state.size()));
+        for (const std::byte byte : snapshot.state) file.write(std::to_integer<unsigned char>(byte));
+        file.write_checksum();
+    }
+}
+
+[[nodiscard]] inline std::vector<RecordedSnapshot> read_snapshots(RecordingReader& file, std::uint64_t ticks) {
+    file.enter("the number of snapshots");
+    const auto count = file.read<std::uint64_t>();
+    file.check_sum();
+    std::vector<RecordedSnapshot> snapshots;
+    for (std::uint64_t i = 0; i < count; ++i) {
+        file.enter("snapshot " + std::to_string(i) + " of " + std::to_string(count));
+        RecordedSnapshot snapshot;
+        snapshot.tick = static_cast<std::size_t>(file.read<std::uint64_t>());
+        const std::size_t first = snapshots.empty() ? 0 : snapshots.back().tick;
+        if (snapshot.tick < first || snapshot.tick >= ticks) {
+            refuse(reader_name, "snapshot ", i, " must be before a tick from ", first, " to ", ticks, ", got ",
+                   snapshot.tick);
+        }
+        const auto size = file.read<std::uint64_t>();
+        for (std::uint64_t byte = 0; byte < size; ++byte)  // memory is bounded by the file, not by its numbers
+            snapshot.state.push_back(static_cast<std::byte>(file.read<unsigned char>()));
+        file.check_sum();
+        snapshots.push_back(std::move(snapshot));
+    }
+    return snapshots;
+}
+
 }  // namespace detail
 
 template <Real Scalar>
 void write_recording(std::ostream& file, const Recording<Scalar>& recording) {
     detail::RecordingWriter writer(file);
     for (const unsigned char byte : detail::recording_magic) writer.write(byte);
-    writer.write(recording_version);
+    writer.write(recording.snapshots.empty() ? std::uint32_t{1} : recording_version);
     writer.write(static_cast<std::uint32_t>(sizeof(Scalar)));
     writer.write(static_cast<std::uint32_t>(recording.vertex_count));
     writer.write(static_cast<std::uint64_t>(recording.ticks.size()));
@@ -202,6 +240,7 @@ void write_recording(std::ostream& file, const Recording<Scalar>& recording) {
         writer.write(static_cast<unsigned char>(tick.tool.grasping ? 1 : 0));
         writer.write_checksum();
     }
+    if (!recording.snapshots.empty()) detail::write_snapshots(writer, recording.snapshots);
 }
 
 template <Real Scalar>
@@ -214,6 +253,7 @@ Recording<Scalar> read_recording(std::istream& file, Index vertex_count) {
         reader.enter("tick " + std::to_string(i) + total);
         recording.ticks.push_back(detail::read_tick<Scalar>(reader));
     }
+    if (header.version > 1) recording.snapshots = detail::read_snapshots(reader, header.ticks);
     reader.check_end();
     return recording;
 }
