@@ -180,11 +180,13 @@ async function testDial(page, rows) {
   const { reaction } = await hold(moving + 1);
   check("a replay has the force of the recording", reaction.every((f, k) => f === rows[moving][9 + k]));
   const errors = [];
-  const means = [];
-  for (const sweeps of [1, 4, 16]) {
-    await page.locator("#sweeps").fill(String(sweeps));
-    errors.push((await hold(moving + 1)).error);
-    means.push((await state(page)).median);
+  const means = [Infinity, Infinity, Infinity]; // the shortest of several: other programs may run beside
+  for (let round = 0; round < 5; ++round) {
+    for (const [i, sweeps] of [1, 4, 16].entries()) {
+      await page.locator("#sweeps").fill(String(sweeps));
+      errors[i] = (await hold(moving + 1)).error;
+      means[i] = Math.min(means[i], (await state(page)).median);
+    }
   }
   const found = errors.map((error) => error.toPrecision(3)).join(", ");
   check("1, 4, 16 sweeps: smaller error", errors[0] > errors[1] && errors[1] > errors[2], found);
