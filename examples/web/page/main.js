@@ -22,12 +22,13 @@ let replaying = false;
 let held = null; // for tests: waits for the error of a tick
 
 const view = document.getElementById("view");
+const plot = new Plot(document.getElementById("plot"));
 const panel = new Panel({
   mesh: open,
   file: openFile,
   settings() {
     physics?.send({ type: "configure", settings: panel.settings });
-    plot?.clearErrors();
+    plot.clearErrors();
   },
   choose: beginChoice,
   record: () => (recording ? physics.send({ type: "stop" }) : begin({ type: "record" })),
@@ -36,7 +37,6 @@ const panel = new Panel({
 });
 const scene = new Scene(view);
 const hand = new Hand(view, scene, panel.options);
-var plot = new Plot(document.getElementById("plot"));
 const times = new TickTimes();
 
 // Changes to the membrane `mesh`, unless the library refuses it.

@@ -8,6 +8,7 @@ const pressFirst = "Press or pull first: settings are tried on your last stroke.
 
 const percent = (value) => (value < 1e-4 ? "below 0.01 %" : `${Number((100 * value).toPrecision(2))} %`);
 const element = (id) => document.getElementById(id);
+const firstHint = element("hint").textContent;
 
 export class Panel {
   // depth [size of the membrane]
@@ -99,7 +100,7 @@ export class Panel {
     this.showScale();
   }
 
-  hint(text = "Drag on the membrane to press it. Drag beside it to turn the view.") {
+  hint(text = firstHint) {
     element("hint").textContent = text;
     element("hint").classList.remove("done");
   }
