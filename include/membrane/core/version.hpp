@@ -7,3 +7,7 @@
 #define MEMBRANE_VERSION_MINOR 2
 #define MEMBRANE_VERSION_PATCH 0
 ///@}
+
+/// The same as one number, 200 for 0.2.0: `#if MEMBRANE_VERSION >= 300`. Of the numbers for minor and patch, each is below
+/// 100.
+#define MEMBRANE_VERSION (10000 * MEMBRANE_VERSION_MAJOR + 100 * MEMBRANE_VERSION_MINOR + MEMBRANE_VERSION_PATCH)
