@@ -1,5 +1,6 @@
-"""conan create cmake/packages/conan: a package of the source tree that it stands in. It has the CMake package that `cmake --install`
-makes, with the targets membrane::membrane, membrane::deterministic and membrane::instantiated."""
+"""conan create cmake/packages/conan: a package of the source tree that it stands in. It has the CMake package that
+`cmake --install` makes, with the targets membrane::membrane, membrane::deterministic and membrane::instantiated.
+"""
 import os
 import re
 
