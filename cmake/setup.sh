@@ -88,7 +88,8 @@ example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json
     libtinyobjloader-dev zlib1g-dev gnuplot-nox)
 bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox
     libbullet-dev libcgal-dev libembree-dev libfcl-dev)
-check_packages=(clang clang-format-14 clang-tidy debootstrap doxygen git libclang-rt-dev python3 valgrind)
+check_packages=(clang clang-format-14 clang-tidy debootstrap doxygen g++-mingw-w64-x86-64-posix git libclang-rt-dev meson
+    pkg-config python3 valgrind)
 
 # one_core: sets `pinned`, the command that keeps another on the core of this script, where there is taskset.
 one_core() {

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: MIT
+#include <bit>
+#include <cstdint>
 #include <cstdio>
 
 #include <membrane/membrane.hpp>
 
-// Presses a sphere for a tenth of a second and says whether that was felt.
+#if MEMBRANE_VERSION < 300
+#error "membrane 0.3.0 or newer is needed"
+#endif
+
+// Presses a sphere for a tenth of a second. Prints the force and a number made of every bit of the positions, and says
+// whether the sphere was felt.
 int main() {
     const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 2});
     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
@@ -23,7 +30,9 @@ int main() {
         normals.update(x, report.moved);
         device.write(feel({tool, contact, report}));
     }
-    std::printf("membrane %d.%d.%d: %.3f N\n", MEMBRANE_VERSION_MAJOR, MEMBRANE_VERSION_MINOR, MEMBRANE_VERSION_PATCH,
-                device.force().z());
+    std::uint64_t bits = 0;
+    for (const double coordinate : x.reshaped()) bits = 31 * bits + std::bit_cast<std::uint64_t>(coordinate);
+    std::printf("membrane %d.%d.%d: %.3f N, bits %llx\n", MEMBRANE_VERSION_MAJOR, MEMBRANE_VERSION_MINOR,
+                MEMBRANE_VERSION_PATCH, device.force().z(), static_cast<unsigned long long>(bits));
     return device.force().z() > 0.1 ? 0 : 1;
 }
