@@ -41,12 +41,24 @@ class BuildExtension(build_ext):
         if is_older(docstrings, here / "docstrings.py", *headers):
             build.mkdir(parents=True, exist_ok=True)
             subprocess.run([sys.executable, here / "docstrings.py", include, docstrings], check=True)
+        self.precompile_headers()
         ParallelCompile("MEMBRANE_JOBS", default=1, needs_recompile=self.needs_recompile).install()
         super().build_extensions()
         package = pathlib.Path(self.get_ext_fullpath("membrane._membrane")).parent
         for name in ("__init__.py", "py.typed"):
             self.copy_file(str(here / "membrane" / name), str(package / name))
         subprocess.run([sys.executable, here / "stubs.py", package], check=True)
+
+    def precompile_headers(self):
+        """types.hpp, which most sources include first: a third of the time of a build is saved."""
+        target = build / "headers/types.hpp.gch"
+        if not is_older(target, *headers):
+            return
+        target.parent.mkdir(exist_ok=True)
+        extension, = self.extensions
+        includes = [f"-I{folder}" for folder in [*extension.include_dirs, *self.include_dirs]]
+        subprocess.run([*self.compiler.compiler_so, *includes, *extension.extra_compile_args, "-x", "c++-header",
+                        "source/types.hpp", "-o", target], check=True)
 
     @staticmethod
     def needs_recompile(target, source):
@@ -65,8 +77,8 @@ setup(
     package_data={"membrane": ["py.typed", "*.pyi"]},
     ext_modules=[
         Pybind11Extension("membrane._membrane", [str(source.relative_to(here)) for source in sources], cxx_std=20,
-                          include_dirs=[str(include), str(build)], extra_compile_args=["-isystem", "/usr/include/eigen3",
-                                                                                       *options])
+                          include_dirs=[str(build / "headers"), str(here / "source"), str(include), str(build)],
+                          extra_compile_args=["-isystem", "/usr/include/eigen3", "-include", "types.hpp", *options])
     ],
     cmdclass={"build_ext": BuildExtension},
     options={"build": {"build_base": str(build)}, "egg_info": {"egg_base": str(build)}},

@@ -39,7 +39,9 @@ Constraints::Constraints(std::string_view component, const py::args& arguments, 
         refuse(component, "there must be at most ", max_constraints, " constraints, got ", arguments.size());
     }
     for (const auto& argument : arguments) {
-        const auto& constraint = argument.cast<const Acting&>();
+        py::detail::make_caster<Acting> caster;
+        if (!caster.load(argument, false)) throw py::type_error("constraints are press, pull, load and pin");
+        const auto& constraint = py::detail::cast_op<const Acting&>(caster);
         if (constraint.vertex_count != membrane::no_index) {
             check_count(component, "the contact", constraint.vertex_count, vertex_count);
         }
