@@ -57,8 +57,9 @@ class BuildExtension(build_ext):
         target.parent.mkdir(exist_ok=True)
         extension, = self.extensions
         includes = [f"-I{folder}" for folder in [*extension.include_dirs, *self.include_dirs]]
-        subprocess.run([*self.compiler.compiler_so, *includes, *extension.extra_compile_args, "-x", "c++-header",
-                        "source/types.hpp", "-o", target], check=True)
+        flags = [flag for flag in extension.extra_compile_args if flag not in ("-include", "types.hpp")]
+        subprocess.run([*self.compiler.compiler_so, *includes, *flags, "-x", "c++-header", "source/types.hpp", "-o", target],
+                       check=True)
 
     @staticmethod
     def needs_recompile(target, source):

@@ -1,19 +1,26 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <membrane/accuracy/equilibrium.hpp>
-
 #include "types.hpp"
 
-/// Equilibria, for several source files.
+/// Long calls.
 namespace membrane_python {
 
-using membrane::Equilibrium;
-using membrane::EquilibriumOptions;
-
-/// The equilibrium, with as many reactions as there are constraints. Does not need Python's lock.
-[[nodiscard]] Equilibrium equilibrium_of(const membrane::ConstPointsRef<double>& x, const Mesh& mesh,
-                                         const Network& network, const Foundation& foundation,
-                                         const EquilibriumOptions& options, const Constraints& constraints);
+/// What `call(network, foundation)` returns, with the types of both, without Python's lock. An error that a law of Python
+/// raised meanwhile is raised in place of the one that follows from it.
+template <class Call>
+[[nodiscard]] auto unlocked(const Network& network, const Foundation& foundation, Call call) {
+    try {
+        auto result = [&] {
+            const py::gil_scoped_release unlock;
+            return std::visit(call, network.any, foundation.any);
+        }();
+        network.rethrow();
+        return result;
+    } catch (const membrane::InvalidInput&) {
+        network.rethrow();
+        throw;
+    }
+}
 
 }  // namespace membrane_python

@@ -122,7 +122,8 @@ membrane_python::MovingPositions positions_of(handle source, bool writes) {
     if (writes && (array->flags & npy_api::NPY_ARRAY_WRITEABLE_) == 0) {
         throw type_error("positions must be writeable, for the step moves them: mesh.positions.copy()");
     }
-    return {reinterpret_cast<double*>(array->data), array->dimensions[0], (std::max)(array->strides[0] / size, Py_intptr_t(3))};
+    return {reinterpret_cast<double*>(array->data), array->dimensions[0],
+            (std::max)(array->strides[0] / size, Py_intptr_t(3))};
 }
 
 bool type_caster<membrane_python::Moved>::load(handle source, bool) {

@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
 #include <membrane/core/field.hpp>
 #include <membrane/core/types.hpp>
 #include <membrane/core/vector3.hpp>
 #include <membrane/solve/step.hpp>
-#include <pybind11/numpy.h>
-#include <pybind11/pybind11.h>
 
 /// numpy arrays as the library's arguments and results. Points are the rows of a V x 3 array in C order, which has the
 /// memory of the library's 3 x V matrix.
@@ -37,7 +37,7 @@ struct PointsInPlace {
 
     [[nodiscard]] Map map() const noexcept { return Map(data, 3, count, Eigen::OuterStride<>(stride)); }
 };
-using Positions = PointsInPlace<false>;        ///< that are read
+using Positions = PointsInPlace<false>;       ///< that are read
 using MovingPositions = PointsInPlace<true>;  ///< that a step moves
 
 /// Vertices that moved: a `StepReport`, or an array of int32.
@@ -66,9 +66,10 @@ class IndexArray : public py::object {
         make_array(py::detail::npy_api::NPY_DOUBLE_, {x.cols(), 3}, x.data(), owner).release());
 }
 [[nodiscard]] inline FloatArray view(std::span<const Vector> vectors, py::handle owner) {
-    return py::reinterpret_steal<FloatArray>(
-        make_array(py::detail::npy_api::NPY_DOUBLE_, {static_cast<Py_intptr_t>(vectors.size()), 3}, vectors.data(), owner)
-            .release());
+    return py::reinterpret_steal<FloatArray>(make_array(py::detail::npy_api::NPY_DOUBLE_,
+                                                        {static_cast<Py_intptr_t>(vectors.size()), 3}, vectors.data(),
+                                                        owner)
+                                                 .release());
 }
 [[nodiscard]] inline IndexArray view(std::span<const Index> indices, py::handle owner) {
     return py::reinterpret_steal<IndexArray>(

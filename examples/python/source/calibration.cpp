@@ -2,11 +2,11 @@
 #include <utility>
 #include <vector>
 
+#include <pybind11/stl.h>
 #include <membrane/calibration/fit.hpp>
 #include <membrane/calibration/indentation.hpp>
-#include <pybind11/stl.h>
 
-#include "types.hpp"
+#include "accuracy.hpp"
 
 namespace membrane_python {
 
@@ -44,12 +44,7 @@ class Indentation {
             const auto build = [&](Numbers) { return std::pair(springs, volume); };
             return membrane::Indentation(mesh_, tool_, direction_, build)(constants, depths);
         };
-        auto forces = [&] {
-            const py::gil_scoped_release unlock;
-            return std::visit(press_with, network.any, foundation.any);
-        }();
-        network.rethrow();
-        return forces;
+        return unlocked(network, foundation, press_with);
     }
 
     [[nodiscard]] const Tool& touching() const noexcept { return touching_; }
@@ -110,8 +105,9 @@ void bind_calibration(py::module_& module) {
                            std::pair("min_sensitivity", &FitOptions::min_sensitivity),
                            std::pair("max_iterations", &FitOptions::max_iterations));
     using Column = const std::vector<double>&;
-    options.def(module, "fit", options.taking<Column, Column, Column, const py::object&, Column>(&fit), py::arg("depth"),
-                py::arg("force"), py::arg("start"), py::arg("model"), py::arg("deviation") = std::vector<double>{});
+    options.def(module, "fit", options.taking<Column, Column, Column, const py::object&, Column>(&fit),
+                py::arg("depth"), py::arg("force"), py::arg("start"), py::arg("model"),
+                py::arg("deviation") = std::vector<double>{});
 }
 
 }  // namespace membrane_python

@@ -38,19 +38,12 @@ class Keywords {
     }
 
     /// Defines `function`, as of `taking`, by this name; `leading` are its first arguments.
-    template <class Scope, class Function, class... Leading>
-    void def(Scope& scope, const char* name, const Function& function, const Leading&... leading) const {
-        def_documented(scope, name, doc(qualified(scope, name).c_str()), function, leading...);
-    }
-
-    /// The same with a comment of another name.
-    template <class Scope, class Function, class... Leading>
-    void def_documented(Scope& scope, const char* name, const std::string& comment, const Function& function,
-                        const Leading&... leading) const {
-        const std::string text = comment + "\n\n" + description();
+    template <class... Leading>
+    void def(py::module_& module, const char* name, const auto& function, const Leading&... leading) const {
+        const std::string text = std::string(doc(name)) + "\n\n" + description();
         std::apply(
             [&](const auto&... field) {
-                scope.def(name, function, leading..., py::kw_only(), as_argument(field)..., text.c_str());
+                module.def(name, function, leading..., py::kw_only(), as_argument(field)..., text.c_str());
             },
             fields_);
     }
@@ -82,7 +75,6 @@ class Keywords {
         return py::arg(field.first) = Options{}.*field.second;
     }
     [[nodiscard]] std::string member(const char* field) const { return name_ + "::" + field; }
-    [[nodiscard]] static std::string qualified(const py::module_&, const char* name) { return name; }
 
     /// A line for each keyword.
     [[nodiscard]] std::string description() const {

@@ -1,40 +1,28 @@
 // SPDX-License-Identifier: MIT
+#include <membrane/accuracy/equilibrium.hpp>
+
 #include "accuracy.hpp"
 
 namespace membrane_python {
 
-Equilibrium equilibrium_of(const membrane::ConstPointsRef<double>& x, const Mesh& mesh, const Network& network,
-                           const Foundation& foundation, const EquilibriumOptions& options,
-                           const Constraints& constraints) {
-    const auto find = [&](const auto& springs, const auto& volume) {
-        return std::apply(
-            [&](const auto&... each) { return membrane::equilibrium(x, mesh, springs, volume, options, each...); },
-            constraints.all);
-    };
-    auto found = std::visit(find, network.any, foundation.any);
-    found.reactions.resize(constraints.count);
-    return found;
-}
-
 namespace {
 
-/// `equilibrium` of Python.
-[[nodiscard]] Equilibrium equilibrium(Positions x, const Mesh& mesh, const Network& network,
-                                      const Foundation& foundation, const py::args& arguments,
-                                      const EquilibriumOptions& options) {
+using membrane::Equilibrium;
+using membrane::EquilibriumOptions;
+
+[[nodiscard]] Equilibrium find(Positions x, const Mesh& mesh, const Network& network, const Foundation& foundation,
+                               const py::args& arguments, const EquilibriumOptions& options) {
     check_fit("equilibrium", mesh.vertex_count(), x.count, network, foundation);
     const Constraints constraints("equilibrium", arguments, mesh.vertex_count());
-    try {
-        auto found = [&] {
-            const py::gil_scoped_release unlock;
-            return equilibrium_of(x.map(), mesh, network, foundation, options, constraints);
-        }();
-        network.rethrow();
-        return found;
-    } catch (const membrane::InvalidInput&) {
-        network.rethrow();  // of a law of Python: the first error is the reason
-        throw;
-    }
+    auto found = unlocked(network, foundation, [&](const auto& springs, const auto& volume) {
+        return std::apply(
+            [&](const auto&... each) {
+                return membrane::equilibrium(x.map(), mesh, springs, volume, options, each...);
+            },
+            constraints.all);
+    });
+    found.reactions.resize(constraints.count);
+    return found;
 }
 
 }  // namespace
@@ -59,7 +47,7 @@ void bind_equilibrium(py::module_& module) {
                            std::pair("max_iterations", &EquilibriumOptions::max_iterations),
                            std::pair("tolerance", &EquilibriumOptions::tolerance));
     options.def(module, "equilibrium",
-                options.taking<Positions, const Mesh&, const Network&, const Foundation&, const py::args&>(&equilibrium),
+                options.taking<Positions, const Mesh&, const Network&, const Foundation&, const py::args&>(&find),
                 py::arg("x"), py::arg("mesh"), py::arg("network"), py::arg("foundation"));
 }
 

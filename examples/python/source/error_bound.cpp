@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/accuracy/error_bound.hpp>
 
-#include "accuracy.hpp"
+#include "types.hpp"
 
 namespace membrane_python {
 
@@ -9,6 +9,7 @@ namespace {
 
 using Bound = membrane::ErrorBound<>;
 using membrane::BoundStatus;
+using membrane::Equilibrium;
 using membrane::ErrorReport;
 using membrane::ForceEnclosure;
 using LinearNetwork = membrane::MassSpringNetwork<double, membrane::LinearSpring>;
@@ -89,8 +90,8 @@ void bind_error_bound(py::module_& module) {
     }),
                      py::arg("network"));
     bound.def("compute", &compute, py::arg("x"), py::arg("network"), py::arg("foundation"),
-              py::arg("rest") = py::none(), py::arg("mesh") = py::none(),
-              py::return_value_policy::reference_internal, doc("ErrorBound::compute"));
+              py::arg("rest") = py::none(), py::arg("mesh") = py::none(), py::return_value_policy::reference_internal,
+              doc("ErrorBound::compute"));
 }
 
 }  // namespace membrane_python

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <functional>
 
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/force_limits.hpp>
 #include <membrane/haptics/script.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
-#include <pybind11/stl.h>
-#include <pybind11/stl/filesystem.h>
 
 #include <fstream>
 
@@ -63,10 +63,9 @@ void bind_policies(py::module_& module) {
     auto friction = py::class_<Friction>(module, "ContactFriction", doc("ContactFriction"));
     const Keywords options("FrictionOptions", std::pair("coefficient", &FrictionOptions::coefficient),
                            std::pair("stiffness", &FrictionOptions::stiffness));
-    options.def_init(friction, options.taking<const SpringDamperForce&>(
-                                   [](const SpringDamperForce& policy, const FrictionOptions& o) {
-                                       return Friction(policy, o);
-                                   }),
+    options.def_init(friction,
+                     options.taking<const SpringDamperForce&>(
+                         [](const SpringDamperForce& policy, const FrictionOptions& o) { return Friction(policy, o); }),
                      py::arg("policy"));
     def_call(friction);
     friction.def_property_readonly("slips", &Friction::slips, doc("ContactFriction::slips"));
@@ -79,21 +78,21 @@ void bind_policies(py::module_& module) {
                                     std::pair("scale", &CouplingOptions::scale));
     coupling_options.def_init(coupling,
                               coupling_options.taking<>([](const CouplingOptions& o) { return Coupling(o); }));
-    coupling.def("update", &Coupling::update, py::arg("hand"), py::arg("reaction"), py::arg("dt"),
-                 doc("VirtualCoupling::update"))
+    coupling
+        .def("update", &Coupling::update, py::arg("hand"), py::arg("reaction"), py::arg("dt"),
+             doc("VirtualCoupling::update"))
         .def_property_readonly("force", &Coupling::force, doc("VirtualCoupling::force"))
         .def("reset", &Coupling::reset, doc("VirtualCoupling::reset"));
 }
 
 void bind_profiles(py::module_& module) {
     auto profile = py::class_<Profile>(module, "DeviceProfile", doc("DeviceProfile"));
-    const Keywords fields("DeviceProfile", std::pair("peak_force", &DeviceProfile::peak_force),
-                          std::pair("continuous_force", &DeviceProfile::continuous_force),
-                          std::pair("stiffness", &DeviceProfile::stiffness),
-                          std::pair("damping", &DeviceProfile::damping),
-                          std::pair("friction", &DeviceProfile::friction),
-                          std::pair("resolution", &DeviceProfile::resolution),
-                          std::pair("thermal_time", &DeviceProfile::thermal_time));
+    const Keywords fields(
+        "DeviceProfile", std::pair("peak_force", &DeviceProfile::peak_force),
+        std::pair("continuous_force", &DeviceProfile::continuous_force),
+        std::pair("stiffness", &DeviceProfile::stiffness), std::pair("damping", &DeviceProfile::damping),
+        std::pair("friction", &DeviceProfile::friction), std::pair("resolution", &DeviceProfile::resolution),
+        std::pair("thermal_time", &DeviceProfile::thermal_time));
     fields.def_init(profile, fields.taking<std::string>([](std::string name, const DeviceProfile& numbers) {
         return (numbers.check(), Profile(std::move(name), numbers));
     }),
@@ -102,9 +101,13 @@ void bind_profiles(py::module_& module) {
     profile.def_readonly("name", &Profile::owned, doc("DeviceProfile::name"));
     auto devices = module.def_submodule("devices", "Profiles of haptic devices, from their makers' data sheets.");
     using namespace membrane::devices;
-    const std::pair<const char*, const DeviceProfile&> all[] = {
-        {"touch", touch}, {"phantom_desktop", phantom_desktop}, {"premium_1_5", premium_1_5},
-        {"premium_3_0", premium_3_0}, {"omega", omega}, {"delta", delta}, {"sigma", sigma}};
+    const std::pair<const char*, const DeviceProfile&> all[] = {{"touch", touch},
+                                                                {"phantom_desktop", phantom_desktop},
+                                                                {"premium_1_5", premium_1_5},
+                                                                {"premium_3_0", premium_3_0},
+                                                                {"omega", omega},
+                                                                {"delta", delta},
+                                                                {"sigma", sigma}};
     for (const auto& [name, device] : all) devices.attr(name) = Profile(std::string(device.name), device);
 }
 
@@ -119,12 +122,11 @@ void bind_limiter(py::module_& module) {
         .def_readonly("slew", &ActiveLimits::slew, doc("ActiveLimits::slew"))
         .def("any", &ActiveLimits::any, doc("ActiveLimits::any"));
     auto limiter = py::class_<ForceLimiter>(module, "ForceLimiter", doc("ForceLimiter"));
-    const Keywords options("LimitOptions", std::pair("rise_time", &LimitOptions::rise_time),
-                           std::pair("soft_start", &LimitOptions::soft_start),
-                           std::pair("max_state_age", &LimitOptions::max_state_age),
-                           std::pair("fade_time", &LimitOptions::fade_time),
-                           std::pair("max_tick", &LimitOptions::max_tick),
-                           std::pair("thermal_limit", &LimitOptions::thermal_limit));
+    const Keywords options(
+        "LimitOptions", std::pair("rise_time", &LimitOptions::rise_time),
+        std::pair("soft_start", &LimitOptions::soft_start), std::pair("max_state_age", &LimitOptions::max_state_age),
+        std::pair("fade_time", &LimitOptions::fade_time), std::pair("max_tick", &LimitOptions::max_tick),
+        std::pair("thermal_limit", &LimitOptions::thermal_limit));
     options.def_init(limiter, options.taking<const Profile&>([](const Profile& device, const LimitOptions& o) {
         return ForceLimiter(device, o);
     }),
@@ -149,8 +151,7 @@ void bind_device(py::module_& module) {
         .def(py::init([](const py::tuple& row) {
                  if (row.size() != 2 && row.size() != 3)
                      throw py::value_error("a waypoint is (time, position) or (time, position, grasping)");
-                 return Waypoint{row[0].cast<double>(), row[1].cast<Vector>(),
-                                 row.size() == 3 && row[2].cast<bool>()};
+                 return Waypoint{row[0].cast<double>(), row[1].cast<Vector>(), row.size() == 3 && row[2].cast<bool>()};
              }),
              py::arg("row"))
         .def_readonly("time", &Waypoint::time, doc("Waypoint::time"))
@@ -171,11 +172,11 @@ void bind_device(py::module_& module) {
     auto device = py::class_<Device>(module, "ScriptedDevice", doc("ScriptedDevice"));
     const Keywords options("ScriptedDeviceOptions", std::pair("tick", &ScriptedDeviceOptions::tick),
                            std::pair("radius", &ScriptedDeviceOptions::radius));
-    options.def_init(device, options.taking<const std::vector<Waypoint>&>(
-                                 [](const std::vector<Waypoint>& script, const ScriptedDeviceOptions& o) {
-                                     return Device(script, o);
-                                 }),
-                     py::arg("script"));
+    options.def_init(
+        device,
+        options.taking<const std::vector<Waypoint>&>(
+            [](const std::vector<Waypoint>& script, const ScriptedDeviceOptions& o) { return Device(script, o); }),
+        py::arg("script"));
     device.def_property_readonly("running", &Device::running, doc("ScriptedDevice::running"))
         .def("read", &Device::read, doc("ScriptedDevice::read"))
         .def("write", &Device::write, py::arg("force"), doc("ScriptedDevice::write"))

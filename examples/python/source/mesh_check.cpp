@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include <pybind11/stl.h>
 #include <membrane/mesh_check/quality.hpp>
 #include <membrane/mesh_check/repair.hpp>
 #include <membrane/mesh_check/validate.hpp>
-#include <pybind11/stl.h>
 
 #include "types.hpp"
 
@@ -34,8 +34,7 @@ void bind_facts(py::module_& module) {
     using membrane::MeshQuality;
     py::class_<MeshQuality>(module, "MeshQuality", doc("MeshQuality"))
         .def_readonly("smallest_angle", &MeshQuality::smallest_angle, doc("MeshQuality::smallest_angle"))
-        .def_readonly("mean_smallest_angle", &MeshQuality::mean_smallest_angle,
-                      doc("MeshQuality::mean_smallest_angle"))
+        .def_readonly("mean_smallest_angle", &MeshQuality::mean_smallest_angle, doc("MeshQuality::mean_smallest_angle"))
         .def_readonly("mean_edge", &MeshQuality::mean_edge, doc("MeshQuality::mean_edge"))
         .def_readonly("even_edges", &MeshQuality::even_edges, doc("MeshQuality::even_edges"));
     module.def("quality_of", &membrane::quality_of<double>, py::arg("mesh"), doc("quality_of"));
@@ -47,8 +46,7 @@ void bind_validate(py::module_& module) {
             "defect", [](const MeshFinding& self) { return std::string(membrane::name(self.defect)); },
             doc("MeshFinding::defect"))
         .def_property_readonly(
-            "remedy", [](const MeshFinding& self) { return std::string(membrane::remedy(self.defect)); },
-            doc("remedy"))
+            "remedy", [](const MeshFinding& self) { return std::string(membrane::remedy(self.defect)); }, doc("remedy"))
         .def_property_readonly(
             "is_error",
             [](const MeshFinding& self) { return membrane::severity(self.defect) == membrane::Severity::error; },
@@ -109,13 +107,14 @@ void bind_repair(py::module_& module) {
             },
             doc("RepairedMesh::source_triangles"))
         .def_readonly("report", &Repaired::report, doc("RepairedMesh::report"));
-    const Keywords options(
-        "RepairOptions", std::pair("weld", &RepairOptions::weld),
-        std::pair("drop_repeated", &RepairOptions::drop_repeated),
-        std::pair("drop_zero_area", &RepairOptions::drop_zero_area),
-        std::pair("drop_duplicates", &RepairOptions::drop_duplicates), std::pair("orient", &RepairOptions::orient),
-        std::pair("split_vertices", &RepairOptions::split_vertices),
-        std::pair("flip_inward", &RepairOptions::flip_inward), std::pair("drop_isolated", &RepairOptions::drop_isolated));
+    const Keywords options("RepairOptions", std::pair("weld", &RepairOptions::weld),
+                           std::pair("drop_repeated", &RepairOptions::drop_repeated),
+                           std::pair("drop_zero_area", &RepairOptions::drop_zero_area),
+                           std::pair("drop_duplicates", &RepairOptions::drop_duplicates),
+                           std::pair("orient", &RepairOptions::orient),
+                           std::pair("split_vertices", &RepairOptions::split_vertices),
+                           std::pair("flip_inward", &RepairOptions::flip_inward),
+                           std::pair("drop_isolated", &RepairOptions::drop_isolated));
     const auto repair = [](const py::object& positions, const py::object& triangles, const RepairOptions& o) {
         const auto x = points_of(positions);
         const auto corners = triangles_of(triangles);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include <functional>
 
-#include <membrane/meshing/distmesh.hpp>
 #include <pybind11/stl.h>
+#include <membrane/meshing/distmesh.hpp>
 
 #include "types.hpp"
 
@@ -76,9 +76,8 @@ template <class Function>
     const py::gil_scoped_release unlock;
     return with_gradient(body, [&](const auto& whole) {
         if (!within.distance) return membrane::distmesh(whole, options);
-        return with_gradient(within, [&](const auto& part) {
-            return membrane::distmesh(membrane::trimmed(whole, part), options);
-        });
+        return with_gradient(
+            within, [&](const auto& part) { return membrane::distmesh(membrane::trimmed(whole, part), options); });
     });
 }
 
@@ -92,8 +91,7 @@ void bind_bodies(py::module_& module) {
     using namespace membrane;
     py::class_<Body>(module, "Body", doc("SignedDistance"))
         .def("__call__", &Body::operator(), py::arg("p"), "Signed distance of `p` to the surface [m].");
-    def_solid(module, "Ball",
-              Keywords("Ball", std::pair("centre", &Ball::centre), std::pair("radius", &Ball::radius)));
+    def_solid(module, "Ball", Keywords("Ball", std::pair("centre", &Ball::centre), std::pair("radius", &Ball::radius)));
     def_solid(module, "Ellipsoid",
               Keywords("Ellipsoid", std::pair("centre", &Ellipsoid::centre), std::pair("radii", &Ellipsoid::radii)));
     def_solid(module, "Cuboid",
@@ -114,8 +112,8 @@ void bind_bodies(py::module_& module) {
         "difference", [](const Body& first, const Body& second) { return body_of(difference(first, second)); }, a, b,
         doc("difference"));
     module.def(
-        "offset", [](const Body& body, double by) { return body_of(offset(body, by)); }, py::arg("body"),
-        py::arg("by"), doc("offset"));
+        "offset", [](const Body& body, double by) { return body_of(offset(body, by)); }, py::arg("body"), py::arg("by"),
+        doc("offset"));
 }
 
 }  // namespace

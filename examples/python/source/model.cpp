@@ -45,18 +45,20 @@ void bind_laws(py::module_& module) {
                            std::pair("strain_limit", &ExponentialSpring::strain_limit));
     options.def_init(exponential, options.taking<>([](const ExponentialSpring& law) { return (law.check(), law); }));
     options.def_fields(exponential);
-    auto table = py::class_<TableSpring>(
-                     module, "TableSpring",
-                     "A law by a table: tension over stiffness and rest length at each strain, straight in between and\n"
-                     "beyond both ends. Strains ascend, tensions do not descend, the tension at strain 0 is 0.")
-                     .def(py::init<const std::vector<double>&, const std::vector<double>&>(), py::arg("strain"),
-                          py::arg("tension"), "Raises InvalidInput for a table that is not as above.");
-    auto python = py::class_<PythonSpring>(
-                      module, "PythonSpring",
-                      "A law that is a function of Python: function(stiffness, rest_length, length) returns tension [N],\n"
-                      "stiffness [N/m], the derivative of the tension, and energy [J]. Slow: it is called for each\n"
-                      "spring of each update. `TableSpring` is fast. An error of the function is raised by the step.")
-                      .def(py::init<py::function>(), py::arg("function"));
+    auto table =
+        py::class_<TableSpring>(
+            module, "TableSpring",
+            "A law by a table: tension over stiffness and rest length at each strain, straight in between and\n"
+            "beyond both ends. Strains ascend, tensions do not descend, the tension at strain 0 is 0.")
+            .def(py::init<const std::vector<double>&, const std::vector<double>&>(), py::arg("strain"),
+                 py::arg("tension"), "Raises InvalidInput for a table that is not as above.");
+    auto python =
+        py::class_<PythonSpring>(
+            module, "PythonSpring",
+            "A law that is a function of Python: function(stiffness, rest_length, length) returns tension [N],\n"
+            "stiffness [N/m], the derivative of the tension, and energy [J]. Slow: it is called for each\n"
+            "spring of each update. `TableSpring` is fast. An error of the function is raised by the step.")
+            .def(py::init<py::function>(), py::arg("function"));
     def_call<LinearSpring>(linear);
     def_call<TensionSpring>(tension);
     def_call<ExponentialSpring>(exponential);
@@ -124,8 +126,9 @@ void bind_foundations(py::module_& module) {
     }),
                            py::arg("mesh"));
 
-    py::class_<NoSprings, Foundation>(module, "NoFoundation", doc("NoFoundation"))
-        .def(py::init([] { return NoSprings{{membrane::NoFoundation{}}}; }));
+    py::class_<NoSprings, Foundation>(module, "NoFoundation", doc("NoFoundation")).def(py::init([] {
+        return NoSprings{{membrane::NoFoundation{}}};
+    }));
 }
 
 }  // namespace

@@ -65,7 +65,8 @@ PYBIND11_MODULE(_membrane, module) {
                                  "." + std::to_string(MEMBRANE_VERSION_PATCH);
     module.attr("no_index") = membrane::no_index;
     module.attr("unlimited") = membrane::unlimited;
-    py::register_exception<membrane::InvalidInput>(module, "InvalidInput", PyExc_ValueError).doc() = doc("InvalidInput");
+    py::register_exception<membrane::InvalidInput>(module, "InvalidInput", PyExc_ValueError).doc() =
+        doc("InvalidInput");
     bind_surface(module);
     bind_mesh_check(module);
     bind_meshing(module);

@@ -2,10 +2,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include <membrane/haptics/recording.hpp>
-#include <membrane/haptics/recording_file.hpp>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
+#include <membrane/haptics/recording.hpp>
+#include <membrane/haptics/recording_file.hpp>
 
 #include "types.hpp"
 
@@ -57,7 +57,8 @@ void bind_recording(py::module_& module) {
             },
             "The time of each tick [s].")
         .def_property_readonly(
-            "positions", [](const Recording& self) { return rows_of(self, [](const auto& t) { return t.tool.position; }); },
+            "positions",
+            [](const Recording& self) { return rows_of(self, [](const auto& t) { return t.tool.position; }); },
             "The tool's position in each tick [m].")
         .def_property_readonly(
             "forces", [](const Recording& self) { return rows_of(self, [](const auto& tick) { return tick.force; }); },

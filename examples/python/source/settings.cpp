@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/accuracy/choose_settings.hpp>
 #include <pybind11/stl.h>
+#include <membrane/accuracy/choose_settings.hpp>
 
-#include "types.hpp"
+#include "accuracy.hpp"
 
 namespace membrane_python {
 
@@ -21,23 +21,15 @@ struct Path {
     Index vertex_count;
 };
 
-/// Calls `function(network, foundation)` without Python's lock.
-template <class Function>
-[[nodiscard]] auto unlocked(const char* name, const Mesh& mesh, const Network& network, const Foundation& foundation,
-                            const Path& path, Function function) {
+void check(const char* name, const Mesh& mesh, const Network& network, const Foundation& foundation, const Path& path) {
     check_fit(name, mesh.vertex_count(), mesh.vertex_count(), network, foundation);
     check_count(name, "the trajectory", path.vertex_count, mesh.vertex_count());
-    auto result = [&] {
-        const py::gil_scoped_release unlock;
-        return std::visit(function, network.any, foundation.any);
-    }();
-    network.rethrow();
-    return result;
 }
 
 [[nodiscard]] Choice choose(const Mesh& mesh, const Network& network, const Foundation& foundation, const Path& path,
                             double force_error, double time, const Experiment& experiment) {
-    return unlocked("choose_settings", mesh, network, foundation, path, [&](const auto& springs, const auto& volume) {
+    check("choose_settings", mesh, network, foundation, path);
+    return unlocked(network, foundation, [&](const auto& springs, const auto& volume) {
         return membrane::choose_settings(mesh, springs, volume, path.trajectory,
                                          Requirement{.force_error = force_error, .time = time}, experiment);
     });
@@ -45,14 +37,16 @@ template <class Function>
 
 [[nodiscard]] References references_of(const Mesh& mesh, const Network& network, const Foundation& foundation,
                                        const Path& path, Index tick_stride) {
-    return unlocked("equilibria", mesh, network, foundation, path, [&](const auto& springs, const auto& volume) {
+    check("equilibria", mesh, network, foundation, path);
+    return unlocked(network, foundation, [&](const auto& springs, const auto& volume) {
         return membrane::equilibria(mesh, springs, volume, path.trajectory, tick_stride);
     });
 }
 
 [[nodiscard]] TrialResult trial(const Mesh& mesh, const Network& network, const Foundation& foundation,
                                 const Path& path, const References& references, const SolverOptions& options) {
-    return unlocked("run_trial", mesh, network, foundation, path, [&](const auto& springs, const auto& volume) {
+    check("run_trial", mesh, network, foundation, path);
+    return unlocked(network, foundation, [&](const auto& springs, const auto& volume) {
         return membrane::run_trial(mesh, springs, volume, path.trajectory, references, options);
     });
 }
@@ -95,16 +89,15 @@ void bind_settings(py::module_& module) {
     module.def("equilibria", &references_of, mesh, network, foundation, trajectory, py::arg("tick_stride") = 1,
                doc("equilibria"));
     const auto keywords = solver_keywords();
-    keywords.def(module, "run_trial",
-                 keywords.taking<const Mesh&, const Network&, const Foundation&, const Path&, const References&>(&trial),
-                 mesh, network, foundation, trajectory, py::arg("references"));
-    const Keywords options("GridSearchOptions", std::pair("layers", &Experiment::layers),
-                           std::pair("sweeps", &Experiment::sweeps),
-                           std::pair("contact_iterations", &Experiment::contact_iterations),
-                           std::pair("others", &Experiment::others),
-                           std::pair("safety_factor", &Experiment::safety_factor),
-                           std::pair("tick_stride", &Experiment::tick_stride),
-                           std::pair("repetitions", &Experiment::repetitions));
+    keywords.def(
+        module, "run_trial",
+        keywords.taking<const Mesh&, const Network&, const Foundation&, const Path&, const References&>(&trial), mesh,
+        network, foundation, trajectory, py::arg("references"));
+    const Keywords options(
+        "GridSearchOptions", std::pair("layers", &Experiment::layers), std::pair("sweeps", &Experiment::sweeps),
+        std::pair("contact_iterations", &Experiment::contact_iterations), std::pair("others", &Experiment::others),
+        std::pair("safety_factor", &Experiment::safety_factor), std::pair("tick_stride", &Experiment::tick_stride),
+        std::pair("repetitions", &Experiment::repetitions));
     options.def(module, "choose_settings",
                 options.taking<const Mesh&, const Network&, const Foundation&, const Path&, double, double>(&choose),
                 mesh, network, foundation, trajectory, py::arg("force_error") = Requirement{}.force_error,

@@ -9,7 +9,8 @@ namespace membrane_python {
 
 namespace {
 
-[[nodiscard]] std::unique_ptr<Solver> solver_of(const Network& network, const Rule& rule, const SolverOptions& options) {
+[[nodiscard]] std::unique_ptr<Solver> solver_of(const Network& network, const Rule& rule,
+                                                const SolverOptions& options) {
     const auto build = [&](const auto& springs, const auto& one) {
         using Type = SolverOf<std::remove_cvref_t<decltype(one)>>;
         return std::make_unique<Solver>(Solver{Type(springs, options, one), springs.vertex_count()});
@@ -68,7 +69,10 @@ void bind_constraints(py::module_& module) {
         "pull", [](const Tool& tool, const Grasp& grasp) { return Acting{.any = membrane::pull(tool, grasp)}; },
         py::arg("tool"), py::arg("grasp"), doc("pull"));
     module.def(
-        "pull", [](Index v, const Vector& target) { return Acting{.any = membrane::VertexAttachment<double>{v, target}}; },
+        "pull",
+        [](Index v, const Vector& target) {
+            return Acting{.any = membrane::VertexAttachment<double>{v, target}};
+        },
         py::arg("vertex"), py::arg("target"), doc("pull"));
     module.def(
         "load",

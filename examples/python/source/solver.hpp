@@ -37,7 +37,7 @@ struct StepArguments {
 template <class Rule, class Volume>
 [[nodiscard]] StepReport take_step(SolverOf<Rule>& solver, const StepArguments& arguments, const Volume& volume);
 
-#define MEMBRANE_PYTHON_STEPS(PREFIX, RULE)                                                                        \
+#define MEMBRANE_PYTHON_STEPS(PREFIX, RULE)                                                                            \
     PREFIX StepReport take_step(SolverOf<RULE>&, const StepArguments&, const membrane::VirtualVolumeSprings<double>&); \
     PREFIX StepReport take_step(SolverOf<RULE>&, const StepArguments&, const membrane::FoundationSprings<double>&);    \
     PREFIX StepReport take_step(SolverOf<RULE>&, const StepArguments&, const membrane::NoFoundation&)
@@ -53,7 +53,8 @@ template <class Rule, class Volume, class Springs, std::size_t... i>
                                    const Volume& volume, std::index_sequence<i...>) {
     using Reference = membrane::ConstraintRef<double>;
     if (with.seconds == std::numeric_limits<double>::infinity()) {
-        return solver.step(with.x.map(), with.dt, springs, volume, static_cast<const Reference&>(with.constraints.all[i])...);
+        return solver.step(with.x.map(), with.dt, springs, volume,
+                           static_cast<const Reference&>(with.constraints.all[i])...);
     }
     using Clock = std::chrono::steady_clock;
     const auto end = Clock::now() + std::chrono::duration_cast<Clock::duration>(

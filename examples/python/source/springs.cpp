@@ -6,8 +6,8 @@
 #include <limits>
 #include <tuple>
 
-#include <membrane/core/check.hpp>
 #include <pybind11/stl.h>
+#include <membrane/core/check.hpp>
 
 namespace membrane_python {
 
@@ -58,10 +58,10 @@ SpringResponse<double> TableSpring::operator()(const SpringState<double>& spring
     const double strain = (spring.length - spring.rest_length) / spring.rest_length;
     const Piece& piece = piece_at(strain);
     const double beyond = strain - piece.strain, force = spring.stiffness * spring.rest_length;
-    return {.tension = force * (piece.tension + piece.slope * beyond),
-            .stiffness = spring.stiffness * piece.slope,
-            .energy = force * spring.rest_length *
-                      (piece.energy + (piece.tension + piece.slope * beyond / 2) * beyond)};
+    return {
+        .tension = force * (piece.tension + piece.slope * beyond),
+        .stiffness = spring.stiffness * piece.slope,
+        .energy = force * spring.rest_length * (piece.energy + (piece.tension + piece.slope * beyond / 2) * beyond)};
 }
 
 PythonSpring::PythonSpring(py::function function)
@@ -75,9 +75,8 @@ SpringResponse<double> PythonSpring::operator()(const SpringState<double>& sprin
     constexpr double none = std::numeric_limits<double>::quiet_NaN();
     if (call_->error) return {none, none, none};
     try {
-        const auto [tension, stiffness, energy] =
-            call_->function(spring.stiffness, spring.rest_length, spring.length)
-                .cast<std::tuple<double, double, double>>();
+        const auto [tension, stiffness, energy] = call_->function(spring.stiffness, spring.rest_length, spring.length)
+                                                      .cast<std::tuple<double, double, double>>();
         return {tension, stiffness, energy};
     } catch (...) {
         call_->error = std::current_exception();

@@ -7,8 +7,8 @@
 #include <variant>
 #include <vector>
 
-#include <membrane/model/spring_law.hpp>
 #include <pybind11/pybind11.h>
+#include <membrane/model/spring_law.hpp>
 
 /// Spring laws that a program of Python chooses while it runs.
 namespace membrane_python {

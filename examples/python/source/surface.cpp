@@ -22,12 +22,10 @@ void bind_mesh(py::module_& module) {
         .def_property_readonly("vertex_count", &Mesh::vertex_count, doc("TriangleMesh::vertex_count"))
         .def_property_readonly("triangle_count", &Mesh::triangle_count, doc("TriangleMesh::triangle_count"))
         .def_property_readonly(
-            "positions",
-            [](const py::object& self) { return view(self.cast<const Mesh&>().positions(), self); },
+            "positions", [](const py::object& self) { return view(self.cast<const Mesh&>().positions(), self); },
             doc("TriangleMesh::positions"))
         .def_property_readonly(
-            "triangles",
-            [](const py::object& self) { return view(self.cast<const Mesh&>().triangles(), self); },
+            "triangles", [](const py::object& self) { return view(self.cast<const Mesh&>().triangles(), self); },
             doc("TriangleMesh::triangles"))
         .def("__repr__", [](const Mesh& mesh) {
             return "TriangleMesh of " + std::to_string(mesh.vertex_count()) + " vertices and " +
@@ -67,7 +65,9 @@ void bind_shapes(py::module_& module) {
 
 void bind_normals(py::module_& module) {
     py::class_<Normals>(module, "VertexNormals", doc("VertexNormals"))
-        .def(py::init([](const Mesh& mesh) { return Normals{membrane::VertexNormals(mesh), mesh.vertex_count()}; }),
+        .def(py::init([](const Mesh& mesh) {
+                 return Normals{membrane::VertexNormals(mesh), mesh.vertex_count()};
+             }),
              py::arg("mesh"), doc("VertexNormals::VertexNormals"))
         .def(
             "update",

@@ -44,7 +44,8 @@ struct Network {
 };
 
 struct Foundation {
-    std::variant<membrane::VirtualVolumeSprings<double>, membrane::FoundationSprings<double>, membrane::NoFoundation> any;
+    std::variant<membrane::VirtualVolumeSprings<double>, membrane::FoundationSprings<double>, membrane::NoFoundation>
+        any;
 
     [[nodiscard]] Index vertex_count(Index otherwise) const {
         const auto count = [&](const auto& volume) {
@@ -89,9 +90,9 @@ struct Acting {
                              membrane::VertexAttachment<double>, membrane::PinnedVertices, membrane::PointLoad<double>>;
 
     Any any;
-    py::object contact = {};                             // keeps the memory of a tool's contact
+    py::object contact = {};                              // keeps the memory of a tool's contact
     std::shared_ptr<const std::vector<Index>> pins = {};  // memory of pinned vertices
-    Index vertex_count = membrane::no_index;             // of the contact's mesh
+    Index vertex_count = membrane::no_index;              // of the contact's mesh
 
     [[nodiscard]] membrane::ConstraintRef<double> reference() const {
         return std::visit([](const auto& one) { return membrane::ConstraintRef<double>(one); }, any);

@@ -84,8 +84,7 @@ void cap() {
     auto tracker = membrane::ContactTracker(mesh);
     auto limit = membrane::ForceLimiter(membrane::devices::touch);
     const auto feel = membrane::ReactionForce{.scale = 20};
-    auto device =
-        membrane::ScriptedDevice<double>({{0.0, {0, 0, 10e-3}}, {0.3, {1e-3, 0, 8.2e-3}}}, {.radius = 1e-3});
+    auto device = membrane::ScriptedDevice<double>({{0.0, {0, 0, 10e-3}}, {0.3, {1e-3, 0, 8.2e-3}}}, {.radius = 1e-3});
     auto x = mesh.positions();
     for (unsigned tick = 0; device.running(); ++tick) {
         const auto tool = device.read();
@@ -103,9 +102,9 @@ void offline() {
     const auto half = membrane::distmesh(membrane::trimmed(membrane::Ball{.radius = 1}, membrane::HalfSpace{}),
                                          {.edge_length = 0.3, .iterations = 50});
     print_points(half.positions());
-    const auto cube = membrane::distmesh(
-        [](const Vector& p) { return p.cwiseAbs().maxCoeff() - 0.5; },
-        {.edge_length = 0.3, .bounds = membrane::Bounds{{-1, -1, -1}, {1, 1, 1}}, .iterations = 20});
+    const auto cube =
+        membrane::distmesh([](const Vector& p) { return p.cwiseAbs().maxCoeff() - 0.5; },
+                           {.edge_length = 0.3, .bounds = membrane::Bounds{{-1, -1, -1}, {1, 1, 1}}, .iterations = 20});
     print_points(cube.positions());
 
     const auto mesh = membrane::icosphere<double>({.subdivisions = 2});

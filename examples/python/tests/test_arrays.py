@@ -112,7 +112,7 @@ def test_indices_that_are_no_vertices_refuse_the_step(scene):
             assert report.status == membrane.StepStatus.invalid_input and len(report.moved) == 0
 
 
-def test_constraints_are_constraints_and_at_most_sixteen(scene):
+def test_constraints_are_constraints_and_not_more_than_sixteen(scene):
     with pytest.raises(TypeError, match="press, pull, load and pin"):
         scene.solver.step(scene.x, 1e-3, scene.network, scene.foundation, 7)
     pins = [membrane.pin([v]) for v in range(17)]
