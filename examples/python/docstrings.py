@@ -20,7 +20,8 @@ def names_of(declaration):
         return [found[1]]
     if found := re.match(r"[^=(]*?(operator\(\)|[\w]+)\(", declaration):
         return [found[1]]
-    data = re.sub(r"\s*=\s*[^,]*", "", re.sub(r"\{[^{}]*(\}|$)|<[^<>]*(<[^<>]*>)?[^<>]*>", "", declaration)).rstrip("; {")
+    plain = re.sub(r"\{[^{}]*(\}|$)|<[^<>]*(<[^<>]*>)?[^<>]*>", "", declaration)
+    data = re.sub(r"\s*=\s*[^,]*", "", plain).rstrip("; {")
     return re.findall(r"(\w+)\s*(?:,|$)", data)
 
 

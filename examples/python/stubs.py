@@ -20,7 +20,8 @@ import numpy.typing
 """
 ARRAY = "numpy.typing.NDArray[numpy.float64]"
 BOTH = {"function": "Callable[..., Any]", r"Optional\[(.*)\]": r"\1 | None", r"Tuple\[": "tuple[", "NoneType": "None"}
-TAKEN = {"Vector3": "numpy.typing.ArrayLike", "Field": "numpy.typing.ArrayLike | None", r"List\[int\[3\]\]": "Sequence[int]",
+TAKEN = {"Vector3": "numpy.typing.ArrayLike", "Field": "numpy.typing.ArrayLike | None",
+         r"List\[int\[3\]\]": "Sequence[int]",
          r"List\[float\]": "Sequence[float] | numpy.typing.NDArray[numpy.float64]",
          r"List\[int\]": "Sequence[int] | numpy.typing.NDArray[numpy.int32]", r"List\[": "Sequence[",
          r"os\.PathLike": "str | os.PathLike[str]"}

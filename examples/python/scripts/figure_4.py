@@ -31,14 +31,16 @@ def positions(script, until):
 
 def main():
     touching = [(0.0, (0, 0, ABOVE)), (0.3, (0, 0, DEEP))]
-    pulling = [(0.0, (0, 0, ABOVE)), (0.1, (0, 0, 12.4e-3)), (0.15, (0, 0, 12.4e-3), True), (0.4, (0, 0, HIGH + 2.4e-3), True)]
+    pulling = [(0.0, (0, 0, ABOVE)), (0.1, (0, 0, 12.4e-3)), (0.15, (0, 0, 12.4e-3), True),
+               (0.4, (0, 0, HIGH + 2.4e-3), True)]
     figure = matplotlib.pyplot.figure(figsize=(12, 4.2))
     for column, (title, script, until) in enumerate([("at rest", touching, 0.0), ("pressed", touching, 1.0),
                                                      ("pulled", pulling, 1.0)]):
         triangles, x, force = positions(script, until)
         axes = figure.add_subplot(1, 3, column + 1, projection="3d")
         axes.plot_trisurf(*(1e3 * x.T), triangles=triangles, color="#e8b4a0", edgecolor="#904030", linewidth=0.2)
-        axes.set(title=f"{title}: {1e3 * force:.0f} mN", box_aspect=(1, 1, 1.2), xlim=(-10, 10), ylim=(-10, 10), zlim=(-10, 14))
+        axes.set(title=f"{title}: {1e3 * force:.0f} mN", box_aspect=(1, 1, 1.2), xlim=(-10, 10), ylim=(-10, 10),
+                 zlim=(-10, 14))
         axes.view_init(elev=15)
         print(f"{title:8} {1e3 * force:6.1f} mN, top at {1e3 * x[:, 2].max():.2f} mm")
     figure.savefig("figure_4.png", dpi=120)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The trade of error against time: each number of layers and sweeps on one recorded press, and what choose_settings finds."""
+"""The trade of error against time: each number of layers and sweeps on one press, and what choose_settings finds."""
 import math
 
 import matplotlib.pyplot
@@ -30,10 +30,12 @@ def main():
     for layers in (2, 4, 6, 8):
         results = []
         for sweeps in (1, 2, 4, 8):
-            result = membrane.run_trial(mesh, network, foundation, trajectory, references, layers=layers, sweeps=sweeps)
+            result = membrane.run_trial(mesh, network, foundation, trajectory, references, layers=layers,
+                                        sweeps=sweeps)
             results.append(result)
             print(f"{layers:6} {sweeps:7} {100 * result.force_error:11.3f} {1e6 * result.time:11.1f}")
-        axes.loglog([1e6 * r.time for r in results], [100 * r.force_error for r in results], "o-", label=f"{layers} layers")
+        axes.loglog([1e6 * result.time for result in results], [100 * result.force_error for result in results], "o-",
+                    label=f"{layers} layers")
     axes.set(xlabel="tick [us]", ylabel="error of the force [%]", title="642 vertices, 1 to 8 sweeps")
     axes.legend()
     axes.figure.savefig("trade.png", dpi=120)

@@ -112,7 +112,8 @@ def test_a_table_is_consistent():
         tension, stiffness, _ = law(40.0, 1.0, length)
         assert abs((high[2] - low[2]) / 2e-6 - tension) < 1e-6
         assert abs((high[0] - low[0]) / 2e-6 - stiffness) < 1e-6
-    for strain, tension in (([0.0], [0.0]), ([0, 0], [0, 0]), ([0, 1], [0, -1]), ([0, 1], [1, 2]), ([0, 1], [0, numpy.nan])):
+    for strain, tension in (([0.0], [0.0]), ([0, 0], [0, 0]), ([0, 1], [0, -1]), ([0, 1], [1, 2]),
+                            ([0, 1], [0, numpy.nan])):
         with pytest.raises(membrane.InvalidInput, match="TableSpring"):
             membrane.TableSpring(strain, tension)
 

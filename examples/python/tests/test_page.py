@@ -60,8 +60,8 @@ def test_stubs_name_what_the_module_has():
 
 
 def test_examples_have_the_types_of_the_stubs(tmp_path):
-    run = subprocess.run([sys.executable, "-m", "mypy", "--ignore-missing-imports", "--check-untyped-defs", "--cache-dir", tmp_path,
-                          *sorted((HERE / "scripts").glob("*.py")), HERE / "tests/loops.py"],
+    run = subprocess.run([sys.executable, "-m", "mypy", "--ignore-missing-imports", "--check-untyped-defs",
+                          "--cache-dir", tmp_path, *sorted((HERE / "scripts").glob("*.py")), HERE / "tests/loops.py"],
                          capture_output=True, text=True,
                          env={**os.environ, "MYPYPATH": str(pathlib.Path(membrane.__file__).parents[1])})
     assert run.returncode == 0, run.stdout + run.stderr
