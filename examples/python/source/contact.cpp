@@ -38,7 +38,8 @@ void bind_contact_data(py::module_& module) {
         .value("ongoing", ContactPhase::ongoing, doc("ContactPhase::ongoing"))
         .value("ended", ContactPhase::ended, doc("ContactPhase::ended"));
     py::class_<Contact>(module, "Contact", doc("Contact"))
-        .def_property_readonly("touching", &Contact::touching, doc("Contact::touching"))
+        .def_property_readonly(
+            "touching", [](const Contact& self) { return self.touching(); }, doc("Contact::touching"))
         .def_readonly("phase", &Contact::phase, doc("Contact::phase"))
         .def_readonly("triangle", &Contact::triangle, doc("Contact::triangle"))
         .def_readonly("corners", &Contact::corners, doc("Contact::corners"))

@@ -20,14 +20,14 @@ def pressed(law=membrane.LinearSpring(), depth=1e-3, network=None):
         press = membrane.press(tool, tracker.update(tree, x, tool))
         report = solver.step(x, 1e-3, network, foundation, press)
         tree.refit(x, report.moved)
-        if report.converged:
+        if report.residual < 1e-10:
             return mesh, network, foundation, x, report, press
     raise AssertionError("no equilibrium")
 
 
 def test_errors_have_the_words_of_the_library():
     mesh = membrane.icosphere(subdivisions=0)
-    with pytest.raises(membrane.InvalidInput, match=r"^MassSpringNetwork: stiffness \[N/m\] is required"):
+    with pytest.raises(membrane.InvalidInput, match=r"^MassSpringNetwork: stiffness of the springs \[N/m\] is required"):
         membrane.MassSpringNetwork(mesh)
     with pytest.raises(ValueError, match=r"stiffness of spring 17 must be finite and not negative \[N/m\], got -3"):
         membrane.MassSpringNetwork(mesh, stiffness=[-3.0 if s == 17 else 1.0 for s in range(30)])
@@ -188,8 +188,8 @@ def test_meshes_are_checked_and_repaired():
 
 def test_distmesh_of_a_function():
     spoken = []
-    torus = membrane.distmesh(lambda p: numpy.hypot(numpy.hypot(p[0], p[1]) - 1, p[2]) - 0.4, edge_length=0.3,
-                              bounds=((-1.5, -1.5, -0.5), (1.5, 1.5, 0.5)), iterations=10,
+    torus = membrane.distmesh(lambda p: numpy.hypot(numpy.hypot(p[0], p[1]) - 1, p[2]) - 0.4, edge_length=0.4,
+                              bounds=((-1.5, -1.5, -0.5), (1.5, 1.5, 0.5)), iterations=2,
                               progress=lambda now: spoken.append(now.iteration))
     assert membrane.validate(torus.positions, torus.triangles).facts.genus == 1 and spoken[0] == 1
     with pytest.raises(ZeroDivisionError):
@@ -209,7 +209,7 @@ def test_settings_are_found():
     references = membrane.equilibria(mesh, network, foundation, trajectory, tick_stride=10)
     errors = [membrane.run_trial(mesh, network, foundation, trajectory, references, layers=layers, sweeps=4).force_error
               for layers in (0, 8)]
-    assert errors[1] < errors[0] and errors[1] < 0.01
+    assert errors[1] < errors[0] and errors[1] < 0.02
     choice = membrane.choose_settings(mesh, network, foundation, trajectory, force_error=0.05, layers=[1, 4, 8],
                                       sweeps=[1, 4], contact_iterations=[2], tick_stride=10, repetitions=1)
     assert choice.satisfied and choice.force_error <= 0.05 and choice.options.sweeps in (1, 4)
