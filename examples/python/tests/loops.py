@@ -113,8 +113,8 @@ def time_ticks(ticks):
         tool = device.read()
         contact = tracker.update(tree, x, tool)
         report = solver.step(x, dt, network, foundation, press(tool, contact))
-        tree.refit(x, report.moved)
-        normals.update(x, report.moved)
+        tree.refit(x, report)
+        normals.update(x, report)
         device.write(feel(tool, contact, report))
         times.append(clock() - start)
     return times
