@@ -30,6 +30,7 @@ LITERAL = re.compile(r"-?[\d.]+(e-?\d+)?|True|False|None")
 
 
 def in_words_of_typing(text, names):
+    text = re.sub(r"membrane::(\w+)<double>", r"\1", text)  # of a class that is defined after the function
     for pattern, by in {**names, **BOTH}.items():
         text = re.sub(rf"\b{pattern}", by, text)
     return text.replace("Sequence[Waypoint]", "Sequence[Waypoint | tuple[Any, ...]]")
