@@ -19,7 +19,7 @@ import numpy
 import numpy.typing
 """
 ARRAY = "numpy.typing.NDArray[numpy.float64]"
-BOTH = {"function": "Callable[..., Any]", r"Optional\[(.*)\]": r"\1 | None", r"Tuple\[": "tuple[", "NoneType": "None"}
+BOTH = {r"(?<=: )function": "Callable[..., Any]", r"Optional\[(.*)\]": r"\1 | None", r"Tuple\[": "tuple[", "NoneType": "None"}
 TAKEN = {"Vector3": "numpy.typing.ArrayLike", "Field": "numpy.typing.ArrayLike | None",
          r"List\[int\[3\]\]": "Sequence[int]",
          r"List\[float\]": "Sequence[float] | numpy.typing.NDArray[numpy.float64]",
