@@ -59,7 +59,7 @@ def cap():
     feel = membrane.ReactionForce(scale=20)
     device = membrane.ScriptedDevice([(0.0, (0, 0, 10e-3)), (0.3, (1e-3, 0, 8.2e-3))], radius=1e-3)
     x = mesh.positions.copy()
-    forces = []
+    forces: list[numpy.ndarray] = []
     while device.running:
         tool = device.read()
         contact = tracker.update(tree, x, tool)
