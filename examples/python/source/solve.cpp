@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+#include <memory>
+
+#include <pybind11/stl.h>
+
+#include "solver.hpp"
+
+namespace membrane_python {
+
+namespace {
+
+[[nodiscard]] std::unique_ptr<Solver> solver_of(const Network& network, const Rule& rule,
+                                                const SolverOptions& options) {
+    const auto build = [&](const auto& springs, const auto& one) {
+        using Type = SolverOf<std::remove_cvref_t<decltype(one)>>;
+        return std::make_unique<Solver>(Solver{Type(springs, options, one), springs.vertex_count()});
+    };
+    return std::visit(build, network.any, rule);
+}
+
+StepReport& step(Solver& solver, double seconds, MovingPositions x, double dt, const Network& network,
+                 const Foundation& foundation, const py::args& arguments) {
+    constexpr auto name = "QuasiStaticSolver";
+    check_fit(name, solver.vertex_count, x.count, network, foundation);
+    const Constraints constraints(name, arguments, solver.vertex_count);
+    const StepArguments with{x, dt, network, constraints, seconds};
+    solver.report = std::visit([&](auto& one, const auto& volume) { return take_step(one, with, volume); }, solver.any,
+                               foundation.any);
+    network.rethrow();
+    return solver.report;
+}
+
+void bind_report(py::module_& module) {
+    using membrane::StepStatus;
+    py::enum_<StepStatus>(module, "StepStatus", doc("StepStatus"))
+        .value("advanced", StepStatus::advanced, doc("StepStatus::advanced"))
+        .value("bad_time_step", StepStatus::bad_time_step, doc("StepStatus::bad_time_step"))
+        .value("invalid_input", StepStatus::invalid_input, doc("StepStatus::invalid_input"))
+        .value("unstable", StepStatus::unstable, doc("StepStatus::unstable"))
+        .value("too_many_contact_points", StepStatus::too_many_contact_points,
+               doc("StepStatus::too_many_contact_points"));
+    py::class_<StepReport>(module, "StepReport", doc("StepReport"))
+        .def_readonly("status", &StepReport::status, doc("StepReport::status"))
+        .def_readonly("converged", &StepReport::converged, doc("StepReport::converged"))
+        .def_readonly("out_of_time", &StepReport::out_of_time, doc("StepReport::out_of_time"))
+        .def_readonly("residual", &StepReport::residual, doc("StepReport::residual"))
+        .def_readonly("vertex_updates", &StepReport::vertex_updates, doc("StepReport::vertex_updates"))
+        .def_property_readonly(
+            "moved", [](const py::object& self) { return view(self.cast<const StepReport&>().moved, self); },
+            doc("StepReport::moved"))
+        .def_property_readonly(
+            "reactions", [](const py::object& self) { return view(self.cast<const StepReport&>().reactions, self); },
+            doc("StepReport::reactions"))
+        .def("total_reaction", &StepReport::total_reaction, doc("StepReport::total_reaction"));
+}
+
+void bind_constraints(py::module_& module) {
+    py::class_<Acting>(module, "Constraint", doc("Constraint"));
+    module.def(
+        "press",
+        [](const Tool& tool, const py::object& contact, const Grasp* grasp) {
+            const auto& of = contact.cast<const Contact&>();
+            return Acting{.any = membrane::press<double>(tool, of, grasp != nullptr ? *grasp : Grasp{}),
+                          .contact = contact,
+                          .vertex_count = of.vertex_count};
+        },
+        py::arg("tool"), py::arg("contact"), py::arg("grasp") = py::none(), doc("press"));
+    module.def(
+        "pull", [](const Tool& tool, const Grasp& grasp) { return Acting{.any = membrane::pull(tool, grasp)}; },
+        py::arg("tool"), py::arg("grasp"), doc("pull"));
+    module.def(
+        "pull",
+        [](Index v, const Vector& target) {
+            return Acting{.any = membrane::VertexAttachment<double>{v, target}};
+        },
+        py::arg("vertex"), py::arg("target"), doc("pull"));
+    module.def(
+        "load",
+        [](const std::array<Index, 3>& corners, const Vector& barycentric, const Vector& force) {
+            return Acting{.any = membrane::load(corners, barycentric, force)};
+        },
+        py::arg("corners"), py::arg("barycentric"), py::arg("force"), doc("load"));
+    module.def(
+        "pin",
+        [](std::vector<Index> vertices) {
+            auto pins = std::make_shared<const std::vector<Index>>(std::move(vertices));
+            return Acting{.any = membrane::pin(*pins), .pins = pins};
+        },
+        py::arg("vertices"), "`vertices` keep their positions.");
+}
+
+void bind_rules(py::module_& module) {
+    using membrane::UpdateOrder;
+    py::enum_<UpdateOrder>(module, "UpdateOrder", doc("UpdateOrder"))
+        .value("breadth_first", UpdateOrder::breadth_first, doc("UpdateOrder::breadth_first"))
+        .value("colour_layers", UpdateOrder::colour_layers, doc("UpdateOrder::colour_layers"))
+        .value("colour_all", UpdateOrder::colour_all, doc("UpdateOrder::colour_all"));
+    const auto bind = [&]<class Rule>(const char* name, Rule) {
+        const std::string omega = std::string(name) + "::omega";
+        py::class_<Rule>(module, name, doc(name))
+            .def(py::init([](double omega_of) { return Rule{.omega = omega_of}; }), py::arg("omega") = Rule{}.omega)
+            .def_readonly("omega", &Rule::omega, doc(omega.c_str()));
+    };
+    bind("BlockStep", membrane::BlockStep{});
+    bind("SafeStep", membrane::SafeStep{});
+    auto options = py::class_<SolverOptions>(module, "SolverOptions", doc("SolverOptions"));
+    const auto keywords = solver_keywords();
+    keywords.def_init(options, keywords.taking<>([](const SolverOptions& o) { return (o.check(), o); }));
+    keywords.def_fields(options);
+}
+
+void bind_solver(py::module_& module) {
+    auto solver = py::class_<Solver>(module, "QuasiStaticSolver", doc("QuasiStaticSolver"));
+    solver.def(py::init([](const Network& network, const SolverOptions& options, const Rule& rule) {
+                   return solver_of(network, rule, options);
+               }),
+               py::arg("network"), py::arg("options"), py::arg("rule") = membrane::BlockStep{});
+    const auto keywords = solver_keywords();
+    keywords.def_init(solver, keywords.taking<const Network&, const Rule&>(&solver_of), py::arg("network"),
+                      py::arg("rule") = membrane::BlockStep{});
+    solver.def(
+        "step",
+        [](Solver& self, MovingPositions x, double dt, const Network& network, const Foundation& foundation,
+           const py::args& constraints) -> StepReport& {
+            return step(self, std::numeric_limits<double>::infinity(), x, dt, network, foundation, constraints);
+        },
+        py::arg("x"), py::arg("dt"), py::arg("network"), py::arg("foundation"),
+        py::return_value_policy::reference_internal, doc("QuasiStaticSolver::step"));
+    solver.def(
+        "step_within",
+        [](Solver& self, double seconds, MovingPositions x, double dt, const Network& network,
+           const Foundation& foundation, const py::args& constraints) -> StepReport& {
+            return step(self, (std::max)(seconds, 0.0), x, dt, network, foundation, constraints);
+        },
+        py::arg("seconds"), py::arg("x"), py::arg("dt"), py::arg("network"), py::arg("foundation"),
+        py::return_value_policy::reference_internal, doc("QuasiStaticSolver::step_until"));
+    solver.def(
+        "wake",
+        [](Solver& self, const Moved& vertices) {
+            std::visit([&](auto& one) { one.wake(vertices.vertices); }, self.any);
+        },
+        py::arg("vertices"), doc("QuasiStaticSolver::wake"));
+    solver.def(
+        "wake_all", [](Solver& self) { std::visit([](auto& one) { one.wake_all(); }, self.any); },
+        doc("QuasiStaticSolver::wake_all"));
+    solver.def(
+        "reset", [](Solver& self) { std::visit([](auto& one) { one.reset(); }, self.any); },
+        doc("QuasiStaticSolver::reset"));
+}
+
+}  // namespace
+
+void bind_solve(py::module_& module) {
+    bind_report(module);
+    bind_constraints(module);
+    bind_rules(module);
+    bind_solver(module);
+}
+
+}  // namespace membrane_python

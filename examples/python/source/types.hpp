@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <membrane/membrane.hpp>
+#include <membrane/model/foundation_layer.hpp>
+
+#include "arrays.hpp"
+#include "documentation.hpp"
+#include "springs.hpp"
+
+/// What the classes of Python hold. Numbers are doubles; where the library has a type parameter there is a variant.
+namespace membrane_python {
+
+using membrane::refuse;
+using Mesh = membrane::TriangleMesh<double>;
+using Tool = membrane::Tool<double>;
+using Grasp = membrane::Grasp<double>;
+using StepReport = membrane::StepReport<double>;
+using SolverOptions = membrane::SolverOptions<double>;
+
+/// Springs of one law: linear ones are updated several at a time.
+struct Network {
+    std::variant<membrane::MassSpringNetwork<double, membrane::LinearSpring>,
+                 membrane::MassSpringNetwork<double, AnySpring>>
+        any;
+
+    [[nodiscard]] Index vertex_count() const {
+        return std::visit([](const auto& network) { return network.vertex_count(); }, any);
+    }
+    /// Throws the error that a law of Python has raised.
+    void rethrow() const {
+        if (any.index() == 0) return;
+        if (const auto* law = std::get_if<PythonSpring>(&std::get<1>(any).law().law)) law->rethrow();
+    }
+};
+
+struct Foundation {
+    std::variant<membrane::VirtualVolumeSprings<double>, membrane::FoundationSprings<double>, membrane::NoFoundation>
+        any;
+
+    [[nodiscard]] Index vertex_count(Index otherwise) const {
+        const auto count = [&](const auto& volume) {
+            if constexpr (requires { volume.anchors(); }) return static_cast<Index>(volume.anchors().cols());
+            return otherwise;
+        };
+        return std::visit(count, any);
+    }
+};
+
+///@{
+/// The foundations' classes of Python.
+struct VolumeSprings : Foundation {};
+struct LayerSprings : Foundation {};
+struct NoSprings : Foundation {};
+///@}
+
+/// A contact and the mesh it belongs to.
+struct Contact : membrane::Contact<double> {
+    Index vertex_count = 0;
+};
+
+/// Boxes, tracker, grasper, normals: with the number of vertices, so that arrays are checked.
+struct Tree {
+    membrane::AabbTree<double> tree;
+    Index vertex_count;
+};
+struct Tracker {
+    membrane::ContactTracker<double> tracker;
+    Index vertex_count;
+    Contact contact = {};  // of the last update
+};
+struct Forceps {
+    membrane::Grasper<double> grasper;
+    Index vertex_count;
+    Grasp grasp = {};  // of the last update
+};
+
+/// A constraint of a step.
+struct Acting {
+    using Any = std::variant<membrane::ToolContact<double>, membrane::PointAttachment<double>,
+                             membrane::VertexAttachment<double>, membrane::PinnedVertices, membrane::PointLoad<double>>;
+
+    Any any;
+    py::object contact = {};                              // keeps the memory of a tool's contact
+    std::shared_ptr<const std::vector<Index>> pins = {};  // memory of pinned vertices
+    Index vertex_count = membrane::no_index;              // of the contact's mesh
+
+    [[nodiscard]] membrane::ConstraintRef<double> reference() const {
+        return std::visit([](const auto& one) { return membrane::ConstraintRef<double>(one); }, any);
+    }
+};
+
+inline constexpr std::size_t max_constraints = membrane::StepState<double>::max_constraints;
+
+/// A constraint or none, for functions that take their constraints one by one: there are always `max_constraints`.
+class Described : public membrane::ConstraintRef<double> {
+  public:
+    Described() : ConstraintRef(none) {}
+    explicit Described(const Acting& acting) : ConstraintRef(acting.reference()), acting_(&acting) {}
+
+    template <class Terms>
+    friend void describe(const Described& constraint, Terms& terms) {
+        if (constraint.acting_ == nullptr) return;
+        std::visit([&](const auto& one) { describe(one, terms); }, constraint.acting_->any);
+    }
+
+  private:
+    inline static const membrane::PointAttachment<double> none{};
+    const Acting* acting_ = nullptr;
+};
+
+/// The constraints among the arguments of a call; behind them, none.
+struct Constraints {
+    std::array<Described, max_constraints> all = {};
+    std::size_t count = 0;
+
+    /// @throws InvalidInput if one is of another mesh, or there are too many
+    Constraints(std::string_view component, const py::args& arguments, Index vertex_count);
+};
+
+/// Options of the solver, as keywords of Python.
+[[nodiscard]] inline auto solver_keywords() {
+    return Keywords("SolverOptions", std::pair("layers", &SolverOptions::layers),
+                    std::pair("adaptive_layers", &SolverOptions::adaptive_layers),
+                    std::pair("sweeps", &SolverOptions::sweeps),
+                    std::pair("contact_iterations", &SolverOptions::contact_iterations),
+                    std::pair("order", &SolverOptions::order), std::pair("predict", &SolverOptions::predict),
+                    std::pair("max_vertex_updates", &SolverOptions::max_vertex_updates),
+                    std::pair("force_tolerance", &SolverOptions::force_tolerance),
+                    std::pair("rigid_stiffness", &SolverOptions::rigid_stiffness),
+                    std::pair("max_contact_points", &SolverOptions::max_contact_points),
+                    std::pair("max_packed_vertices", &SolverOptions::max_packed_vertices));
+}
+
+using Rule = std::variant<membrane::BlockStep, membrane::SafeStep>;
+
+/// Refuses a membrane whose parts are of different meshes.
+void check_fit(std::string_view component, Index vertex_count, Eigen::Index points, const Network& network,
+               const Foundation& foundation);
+
+///@{
+/// What each source file adds to the module.
+void bind_surface(py::module_& module);
+void bind_mesh_check(py::module_& module);
+void bind_meshing(py::module_& module);
+void bind_model(py::module_& module);
+void bind_material(py::module_& module);
+void bind_contact(py::module_& module);
+void bind_solve(py::module_& module);
+void bind_haptics(py::module_& module);
+void bind_recording(py::module_& module);
+void bind_equilibrium(py::module_& module);
+void bind_error_bound(py::module_& module);
+void bind_settings(py::module_& module);
+void bind_calibration(py::module_& module);
+///@}
+
+}  // namespace membrane_python

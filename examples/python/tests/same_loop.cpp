@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: MIT
+//
+// same_loop NAME: the loops and calls of loops.py in C++, and what they compute with all digits, for the tests to compare.
+// same_loop time TICKS: the nanoseconds of each tick of the first loop, for overhead.py.
+#include <chrono>
+#include <cstdio>
+#include <cstdlib>
+#include <string_view>
+
+#include <membrane/accuracy/equilibrium.hpp>
+#include <membrane/calibration/fit.hpp>
+#include <membrane/calibration/indentation.hpp>
+#include <membrane/haptics/force_limits.hpp>
+#include <membrane/membrane.hpp>
+#include <membrane/meshing/distmesh.hpp>
+#include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/spring_stiffness.hpp>
+
+namespace {
+
+using membrane::Index;
+using Vector = membrane::Vector3<double>;
+
+constexpr double dt = 1e-3;  // [s]
+
+void print(const Vector& vector) { std::printf("%.17g %.17g %.17g\n", vector.x(), vector.y(), vector.z()); }
+
+template <class Points>
+void print_points(const Points& x) {
+    for (Eigen::Index v = 0; v < x.cols(); ++v) print(membrane::point(x, static_cast<Index>(v)));
+}
+
+/// A sphere is pressed, grasped and pulled, with a load and two pinned vertices.
+void sphere() {
+    const auto mesh = membrane::icosphere<double>({.radius = 10e-3, .subdivisions = 3});
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto grasper = membrane::Grasper(mesh);
+    auto normals = membrane::VertexNormals(mesh);
+    const auto feel = membrane::SpringDamperForce{.stiffness = 100, .damping = 0.5};
+    auto device = membrane::ScriptedDevice<double>({{0.0, {0, 0, 13e-3}},
+                                                    {0.1, {0, 0, 11e-3}},
+                                                    {0.2, {1e-3, 0, 11e-3}, true},
+                                                    {0.3, {1e-3, 1e-3, 14e-3}, true},
+                                                    {0.4, {0, 0, 16e-3}}},
+                                                   {.radius = 2e-3});
+    const Index pins[] = {100, 200};
+    auto x = mesh.positions();
+    while (device.running()) {
+        const auto tool = device.read();
+        const auto contact = tracker.update(tree, x, tool);
+        const auto grasp = grasper.update(contact, x, tool);
+        const auto report =
+            solver.step(x, dt, network, foundation, press(tool, contact, grasp), pull(tool, grasp),
+                        membrane::load({0, 42, 44}, Vector(0.5, 0.25, 0.25), Vector(0, 1e-3, 0)), membrane::pin(pins));
+        tree.refit(x, report.moved);
+        normals.update(x, report.moved);
+        device.write(feel({tool, contact, report, grasp}));
+        print(device.force());
+        for (const auto& reaction : report.reactions) print(reaction);
+    }
+    print_points(x);
+    print_points(normals.values());
+}
+
+/// A cornea on a layer, its rim pinned, by the other rule, with a limited force.
+void cap() {
+    const auto mesh = membrane::spherical_cap<double>();
+    const auto material = membrane::materials::cornea().typical;
+    const membrane::FoundationLayer layer{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};
+    const auto network = membrane::MassSpringNetwork(
+        mesh, membrane::TensionSpring{},
+        {.stiffness = membrane::spring_stiffnesses(mesh, material), .pinned = membrane::border(mesh)});
+    const auto foundation =
+        membrane::FoundationSprings(mesh, {.normal = membrane::normal_stiffnesses(mesh, layer),
+                                           .tangential = membrane::tangential_stiffnesses(mesh, layer),
+                                           .recovery_time = 0.05});
+    auto solver = membrane::QuasiStaticSolver(
+        network, {.layers = 4, .sweeps = 3, .order = membrane::UpdateOrder::breadth_first}, membrane::SafeStep{});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto limit = membrane::ForceLimiter(membrane::devices::touch);
+    const auto feel = membrane::ReactionForce{.scale = 20};
+    auto device = membrane::ScriptedDevice<double>({{0.0, {0, 0, 10e-3}}, {0.3, {1e-3, 0, 8.2e-3}}}, {.radius = 1e-3});
+    auto x = mesh.positions();
+    for (unsigned tick = 0; device.running(); ++tick) {
+        const auto tool = device.read();
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+        tree.refit(x, report.moved);
+        device.write(limit(feel({tool, contact, report}), tool.time, tick));
+        print(device.force());
+    }
+    print_points(x);
+}
+
+/// Meshes, an equilibrium, a fit.
+void offline() {
+    const auto half = membrane::distmesh(membrane::trimmed(membrane::Ball{.radius = 1}, membrane::HalfSpace{}),
+                                         {.edge_length = 0.3, .iterations = 50});
+    print_points(half.positions());
+    const auto cube =
+        membrane::distmesh([](const Vector& p) { return p.cwiseAbs().maxCoeff() - 0.5; },
+                           {.edge_length = 0.3, .bounds = membrane::Bounds{{-1, -1, -1}, {1, 1, 1}}, .iterations = 20});
+    print_points(cube.positions());
+
+    const auto mesh = membrane::icosphere<double>({.subdivisions = 2});
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::ExponentialSpring{}, {.stiffness = 40.0});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0});
+    const auto rest = membrane::equilibrium(mesh.positions(), mesh, network, foundation, {},
+                                            membrane::pull(0, Vector(0, 6e-3, 9.2e-3)), membrane::pin({}));
+    print_points(rest.x);
+    for (const auto& reaction : rest.reactions) print(reaction);
+
+    const auto build = [&](std::span<const double> c) {
+        return std::pair(membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = c[0]}),
+                         membrane::VirtualVolumeSprings(mesh, {.stiffness = c[1]}));
+    };
+    const membrane::Tool<double> tip{.position = {0, 0, 0.015}, .radius = 1e-3};
+    const membrane::Indentation model(mesh, tip, {0, 0, -1}, build);
+    const std::vector<double> depths{2e-4, 5e-4, 1e-3, 2e-3};
+    const auto found = membrane::fit({depths, model(std::vector<double>{40.0, 8.0}, depths)}, {30.0, 10.0}, model);
+    for (const double constant : found.constants) std::printf("%.17g\n", constant);
+}
+
+/// The loop of the README for `ticks` ticks: a tool goes in and out.
+void time_ticks(int ticks) {
+    const auto mesh = membrane::icosphere<double>({.radius = 10e-3, .subdivisions = 3});
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    const auto feel = membrane::ReactionForce{};
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto normals = membrane::VertexNormals(mesh);
+    std::vector<membrane::Waypoint<double>> script;
+    for (int i = 0; i <= ticks / 200; ++i) script.push_back({0.2 * i, {0, 0, i % 2 == 0 ? 11.9e-3 : 10.5e-3}});
+    auto device = membrane::ScriptedDevice<double>(script, {.radius = 2e-3});
+    std::vector<double> times;
+    times.reserve(static_cast<std::size_t>(ticks));
+    auto x = mesh.positions();
+    for (int tick = 0; tick < ticks; ++tick) {
+        const auto start = std::chrono::steady_clock::now();
+        const auto tool = device.read();
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+        tree.refit(x, report.moved);
+        normals.update(x, report.moved);
+        device.write(feel({tool, contact, report}));
+        times.push_back(std::chrono::duration<double, std::nano>(std::chrono::steady_clock::now() - start).count());
+    }
+    for (const double time : times) std::printf("%.0f\n", time);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    const std::string_view name = argc > 1 ? argv[1] : "";
+    if (name == "sphere") {
+        sphere();
+    } else if (name == "cap") {
+        cap();
+    } else if (name == "offline") {
+        offline();
+    } else if (name == "time" && argc > 2) {
+        time_ticks(std::atoi(argv[2]));
+    } else {
+        return 2;
+    }
+}
