@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/accuracy/error_bound.hpp>
 #include <pybind11/stl.h>
+#include <membrane/accuracy/error_bound.hpp>
 
 #include "types.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-#include <membrane/model/spring_stiffness.hpp>
 #include <pybind11/stl.h>
+#include <membrane/model/spring_stiffness.hpp>
 
 #include "types.hpp"
 
