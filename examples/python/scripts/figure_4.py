@@ -25,7 +25,7 @@ def positions(script, until):
         report = solver.step(x, TICK, network, foundation, membrane.press(tool, contact, grasp),
                              membrane.pull(tool, grasp))
         tree.refit(x, report.moved)
-        force = numpy.linalg.norm(report.total_reaction())
+        force = float(numpy.linalg.norm(report.total_reaction()))
     return mesh.triangles, x, force
 
 
