@@ -26,17 +26,17 @@ struct BoundOf {
     return std::get<0>(network.any);
 }
 
-ErrorReport& compute(BoundOf& self, Positions x, const Network& network, const Foundation& foundation,
-                     const py::args& arguments, const Equilibrium* rest, const Mesh* mesh) {
+/// The report of `compute(volume, constraint...)`, which is that of the last call for `self`.
+template <class Compute>
+ErrorReport& report_of(BoundOf& self, Positions x, const Network& network, const Foundation& foundation,
+                       const py::args& arguments, Compute compute) {
     constexpr auto name = "ErrorBound";
     const auto& springs = linear(network);
     check_fit(name, springs.vertex_count(), x.count, network, foundation);
-    if ((rest == nullptr) != (mesh == nullptr)) refuse(name, "rest and mesh must be given together");
     const Constraints constraints(name, arguments, springs.vertex_count());
     const auto find = [&](const auto& volume, const auto&... each) {
         if constexpr (membrane::LinearFoundation<std::remove_cvref_t<decltype(volume)>>) {
-            if (rest == nullptr) return self.bound.compute(x.map(), springs, volume, each...);
-            return self.bound.compute(*rest, x.map(), *mesh, springs, volume, each...);
+            return compute(springs, volume, each...);
         } else {
             refuse(name, "the foundation must be VirtualVolumeSprings or NoFoundation, got another one");
             return ErrorReport{};
@@ -49,6 +49,18 @@ ErrorReport& compute(BoundOf& self, Positions x, const Network& network, const F
         foundation.any);
     self.report.reactions = self.report.reactions.first((std::min)(self.report.reactions.size(), constraints.count));
     return self.report;
+}
+
+ErrorReport& compute(BoundOf& self, Positions x, const Network& network, const Foundation& foundation,
+                     const py::args& arguments) {
+    return report_of(self, x, network, foundation, arguments,
+                     [&](const auto&... scene) { return self.bound.compute(x.map(), scene...); });
+}
+
+ErrorReport& compute_near(BoundOf& self, Positions x, const Network& network, const Foundation& foundation,
+                          const py::args& arguments, const Equilibrium& rest, const Mesh& mesh) {
+    return report_of(self, x, network, foundation, arguments,
+                     [&](const auto&... scene) { return self.bound.compute(rest, x.map(), mesh, scene...); });
 }
 
 void bind_reports(py::module_& module) {
@@ -91,8 +103,9 @@ void bind_error_bound(py::module_& module) {
     }),
                      py::arg("network"));
     bound.def("compute", &compute, py::arg("x"), py::arg("network"), py::arg("foundation"),
-              py::arg("rest") = py::none(), py::arg("mesh") = py::none(), py::return_value_policy::reference_internal,
-              doc("ErrorBound::compute"));
+              py::return_value_policy::reference_internal, doc("ErrorBound::compute"));
+    bound.def("compute", &compute_near, py::arg("x"), py::arg("network"), py::arg("foundation"), py::arg("rest"),
+              py::arg("mesh"), py::return_value_policy::reference_internal, doc("ErrorBound::compute"));
 }
 
 }  // namespace membrane_python
