@@ -113,25 +113,25 @@ TEST_CASE("bounds are those of another unit of length, roundings too", "[error_b
         CAPTURE(seed);
         Pressed membrane(static_cast<std::uint64_t>(seed), 1, 1.0);
         membrane.press_somewhere(0.1);
-        const Handed handed(membrane);
-        if (!handed.rest.converged) continue;
+        const Handed bounds(membrane);
+        if (!bounds.rest.converged) continue;
         for (const double scale : {0x1p-10, 0x1p10}) {  // exact
-            std::vector<ScenePress> tools(handed.scene.tools().begin(), handed.scene.tools().end());
+            std::vector<ScenePress> tools(bounds.scene.tools().begin(), bounds.scene.tools().end());
             for (auto& pressing : tools) {
                 pressing.tool.position *= scale;
                 pressing.tool.axis *= scale;
                 pressing.tool.radius *= scale;
             }
-            auto contacts = handed.rest.contacts;
+            auto contacts = bounds.rest.contacts;
             for (auto& contact : contacts) {
                 contact.gap *= scale;
                 contact.weights *= 2;  // a point is where the weights say, whatever they sum up to
             }
-            ContactBounds places(handed.problem);
-            places.assign(handed.problem, membrane.mesh.triangles(), scale * handed.rest.x, tools, contacts);
-            CHECK(places.penetration() == scale * handed.places.penetration());
+            ContactBounds places(bounds.problem);
+            places.assign(bounds.problem, membrane.mesh.triangles(), scale * bounds.rest.x, tools, contacts);
+            CHECK(places.penetration() == scale * bounds.places.penetration());
             CHECK(places.penetration() > 0);
-            CHECK(places.work() == scale * handed.places.work());
+            CHECK(places.work() == scale * bounds.places.work());
             CHECK(places.work() > 0);
         }
     }
