@@ -32,7 +32,7 @@ using Score = std::optional<double>;
 /// Maximises a score over numbers in [-1, 1] without its gradient: one is changed into one, and the better is kept; the
 /// changes grow with each success and shrink with each failure (evolution strategy). Returns the number of scores.
 template <class Evaluate>
-int search(Index unknowns, int evaluations, Random& random, const Evaluate& score_of) {
+int search(Index unknowns, int evaluations, Random& random, Evaluate score_of) {
     const auto any = [&] {
         Eigen::VectorXd numbers(unknowns);
         for (double& number : numbers) number = random.number(-1.0, 1.0);
