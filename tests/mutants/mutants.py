@@ -250,7 +250,8 @@ class Campaign:
         print(f"{self.killed} killed, {len(self.survivors)} survived, {self.equivalent} are equivalent")
         for mutant in sorted(self.survivors, key=str):
             print(f"\n{mutant}")
-        return 1 if len(self.survivors) > max(1, self.killed / 19) else 0
+        bearable = self.killed if self.arguments.own else max(1, self.killed / 19)
+        return 1 if len(self.survivors) > bearable else 0
 
 
 def main():
