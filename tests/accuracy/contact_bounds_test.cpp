@@ -9,77 +9,22 @@
 #include <sstream>
 #include <vector>
 
-#include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/accuracy/error_bound.hpp>
 #include <membrane/accuracy/factored_convexity.hpp>
-#include <membrane/contact/aabb_tree.hpp>
-#include <membrane/contact/contact_tracker.hpp>
-#include <membrane/solve/quasi_static.hpp>
-#include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/contact_newton.hpp"
+#include "support/pressed.hpp"
 #include "support/random.hpp"
 
 using namespace membrane;
+using test::Pressed;
 using test::Random;
 
 namespace {
 
 double farthest(const Points<double>& a, const Points<double>& b) { return (a - b).colwise().norm().maxCoeff(); }
-
-/// A sphere of radius 1 with springs of 1 N/m, into which a tool is pressed by a solver that is given little time.
-struct Pressed {
-    Pressed(std::uint64_t seed, Index subdivisions, double foundation_stiffness)
-        : random(seed),
-          mesh(icosphere({.radius = 1, .subdivisions = subdivisions})),
-          foundation(mesh, {.stiffness = foundation_stiffness}) {
-        edge = 2.0 / (1 << subdivisions) * 0.6;
-    }
-
-    /// By a sphere, or by the side and the end of a capsule, of one to four edges.
-    void press_somewhere(double deep) {
-        const Vector3<double> outward = random.unit_vector();
-        tool.radius = edge * std::pow(4, random.number());
-        if (random.chance(0.3)) tool.axis = 0.5 * (outward + 0.5 * random.vector());
-        QuasiStaticSolver solver(network, {.layers = 1 + random.index(12), .sweeps = 1 + random.index(6)});
-        AabbTree<double> tree(mesh);
-        ContactTracker<double> tracker(mesh);
-        const Index ticks = 10 + random.index(20);
-        for (Index tick = 0; tick <= ticks; ++tick) {
-            const double part = std::min(1.5 * tick / ticks, 1.0);
-            tool.position = (1 + tool.radius + 0.05 - (0.05 + deep) * part) * outward;
-            tool.time = 1e-3 * tick;
-            contact = tracker.update(tree, x, tool);
-            const auto report = solver.step(x, 1e-3, network, foundation, press(tool, contact));
-            tree.refit(x, report.moved);
-            force = report.reactions[0];
-        }
-        touched.assign(contact.triangles.begin(), contact.triangles.end());
-        candidates.assign(contact.candidates.begin(), contact.candidates.end());
-        points.assign(contact.points.begin(), contact.points.end());
-        contact.points = points;
-        contact.triangles = touched;
-        contact.candidates = candidates;
-    }
-
-    [[nodiscard]] Equilibrium rest_from(const Points<double>& start) const {
-        return equilibrium(start, mesh, network, foundation, {}, press(tool, contact));
-    }
-
-    Random random;
-    TriangleMesh<double> mesh;
-    MassSpringNetwork<double, LinearSpring> network{mesh, LinearSpring{}, NetworkOptions<double>{.stiffness = 1.0}};
-    VirtualVolumeSprings<double> foundation;
-    double edge;
-    Tool<double> tool;
-    Contact<double> contact;
-    std::vector<ContactTriangle> touched, candidates;
-    std::vector<ContactPoint<double>> points;
-    Points<double> x = mesh.positions();
-    Vector3<double> force = Vector3<double>::Zero();
-};
 
 /// What `ContactBounds` is membrane_bounds.
 struct Handed {

@@ -113,6 +113,23 @@ TEST_CASE("a corner that six triangles share counts once for a sphere", "[tool_p
     CHECK(corner_count(gaps[0]) == 1);
 }
 
+TEST_CASE("an edge that two triangles share counts once, in whichever order they name its ends", "[tool_points]") {
+    Points<double> x(3, 4);
+    x << -1, 1, 0, 0, 0, 0, -1, 1, 0, 0, -1, -1;  // a ridge along x
+    Triangles triangles(3, 2);
+    const std::array tools{Tool<double>{.position = {0.1, 0, 0.5}, .radius = 0.4},
+                           Tool<double>{.position = {0.1, -1, 0.5}, .axis = {0, 2, 0}, .radius = 0.4}};
+    for (const std::array<Index, 3>& other : {std::array<Index, 3>{1, 0, 3}, {0, 3, 1}, {3, 1, 0}}) {
+        triangles << 0, other[0], 1, other[1], 2, other[2];
+        for (const auto& tool : tools) {
+            const auto gaps = tool_points(triangles, x, std::array{tool}, 0.2);
+            REQUIRE(gaps.size() == 1);
+            CHECK(gaps[0].gap == Approx(0.1));
+            CHECK(corner_count(gaps[0]) == 2);
+        }
+    }
+}
+
 TEST_CASE("a surface on the axis has no normal, and no gap", "[tool_points]") {
     const auto mesh = disc({.radius = 1, .rings = 2});
     const std::array tools{Tool<double>{.position = Vector3<double>::Zero(), .radius = 0.1}};

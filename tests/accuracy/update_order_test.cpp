@@ -50,7 +50,7 @@ std::vector<Tool<double>> pull() {
 }  // namespace
 
 TEST_CASE("the default order of updates costs no accuracy, in press and pull, at every size", "[order]") {
-    for (Index subdivisions = 2; subdivisions <= std::max(2, cases(3, 4)); ++subdivisions) {
+    for (Index subdivisions = 2; subdivisions <= std::clamp(cases(3, 4), 2, 4); ++subdivisions) {
         const auto mesh = icosphere<double>({.radius = ball, .subdivisions = subdivisions});
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
         const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0});

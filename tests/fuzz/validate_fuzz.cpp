@@ -1,43 +1,20 @@
 // SPDX-License-Identifier: MIT
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 #include <string>
 
 #include <membrane/mesh_check/repair.hpp>
 #include <membrane/mesh_check/validate.hpp>
 
+#include "bytes.hpp"
+
 // Any bytes as a mesh: validation comes back, its verdict is that of `TriangleMesh`, and so it is after a repair.
 
+using test::Bytes;
+using test::require;
+
 namespace {
-
-/// Numbers from the bytes, zeros when they are used up.
-class Bytes {
-  public:
-    Bytes(const std::uint8_t* data, std::size_t size) : data_(data), size_(size) {}
-
-    template <class Number>
-    Number next() {
-        Number number{};
-        if (size_ >= sizeof number) {
-            std::memcpy(&number, data_, sizeof number);
-            data_ += sizeof number;
-            size_ -= sizeof number;
-        } else {
-            size_ = 0;
-        }
-        return number;
-    }
-
-  private:
-    const std::uint8_t* data_;
-    std::size_t size_;
-};
-
-void require(bool holds) {
-    if (!holds) __builtin_trap();
-}
 
 template <class Scalar>
 bool taken(const membrane::Points<Scalar>& x, const membrane::Triangles& triangles) {
@@ -51,11 +28,10 @@ bool taken(const membrane::Points<Scalar>& x, const membrane::Triangles& triangl
 
 template <class Scalar>
 void examine(Bytes bytes) {
-    const auto switches = bytes.next<std::uint8_t>();
-    const auto on = [&](unsigned bit) { return ((static_cast<unsigned>(switches) >> bit) & 1U) != 0; };
-    membrane::Points<Scalar> x(3, bytes.next<std::uint8_t>() % 32);
-    membrane::Triangles triangles(3, bytes.next<std::uint8_t>() % 48);
-    const bool wild_numbers = on(0), wild_indices = on(1);
+    const test::Switches switches(bytes.next<std::uint8_t>());
+    membrane::Points<Scalar> x(3, bytes.index(32));
+    membrane::Triangles triangles(3, bytes.index(48));
+    const bool wild_numbers = switches.on(0), wild_indices = switches.on(1);
     for (Scalar& coordinate : x.reshaped()) {
         coordinate = wild_numbers ? bytes.next<Scalar>() : static_cast<Scalar>(bytes.next<std::int8_t>() % 8);
     }
@@ -67,14 +43,15 @@ void examine(Bytes bytes) {
     require(report.valid() == taken(x, triangles));
     require(report.empty() == to_string(report).empty() || !report.complete);
 
-    const membrane::RepairOptions options{.weld = on(2) ? std::optional<double>(on(3) ? 0.0 : 1.0) : std::nullopt,
-                                          .drop_repeated = on(4),
-                                          .drop_zero_area = on(5),
-                                          .drop_duplicates = on(5),
-                                          .orient = on(6),
-                                          .split_vertices = on(7),
-                                          .flip_inward = on(3),
-                                          .drop_isolated = on(4)};
+    const membrane::RepairOptions options{
+        .weld = switches.on(2) ? std::optional<double>(switches.on(3) ? 0.0 : 1.0) : std::nullopt,
+        .drop_repeated = switches.on(4),
+        .drop_zero_area = switches.on(5),
+        .drop_duplicates = switches.on(5),
+        .orient = switches.on(6),
+        .split_vertices = switches.on(7),
+        .flip_inward = switches.on(3),
+        .drop_isolated = switches.on(4)};
     try {
         const auto repaired = membrane::repair(x, triangles, options);
         require(membrane::validate(repaired.positions, repaired.triangles).valid() ==

@@ -11,6 +11,7 @@
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/force_change.hpp"
 #include "support/haptic_loop.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
@@ -18,27 +19,13 @@
 
 using namespace membrane;
 using test::Random;
+using test::size_of;
+using test::within_slew;
 
 namespace {
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-
-template <class S>
-double size_of(const Vector3<S>& force) {
-    return norm<double>(force.template cast<double>());
-}
-
-/// Whether a change from `before` to `after` is no larger than `most`, or straight towards zero. What a float is off by
-/// its own rounding is no change.
-template <class S>
-bool within_slew(const Vector3<S>& before, const Vector3<S>& after, double most) {
-    const Vector3<double> p = before.template cast<double>(), f = after.template cast<double>();
-    if (norm<double>(f - p) <= most * (1 + 1e-12)) return true;
-    const double kept = std::clamp(dot(f, p) / squared_norm(p), 0.0, 1.0);
-    const double rounding = 16 * static_cast<double>(std::numeric_limits<S>::epsilon()) * norm(p);
-    return norm<double>(f - kept * p) <= rounding;
-}
 
 /// Nothing but the device's peak.
 constexpr LimitOptions only_peak{.rise_time = 0, .soft_start = 0, .max_state_age = infinity, .thermal_limit = false};

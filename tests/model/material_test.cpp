@@ -60,6 +60,13 @@ TEST_CASE("tissues are materials, typical ones within the range", "[material]") 
     }
     // [Fisher69] gives dyn/cm^2.
     CHECK(materials::lens_capsule().upper.young_modulus == Approx(6e7 * 1e-5 / 1e-4));
+    const auto has_ratio = [](const MaterialRange& tissue, double ratio) {
+        return tissue.typical.poisson_ratio == ratio && tissue.lower.poisson_ratio == ratio &&
+               tissue.upper.poisson_ratio == ratio;
+    };
+    CHECK(has_ratio(materials::cornea(), 0.49));
+    CHECK(has_ratio(materials::lens_capsule(), 0.47));
+    CHECK(has_ratio(materials::retina(), 0.49));
 }
 
 TEST_CASE("materials and foundations that make no sense are refused by name", "[material][bad]") {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <limits>
 
 #if defined(NDEBUG) && !defined(__SANITIZE_ADDRESS__)
 inline constexpr bool cases_are_slow = false;
@@ -10,14 +11,18 @@ inline constexpr bool cases_are_slow = false;
 inline constexpr bool cases_are_slow = true;  // asserts, or a sanitizer
 #endif
 
-/// How many random cases to run: `usual`, or `in_long_run` where `tests/run --long` asks for it (MEMBRANE_LONG_TESTS); a
-/// twentieth where asserts or a sanitizer make each case slow. At least one.
+/// How many random cases to run: `usual`; `in_long_run` times MEMBRANE_LONG_TESTS where that is set, to 1 by
+/// `tests/run --long` and to more by `tests/campaign`; a twentieth where asserts or a sanitizer make each case slow. At
+/// least one.
 ///
 ///     for (int seed = 1; seed <= cases(200, 20'000); ++seed) {
 ///         CAPTURE(seed);
 inline int cases(int usual, int in_long_run) {
     if (cases_are_slow) return (std::max)(1, usual / 20);
-    return std::getenv("MEMBRANE_LONG_TESTS") != nullptr ? in_long_run : usual;
+    const char* const times = std::getenv("MEMBRANE_LONG_TESTS");
+    if (times == nullptr) return usual;
+    const long long all = (std::max)(1LL, std::atoll(times)) * in_long_run;
+    return static_cast<int>((std::min)(all, static_cast<long long>(std::numeric_limits<int>::max())));
 }
 /// All of `most` in a long run, a fifth otherwise; a twentieth where each case is slow.
 inline int cases(int most) { return cases(cases_are_slow ? most : (std::max)(1, most / 5), most); }

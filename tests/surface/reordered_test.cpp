@@ -82,6 +82,35 @@ TEMPLATE_TEST_CASE("a reordered mesh is the same surface, each vertex and triang
     }
 }
 
+TEMPLATE_TEST_CASE("triangles are in the order of the first of their vertices", "[reordered]", double, float) {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto near = reordered(test::random_surface<TestType>(random).mesh()).mesh;
+        std::vector<Index> first;
+        for (const auto& corners : near.triangles().colwise()) first.push_back(corners.minCoeff());
+        REQUIRE(std::is_sorted(first.begin(), first.end()));
+    }
+}
+
+TEMPLATE_TEST_CASE("the curve fills cubes of the longest side, also of a surface without thickness", "[reordered]",
+                   double, float) {
+    using S = TestType;
+    Random random(1);
+    // Of eight cubes the curve goes through one after the other, along x first; a sheet this low is in two of them.
+    const auto low = shuffled(sheet<S>({.width = 1, .height = S(0.4), .columns = 15, .rows = 6}), random);
+    const auto x = reordered(low).mesh.positions().row(0).eval();
+    const auto middle = S(0.5) * (x.minCoeff() + x.maxCoeff());
+    CHECK(std::is_partitioned(x.begin(), x.end(), [&](S along) { return along < middle; }));
+    // A square is in four: both halves of the lower one, then of the upper one.
+    const auto square = shuffled(sheet<S>({.width = 1, .height = 1, .columns = 15, .rows = 15}), random);
+    const Points<S> y = reordered(square).mesh.positions();
+    const Vector3<S> centre = S(0.5) * (y.rowwise().minCoeff() + y.rowwise().maxCoeff());
+    std::vector<int> quarters;
+    for (const auto& p : y.colwise()) quarters.push_back((p.y() < centre.y() ? 0 : 2) + (p.x() < centre.x() ? 0 : 1));
+    CHECK(std::is_sorted(quarters.begin(), quarters.end()));
+}
+
 TEST_CASE("what is near in space is near in memory", "[reordered]") {
     Random random(1);
     const auto sphere = icosphere<double>({.subdivisions = 5});  // 10,242 vertices
