@@ -47,7 +47,8 @@ LimitOptions any_options(Bytes& bytes) {
 /// Whether the change is no larger than `most`, or straight towards zero, within a float's rounding of the forces.
 template <Real S>
 bool within_slew(const Vector3<double>& before, const Vector3<double>& after, double most) {
-    const double rounding = 32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * norm(before);
+    const double rounding =
+        32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (std::max)(norm(before), norm(after));
     if (norm<double>(after - before) <= most * (1 + 1e-12) + rounding) return true;
     const double square = squared_norm(before);
     const double kept = square > 0 ? std::clamp(dot(after, before) / square, 0.0, 1.0) : 0.0;
