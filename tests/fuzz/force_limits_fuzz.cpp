@@ -47,9 +47,10 @@ LimitOptions any_options(Bytes& bytes) {
 /// Whether the change is no larger than `most`, or straight towards zero, within the rounding of the forces' scalar.
 template <Real S>
 bool within_slew(const Vector3<double>& before, const Vector3<double>& after, double most) {
-    using Limits = std::numeric_limits<S>;
-    const double rounding = 32 * static_cast<double>(Limits::epsilon()) * (std::max)(norm(before), norm(after)) +
-                            4 * static_cast<double>(Limits::denorm_min());
+    constexpr double negligible = 1e-30;  // [N]; squares of less may underflow
+    const double rounding =
+        32 * static_cast<double>(std::numeric_limits<S>::epsilon()) * (std::max)(norm(before), norm(after)) +
+        negligible;
     if (norm<double>(after - before) <= most * (1 + 1e-12) + rounding) return true;
     const double square = squared_norm(before);
     const double kept = square > 0 ? std::clamp(dot(after, before) / square, 0.0, 1.0) : 0.0;
