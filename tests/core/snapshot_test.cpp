@@ -57,7 +57,8 @@ bool restored(const std::vector<std::byte>& snapshot, const auto& parts) {
 }
 
 template <class Loop>
-void check_resumes(std::uint64_t seed) {
+void check_resumes(int case_number) {
+    const auto seed = static_cast<std::uint64_t>(case_number);
     CAPTURE(seed);
     test::Random random(seed);
     const auto loop = std::make_unique<Loop>(seed), other = std::make_unique<Loop>(seed);
