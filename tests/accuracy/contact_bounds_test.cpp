@@ -108,6 +108,38 @@ TEST_CASE("pressures do no more work towards any state than the bound says", "[e
     CHECK(compared > cases(100));
 }
 
+TEST_CASE("bounds are those of another unit of length, roundings too", "[error_bound]") {
+    int overlapping = 0, working = 0;
+    for (int seed = 1; seed <= cases(40) + 8; ++seed) {
+        CAPTURE(seed);
+        Pressed membrane(static_cast<std::uint64_t>(seed), 1, 1.0);
+        membrane.press_somewhere(0.1);
+        const Handed bounds(membrane);
+        if (!bounds.rest.converged) continue;
+        for (const double scale : {0x1p-10, 0x1p10}) {  // exact
+            std::vector<ScenePress> tools(bounds.scene.tools().begin(), bounds.scene.tools().end());
+            for (auto& pressing : tools) {
+                pressing.tool.position *= scale;
+                pressing.tool.axis *= scale;
+                pressing.tool.radius *= scale;
+            }
+            auto contacts = bounds.rest.contacts;
+            for (auto& contact : contacts) {
+                contact.gap *= scale;
+                contact.weights *= 2;  // a point is where the weights say, whatever they sum up to
+            }
+            ContactBounds places(bounds.problem);
+            places.assign(bounds.problem, membrane.mesh.triangles(), scale * bounds.rest.x, tools, contacts);
+            CHECK(places.penetration() == scale * bounds.places.penetration());
+            CHECK(places.work() == scale * bounds.places.work());
+            overlapping += places.penetration() > 0;
+            working += places.work() > 0;
+        }
+    }
+    CHECK(overlapping > 0);
+    CHECK(working > 0);
+}
+
 TEST_CASE("pressures balance the membrane, and are borne near the tool only", "[error_bound]") {
     int found = 0;
     for (int seed = 1; seed <= cases(40); ++seed) {
