@@ -123,11 +123,12 @@ class Loop {
             const auto& queue = session_.queue();
             for (Index k = 0; k < queue.layer_count(); ++k)
                 for (const Index v : queue.layer(k)) values_[v] = 1 - static_cast<float>(k) / queue.layer_count();
-        } else {
+        } else if (quantity == "displacement") {
+            values_ = (session_.x() - session_.mesh().positions()).colwise().norm().transpose().cast<float>();
+        } else if (quantity == "tension") {
             const auto state = examples::surface_state(session_.mesh(), session_.x(), session_.network_now(),
                                                        session_.foundation_now());
-            if (quantity == "tension") values_ = state.tension.cast<float>();
-            if (quantity == "displacement") values_ = state.displacement.colwise().norm().cast<float>();
+            values_ = state.tension.cast<float>();
         }
         return view(values_);
     }

@@ -44,8 +44,8 @@ const size = (force) => Math.hypot(...force);
 const picture = (page, name) => page.screenshot({ path: join(folder, `${name}.png`) });
 
 // Waits for a condition on the state of the page, in JavaScript.
-const until = (page, condition) => page.waitForFunction(`(({ ${Object.keys(names)} }) => ${condition})(membrane.state)`);
-const names = { force: 0, touching: 0, holding: 0, vertices: 0, frames: 0, recording: 0, left: 0, time: 0 };
+const until = (page, condition) => page.waitForFunction(`(({ ${names} }) => ${condition})(membrane.state)`);
+const names = ["force", "touching", "holding", "vertices", "frames", "recording", "left", "time"];
 
 // Waits for some simulated time [s].
 async function simulate(page, seconds) {
