@@ -4,11 +4,13 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include <membrane/core/arctangent.hpp>
 #include <membrane/model/elements.hpp>
 #include <membrane/model/material.hpp>
 #include <membrane/surface/half_edges.hpp>
@@ -37,6 +39,8 @@ namespace membrane {
 template <Number Scalar>
 struct Hinge {
     static constexpr std::size_t corner_count = 4;  ///< two of the edge, two apexes
+    static constexpr std::array<std::array<std::size_t, 4>, 4> orders{
+        {{0, 1, 2, 3}, {1, 0, 3, 2}, {0, 1, 2, 3}, {1, 0, 3, 2}}};  ///< see `Element`
 
     Scalar stiffness;  ///< [N m]
     Scalar rest;       ///< [rad]
@@ -52,6 +56,7 @@ struct Hinge {
                                                 const Vector3<N>& displacement) const noexcept;
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 4>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
+    [[nodiscard]] Hinge in_order(std::size_t) const noexcept { return *this; }
     ///@}
 };
 
@@ -79,7 +84,25 @@ class Fold {
 
     [[nodiscard]] N angle() const noexcept {
         const N sine = dot<N>(cross(left, right), edge) / unless_zero(norm(edge)), cosine = dot(left, right);
-        return if_valid(lane_by_lane<N>([](auto y, auto x) { return std::atan2(y, x); }, sine, cosine));
+        return if_valid(arctangent<N>(sine, cosine));
+    }
+
+    /// 1 / h^2: no eigenvalue of the angle's second derivative by corner i is larger. At an apex h is its distance from the
+    /// edge; at the edge's corners it is a sum, over the distances from the two lines through the other end and an apex.
+    [[nodiscard]] N curvature(const Corners<N, 4>& x, std::size_t i) const noexcept {
+        const N by_left = 1 / unless_zero(squared_norm(left)), by_right = 1 / unless_zero(squared_norm(right));
+        if (i == 2) return if_valid(squared_norm(edge) * by_left);
+        if (i == 3) return if_valid(squared_norm(edge) * by_right);
+        const Vector3<N>& end = x[1 - i];
+        return if_valid(squared_norm<N>(x[2] - end) * by_left + squared_norm<N>(x[3] - end) * by_right);
+    }
+
+    /// How far a corner may move until its curvature exceeds (4/3)^2 of what it is: a quarter of the least h. Without a
+    /// triangle's area nothing is known, unless the hinge has no stiffness.
+    [[nodiscard]] N reach(const N& curvature, const N& stiffness) const noexcept {
+        constexpr auto far = std::numeric_limits<Each<N>>::infinity();
+        const N quarter = Each<N>(0.25) / root_of<N>(unless_zero(curvature));
+        return select<N>(stiffness > 0, select<N>(is_valid(), quarter, 0), far);
     }
 
     [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
@@ -121,7 +144,13 @@ CornerForce<N> Hinge<Scalar>::force_on(const Corners<N, 4>& x, std::size_t i) co
     const N k = static_cast<N>(stiffness);
     const Vector3<N> slope = fold.slope(x, i);
     const N moment = k * detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
-    return {-moment * slope, outer<N>(k, slope)};
+    using std::abs;
+    const N curvature = fold.curvature(x, i), bend = Each<N>(8.0 / 9) * curvature;  // half the largest within reach
+    const EnergyRemainder<N> remainder{.second = abs(moment) * bend,
+                                       .third = k * (norm(slope) * bend),
+                                       .fourth = k / 2 * (bend * bend),
+                                       .reach = fold.reach(curvature, k)};
+    return {-moment * slope, outer<N>(k, slope), remainder};
 }
 
 template <Number Scalar>

@@ -4,6 +4,7 @@
 #include <concepts>
 #include <limits>
 
+#include <membrane/core/lanes.hpp>
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/core/types.hpp>
 
@@ -22,8 +23,30 @@ struct VertexForce {
     Scalar stiffness = 0;                             ///< stiffness bound: no eigenvalue of the Hessian is larger [N/m]
 };
 
-/// Force on a vertex and a quadratic upper bound of the energy: for a displacement d of length up to rho the energy is
-/// at most E - force . d + d . (stiffness I - stiffness_reduction / (1 + rho / size)) d / 2, see
+/// Upper bound of what a quadratic expansion of an energy leaves out: |d|^2 (second + third |d| + fourth |d|^2) for a
+/// displacement d no longer than `reach`.
+template <Number Scalar>
+struct EnergyRemainder {
+    Scalar second = 0;                                             ///< [N/m]
+    Scalar third = 0;                                              ///< [N/m^2]
+    Scalar fourth = 0;                                             ///< [N/m^3]
+    Scalar reach = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m], zero if no bound is known
+
+    /// Adds a bound: of the elements at one vertex.
+    MEMBRANE_INLINE EnergyRemainder& operator+=(const EnergyRemainder& other) noexcept {
+        second += other.second, third += other.third, fourth += other.fourth;
+        reach = smaller(reach, other.reach);
+        return *this;
+    }
+
+    /// The bound at a displacement of length `size` [J].
+    [[nodiscard]] MEMBRANE_INLINE Scalar at(const Scalar& size) const noexcept {
+        return size * size * (second + size * (third + size * fourth));
+    }
+};
+
+/// Force on a vertex and an upper bound of the energy: for a displacement d of length up to rho the energy is at most
+/// E - force . d + d . (stiffness I - stiffness_reduction / (1 + rho / size)) d / 2 + remainder, see
 /// `MassSpringNetwork::majoriser`.
 template <Number Scalar>
 struct EnergyMajoriser {
@@ -31,6 +54,7 @@ struct EnergyMajoriser {
     Scalar stiffness = 0;                                         ///< [N/m]
     Symmetric3<Scalar> stiffness_reduction;                       ///< positive semidefinite [N/m]
     Scalar size = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m]
+    EnergyRemainder<Scalar> remainder;                            ///< of elements that are not springs
 };
 
 /// Change of the energy by the displacement of one vertex.
@@ -48,7 +72,7 @@ struct EnergyChange {
 
 /// The elastic elements of a membrane: springs, or springs and others. Beyond the signatures: all forces derive from
 /// one energy; `neighbours(v)` lists, by their `other`, all vertices whose position changes the force on `v`; the bound
-/// of `EnergyMajoriser` holds for every displacement if the network `never_stiffens`, else for small ones.
+/// of `EnergyMajoriser` holds for every displacement if the network `never_stiffens`, else up to the remainder's reach.
 template <class Network, class Scalar>
 concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, Scalar> &&
     requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& displacement) {

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -27,7 +28,25 @@ template <Number Scalar>
 struct CornerForce {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
     Symmetric3<Scalar> hessian = {};                  ///< of the energy by the corner, positive semidefinite [N/m]
+    EnergyRemainder<Scalar> remainder{.reach = 0};    ///< bounds the energy beyond the force and Hessian
+
+    /// Adds those of another element at the same vertex.
+    MEMBRANE_INLINE CornerForce& operator+=(const CornerForce& other) noexcept {
+        force += other.force, hessian += other.hessian, remainder += other.remainder;
+        return *this;
+    }
 };
+
+/// Adds the elements at a vertex, with their Hessian at the present positions; the size is left as it is.
+template <Number Scalar>
+MEMBRANE_INLINE void add(EnergyMajoriser<Scalar>& sum, const CornerForce<Scalar>& elements) noexcept {
+    const Scalar stiffness = eigenvalue_bound(elements.hessian);
+    sum.force += elements.force;
+    sum.stiffness += stiffness;
+    sum.stiffness_reduction += diagonal3(stiffness);
+    sum.stiffness_reduction += Scalar(-1) * elements.hessian;
+    sum.remainder += elements.remainder;
+}
 
 /// Positions of an element's corners [m].
 template <Number Scalar, std::size_t count>
@@ -35,8 +54,14 @@ using Corners = std::array<Vector3<Scalar>, count>;
 
 /// One element with its constants, evaluated in float and in double. Beyond the signatures: force, Hessian and change
 /// of energy belong to one energy; `hessian_block(x, i, j)` is its second derivative by corners i and j [N/m], or an
-/// approximation with which Newton's method still converges. The elements of this library also take `Lanes`, as
-/// constants and as positions: several elements of one kind at once, each with the same bits as alone.
+/// approximation with which Newton's method still converges.
+///
+/// Optional, for speed, and satisfied by the elements of this library:
+/// - `CornerForce::remainder`: with it most updates need no look at the energy.
+/// - `E` is `E<Scalar>`, its members are `Scalar`s, and it takes `Lanes` as constants and as positions: several elements
+///   of one kind at once, each with the same bits as alone.
+/// - `E::orders` and `in_order(i)`: in the order `orders[i]` of the corners, with the constants `in_order(i)`, the element
+///   is the same. Corners that come to the same place are evaluated together.
 template <class E>
 concept Element = std::copyable<E> && requires(const E& element, const Corners<double, E::corner_count>& x,
                                                const Corners<float, E::corner_count>& y, std::size_t i) {
@@ -69,6 +94,46 @@ struct ElementInstance {
 };
 
 namespace detail {
+
+/// The order of corners in which an element is evaluated at corner `i`.
+template <class E>
+[[nodiscard]] constexpr std::array<std::size_t, E::corner_count> order_at(std::size_t i) noexcept {
+    if constexpr (requires { E::orders; }) {
+        return E::orders[i];
+    } else {
+        std::array<std::size_t, E::corner_count> order{};
+        for (std::size_t k = 0; k < order.size(); ++k) order[k] = k;
+        return order;
+    }
+}
+
+/// The place of corner `i` in that order.
+template <class E>
+[[nodiscard]] constexpr std::size_t place_of(std::size_t i) noexcept {
+    const auto order = order_at<E>(i);
+    return static_cast<std::size_t>(std::find(order.begin(), order.end(), i) - order.begin());
+}
+
+/// Whether a corner comes to this place.
+template <class E>
+[[nodiscard]] constexpr bool is_place(std::size_t place) noexcept {
+    for (std::size_t i = 0; i < E::corner_count; ++i) {
+        if (place_of<E>(i) == place) return true;
+    }
+    return false;
+}
+
+/// `instance` with its corners in the order of corner `i`.
+template <class E>
+[[nodiscard]] ElementInstance<E> in_order_of(const ElementInstance<E>& instance, std::size_t i) noexcept {
+    ElementInstance<E> ordered = instance;
+    if constexpr (requires { instance.element.in_order(i); }) {
+        const auto order = order_at<E>(i);
+        for (std::size_t k = 0; k < order.size(); ++k) ordered.corners[k] = instance.corners[order[k]];
+        ordered.element = instance.element.in_order(i);
+    }
+    return ordered;
+}
 
 template <class E>
 consteval bool check_element() noexcept {  // NOLINT(readability-function-size): a sentence for each requirement
@@ -128,6 +193,30 @@ consteval bool check_element() noexcept {  // NOLINT(readability-function-size):
 template <class E>
 concept CheckedElement = detail::check_element<E>();
 
+namespace detail {
+
+/// `E<Scalar>` with another scalar.
+template <class E, class N>
+struct WithScalar;
+template <template <class> class E, class Scalar, class N>
+struct WithScalar<E<Scalar>, N> {
+    using Type = E<N>;
+    static constexpr bool is_numbers = std::is_trivially_copyable_v<E<Scalar>>&& std::is_trivially_copyable_v<E<N>> &&
+                                       sizeof(E<Scalar>) / sizeof(Scalar) == sizeof(E<N>) / sizeof(N);
+};
+
+}  // namespace detail
+
+/// Whether an element can be evaluated in lanes, see `Element`: its constants are numbers of one type.
+template <class E, class Scalar>
+concept ElementInLanes =
+    requires(const typename detail::WithScalar<E, Lanes<Scalar>>::Type& element,
+             const Corners<Lanes<Scalar>, E::corner_count>& x, std::size_t i) {
+    requires detail::WithScalar<E, Lanes<Scalar>>::is_numbers;
+    { element.force_on(x, i) } -> std::same_as<CornerForce<Lanes<Scalar>>>;
+    { element.energy_change(x, i, x[i]) } -> std::same_as<EnergyChange<Lanes<Scalar>>>;
+};
+
 /// Elements of one kind, each with its vertices. Immutable; holds no positions.
 template <Real Scalar_, CheckedElement Each>
 class Elements {
@@ -135,13 +224,14 @@ class Elements {
     using Scalar = Scalar_;                                          ///< of the constants and forces
     static constexpr std::size_t corner_count = Each::corner_count;  ///< vertices of one element
     using Instance = ElementInstance<Each>;                          ///< one element with its vertices
+    static constexpr bool in_lanes = ElementInLanes<Each, Scalar>;   ///< whether they can be evaluated in lanes
 
     /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, or whose force or stiffness
     /// at rest is not finite: a triangle is too thin, or a constant too large, for the scalar. Cost: linear.
     Elements(const TriangleMesh<Scalar>& mesh, std::vector<Instance> all);
 
     /// Number of vertices of the mesh.
-    [[nodiscard]] Index vertex_count() const noexcept { return corners_of_.row_count(); }
+    [[nodiscard]] Index vertex_count() const noexcept { return at_vertex_.row_count(); }
 
     /// All elements, in the order in which they were given.
     [[nodiscard]] std::span<const Instance> all() const noexcept { return all_; }
@@ -152,14 +242,20 @@ class Elements {
         for (const auto& instance : all_) act(instance);
     }
 
-    /// Calls `act(instance, x, corner)` for each element of vertex `v`: `x` are the positions of its corners, number
-    /// `corner` is `v`.
+    /// An element as it is evaluated at one of its vertices.
+    struct AtVertex {
+        Instance instance;  ///< in the order of corners for this vertex
+        std::size_t place;  ///< of the vertex among the corners
+    };
+
+    /// The elements of vertex `v`, by their `place`.
+    [[nodiscard]] std::span<const AtVertex> at(Index v) const noexcept { return at_vertex_[v]; }
+
+    /// Calls `act(instance, x, place)` for each element of vertex `v`: `x` are the positions of its corners, number
+    /// `place` is `v`.
     template <class Act>
     void for_each(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
-        for (const auto& at : corners_of_[v]) {
-            const Instance& instance = all_[static_cast<std::size_t>(at.element)];
-            act(instance, instance.where(x), static_cast<std::size_t>(at.corner));
-        }
+        for (const auto& [instance, place] : at_vertex_[v]) act(instance, instance.where(x), place);
     }
 
     /// Positions of the corners of an element.
@@ -172,13 +268,10 @@ class Elements {
     [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
   private:
-    struct Corner {
-        Index element, corner;
-    };
     [[nodiscard]] Scalar force_tolerance_of(const Instance& instance, const Points<Scalar>& x) const noexcept;
 
     std::vector<Instance> all_;
-    CompressedRows<Corner> corners_of_;
+    CompressedRows<AtVertex> at_vertex_;
     Scalar force_tolerance_ = 0;
 };
 
@@ -197,10 +290,13 @@ Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<I
         }
         force_tolerance_ = (std::max)(force_tolerance_, negligible);
     }
-    corners_of_ = CompressedRows<Corner>(mesh.vertex_count(), [this](auto put) {
-        for (std::size_t i = 0; i < all_.size(); ++i) {
-            for (std::size_t k = 0; k < corner_count; ++k) {
-                put(all_[i].corners[k], Corner{static_cast<Index>(i), static_cast<Index>(k)});
+    at_vertex_ = CompressedRows<AtVertex>(mesh.vertex_count(), [this](auto put) {
+        for (std::size_t place = 0; place < corner_count; ++place) {
+            for (const auto& instance : all_) {
+                for (std::size_t i = 0; i < corner_count; ++i) {
+                    if (detail::place_of<Each>(i) != place) continue;
+                    put(instance.corners[i], AtVertex{detail::in_order_of(instance, i), place});
+                }
             }
         }
     });

@@ -202,7 +202,7 @@ template <Number Scalar>
 }
 
 /// A spring as an `Element`, between its two ends.
-template <Real Scalar, class Law>
+template <Number Scalar, class Law>
 struct SpringElement {
     static constexpr std::size_t corner_count = 2;  ///< its ends
 
@@ -219,11 +219,11 @@ struct SpringElement {
     }
 
     /// The law at this length [m].
-    template <Real N>
-    [[nodiscard]] SpringResponse<N> response(N length) const noexcept {
-        constexpr N shortest = (std::numeric_limits<N>::min)();  // no law is called with a smaller length
+    template <Number N>
+    [[nodiscard]] SpringResponse<N> response(const N& length) const noexcept {
+        constexpr auto shortest = (std::numeric_limits<Each<N>>::min)();  // no law is called with a smaller length
         return (*law)(
-            SpringState<N>{static_cast<N>(stiffness), static_cast<N>(rest_length), (std::max)(length, shortest)});
+            SpringState<N>{static_cast<N>(stiffness), static_cast<N>(rest_length), larger<N>(length, shortest)});
     }
 
     ///@{
@@ -239,13 +239,14 @@ struct SpringElement {
     [[nodiscard]] N energy(const Corners<N, 2>& x) const noexcept {
         return response(norm<N>(x[1] - x[0])).energy;
     }
-    template <Real N>
+    template <Number N>
     [[nodiscard]] EnergyChange<N> energy_change(const Corners<N, 2>& x, std::size_t i,
                                                 const Vector3<N>& displacement) const noexcept {
+        using std::abs;
         const Vector3<N> edge = x[1 - i] - x[i];
         const N length = norm(edge), far = detail::largest_magnitude(x[i]);
         const auto before = response(length), after = response(norm<N>(edge - displacement));
-        return {after.energy - before.energy, before.energy + std::abs(before.tension) * (length + far)};
+        return {after.energy - before.energy, before.energy + abs(before.tension) * (length + far)};
     }
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 2>& x, std::size_t i,
                                                 std::size_t j) const noexcept {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <utility>
 #include <vector>
@@ -23,7 +24,8 @@ namespace membrane {
 /// if the border is pinned, the loads of all triangles together have an energy, -pressure times volume.
 template <Number Scalar>
 struct PressureLoad {
-    static constexpr std::size_t corner_count = 3;  ///< the triangle's
+    static constexpr std::size_t corner_count = 3;                                      ///< the triangle's
+    static constexpr std::array<std::array<std::size_t, 3>, 3> orders{{{0, 1, 2}, {1, 2, 0}, {2, 0, 1}}};  ///< see `Element`
 
     Scalar pressure;  ///< [Pa], positive from inside
 
@@ -32,7 +34,7 @@ struct PressureLoad {
     template <Number N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 3>& x, std::size_t i) const noexcept {
         const Vector3<N>&next = x[(i + 1) % 3], &last = x[(i + 2) % 3];
-        return {static_cast<N>(pressure) / 6 * cross<N>(next - x[i], last - x[i])};
+        return {static_cast<N>(pressure) / 6 * cross<N>(next - x[i], last - x[i]), {}, {}};  // linear in the corner
     }
     template <Number N>
     [[nodiscard]] N energy(const Corners<N, 3>& x) const noexcept {
@@ -46,6 +48,7 @@ struct PressureLoad {
     }
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 3>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
+    [[nodiscard]] PressureLoad in_order(std::size_t) const noexcept { return *this; }
     ///@}
 };
 
@@ -60,7 +63,7 @@ struct DeadLoad {
     /// As `Element` requires.
     template <Number N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 1>&, std::size_t) const noexcept {
-        return {force.template cast<N>()};
+        return {force.template cast<N>(), {}, {}};
     }
     template <Number N>
     [[nodiscard]] N energy(const Corners<N, 1>& x) const noexcept {

@@ -28,12 +28,21 @@ class Tissue {
   public:
     using Scalar = typename Springs::Scalar;       ///< that of the springs
     static constexpr bool never_stiffens = false;  ///< elements may stiffen: updates need a line search
+    static constexpr bool in_lanes = (Kinds::in_lanes && ...);  ///< whether all elements can be evaluated in lanes
+    static constexpr bool bounds_energy =
+        Springs::never_stiffens;  ///< `majoriser` bounds the energy up to the reach of its remainder
 
     /// Keeps copies. @throws InvalidInput for elements of another mesh than the springs'. Linear.
     explicit Tissue(const Springs& springs, const Kinds&... kinds);
 
     /// The springs, without the elements.
     [[nodiscard]] const Springs& springs() const noexcept { return springs_; }
+
+    ///@{
+    /// As of the springs.
+    [[nodiscard]] const auto& law() const noexcept { return springs_.law(); }
+    [[nodiscard]] auto springs_of(Index v) const noexcept { return springs_.springs_of(v); }
+    ///@}
 
     /// Calls `act(elements)` for each kind.
     template <class Act>
@@ -141,16 +150,10 @@ auto Tissue<Springs, Kinds...>::force_on(Index v, const ConstPointsRef<Scalar>& 
 template <class Springs, class... Kinds>
 auto Tissue<Springs, Kinds...>::majoriser(Index v, const ConstPointsRef<Scalar>& x) const noexcept
     -> EnergyMajoriser<Scalar> {
+    CornerForce<Scalar> elements{{}, {}, {}};
+    for_each_corner_force(v, x, [&](const CornerForce<Scalar>& corner) { elements += corner; });
     auto sum = springs_.majoriser(v, x);
-    Symmetric3<Scalar> hessian;
-    for_each_corner_force(v, x, [&](const CornerForce<Scalar>& corner) {
-        sum.force += corner.force;
-        hessian += corner.hessian;
-    });
-    const Scalar stiffness = eigenvalue_bound(hessian);
-    sum.stiffness += stiffness;
-    sum.stiffness_reduction += diagonal3(stiffness);
-    sum.stiffness_reduction += Scalar(-1) * hessian;
+    add(sum, elements);
     return sum;
 }
 

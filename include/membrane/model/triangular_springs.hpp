@@ -23,7 +23,8 @@ namespace membrane {
 /// triangles, for any shape. Like that material it collapses if compressed to less than about 60 %.
 template <Number Scalar>
 struct TriangularSpring {
-    static constexpr std::size_t corner_count = 3;  ///< the triangle's
+    static constexpr std::size_t corner_count = 3;                                      ///< the triangle's
+    static constexpr std::array<std::array<std::size_t, 3>, 3> orders{{{0, 1, 2}, {1, 2, 0}, {2, 0, 1}}};  ///< see `Element`
 
     Symmetric3<Scalar> stiffness;  ///< K [N/m^3]
     Vector3<Scalar> rest;          ///< L_k^2, edge k is opposite of corner k [m^2]
@@ -39,6 +40,7 @@ struct TriangularSpring {
                                                 const Vector3<N>& displacement) const noexcept;
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 3>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
+    [[nodiscard]] TriangularSpring in_order(std::size_t i) const noexcept;
     ///@}
 
     /// Mean of the two principal tensions, force per current width [N/m].
@@ -121,7 +123,18 @@ CornerForce<N> TriangularSpring<Scalar>::force_on(const Corners<N, 3>& x, std::s
     result.hessian += outer<N>(4 * (along_last - both), last);
     result.hessian += outer<N>(4 * both, next + last);
     result.hessian += diagonal3(larger<N>(to_next + to_last, N(0)));  // compression across the edges is left out
+    // The energy is a polynomial: its terms of third and fourth order.
+    result.remainder = {.third = 2 * norm<N>((along_next + both) * next + (along_last + both) * last),
+                        .fourth = larger<N>((along_next + along_last) / 2 + both, N(0))};
     return result;
+}
+
+template <Number Scalar>
+TriangularSpring<Scalar> TriangularSpring<Scalar>::in_order(std::size_t i) const noexcept {
+    const auto [a, b, c] = orders[i];
+    const auto of = [this](std::size_t k, std::size_t l) { return detail::entry(stiffness, k, l); };
+    const auto at = [this](std::size_t k) { return rest[static_cast<Eigen::Index>(k)]; };
+    return {{of(a, a), of(b, b), of(c, c), of(a, b), of(a, c), of(b, c)}, {at(a), at(b), at(c)}};
 }
 
 template <Number Scalar>

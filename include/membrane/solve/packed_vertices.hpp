@@ -11,6 +11,7 @@
 #include <membrane/core/executor.hpp>
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/lane_points.hpp>
+#include <membrane/solve/packed_elements.hpp>
 #include <membrane/solve/vertex_update.hpp>
 
 /// Updates of vertices in SIMD lanes, one vertex in each.
@@ -24,11 +25,24 @@
 ///     }
 namespace membrane {
 
-/// Whether `Rule` can update vertices in lanes. The network is of springs. Their law and the rule accept `Lanes`. The
-/// foundation is `NoFoundation` or has `spring`. No update needs a line search.
+namespace detail {
+
+template <class Rule, class Network>
+[[nodiscard]] consteval bool energy_allows_lanes() noexcept {
+    if constexpr (HasElements<Network>) {
+        return has_energy_bound<Rule, Network> && Network::in_lanes;
+    } else {
+        return !needs_line_search<Rule, Network>;
+    }
+}
+
+}  // namespace detail
+
+/// Whether `Rule` can update vertices in lanes. The law of the springs, all elements and the rule accept `Lanes`. The
+/// foundation is `NoFoundation` or has `spring`. Springs need no line search.
 template <class Scalar, class Rule, class Network, class Volume>
-concept UpdatesInLanes = (Network::never_stiffens ||
-                          !is_descent_rule<Rule>)&&requires(const Rule& rule, const Network& network,
+concept UpdatesInLanes = detail::energy_allows_lanes<Rule, Network>() &&
+                         requires(const Rule& rule, const Network& network,
                                                             const SpringState<Lanes<Scalar>>& spring,
                                                             const VertexState<Lanes<Scalar>>& vertex) {
     network.law()(spring);
@@ -117,8 +131,10 @@ class PackedVertices {
         constexpr std::size_t packs_in_task = 32;
         parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
             std::size_t p = begin + first;
-            for (; p + 1 < begin + last; p += 2) update_two<in_contact>(p, scene, rule);
-            if (p < begin + last) outcomes_[p] = update_pack<in_contact>(p, scene, rule);
+            if constexpr (!HasElements<NetworkOf<Scene>>) {
+                for (; p + 1 < begin + last; p += 2) update_two<in_contact>(p, scene, rule);
+            }
+            for (; p < begin + last; ++p) outcomes_[p] = update_pack<in_contact>(p, scene, rule);
         });
     }
     /// Outcome of the last `update` for pack `p`.
@@ -157,6 +173,9 @@ class PackedVertices {
         std::size_t members = 0, packs = 0, slots = 0, needed = 0;
     };
 
+    template <class Scene>
+    using NetworkOf = std::remove_cvref_t<decltype(std::declval<const Scene&>().network)>;
+
     template <class Network>
     [[nodiscard]] bool pack(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
                             const Network& network) noexcept;
@@ -185,6 +204,13 @@ class PackedVertices {
     template <class Rule, class Scene>
     [[nodiscard]] VertexState<Wide> spring_state(std::size_t p, const Vector3<Wide>& here,
                                                  const Scene& scene) const noexcept;
+    template <class Scene>
+    [[nodiscard]] Vector3<Wide> backtracked(std::size_t p, const PackState& at, Vector3<Wide> displacement,
+                                            const typename Wide::Mask& moves, const Scene& scene) const noexcept;
+    template <class Scene>
+    [[nodiscard]] EnergyChange<Wide> energy_change(std::size_t p, const Vector3<Wide>& here,
+                                                   const Vector3<Wide>& displacement,
+                                                   const Scene& scene) const noexcept;
     template <bool in_contact, class Scene>
     void add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene,
                     VertexForce<Wide>& others) const noexcept;
@@ -204,6 +230,7 @@ class PackedVertices {
     std::vector<Outcome> outcomes_;
     std::size_t slot_count_ = 0;
     std::vector<Slot> slots_;
+    PackedElements<Scalar> elements_;
     FixedVector<Index> needed_;
     std::vector<unsigned char> is_needed_;
     Extent assigned_;
@@ -220,6 +247,7 @@ PackedVertices<Scalar>::PackedVertices(const Network& network, Index capacity)
       packs_(packs_for(members_.capacity())),
       terms_(packs_.capacity()),
       outcomes_(packs_.capacity()),
+      elements_(network, members_.capacity(), packs_.capacity()),
       needed_(capacity > 0 ? static_cast<std::size_t>(network.vertex_count()) : 0),
       is_needed_(needed_.capacity(), 0) {
     std::size_t ends = 0, longest = 0;
@@ -269,6 +297,7 @@ void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
     for (const Index v : needed_.items().subspan(extent.needed)) is_needed_[static_cast<std::size_t>(v)] = 0;
     members_.truncate(extent.members);
     packs_.truncate(extent.packs);
+    elements_.truncate(extent.packs);
     slot_count_ = extent.slots;
     needed_.truncate(extent.needed);
 }
@@ -279,12 +308,12 @@ template <Real Scalar>
 template <class Network>
 bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const Network& network) noexcept {
     std::size_t springs = 0;
-    for (const Index v : vertices) springs = (std::max)(springs, network.neighbours(v).size());
+    for (const Index v : vertices) springs = (std::max)(springs, network.springs_of(v).size());
     if (members_.size() + vertices.size() > members_.capacity() || slot_count_ + springs > slots_.size()) return false;
     Pack pack{members_.size(), vertices.size(), slot_count_, springs, {}, false};
     pack.own.fill(unused_row_);
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
-    if (!packs_.try_push_back(pack)) return false;
+    if (!elements_.append(vertices, pack.own, network) || !packs_.try_push_back(pack)) return false;
     const auto slots = std::span(slots_).subspan(slot_count_, springs);
     for (Slot& slot : slots) slot = {Scalar(0), Scalar(0), pack.own};
     for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -295,9 +324,9 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
             slot->stiffness.set(i, spring.stiffness);
             slot->rest_length.set(i, spring.rest_length);
             slot->other[i] = numbers_in_point * spring.other;
-            need(spring.other);
             ++slot;
         }
+        for (const auto& neighbour : network.neighbours(vertices[i])) need(neighbour.other);
     }
     slot_count_ += springs;
     return true;
@@ -404,6 +433,13 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
     PackState at;
     at.here = gather(rows.position.data(), own.data());
     at.vertex = spring_state<Rule>(p, at.here, scene);
+    if constexpr (HasElements<NetworkOf<Scene>>) {
+        CornerForce<Wide> elements{{}, {}, {}};
+        elements_.for_each(p, at.here, rows.position.data(), scene.network,
+                           [&](const auto& element, const auto& x, std::size_t i)
+                               MEMBRANE_INLINE_LAMBDA { elements += element.force_on(x, i); });
+        add(static_cast<EnergyMajoriser<Wide>&>(at.vertex), elements);
+    }
     if constexpr (in_contact) {
         const auto of_constraints = gather_padded(rows.force.data(), own.data());
         at.constraint_force = of_constraints.point;
@@ -439,10 +475,50 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState
     }
     if constexpr (in_contact) keep_response(p, at, as_block<Wide>(move.compliance), rows);
     const auto moves = move.moves & may_move;
-    PaddedLanes<Scalar> there{at.here + move.displacement, select<Wide>(may_move, move.least, 0)};
+    Vector3<Wide> displacement = move.displacement;
+    if constexpr (needs_line_search<Rule, NetworkOf<Scene>>) {
+        displacement = backtracked(p, at, displacement, moves, scene);
+    }
+    PaddedLanes<Scalar> there{at.here + displacement, select<Wide>(may_move, move.least, 0)};
     for (Eigen::Index k = 0; k < 3; ++k) there.point[k] = select(moves, there.point[k], at.here[k]);
     scatter_padded(there, rows.position.data(), own.data());
     return any(moves) ? Outcome::moved : Outcome::at_rest;
+}
+
+// As the function of the same name for one vertex, in the lanes of `moves`.
+template <Real Scalar>
+template <class Scene>
+auto PackedVertices<Scalar>::backtracked(std::size_t p, const PackState& at, Vector3<Wide> displacement,
+                                         const typename Wide::Mask& moves, const Scene& scene) const noexcept
+    -> Vector3<Wide> {
+    auto rises = moves & !surely_descends(at.vertex, displacement);
+    for (int i = 0; i < std::numeric_limits<Scalar>::digits && any(rises); ++i) {
+        const Wide work =
+            dot<Wide>(at.others.force, displacement) - at.others.stiffness * squared_norm(displacement) / 2;
+        const auto energy = energy_change(p, at.here, displacement, scene);
+        rises = rises & !(energy.change <= work + 16 * std::numeric_limits<Scalar>::epsilon() * energy.size);
+        const Wide factor = select<Wide>(rises, Scalar(0.5), 1);
+        displacement = factor * displacement;
+    }
+    const Wide factor = select<Wide>(rises, 0, 1);
+    return factor * displacement;
+}
+
+template <Real Scalar>
+template <class Scene>
+auto PackedVertices<Scalar>::energy_change(std::size_t p, const Vector3<Wide>& here, const Vector3<Wide>& displacement,
+                                           const Scene& scene) const noexcept -> EnergyChange<Wide> {
+    const auto* rows = scene.state.position.data();
+    EnergyChange<Wide> sum;
+    for (const Slot& slot : std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count)) {
+        const auto& law = scene.network.law();
+        const SpringElement<Wide, std::remove_cvref_t<decltype(law)>> spring{&law, slot.stiffness, slot.rest_length};
+        sum += spring.template energy_change<Wide>({here, gather(rows, slot.other.data())}, 0, displacement);
+    }
+    elements_.for_each(p, here, rows, scene.network, [&](const auto& element, const auto& x, std::size_t i) {
+        sum += element.energy_change(x, i, displacement);
+    });
+    return sum;
 }
 
 template <Real Scalar>
@@ -468,7 +544,10 @@ MEMBRANE_FLATTEN void PackedVertices<Scalar>::evaluate_residual(std::size_t p, c
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     const Vector3<Wide> here = gather(rows.position.data(), own.data());
-    const auto springs = springs_on<VertexForce<Wide>>(p, here, scene);
+    auto springs = springs_on<VertexForce<Wide>>(p, here, scene);
+    elements_.for_each(p, here, rows.position.data(), scene.network,
+                       [&](const auto& element, const auto& x, std::size_t i)
+                           MEMBRANE_INLINE_LAMBDA { springs.force += element.force_on(x, i).force; });
     VertexForce<Wide> others{gather(rows.force.data(), own.data()), 0};
     add_others<true>(p, here, scene, others);
     const Vector3<Wide> force = springs.force + others.force;

@@ -285,7 +285,7 @@ struct Sweeps {
                                vertex.stiffness - vertex.contact_stiffness);
         }
         if (!move.moves) return false;
-        state.set_position(v, point(scene.x, v) + backtracked<Rule>(scene, v, move.displacement));
+        state.set_position(v, point(scene.x, v) + backtracked<Rule>(scene, v, vertex, move.displacement));
         return true;
     }
 };

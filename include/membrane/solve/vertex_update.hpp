@@ -17,7 +17,7 @@
 ///
 ///     auto state = membrane::state_of<Rule>(scene, v);
 ///     const auto move = membrane::move_of(rule, state, scene.state.force_tolerance);
-///     if (move.moves) x.col(v) += membrane::backtracked<Rule>(scene, v, move.displacement);
+///     if (move.moves) x.col(v) += membrane::backtracked<Rule>(scene, v, state, move.displacement);
 namespace membrane {
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
@@ -143,12 +143,37 @@ template <class Scalar, class Network, class Volume>
     return compliance * (largest_eigenvalue_at<Scalar>(scene.network, v, scene.x) + others) >= 2;
 }
 
-/// Backtracking line search, where springs may stiffen and `Rule` guarantees descent: halves the displacement until the
-/// energy does not rise, up to rounding.
+/// Whether an update needs a line search: springs or elements may stiffen, and `Rule` guarantees descent.
+template <class Rule, class Network>
+inline constexpr bool needs_line_search = !Network::never_stiffens && is_descent_rule<Rule>;
+
+/// Whether the majoriser bounds the energy of `Network`, and `Rule` evaluates it.
+template <class Rule, class Network>
+inline constexpr bool has_energy_bound = requires {
+    requires Rule::needs_majoriser;
+    requires Network::bounds_energy;
+};
+
+/// Whether the majoriser of `vertex` shows that a displacement does not raise the energy.
+template <Number N>
+[[nodiscard]] MEMBRANE_INLINE auto surely_descends(const VertexState<N>& vertex,
+                                                   const Vector3<N>& displacement) noexcept {
+    const N size = norm(displacement), part = 1 / (1 + size / vertex.size);
+    const N reduction = part * dot<N>(displacement, vertex.stiffness_reduction * displacement);
+    const N work = dot<N>(vertex.force, displacement) - (vertex.stiffness * (size * size) - reduction) / 2;
+    return (size <= vertex.remainder.reach) & (vertex.remainder.at(size) <= work);
+}
+
+/// Backtracking line search, where an update needs one: halves the displacement until the energy does not rise, up to
+/// rounding.
 template <class Rule, class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> backtracked(const StepInput<Scalar, Network, Volume>& scene, Index v,
+                                          const VertexState<Scalar>& vertex,
                                           std::type_identity_t<Vector3<Scalar>> displacement) noexcept {
-    if constexpr (!Network::never_stiffens && is_descent_rule<Rule>) {
+    if constexpr (needs_line_search<Rule, Network>) {
+        if constexpr (has_energy_bound<Rule, Network>) {
+            if (surely_descends(vertex, displacement)) return displacement;
+        }
         const auto others = non_network_force(scene, v);
         for (int i = 0; i < std::numeric_limits<Scalar>::digits; ++i, displacement /= 2) {
             const Scalar work = dot(others.force, displacement) - others.stiffness * squared_norm(displacement) / 2;
