@@ -125,6 +125,26 @@ Table sweep_table(const std::string& topic, const std::string& title) {
         .columns = {642, 2562, 10242}};
 }
 
+/// A step of springs and of tissues with more and more elements.
+Table elements_table() {
+    Table table{.topic = "elements",
+                .key = "elements",
+                .title = "A step of a tissue, and its ratio to one of springs",
+                .rows = {},
+                .columns = {469}};
+    for (const std::string scalar : {"double", "float"}) {
+        table.rows.push_back({"springs, " + scalar, "springs/" + scalar});
+        for (const std::string kinds : {"triangles", "triangles, pressure", "triangles, pressure, bending"}) {
+            std::string name = kinds;
+            std::erase(name, ' ');
+            std::replace(name.begin(), name.end(), ',', '_');
+            table.rows.push_back({kinds + ", " + scalar, name + "/" + scalar});
+            table.rows.push_back({"  ratio", name + "/" + scalar, Row::counter, "ratio", ""});
+        }
+    }
+    return table;
+}
+
 /// A vertex in one of the 16 sweeps of a step over the whole mesh, by order and scalar.
 Table threads_table() {
     Table table{.topic = "threads",
@@ -210,6 +230,7 @@ const std::vector<Table> all_tables{
                     {20, 25, 30, 35, 40, 45, 50, 55, 60, 65, 70, 75, 80, 90, 100, 200, 500, 1000}),
     stability_table("limit", "The same; dt in hundredths of the theoretical limit of each scene",
                     {80, 85, 90, 95, 98, 99, 100, 101, 102, 105, 110, 115, 120, 125, 130}),
+    elements_table(),
     sweep_table("sweep", "A vertex update, in a sweep over all vertices; registers of 16 bytes"),
     sweep_table("sweep_avx2", "The same; registers of 32 bytes"),
     threshold_table("642"),

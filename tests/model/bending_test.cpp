@@ -59,7 +59,9 @@ std::pair<double, double> energy_and_area(const Elements<double, Hinge<double>>&
 }  // namespace
 
 TEST_CASE("a hinge pulls with the derivative of its energy, however far it is folded", "[bending]") {
-    for (int seed = 1; seed <= cases(500); ++seed) {
+    const int hinges = cases(500);
+    int known = 0;
+    for (int seed = 1; seed <= hinges; ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const double size = std::pow(10, random.number(-4.0, 0.0)), k = std::pow(10, random.number(-8.0, 0.0));
@@ -80,7 +82,41 @@ TEST_CASE("a hinge pulls with the derivative of its energy, however far it is fo
         test::check_element(hinge, x, 0.2 * size, k, random);
         const Hinge<double> at_rest{.stiffness = k, .rest = detail::Fold<double>(x).angle()};
         test::check_hessian(at_rest, x, 0.2 * size, k);
+        known += test::check_remainder(hinge, x, 0.2 * size, k, random);
+        for (std::size_t i = 0; i < 4; ++i) {  // seen from each corner the same
+            const auto& order = Hinge<double>::orders[i];
+            const Corners<double, 4> ordered{x[order[0]], x[order[1]], x[order[2]], x[order[3]]};
+            REQUIRE(hinge.in_order(i).energy(ordered) == Approx(hinge.energy(x)));
+        }
     }
+    CHECK(known > hinges);  // of four corners
+}
+
+TEST_CASE("no hinge curves more than the heights over its lines say", "[bending]") {
+    Random random(7);
+    double most = 0;
+    for (int i = 0; i < cases(2000); ++i) {
+        Corners<double, 4> x;
+        for (auto& corner : x) corner = std::exp(random.number(-1.0, 1.0)) * random.vector();
+        const detail::Fold<double> fold(x);
+        for (std::size_t corner = 0; corner < 4; ++corner) {
+            const double curvature = fold.curvature(x, corner), h = 1e-5 / std::sqrt(curvature);
+            Eigen::Matrix3d second;
+            for (Eigen::Index k = 0; k < 3; ++k) {
+                auto before = x, after = x;
+                before[corner][k] -= h, after[corner][k] += h;
+                second.col(k) = (detail::Fold<double>(after).slope(after, corner) -
+                                 detail::Fold<double>(before).slope(before, corner))
+                                    .eigen() /
+                                (2 * h);
+            }
+            const Eigen::Matrix3d symmetric = (second + second.transpose()) / 2;
+            const double largest = test::eigenvalues_of(symmetric).cwiseAbs().maxCoeff();
+            REQUIRE(largest <= (1 + 1e-4) * curvature);
+            most = std::max(most, largest / curvature);
+        }
+    }
+    CHECK(most > 0.9);
 }
 
 TEST_CASE("hinges of equilateral triangles store what a plate does", "[bending]") {

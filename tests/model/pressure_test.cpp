@@ -149,7 +149,9 @@ TEST_CASE("with balancing loads the mesh is the shape at rest, to the bit", "[pr
             for (Index v = 0; v < mesh.vertex_count(); ++v) {
                 REQUIRE(still.force_on(v, mesh.positions()).force == Vector3<S>::Zero());
             }
-            test::check_element(DeadLoad<double>{random.vector()}, Corners<double, 1>{random.vector()}, 1, 1, random);
+            const DeadLoad<double> load{random.vector()};
+            test::check_element(load, Corners<double, 1>{random.vector()}, 1, 1, random);
+            REQUIRE(test::check_remainder(load, Corners<double, 1>{random.vector()}, 1, 1, random) == 1);
         };
         check(0.0);
         check(0.0F);

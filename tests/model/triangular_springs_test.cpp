@@ -131,6 +131,13 @@ TEST_CASE("a triangular spring stores what a sheet of Saint Venant and Kirchhoff
 
         test::check_element(element, now, size, energy + sheet * size * size, random);
         test::check_hessian(element, now, size, energy + sheet * size * size);
+        REQUIRE(test::check_remainder(element, now, size, energy + sheet * size * size, random) == 3);
+        for (std::size_t i = 0; i < 3; ++i) {  // seen from each corner the same
+            const auto& order = TriangularSpring<double>::orders[i];
+            const Corners<double, 3> ordered{now[order[0]], now[order[1]], now[order[2]]};
+            REQUIRE(order[0] == i);
+            REQUIRE(element.in_order(i).energy(ordered) == Approx(element.energy(now)).epsilon(1e-12));
+        }
     }
 }
 

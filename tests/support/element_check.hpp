@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -44,6 +45,27 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
         const auto single = element.force_on(y, i);
         REQUIRE((single.force.template cast<double>() - pull.force).norm() < 1e-4 * energy / size);
     }
+}
+
+/// What an element's force, Hessian and remainder say of its energy, over displacements of up to twice its range. Returns
+/// for how many they said something.
+template <class E>
+int check_remainder(const E& element, const membrane::Corners<double, E::corner_count>& x, double size, double energy,
+                    Random& random) {
+    int known = 0;
+    for (std::size_t i = 0; i < E::corner_count; ++i) {
+        const auto pull = element.force_on(x, i);
+        const double most = std::min(3 * size, 2 / std::sqrt(pull.remainder.per_range));
+        const membrane::Vector3<double> d = random.number(0.0, 1.0) * most * random.unit_vector();
+        const double quadratic = membrane::dot<double>(d, pull.hessian * d) / 2;
+        const double beyond = pull.remainder.at(membrane::squared_norm(d), quadratic);
+        known += std::isfinite(beyond);
+        auto there = x;
+        there[i] += d;
+        const double change = element.energy(there) - element.energy(x);
+        REQUIRE(change <= quadratic + beyond - membrane::dot(pull.force, d) + 1e-12 * (energy + std::abs(change)));
+    }
+    return known;
 }
 
 /// The exact second derivative, by differences of the forces.

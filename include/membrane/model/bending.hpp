@@ -43,7 +43,7 @@ struct Hinge {
         {{0, 1, 2, 3}, {1, 0, 3, 2}, {0, 1, 2, 3}, {1, 0, 3, 2}}};  ///< see `Element`
 
     Scalar stiffness;  ///< [N m]
-    Scalar rest;       ///< [rad]
+    Scalar rest;       ///< between -pi and pi [rad]
 
     ///@{
     /// As `Element` requires.
@@ -70,69 +70,58 @@ template <Real Scalar>
 
 namespace detail {
 
-/// The angle of a hinge, and its derivative by each corner; both are zero if a triangle has no area.
+/// The angle of a hinge, and its derivatives by each corner; all are zero if a triangle has no area.
 template <Number N>
 class Fold {
   public:
     explicit Fold(const Corners<N, 4>& x) noexcept
-        : edge(x[1] - x[0]), left(cross<N>(edge, x[2] - x[0])), right(cross<N>(x[3] - x[0], edge)) {}
-
-    [[nodiscard]] auto is_valid() const noexcept {
-        const auto on_left = squared_norm(left) > 0, on_right = squared_norm(right) > 0;
-        return on_left & on_right;
+        : edge(x[1] - x[0]), left(cross<N>(edge, x[2] - x[0])), third(x[3] - x[0]), right(cross<N>(third, edge)) {
+        const N on_left = squared_norm(left), on_right = squared_norm(right);
+        valid = (on_left > 0) & (on_right > 0);
+        by_left = 1 / select<N>(valid, on_left, 1), by_right = 1 / select<N>(valid, on_right, 1);
+        square = squared_norm(edge), length = root_of<N>(square);
     }
 
     [[nodiscard]] N angle() const noexcept {
-        const N sine = dot<N>(cross(left, right), edge) / unless_zero(norm(edge)), cosine = dot(left, right);
-        return if_valid(arctangent<N>(sine, cosine));
+        return if_valid(arctangent<N>(-length * dot<N>(left, third), dot(left, right)));
+    }
+
+    [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
+        const N turn_left = if_valid(-length * by_left), turn_right = if_valid(-length * by_right);
+        if (i == 2) return turn_left * left;
+        if (i == 3) return turn_right * right;
+        // The angle does not change if the hinge is translated, or rotated about its edge.
+        const N per_square = 1 / select<N>(valid, square, 1);
+        const N on_left = per_square * dot<N>(edge, x[2] - x[0]), on_right = per_square * dot<N>(edge, x[3] - x[0]);
+        return i == 0 ? Vector3<N>(((on_left - 1) * turn_left) * left + ((on_right - 1) * turn_right) * right)
+                      : Vector3<N>((-on_left * turn_left) * left + (-on_right * turn_right) * right);
     }
 
     /// 1 / h^2: no eigenvalue of the angle's second derivative by corner i is larger. At an apex h is its distance from the
     /// edge; at the edge's corners it is a sum, over the distances from the two lines through the other end and an apex.
     [[nodiscard]] N curvature(const Corners<N, 4>& x, std::size_t i) const noexcept {
-        const N by_left = 1 / unless_zero(squared_norm(left)), by_right = 1 / unless_zero(squared_norm(right));
-        if (i == 2) return if_valid(squared_norm(edge) * by_left);
-        if (i == 3) return if_valid(squared_norm(edge) * by_right);
+        if (i == 2) return square * by_left;
+        if (i == 3) return square * by_right;
         const Vector3<N>& end = x[1 - i];
-        return if_valid(squared_norm<N>(x[2] - end) * by_left + squared_norm<N>(x[3] - end) * by_right);
+        return squared_norm<N>(x[2] - end) * by_left + squared_norm<N>(x[3] - end) * by_right;
     }
 
-    /// How far a corner may move until its curvature exceeds (4/3)^2 of what it is: a quarter of the least h. Without a
-    /// triangle's area nothing is known, unless the hinge has no stiffness.
-    [[nodiscard]] N reach(const N& curvature, const N& stiffness) const noexcept {
-        constexpr auto far = std::numeric_limits<Each<N>>::infinity();
-        const N quarter = Each<N>(0.25) / root_of<N>(unless_zero(curvature));
-        return select<N>(stiffness > 0, select<N>(is_valid(), quarter, 0), far);
-    }
+    [[nodiscard]] N if_valid(const N& number) const noexcept { return select<N>(valid, number, 0); }
 
-    [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
-        const Vector3<N> slope = slope_of_valid(x, i);
-        return {if_valid(slope[0]), if_valid(slope[1]), if_valid(slope[2])};
-    }
-
-    Vector3<N> edge, left, right;
+    Vector3<N> edge, left, third, right;
+    decltype(N() < N()) valid;  // both triangles have areas
 
   private:
-    [[nodiscard]] Vector3<N> slope_of_valid(const Corners<N, 4>& x, std::size_t i) const noexcept {
-        const N length = norm(edge), square = unless_zero(length * length);
-        const Vector3<N> by_left = (-length / unless_zero(squared_norm(left))) * left;
-        const Vector3<N> by_right = (-length / unless_zero(squared_norm(right))) * right;
-        if (i == 2) return by_left;
-        if (i == 3) return by_right;
-        // The angle does not change if the hinge is translated, or rotated about its edge.
-        const N on_left = dot<N>(edge, x[2] - x[0]) / square, on_right = dot<N>(edge, x[3] - x[0]) / square;
-        return i == 0 ? Vector3<N>((on_left - 1) * by_left + (on_right - 1) * by_right)
-                      : Vector3<N>(-on_left * by_left - on_right * by_right);
-    }
-    [[nodiscard]] N if_valid(const N& number) const noexcept { return select<N>(is_valid(), number, 0); }
-    [[nodiscard]] static N unless_zero(const N& divisor) noexcept { return select<N>(divisor > 0, divisor, 1); }
+    N by_left, by_right;  // the inverse squares of twice the areas
+    N square, length;     // of the edge
 };
 
-/// `angle` less whole turns, between -pi and pi [rad].
+/// `angle` less a whole turn if it is beyond half a turn [rad]. @pre between -2 pi and 2 pi
 template <Number N>
-[[nodiscard]] N within_half_turn(N angle) noexcept {
-    constexpr Each<N> turn = 2 * std::numbers::pi_v<Each<N>>;
-    return angle - turn * lane_by_lane<N>([](auto turns) { return std::round(turns); }, angle / turn);
+[[nodiscard]] N within_half_turn(const N& angle) noexcept {
+    constexpr auto half = std::numbers::pi_v<Each<N>>;
+    using std::abs;
+    return select<N>(abs(angle) > half, angle - select<N>(angle > 0, 2 * half, -2 * half), angle);
 }
 
 }  // namespace detail
@@ -140,17 +129,17 @@ template <Number N>
 template <Number Scalar>
 template <Number N>
 CornerForce<N> Hinge<Scalar>::force_on(const Corners<N, 4>& x, std::size_t i) const noexcept {
-    const detail::Fold<N> fold(x);
-    const N k = static_cast<N>(stiffness);
-    const Vector3<N> slope = fold.slope(x, i);
-    const N moment = k * detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
     using std::abs;
-    const N curvature = fold.curvature(x, i), bend = Each<N>(8.0 / 9) * curvature;  // half the largest within reach
-    const EnergyRemainder<N> remainder{.second = abs(moment) * bend,
-                                       .third = k * (norm(slope) * bend),
-                                       .fourth = k / 2 * (bend * bend),
-                                       .reach = fold.reach(curvature, k)};
-    return {-moment * slope, outer<N>(k, slope), remainder};
+    const detail::Fold<N> fold(x);
+    const N k = static_cast<N>(stiffness), curvature = fold.curvature(x, i);
+    const Vector3<N> slope = fold.slope(x, i);
+    const N moment = fold.if_valid(k * detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest)));
+    // Within a quarter of the distances h the curvature grows to at most (4/3)^2 of itself: `bend` is half of that. Without
+    // an area nothing is known.
+    const N bend = Each<N>(8.0 / 9) * curvature;
+    constexpr auto unknown = std::numeric_limits<Each<N>>::infinity();
+    const N per_range = select<N>(fold.valid, 16 * curvature, select<N>(k > 0, unknown, 0));
+    return {-moment * slope, outer<N>(k, slope), {abs(moment) * bend, k / 2 * (bend * bend), per_range}};
 }
 
 template <Number Scalar>
@@ -158,7 +147,7 @@ template <Number N>
 N Hinge<Scalar>::energy(const Corners<N, 4>& x) const noexcept {
     const detail::Fold<N> fold(x);
     const N by = detail::within_half_turn<N>(fold.angle() - static_cast<N>(rest));
-    return select<N>(fold.is_valid(), static_cast<N>(stiffness) * by * by / 2, 0);
+    return fold.if_valid(static_cast<N>(stiffness) * by * by / 2);
 }
 
 template <Number Scalar>
@@ -178,7 +167,7 @@ EnergyChange<N> Hinge<Scalar>::energy_change(const Corners<N, 4>& x, std::size_t
 template <Number Scalar>
 Eigen::Matrix3d Hinge<Scalar>::hessian_block(const Corners<double, 4>& x, std::size_t i, std::size_t j) const noexcept {
     const detail::Fold<double> fold(x);
-    if (!fold.is_valid()) return Eigen::Matrix3d::Zero();
+    if (!fold.valid) return Eigen::Matrix3d::Zero();
     return static_cast<double>(stiffness) * fold.slope(x, i) * fold.slope(x, j).transpose();
 }
 
@@ -195,7 +184,7 @@ Elements<Scalar, Hinge<Scalar>> bending_springs(const TriangleMesh<Scalar>& mesh
         Corners<double, 4> x;
         for (std::size_t i = 0; i < 4; ++i) x[i] = point(mesh.positions(), corners[i]).template cast<double>();
         const detail::Fold<double> fold(x);
-        if (!fold.is_valid() || rigidity == 0) return;
+        if (!fold.valid || rigidity == 0) return;
         const double areas = (norm(fold.left) + norm(fold.right)) / 2;
         all.push_back(
             {corners,

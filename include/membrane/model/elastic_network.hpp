@@ -23,25 +23,27 @@ struct VertexForce {
     Scalar stiffness = 0;                             ///< stiffness bound: no eigenvalue of the Hessian is larger [N/m]
 };
 
-/// Upper bound of what a quadratic expansion of an energy leaves out: |d|^2 (second + third |d| + fourth |d|^2) for a
-/// displacement d no longer than `reach`.
+/// What the energy of elements may exceed its quadratic expansion by. With their Hessian H it is, for a displacement d of
+/// length s, s^2 <= 1 / per_range, at most E - force . d + second s^2 + (sqrt(d . H d / 2) + sqrt(fourth) s^2)^2. This form
+/// is that of energies quadratic in a strain which is not linear in d.
 template <Number Scalar>
 struct EnergyRemainder {
-    Scalar second = 0;                                             ///< [N/m]
-    Scalar third = 0;                                              ///< [N/m^2]
-    Scalar fourth = 0;                                             ///< [N/m^3]
-    Scalar reach = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m], zero if no bound is known
+    Scalar second = 0;     ///< [N/m]
+    Scalar fourth = 0;     ///< [N/m^3]
+    Scalar per_range = 0;  ///< [1/m^2]; infinite if no bound is known
 
-    /// Adds a bound: of the elements at one vertex.
+    /// Adds those of another element at the same vertex.
     MEMBRANE_INLINE EnergyRemainder& operator+=(const EnergyRemainder& other) noexcept {
-        second += other.second, third += other.third, fourth += other.fourth;
-        reach = smaller(reach, other.reach);
+        second += other.second, fourth += other.fourth;
+        per_range = larger(per_range, other.per_range);
         return *this;
     }
 
-    /// The bound at a displacement of length `size` [J].
-    [[nodiscard]] MEMBRANE_INLINE Scalar at(const Scalar& size) const noexcept {
-        return size * size * (second + size * (third + size * fourth));
+    /// The bound beyond E - force . d + d . H d / 2, or infinity. `square` is s^2, `quadratic` at least d . H d / 2 [J].
+    [[nodiscard]] MEMBRANE_INLINE Scalar at(const Scalar& square, const Scalar& quadratic) const noexcept {
+        const Scalar beyond = square * (second + 2 * root_of<Scalar>(fourth * quadratic) + square * fourth);
+        constexpr auto unknown = std::numeric_limits<Each<Scalar>>::infinity();
+        return select<Scalar>(square * per_range <= 1, beyond, unknown);
     }
 };
 
@@ -54,7 +56,7 @@ struct EnergyMajoriser {
     Scalar stiffness = 0;                                         ///< [N/m]
     Symmetric3<Scalar> stiffness_reduction;                       ///< positive semidefinite [N/m]
     Scalar size = std::numeric_limits<Each<Scalar>>::infinity();  ///< [m]
-    EnergyRemainder<Scalar> remainder;                            ///< of elements that are not springs
+    EnergyRemainder<Scalar> remainder{};                          ///< of elements that are not springs
 };
 
 /// Change of the energy by the displacement of one vertex.
@@ -72,7 +74,8 @@ struct EnergyChange {
 
 /// The elastic elements of a membrane: springs, or springs and others. Beyond the signatures: all forces derive from
 /// one energy; `neighbours(v)` lists, by their `other`, all vertices whose position changes the force on `v`; the bound
-/// of `EnergyMajoriser` holds for every displacement if the network `never_stiffens`, else up to the remainder's reach.
+/// of `EnergyMajoriser` holds for every displacement if the network `never_stiffens`, else as far as its
+/// remainder is known.
 template <class Network, class Scalar>
 concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, Scalar> &&
     requires(const Network& network, Index v, const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& displacement) {

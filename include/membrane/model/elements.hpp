@@ -7,11 +7,11 @@
 #include <cstddef>
 #include <limits>
 #include <span>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
+#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/model/elastic_network.hpp>
 #include <membrane/surface/triangle.hpp>
@@ -28,7 +28,8 @@ template <Number Scalar>
 struct CornerForce {
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< [N]
     Symmetric3<Scalar> hessian = {};                  ///< of the energy by the corner, positive semidefinite [N/m]
-    EnergyRemainder<Scalar> remainder{.reach = 0};    ///< bounds the energy beyond the force and Hessian
+    EnergyRemainder<Scalar> remainder{
+        .per_range = std::numeric_limits<Each<Scalar>>::infinity()};  ///< of the energy beyond force and Hessian
 
     /// Adds those of another element at the same vertex.
     MEMBRANE_INLINE CornerForce& operator+=(const CornerForce& other) noexcept {
@@ -193,26 +194,10 @@ consteval bool check_element() noexcept {  // NOLINT(readability-function-size):
 template <class E>
 concept CheckedElement = detail::check_element<E>();
 
-namespace detail {
-
-/// `E<Scalar>` with another scalar.
-template <class E, class N>
-struct WithScalar;
-template <template <class> class E, class Scalar, class N>
-struct WithScalar<E<Scalar>, N> {
-    using Type = E<N>;
-    static constexpr bool is_numbers = std::is_trivially_copyable_v<E<Scalar>>&& std::is_trivially_copyable_v<E<N>> &&
-                                       sizeof(E<Scalar>) / sizeof(Scalar) == sizeof(E<N>) / sizeof(N);
-};
-
-}  // namespace detail
-
-/// Whether an element can be evaluated in lanes, see `Element`: its constants are numbers of one type.
+/// Whether an element can be evaluated in lanes, see `Element`.
 template <class E, class Scalar>
-concept ElementInLanes =
-    requires(const typename detail::WithScalar<E, Lanes<Scalar>>::Type& element,
-             const Corners<Lanes<Scalar>, E::corner_count>& x, std::size_t i) {
-    requires detail::WithScalar<E, Lanes<Scalar>>::is_numbers;
+concept ElementInLanes = StructOfNumbers<E> &&
+    requires(const InLanes<E>& element, const Corners<Lanes<Scalar>, E::corner_count>& x, std::size_t i) {
     { element.force_on(x, i) } -> std::same_as<CornerForce<Lanes<Scalar>>>;
     { element.energy_change(x, i, x[i]) } -> std::same_as<EnergyChange<Lanes<Scalar>>>;
 };

@@ -33,6 +33,47 @@ struct FoundationOptions {
 static_assert(std::is_default_constructible_v<FoundationOptions<float>>);
 static_assert(std::is_default_constructible_v<FoundationOptions<double>>);
 
+/// The spring of one vertex of `FoundationSprings`, for the length of a tick.
+template <Number Scalar>
+struct FoundationSpring {
+    Vector3<Scalar> anchor = Vector3<Scalar>::Zero();  ///< [m]
+    Vector3<Scalar> start = Vector3<Scalar>::Zero();   ///< of the vertex when the tick began [m]
+    Vector3<Scalar> normal = Vector3<Scalar>::Zero();  ///< unit vector
+    Scalar tangential = 0;                             ///< stiffness along the surface [N/m]
+    Scalar excess = 0;                                 ///< of the stiffness along the normal over that [N/m]
+    Scalar rate = 0;                                   ///< recovery time over the length of the tick
+
+    ///@{
+    /// Force and stiffness bound at `position`: without damping, of damping alone, and together.
+    [[nodiscard]] VertexForce<Scalar> elastic_force(const Vector3<Scalar>& position) const noexcept {
+        return {-times(position - anchor), largest() * (1 + rate)};
+    }
+    [[nodiscard]] Vector3<Scalar> damping_force(const Vector3<Scalar>& position) const noexcept {
+        return -times(rate * (position - start));
+    }
+    [[nodiscard]] VertexForce<Scalar> force_on(const Vector3<Scalar>& position) const noexcept {
+        return {-times((position - anchor) + rate * (position - start)), largest() * (1 + rate)};
+    }
+    ///@}
+
+    /// Whether it has damping.
+    [[nodiscard]] bool damps() const noexcept { return any(rate != 0); }
+
+    /// The spring in another frame, by `to_world(point)` and `turned(vector)`.
+    template <class PointToWorld, class VectorToWorld>
+    [[nodiscard]] FoundationSpring moved(const PointToWorld& to_world, const VectorToWorld& turned) const noexcept {
+        return {to_world(anchor), to_world(start), turned(normal), tangential, excess, rate};
+    }
+
+    /// The stiffness K times a displacement [N].
+    [[nodiscard]] Vector3<Scalar> times(const Vector3<Scalar>& displacement) const noexcept {
+        return tangential * displacement + (excess * dot(normal, displacement)) * normal;
+    }
+
+  private:
+    [[nodiscard]] Scalar largest() const noexcept { return larger<Scalar>(tangential + excess, tangential); }
+};
+
 /// For each vertex a spring to its rest position, with one stiffness along the normal n there and one across it:
 /// K = k_t I + (k_n - k_t) n n^T. In a tick of dt its force is -K (u + T (u - u_0) / dt), u the displacement from rest,
 /// u_0 that at the start of the tick, T the recovery time. The damping is T K (Kelvin and Voigt).
@@ -59,13 +100,16 @@ class FoundationSprings {
     [[nodiscard]] Scalar recovery_time(Index v) const noexcept { return constants(v).time; }
     ///@}
 
+    /// The spring of vertex `v`, which was at `start` when the tick of length `dt` [s] began.
+    [[nodiscard]] FoundationSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept {
+        const auto& k = constants(v);
+        return {point(anchors_, v), start, point(normals_, v), k.tangential, k.normal - k.tangential, k.time / dt};
+    }
+
     /// As `FoundationModel` requires.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                                Scalar dt) const noexcept {
-        const auto& k = constants(v);
-        const Scalar rate = k.time / dt;
-        const Vector3<Scalar> displacement = (position - point(anchors_, v)) + rate * (position - start);
-        return {-stiffness_times(v, displacement), (std::max)(k.normal, k.tangential) * (1 + rate)};
+        return spring(v, start, dt).force_on(position);
     }
 
     /// K, the Hessian of the energy, computed in `Number` from constants and normals [N/m].
@@ -81,7 +125,7 @@ class FoundationSprings {
     /// Energy stored in the spring of vertex `v` at `position` [J].
     [[nodiscard]] Scalar energy(Index v, const Vector3<Scalar>& position) const noexcept {
         const Vector3<Scalar> displacement = position - point(anchors_, v);
-        return dot<Scalar>(displacement, stiffness_times(v, displacement)) / 2;
+        return dot<Scalar>(displacement, spring(v, position, 1).times(displacement)) / 2;
     }
 
   private:
@@ -89,13 +133,6 @@ class FoundationSprings {
         Scalar normal, tangential, time;
     };
     [[nodiscard]] const Constants& constants(Index v) const noexcept { return constants_[static_cast<std::size_t>(v)]; }
-
-    /// K `displacement` [N].
-    [[nodiscard]] Vector3<Scalar> stiffness_times(Index v, const Vector3<Scalar>& displacement) const noexcept {
-        const auto& k = constants(v);
-        const Vector3<Scalar> normal = point(normals_, v);
-        return k.tangential * displacement + ((k.normal - k.tangential) * dot(normal, displacement)) * normal;
-    }
 
     Points<Scalar> anchors_, normals_;
     std::vector<Constants> constants_;

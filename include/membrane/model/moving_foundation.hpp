@@ -52,15 +52,12 @@ class MovingFoundation {
     }
 
     /// The spring of vertex `v`, if the model has springs.
-    [[nodiscard]] VolumeSpring<Scalar> spring(Index v, const Vector3<Scalar>& start, Scalar dt) const noexcept requires
-        requires(const Volume& volume) {
-        volume.spring(v, start, dt);
-    }
-    {
+    [[nodiscard]] auto spring(Index v, const Vector3<Scalar>& start,
+                              Scalar dt) const noexcept requires HasSprings<Volume, Scalar> {
         const LocalFrame frame(*body_, v);
-        auto spring = volume_->spring(v, frame.point_to_body(start), dt);
-        spring.anchor = frame.point_to_world(spring.anchor);
-        return spring;
+        return volume_->spring(v, frame.point_to_body(start), dt)
+            .moved([&](const Vector3<Scalar>& place) { return frame.point_to_world(place); },
+                   [&](const Vector3<Scalar>& vector) { return frame.turn.vector_to_world(vector); });
     }
 
     /// The current anchors, if those of the model are those of the body at rest [m].

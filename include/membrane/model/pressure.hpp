@@ -24,8 +24,9 @@ namespace membrane {
 /// if the border is pinned, the loads of all triangles together have an energy, -pressure times volume.
 template <Number Scalar>
 struct PressureLoad {
-    static constexpr std::size_t corner_count = 3;                                      ///< the triangle's
-    static constexpr std::array<std::array<std::size_t, 3>, 3> orders{{{0, 1, 2}, {1, 2, 0}, {2, 0, 1}}};  ///< see `Element`
+    static constexpr std::size_t corner_count = 3;  ///< the triangle's
+    static constexpr std::array<std::array<std::size_t, 3>, 3> orders{
+        {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}}};  ///< see `Element`
 
     Scalar pressure;  ///< [Pa], positive from inside
 

@@ -26,8 +26,8 @@ namespace membrane {
 template <class Springs, class... Kinds>
 class Tissue {
   public:
-    using Scalar = typename Springs::Scalar;       ///< that of the springs
-    static constexpr bool never_stiffens = false;  ///< elements may stiffen: updates need a line search
+    using Scalar = typename Springs::Scalar;                    ///< that of the springs
+    static constexpr bool never_stiffens = false;               ///< elements may stiffen: updates need a line search
     static constexpr bool in_lanes = (Kinds::in_lanes && ...);  ///< whether all elements can be evaluated in lanes
     static constexpr bool bounds_energy =
         Springs::never_stiffens;  ///< `majoriser` bounds the energy up to the reach of its remainder

@@ -23,8 +23,9 @@ namespace membrane {
 /// triangles, for any shape. Like that material it collapses if compressed to less than about 60 %.
 template <Number Scalar>
 struct TriangularSpring {
-    static constexpr std::size_t corner_count = 3;                                      ///< the triangle's
-    static constexpr std::array<std::array<std::size_t, 3>, 3> orders{{{0, 1, 2}, {1, 2, 0}, {2, 0, 1}}};  ///< see `Element`
+    static constexpr std::size_t corner_count = 3;  ///< the triangle's
+    static constexpr std::array<std::array<std::size_t, 3>, 3> orders{
+        {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}}};  ///< see `Element`
 
     Symmetric3<Scalar> stiffness;  ///< K [N/m^3]
     Vector3<Scalar> rest;          ///< L_k^2, edge k is opposite of corner k [m^2]
@@ -123,9 +124,9 @@ CornerForce<N> TriangularSpring<Scalar>::force_on(const Corners<N, 3>& x, std::s
     result.hessian += outer<N>(4 * (along_last - both), last);
     result.hessian += outer<N>(4 * both, next + last);
     result.hessian += diagonal3(larger<N>(to_next + to_last, N(0)));  // compression across the edges is left out
-    // The energy is a polynomial: its terms of third and fourth order.
-    result.remainder = {.third = 2 * norm<N>((along_next + both) * next + (along_last + both) * last),
-                        .fourth = larger<N>((along_next + along_last) / 2 + both, N(0))};
+    // A displacement adds its square to both squared edges.
+    result.remainder.fourth = larger<N>((along_next + along_last) / 2 + both, N(0));
+    result.remainder.per_range = 0;
     return result;
 }
 

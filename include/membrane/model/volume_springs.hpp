@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <membrane/core/field.hpp>
+#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/model/elastic_network.hpp>
@@ -107,6 +108,45 @@ struct VolumeSpring {
         if (any(rate != 0)) sum.force += damping_force(position);
         return sum;
     }
+
+    /// Whether it has damping.
+    [[nodiscard]] bool damps() const noexcept { return any(rate != 0); }
+
+    /// The spring in another frame: `to_world(point)` of its anchor.
+    template <class PointToWorld, class VectorToWorld>
+    [[nodiscard]] VolumeSpring moved(const PointToWorld& to_world, const VectorToWorld&) const noexcept {
+        VolumeSpring there = *this;
+        there.anchor = to_world(anchor);
+        return there;
+    }
+};
+
+/// A model whose force on a vertex is that of a spring with constants for the length of a tick: such as `VolumeSpring`,
+/// with its member functions.
+template <class Volume, class Scalar>
+concept HasSprings = requires(const Volume& volume, const Vector3<Scalar>& start, Scalar dt) {
+    { volume.spring(Index(0), start, dt).force_on(start) } -> std::same_as<VertexForce<Scalar>>;
+    { volume.spring(Index(0), start, dt).damping_force(start) } -> std::same_as<Vector3<Scalar>>;
+    { volume.spring(Index(0), start, dt).damps() } -> std::same_as<bool>;
+};
+
+/// The spring of one vertex.
+template <class Volume, class Scalar>
+    requires HasSprings<Volume, Scalar>
+using SpringOf =
+    std::remove_cvref_t<decltype(std::declval<const Volume&>().spring(Index(0), Vector3<Scalar>(), Scalar(1)))>;
+
+/// Most numbers in a spring for updates of several vertices at once.
+inline constexpr std::size_t max_numbers_in_spring = 12;
+
+/// Whether a solver may update several vertices at once: the spring is a struct of few numbers, and takes `Lanes`.
+template <class Volume, class Scalar>
+concept SpringsInLanes = HasSprings<Volume, Scalar> && StructOfNumbers<SpringOf<Volume, Scalar>> &&
+                             sizeof(SpringOf<Volume, Scalar>) <= max_numbers_in_spring * sizeof(Scalar) &&
+                         requires(const InLanes<SpringOf<Volume, Scalar>>& springs,
+                                  const Vector3<Lanes<Scalar>>& position) {
+    { springs.force_on(position) } -> std::same_as<VertexForce<Lanes<Scalar>>>;
+    { springs.elastic_force(position) } -> std::same_as<VertexForce<Lanes<Scalar>>>;
 };
 
 template <class Volume, Real Scalar>

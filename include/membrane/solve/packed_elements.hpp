@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstring>
 #include <new>
 #include <span>
-#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -36,8 +34,8 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 template <Real Scalar>
 class PackedElements {
   public:
-    using Wide = Lanes<Scalar>;                            ///< a number for each vertex of a pack
-    using Begins = std::array<Index, Wide::count>;         ///< offset of each lane's row
+    using Wide = Lanes<Scalar>;                     ///< a number for each vertex of a pack
+    using Begins = std::array<Index, Wide::count>;  ///< offset of each lane's row
 
     /// Allocates for `capacity` vertices in at most `packs` packs. Nothing for a network without elements.
     template <class Network>
@@ -69,7 +67,7 @@ class PackedElements {
     };
     template <class E>
     struct alignas(32) Slot {
-        typename detail::WithScalar<E, Wide>::Type element;
+        InLanes<E> element;
         std::array<Begins, E::corner_count - 1> others;  // the corners but for the vertex
     };
     template <class E>
@@ -85,7 +83,7 @@ class PackedElements {
         return static_cast<std::size_t>(std::count_if(at_vertex.begin(), at_vertex.end(), is_there));
     }
     template <class E>
-    void set_lane(Slot<E>& slot, std::size_t lane, const typename Elements<Scalar, E>::AtVertex& at) noexcept;
+    void fill_lane(Slot<E>& slot, std::size_t lane, const typename Elements<Scalar, E>::AtVertex& at) noexcept;
     template <class E>
     [[nodiscard]] Slot<E>& slot_at(std::size_t block) noexcept {
         return *std::launder(reinterpret_cast<Slot<E>*>(&blocks_[block]));
@@ -96,8 +94,8 @@ class PackedElements {
     }
 
     std::size_t group_count_ = 0;
-    std::vector<Index> counts_;          // slots of each pack and group
-    FixedVector<std::size_t> begins_;    // first block of each pack
+    std::vector<Index> counts_;        // slots of each pack and group
+    FixedVector<std::size_t> begins_;  // first block of each pack
     std::size_t block_count_ = 0;
     std::vector<Block> blocks_;
 };
@@ -116,7 +114,8 @@ MEMBRANE_INLINE void PackedElements<Scalar>::for_each_group([[maybe_unused]] con
             };
             [&]<std::size_t... place>(std::index_sequence<place...>) MEMBRANE_INLINE_LAMBDA {
                 (if_used(std::integral_constant<std::size_t, place>()), ...);
-            }(std::make_index_sequence<E::corner_count>());
+            }
+            (std::make_index_sequence<E::corner_count>());
         });
     }
 }
@@ -164,7 +163,7 @@ bool PackedElements<Scalar>::append(std::span<const Index> vertices, const Begin
             std::size_t block = first;
             for (const auto& at : elements.at(vertices[lane])) {
                 if (at.place != place) continue;
-                set_lane(slot_at<E>(block), lane, at);
+                fill_lane(slot_at<E>(block), lane, at);
                 block += blocks<E>;
             }
         }
@@ -175,14 +174,9 @@ bool PackedElements<Scalar>::append(std::span<const Index> vertices, const Begin
 
 template <Real Scalar>
 template <class E>
-void PackedElements<Scalar>::set_lane(Slot<E>& slot, std::size_t lane,
-                                      const typename Elements<Scalar, E>::AtVertex& at) noexcept {
-    constexpr std::size_t numbers = sizeof(E) / sizeof(Scalar);
-    const auto* const from = reinterpret_cast<const std::byte*>(&at.instance.element);
-    auto* const to = reinterpret_cast<std::byte*>(&slot.element) + lane * sizeof(Scalar);
-    for (std::size_t k = 0; k < numbers; ++k) {
-        std::memcpy(to + k * sizeof(Wide), from + k * sizeof(Scalar), sizeof(Scalar));
-    }
+void PackedElements<Scalar>::fill_lane(Slot<E>& slot, std::size_t lane,
+                                       const typename Elements<Scalar, E>::AtVertex& at) noexcept {
+    membrane::set_lane(slot.element, lane, at.instance.element);
     for (std::size_t k = 0, other = 0; k < E::corner_count; ++k) {
         if (k != at.place) slot.others[other++][lane] = numbers_in_point * at.instance.corners[k];
     }
@@ -193,19 +187,20 @@ template <class Network, class Act>
 MEMBRANE_INLINE void PackedElements<Scalar>::for_each(std::size_t p, const Vector3<Wide>& here,
                                                       const PaddedPoint<Scalar>* rows, const Network& network,
                                                       const Act& act) const noexcept {
+    if constexpr (!HasElements<Network>) return;
     std::size_t block = begins_[p];
-    for_each_group(network, [&]<class E>(const Elements<Scalar, E>&, auto place, std::size_t group)
-                                MEMBRANE_INLINE_LAMBDA {
-        for (Index n = counts_[p * group_count_ + group]; n > 0; --n) {
-            const Slot<E>& slot = slot_at<E>(block);
-            Corners<Wide, E::corner_count> x;
-            for (std::size_t k = 0; k < E::corner_count; ++k) {
-                x[k] = k == place ? here : gather(rows, slot.others[k - (k > place)].data());
-            }
-            act(slot.element, x, place);
-            block += blocks<E>;
-        }
-    });
+    for_each_group(network,
+                   [&]<class E>(const Elements<Scalar, E>&, auto place, std::size_t group) MEMBRANE_INLINE_LAMBDA {
+                       for (Index n = counts_[p * group_count_ + group]; n > 0; --n) {
+                           const Slot<E>& slot = slot_at<E>(block);
+                           Corners<Wide, E::corner_count> x;
+                           for (std::size_t k = 0; k < E::corner_count; ++k) {
+                               x[k] = k == place ? here : gather(rows, slot.others[k - (k > place)].data());
+                           }
+                           act(slot.element, x, place);
+                           block += blocks<E>;
+                       }
+                   });
 }
 
 }  // namespace membrane

@@ -5,7 +5,11 @@
 #include <array>
 #include <concepts>
 #include <cstddef>
+#include <limits>
+#include <new>
 #include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/executor.hpp>
@@ -42,15 +46,11 @@ template <class Rule, class Network>
 /// foundation is `NoFoundation` or has `spring`. Springs need no line search.
 template <class Scalar, class Rule, class Network, class Volume>
 concept UpdatesInLanes = detail::energy_allows_lanes<Rule, Network>() &&
-                         requires(const Rule& rule, const Network& network,
-                                                            const SpringState<Lanes<Scalar>>& spring,
-                                                            const VertexState<Lanes<Scalar>>& vertex) {
+    requires(const Rule& rule, const Network& network, const SpringState<Lanes<Scalar>>& spring,
+             const VertexState<Lanes<Scalar>>& vertex) {
     network.law()(spring);
     rule.compliance(vertex);
-}
-&&(std::same_as<Volume, NoFoundation> || requires(const Volume& volume, const Vector3<Scalar>& start, Scalar dt) {
-    { volume.spring(Index(0), start, dt) } -> std::same_as<VolumeSpring<Scalar>>;
-});
+} &&(std::same_as<Volume, NoFoundation> || SpringsInLanes<Volume, Scalar>);
 
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
@@ -163,7 +163,7 @@ class PackedVertices {
         Begins other;
     };
     struct alignas(32) Terms {
-        VolumeSpring<Wide> spring;
+        std::array<std::byte, max_numbers_in_spring * sizeof(Wide)> spring;  // of the foundation, see `spring_of`
         Wide mass = 1;
         Wide free = 0;  // 1 for a free vertex
         Index free_count = 0;
@@ -173,6 +173,16 @@ class PackedVertices {
         std::size_t members = 0, packs = 0, slots = 0, needed = 0;
     };
 
+    template <class Scene>
+    using VolumeOf = std::remove_cvref_t<decltype(std::declval<const Scene&>().volume)>;
+    template <class Scene>
+    [[nodiscard]] static auto& spring_of(Terms& terms) noexcept {
+        return *std::launder(reinterpret_cast<InLanes<SpringOf<VolumeOf<Scene>, Scalar>>*>(&terms.spring));
+    }
+    template <class Scene>
+    [[nodiscard]] static const auto& spring_of(const Terms& terms) noexcept {
+        return *std::launder(reinterpret_cast<const InLanes<SpringOf<VolumeOf<Scene>, Scalar>>*>(&terms.spring));
+    }
     template <class Scene>
     using NetworkOf = std::remove_cvref_t<decltype(std::declval<const Scene&>().network)>;
 
@@ -337,6 +347,9 @@ template <class Scene>
 void PackedVertices<Scalar>::begin_step(const Scene& scene) noexcept {
     for (std::size_t p = 0; p < count(); ++p) {
         Terms& terms = terms_[p] = {};
+        if constexpr (HasSprings<VolumeOf<Scene>, Scalar>) {
+            new (&terms.spring) InLanes<SpringOf<VolumeOf<Scene>, Scalar>>();
+        }
         const auto members = vertices(p);
         for (std::size_t i = 0; i < members.size(); ++i) {
             const Index v = members[i];
@@ -345,13 +358,10 @@ void PackedVertices<Scalar>::begin_step(const Scene& scene) noexcept {
                 ++terms.free_count;
             }
             if (scene.network.has_masses()) terms.mass.set(i, scene.network.mass(v));
-            if constexpr (requires { scene.volume.spring(v, point(scene.start, v), scene.dt); }) {
+            if constexpr (HasSprings<VolumeOf<Scene>, Scalar>) {
                 const auto spring = scene.volume.spring(v, point(scene.start, v), scene.dt);
-                for (Eigen::Index k = 0; k < 3; ++k) terms.spring.anchor[k].set(i, spring.anchor[k]);
-                terms.spring.stiffness.set(i, spring.stiffness);
-                terms.spring.rate.set(i, spring.rate);
-                terms.damps = terms.damps || spring.rate != 0;
-                terms.spring.before.set(i, spring.before);
+                terms.damps = terms.damps || spring.damps();
+                set_lane(spring_of<Scene>(terms), i, spring);
             }
         }
     }
@@ -397,10 +407,11 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::spring_state(std::size_t p, const V
 // Adds the volume springs to `others`, which has the forces of constraints.
 template <Real Scalar>
 template <bool in_contact, class Scene>
-MEMBRANE_INLINE void PackedVertices<Scalar>::add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene,
+MEMBRANE_INLINE void PackedVertices<Scalar>::add_others(std::size_t p, const Vector3<Wide>& here,
+                                                        [[maybe_unused]] const Scene& scene,
                                                         VertexForce<Wide>& others) const noexcept {
-    if constexpr (!std::same_as<std::remove_cvref_t<decltype(scene.volume)>, NoFoundation>) {
-        const auto& spring = terms_[p].spring;
+    if constexpr (HasSprings<VolumeOf<Scene>, Scalar>) {
+        const auto& spring = spring_of<Scene>(terms_[p]);
         const auto foundation = terms_[p].damps ? spring.force_on(here) : spring.elastic_force(here);
         others.force = in_contact ? Vector3<Wide>(foundation.force + others.force) : foundation.force;
         others.stiffness = in_contact ? Wide(foundation.stiffness + others.stiffness) : foundation.stiffness;
@@ -552,7 +563,9 @@ MEMBRANE_FLATTEN void PackedVertices<Scalar>::evaluate_residual(std::size_t p, c
     add_others<true>(p, here, scene, others);
     const Vector3<Wide> force = springs.force + others.force;
     Vector3<Wide> undamped = force;
-    if (terms_[p].damps) undamped -= terms_[p].spring.damping_force(here);
+    if constexpr (HasSprings<VolumeOf<Scene>, Scalar>) {
+        if (terms_[p].damps) undamped -= spring_of<Scene>(terms_[p]).damping_force(here);
+    }
     scatter_padded<Scalar>({force, norm(undamped)}, rows.residual.data(), own.data());
 }
 

@@ -101,9 +101,9 @@ template <class Scalar, class Network, class Volume>
 [[nodiscard]] Vector3<Scalar> undamped_force(const StepInput<Scalar, Network, Volume>& scene, Index v,
                                              const Vector3<Scalar>& now) noexcept {
     const Vector3<Scalar> here = point(scene.x, v), start = point(scene.start, v);
-    if constexpr (requires { scene.volume.spring(v, start, scene.dt); }) {
+    if constexpr (HasSprings<Volume, Scalar>) {
         const auto spring = scene.volume.spring(v, start, scene.dt);
-        return spring.rate == 0 ? now : Vector3<Scalar>(now - spring.damping_force(here));
+        return spring.damps() ? Vector3<Scalar>(now - spring.damping_force(here)) : now;
     } else {
         const Vector3<Scalar> still = scene.volume.force_on(v, here, here, scene.dt).force;
         const Vector3<Scalar> moving = scene.volume.force_on(v, here, start, scene.dt).force;
@@ -158,10 +158,10 @@ inline constexpr bool has_energy_bound = requires {
 template <Number N>
 [[nodiscard]] MEMBRANE_INLINE auto surely_descends(const VertexState<N>& vertex,
                                                    const Vector3<N>& displacement) noexcept {
-    const N size = norm(displacement), part = 1 / (1 + size / vertex.size);
+    const N square = squared_norm(displacement), part = 1 / (1 + root_of<N>(square) / vertex.size);
     const N reduction = part * dot<N>(displacement, vertex.stiffness_reduction * displacement);
-    const N work = dot<N>(vertex.force, displacement) - (vertex.stiffness * (size * size) - reduction) / 2;
-    return (size <= vertex.remainder.reach) & (vertex.remainder.at(size) <= work);
+    const N quadratic = larger<N>((vertex.stiffness * square - reduction) / 2, 0);
+    return vertex.remainder.at(square, quadratic) <= dot<N>(vertex.force, displacement) - quadratic;
 }
 
 /// Backtracking line search, where an update needs one: halves the displacement until the energy does not rise, up to
