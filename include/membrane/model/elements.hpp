@@ -58,7 +58,7 @@ using Corners = std::array<Vector3<Scalar>, count>;
 /// approximation with which Newton's method still converges.
 ///
 /// Optional, for speed, and satisfied by the elements of this library:
-/// - `CornerForce::remainder`: with it most updates need no look at the energy.
+/// - `CornerForce::remainder`: with it most updates need no evaluation of the energy.
 /// - `E` is `E<Scalar>`, its members are `Scalar`s, and it takes `Lanes` as constants and as positions: several elements
 ///   of one kind at once, each with the same bits as alone.
 /// - `E::orders` and `in_order(i)`: in the order `orders[i]` of the corners, with the constants `in_order(i)`, the element

@@ -30,7 +30,7 @@ class Tissue {
     static constexpr bool never_stiffens = false;               ///< elements may stiffen: updates need a line search
     static constexpr bool in_lanes = (Kinds::in_lanes && ...);  ///< whether all elements can be evaluated in lanes
     static constexpr bool bounds_energy =
-        Springs::never_stiffens;  ///< `majoriser` bounds the energy up to the reach of its remainder
+        Springs::never_stiffens;  ///< `majoriser` bounds the energy as far as its remainder is known
 
     /// Keeps copies. @throws InvalidInput for elements of another mesh than the springs'. Linear.
     explicit Tissue(const Springs& springs, const Kinds&... kinds);
