@@ -33,7 +33,7 @@ struct InvariantChange {
     Scalar size = 0;    ///< of the summed terms: times epsilon, the rounding error [1]
 };
 
-/// Energy of an element as a function of an invariant of the strain.
+/// Energy of an element as a function of its strain: I1 - 3, or another invariant that is 0 at rest.
 template <Number Scalar>
 struct StrainResponse {
     Scalar energy = 0;     ///< 0 at rest [J]
@@ -87,7 +87,8 @@ struct IncompressibleTriangle {
     template <Number N>
     [[nodiscard]] N invariant_dilation(const Corners<N, 3>& x) const noexcept;
 
-    /// Mean tension [N/m] from the derivative of the energy by s if all lengths grow by 1 + s [J]; zero without area.
+    /// Mean tension [N/m] from the derivative of the energy by s if all lengths grow by 1 + s [J]; zero if less than
+    /// 1e-4 of the area is left.
     template <Number N>
     [[nodiscard]] N mean_tension(const Corners<N, 3>& x, const N& work) const noexcept;
 };
@@ -123,6 +124,8 @@ template <Number N>
 template <Number N>
 class InverseSquare {
   public:
+    static constexpr Each<N> largest = 3 / static_cast<Each<N>>(IncompressibleTriangle<double>::min_area_ratio *
+                                                                IncompressibleTriangle<double>::min_area_ratio);
     explicit InverseSquare(const N& s) noexcept : parts_(parts_of<N>(s - start)), s_(larger<N>(s, start)) {}
 
     [[nodiscard]] N value() const noexcept { return 1 / s_ + polynomial(steep * parts_.below - 1, parts_.below); }
@@ -253,8 +256,11 @@ InvariantChange<N> IncompressibleTriangle<Scalar>::invariant_change(const Corner
     const detail::InverseSquare<N> inverse(squared_norm(normal)), there(squared_norm(after));
     const N of_lengths = 2 * dot(displacement, by) + curved;
     const N of_area = inverse.change(2 * dot(normal, turn) + turned, squared_norm(after));
+    // 1 / J^2 has a largest value, and so has its rounding error.
+    constexpr Each<N> most = detail::InverseSquare<Each<N>>::largest / std::numeric_limits<Each<N>>::epsilon();
     const N steep = -(inverse.slope() + there.slope());
-    const N size = 2 * norm(displacement) * norm(by) + curved + steep * (2 * norm(normal) * norm(turn) + turned);
+    const N area_size = smaller<N>(steep * (2 * norm(normal) * norm(turn) + turned), most);
+    const N size = 2 * norm(displacement) * norm(by) + curved + area_size;
     return {of_lengths + of_area, size};
 }
 
@@ -291,7 +297,8 @@ template <Number Scalar>
 template <Number N>
 N IncompressibleTriangle<Scalar>::mean_tension(const Corners<N, 3>& x, const N& work) const noexcept {
     const N twice_area = norm<N>(cross<N>(x[1] - x[0], x[2] - x[0]));
-    return select<N>(twice_area > 0, work / select<N>(twice_area > 0, twice_area, 1), 0);
+    const auto has_area = twice_area * static_cast<N>(along * across) > N(Each<N>(1e-4));
+    return select<N>(has_area, work / select<N>(has_area, twice_area, 1), 0);
 }
 
 }  // namespace membrane
