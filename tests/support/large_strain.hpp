@@ -265,11 +265,11 @@ membrane::IncompressibleTriangle<membrane::Lanes<double>> rest_shapes(
             side_by_side(all, [](const E& e) { return e.rest.across; })};
 }
 
-/// A sheet clamped at its left edge as deep as it is wide under the loads of `stress` on all edges comes to equilibrium
+/// A square sheet, clamped at its left edge, under the loads of `stress` on all edges comes to equilibrium
 /// in the shape of `deformation`, if `stress` belongs to it.
-template <class Kind>
-void check_equilibrium(const membrane::TriangleMesh<double>& mesh, const Kind& elements,
-                       const Eigen::Matrix2d& deformation, const Eigen::Matrix2d& stress, Random& random) {
+template <class... Kinds>
+void check_equilibrium(const membrane::TriangleMesh<double>& mesh, const Eigen::Matrix2d& deformation,
+                       const Eigen::Matrix2d& stress, Random& random, const Kinds&... elements) {
     std::vector<membrane::Index> clamped;
     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) {
         if (mesh.positions()(0, v) < -0.5 + 1e-9) clamped.push_back(v);
@@ -295,7 +295,7 @@ void check_equilibrium(const membrane::TriangleMesh<double>& mesh, const Kind& e
     using Loads = membrane::Elements<double, membrane::DeadLoad<double>>;
     std::vector<Loads::Instance> all;
     for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) all.push_back({{v}, {loads.col(v)}});
-    const auto tissue = membrane::Tissue(springs, elements, Loads(mesh, all));
+    const auto tissue = membrane::Tissue(springs, elements..., Loads(mesh, all));
     const membrane::Points<double> expected = deformed(mesh, deformation);
     membrane::Points<double> x = jittered(expected, 0.02, random);
     for (const membrane::Index v : clamped) x.col(v) = expected.col(v);

@@ -173,6 +173,11 @@ template <Number N>
     return a[0] * f[0] + a[1] * f[1];
 }
 
+template <Number N, Number Scalar>
+[[nodiscard]] std::array<N, 2> converted(const std::array<Scalar, 2>& a) noexcept {
+    return {static_cast<N>(a[0]), static_cast<N>(a[1])};
+}
+
 /// Force and Hessian of an energy of one invariant.
 template <Number N>
 [[nodiscard]] CornerForce<N> corner_force(const StrainResponse<N>& energy, const InvariantSlope<N>& strain) noexcept {
