@@ -55,17 +55,6 @@ double energy_density(const Material& material, const Eigen::Matrix2d& deformati
     return sheet / (2 * (1 - nu * nu)) * (nu * trace * trace + (1 - nu) * (strain * strain).trace());
 }
 
-/// An irregular flat sheet of the unit square, inner vertices moved by up to 0.3 of a square.
-TriangleMesh<double> irregular_sheet(Index squares, Random& random) {
-    auto surface = test::surface_of(sheet({.width = 1, .height = 1, .columns = squares, .rows = squares}));
-    const double side = 1.0 / squares;
-    for (Index v = 0; v < surface.vertex_count(); ++v) {
-        const bool inside = surface.x.col(v).head<2>().cwiseAbs().maxCoeff() < 0.5 - side / 2;
-        if (inside) surface.x.col(v).head<2>() += 0.3 * side * random.vector(-1.0, 1.0).eigen().head<2>();
-    }
-    return surface.mesh();
-}
-
 template <class Each>
 double energy_of(const Elements<double, Each>& elements, const Points<double>& x) {
     double sum = 0;
@@ -145,7 +134,7 @@ TEST_CASE("a patch of any triangles has the stress of the continuum", "[triangul
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        check_patch(irregular_sheet(2 + random.index(6), random), random);
+        check_patch(test::irregular_sheet(2 + random.index(6), random), random);
     }
 }
 
@@ -177,7 +166,7 @@ TEST_CASE("the error of a stretch that varies falls with the square of the trian
     double coarse = 0;
     Random random(1);
     for (const Index squares : {8, 16, 32}) {
-        const auto mesh = irregular_sheet(squares, random);
+        const auto mesh = test::irregular_sheet(squares, random);
         Points<double> x = mesh.positions();
         for (Index v = 0; v < mesh.vertex_count(); ++v) x.col(v).head<2>() += displacement(x(0, v), x(1, v));
         const double error = std::abs(energy_of(triangular_springs(mesh, material), x) / exact - 1);

@@ -101,6 +101,17 @@ Surface<Scalar> fan(membrane::Index triangles) {
     return surface;
 }
 
+/// An irregular flat sheet of the unit square, inner vertices moved by up to 0.3 of a square.
+inline membrane::TriangleMesh<double> irregular_sheet(membrane::Index squares, Random& random) {
+    auto surface = surface_of(membrane::sheet({.width = 1, .height = 1, .columns = squares, .rows = squares}));
+    const double side = 1.0 / squares;
+    for (membrane::Index v = 0; v < surface.vertex_count(); ++v) {
+        const bool inside = surface.x.col(v).head<2>().cwiseAbs().maxCoeff() < 0.5 - side / 2;
+        if (inside) surface.x.col(v).head<2>() += 0.3 * side * random.vector(-1.0, 1.0).eigen().head<2>();
+    }
+    return surface.mesh();
+}
+
 /// A closed surface: an icosphere of 12 to 162 vertices, jittered, turned, moved, shuffled, 1 mm to 10 m large.
 template <membrane::Real Scalar>
 Surface<Scalar> random_closed_surface(Random& random) {
