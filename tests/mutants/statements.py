@@ -109,7 +109,7 @@ def either(test, old, new):
     if control:
         same = old[:control.end()]
         rest = either(test, old[control.end():], new[control.end():]) if new.startswith(same) else None
-        return rest and same + rest
+        return None if rest is None else same + rest
     control = re.match(r"\s*(if|while|for|switch) \(", old)
     if control:
         return either_control(test, old, new, control)
@@ -124,24 +124,26 @@ def either_control(test, old, new, control):
     inside, changed = old[begin:old_end], new[begin:new_end]
     if inside == changed:
         rest = either(test, old[old_end + 1:], new[new_end + 1:])
-        return rest and old[:old_end + 1] + " " + rest
+        return None if rest is None else f"{old[:old_end + 1]} {rest}"
     if control[1] == "for":
         inside = either_loop(test, inside, changed)
     elif control[1] == "switch" or ";" in inside or re.match(r"\s*(const|auto)\b", inside):
         return None
     else:
         inside = f"{test} ? bool({changed}) : bool({inside})"
-    return inside and old[:begin] + inside + old[old_end:]
+    return None if inside is None else old[:begin] + inside + old[old_end:]
 
 
 def either_loop(test, old, new):
     old, new = parts(old, ";"), parts(new, ";")
     if len(old) != 3 or len(new) != 3:
         return None
-    first = old[0] if old[0] == new[0] else (either_simple(test, old[0], new[0]) or "").rstrip(";")
+    first = old[0] + ";" if old[0] == new[0] else either_simple(test, old[0], new[0])
+    if first is None:
+        return None
     condition = old[1] if old[1] == new[1] else f"{test} ? bool({new[1]}) : bool({old[1]})"
     step = old[2] if old[2] == new[2] else f"({test} ? void({new[2]}) : void({old[2]}))"
-    return first and f"{first}; {condition}; {step}"
+    return f"{first.rstrip(';')}; {condition}; {step}"
 
 
 def either_simple(test, old, new):
