@@ -9,6 +9,7 @@ import concurrent.futures
 import hashlib
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -148,7 +149,7 @@ def chosen(arguments):
     """Each mutant in an order of its own, by the seed, wherever in its header it is."""
     paths = sorted(headers.glob(f"{arguments.folder}/*.hpp"))
     found = {m.key: m for path in paths if str(path.relative_to(headers)) not in left_out for m in mutants_of(path)}
-    found = [m for m in found.values() if arguments.only in f"{m.name} {m.before} -> {m.after}"]
+    found = [m for m in found.values() if any(text in f"{m.name} {m.before} -> {m.after}" for text in arguments.only)]
     return sorted(found, key=lambda m: hashlib.sha256(f"{arguments.seed} {m.key}".encode()).digest())
 
 
@@ -198,6 +199,7 @@ def sample(arguments):
 def write_headers(numbered, place):
     """The headers with all mutants, on the lines of the original; returns which mutants are on which lines."""
     lines = {}
+    shutil.rmtree(place / "include", ignore_errors=True)  # a header may have lost its last one
     for header in {mutant.header for mutant in numbered.values()}:
         source = source_of(header)
         text = source.plain
@@ -373,7 +375,7 @@ def main():
     parser.add_argument("folder", nargs="?", default="*")
     parser.add_argument("--count", type=int, default=600)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", default="")
+    parser.add_argument("--only", nargs="+", default=[""])
     parser.add_argument("--own", action="store_true")
     parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)))
     parser.add_argument("--list", action="store_true")
