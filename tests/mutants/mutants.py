@@ -27,6 +27,7 @@ scratch = root / "build/mutants"
 
 # As many cases as without asserts, and yet an index out of range ends the program.
 flags = ["-std=c++20", "-O1", "-DNDEBUG", "-ffp-contract=off", "-w", "-D_GLIBCXX_ASSERTIONS",
+         "-fsanitize=array-bounds", "-fsanitize-trap=array-bounds",
          "-Deigen_assert(holds)=((holds) ? void() : __builtin_trap())"]
 includes = [f"-I{root}/include", f"-I{tests}", f"-I{root}/examples", f"-I{tests}/support/hd_double",
             "-isystem", "/usr/include/eigen3", f'-DMEMBRANE_TEST_DATA="{tests}/data"']
@@ -114,7 +115,7 @@ def changed(code, previous):
                 yield match.start(), match.end(), new
     for match in number.finditer(code):
         is_whole = match[0].isdigit()
-        yield match.start(), match.end(), str(int(match[0]) + 1) if is_whole else f"{2 * float(match[0]):g}"
+        yield match.start(), match.end(), str(int(match[0]) + 1) if is_whole else f"{2 * float(match[0]) or 1.0:g}"
     for match in re.finditer(r"(?<=[(\s])!(?=[\w(])", code):
         yield match.start(), match.end(), ""
     for match in re.finditer(r"\b(if|while) \(", code):
