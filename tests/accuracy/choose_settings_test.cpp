@@ -319,6 +319,26 @@ TEST_CASE("of all settings the cheapest that keeps the error, the most accurate 
     CHECK(all_tried <= 64 * cases(200));
 }
 
+TEST_CASE("layers that no tool reaches are not tried") {
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const KnownOutcomes known(random);
+        const Index all_layers = 1 + random.index(6);
+        Index most = unlimited;  // of a trial
+        const auto attempt = [&](SolverOptions<double> options) {
+            CHECK(options.layers <= most);
+            if (options.layers > all_layers) {  // then the next of the grid
+                const auto grid = GridSearchOptions<double>{}.layers;
+                most = *std::lower_bound(grid.begin(), grid.end(), all_layers);
+            }
+            options.layers = std::min(options.layers, all_layers);
+            return known.of(options);
+        };
+        static_cast<void>(choose_settings(GridSearchOptions<double>{}, {.time = 1e-4}, attempt));
+    }
+}
+
 TEST_CASE("what is chosen is what the solver then does, in any tick") {
     const SmallScene scene;
     const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke());

@@ -140,6 +140,34 @@ TEST_CASE("bounds are those of another unit of length, roundings too", "[error_b
     CHECK(working > 0);
 }
 
+TEST_CASE("where a tool is smaller or larger, its forces work across what is between it and the surface",
+          "[error_bound]") {
+    int found = 0;
+    for (int seed = 1; seed <= cases(40) + 8; ++seed) {
+        CAPTURE(seed);
+        Pressed membrane(static_cast<std::uint64_t>(seed), 2, 1.0);
+        membrane.press_somewhere(0.1);
+        Handed bounds(membrane);
+        if (!bounds.rest.converged) continue;
+        double multipliers = 0;
+        for (const auto& contact : bounds.rest.contacts) multipliers += contact.multiplier;
+        for (const double part : {-1e-3, 1e-3}) {
+            CAPTURE(part);
+            std::vector<ScenePress> tools(bounds.scene.tools().begin(), bounds.scene.tools().end());
+            const double growth = part * tools[0].tool.radius;
+            tools[0].tool.radius += growth;
+            bounds.places.assign(bounds.problem, membrane.mesh.triangles(), bounds.rest.x, tools, bounds.rest.contacts);
+            if (!bounds.bound_softening(20 * std::abs(growth))) continue;
+            ++found;
+            CHECK(bounds.places.penetration() == Approx(std::max(growth, 0.0)).epsilon(1e-4).margin(1e-15));
+            if (part < 0) CHECK(bounds.places.work() == Approx(-growth * multipliers).epsilon(1e-4));
+            CHECK(bounds.places.work() >= (1 - 1e-4) * std::abs(growth) * multipliers);
+            CHECK(bounds.places.max_radius() < tools[0].tool.radius);  // farther on, a vertex may be across the axis
+        }
+    }
+    CHECK(found >= cases(40));
+}
+
 TEST_CASE("pressures balance the membrane, and are borne near the tool only", "[error_bound]") {
     int found = 0;
     for (int seed = 1; seed <= cases(40); ++seed) {
@@ -305,6 +333,9 @@ TEST_CASE("where tools touch what is held, one another's vertices or nothing at 
     // Without tools it is the same bound as online, only found from where the equilibrium is known.
     const auto alone = equilibrium(membrane.x, membrane.mesh, membrane.network, membrane.foundation, {});
     const auto offline = of(alone);
+    CHECK(of(rest, pressing).certified());
     const auto online = bound.compute(membrane.x, membrane.network, membrane.foundation);
     CHECK(offline.certified() == online.certified());
+    CHECK(online.estimate ==
+          ErrorBound(membrane.network).compute(membrane.x, membrane.network, membrane.foundation).estimate);
 }

@@ -69,7 +69,8 @@ TEST_CASE("rounding of forces stays below what is said of it", "[equilibrium_pro
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
         Scene scene(random);
-        REQUIRE(scene.assign() == ProblemStatus::valid);
+        const Vector3<double> heavy = 1e6 * random.vector<double>();
+        REQUIRE(scene.assign(load({5, 6, 7}, {1, 0, 0}, heavy)) == ProblemStatus::valid);
         const Points<double> y = test::jittered(scene.x, 0.1, random);
         Points<double> force = y;
         std::vector<double> magnitude(static_cast<std::size_t>(y.cols()));
@@ -82,6 +83,7 @@ TEST_CASE("rounding of forces stays below what is said of it", "[equilibrium_pro
                 const Long edge = y.col(end.other).cast<long double>() - here;
                 sum += end.stiffness * (1 - end.rest_length / edge.norm()) * edge;
             }
+            if (v == 5) sum += heavy.eigen().cast<long double>();
             const auto off = static_cast<double>((sum - force.col(v).cast<long double>()).norm());
             CHECK(off <= scene.problem.rounding() * magnitude[static_cast<std::size_t>(v)]);
         }

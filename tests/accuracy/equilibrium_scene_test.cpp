@@ -43,13 +43,16 @@ Contact<double> contact_above() {
     return contact;
 }
 
-/// A constraint of one's own.
+/// A constraint of one's own, with a term of each kind.
 struct Clamp {
     Index first, second;
 };
 void describe(const Clamp& clamp, EquilibriumScene& scene) {
     scene.prescribe(clamp.first);
     scene.prescribe(clamp.second, target);
+    scene.prescribe(corners, middle, target);
+    scene.load(corners, middle, -target);
+    scene.press({}, contact_above());
 }
 static_assert(StaticConstraint<Clamp> && !StaticConstraint<int>);
 
@@ -95,6 +98,9 @@ TEST_CASE("held and loaded points, and constraints of one's own", "[equilibrium_
     const auto own = scene_of(Clamp{0, 1});
     CHECK((own.fixed(0) && own.fixed(1)));
     CHECK(own.goals(1).targets.col(1) == target);
+    CHECK(own.goals(1).attached_points == std::vector{target});
+    CHECK((own.goals(1).loads.rowwise().sum() + target).norm() < 1e-15);
+    CHECK(own.goals(1).tools.size() == 1);
 }
 
 TEST_CASE("a tool that presses, and its exit displacement", "[equilibrium_scene]") {

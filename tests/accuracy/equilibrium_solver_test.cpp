@@ -32,6 +32,11 @@ struct Search {
 
 }  // namespace
 
+TEST_CASE("the mean side of an icosahedron is its edge", "[equilibrium_solver]") {
+    const auto mesh = icosphere<double>({.radius = 1, .subdivisions = 0});
+    CHECK(detail::mean_side(mesh.positions(), mesh.triangles()) == Approx(4 / std::sqrt(10 + 2 * std::sqrt(5.0))));
+}
+
 TEST_CASE("the search converges quadratically", "[equilibrium_solver]") {
     const Search search;
     std::vector<double> residuals;

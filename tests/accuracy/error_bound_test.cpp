@@ -458,8 +458,9 @@ TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
           BoundStatus::unsupported);
     CHECK(status(x, PointAttachment<double>{}) == BoundStatus::certified);
 
-    const auto free = sphere.quick.compute(x, sphere.network, NoFoundation{});
+    const auto free = sphere.quick.compute(x, sphere.network, NoFoundation{}, load({0, 1, 2}, {1, 0, 0}, here));
     CHECK(free.status == BoundStatus::not_convex);  // it may drift
+    CHECK((free.reactions[0].centre == -here && free.reactions[0].radius == 0));
 
     Contact<double> contact;
     CHECK(status(x, press(Tool<double>{}, contact)) == BoundStatus::certified);
@@ -473,6 +474,31 @@ TEST_CASE("what no bound is known for is said, and why", "[error_bound]") {
     CHECK_FALSE(far.certified());
     CHECK(far.cg_iterations == 1);
     CHECK_THROWS_AS(ErrorBound(sphere.network, {.cg_iterations = 0}), InvalidInput);
+}
+
+TEMPLATE_TEST_CASE("a bound is the same in all units of length and stiffness", "[error_bound]", BlockConvexity,
+                   FactoredConvexity) {
+    const Sphere sphere(1);
+    test::Random random(1);
+    const Points<double> x = test::jittered(sphere.mesh.positions(), 1e-4, random);
+    const Vector3<double> target = 1.01 * point(x, 5), force = 1e-3 * random.vector();
+    const auto compute = [&](double length, double stiffness) {
+        const TriangleMesh<double> mesh(length * sphere.mesh.positions(), sphere.mesh.triangles());
+        const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = stiffness, .pinned = {7}});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = stiffness});
+        ErrorBound<TestType> bound(network);
+        const auto error = bound.compute(length * x, network, foundation, pull(5, length * target),
+                                         load({20, 21, 22}, {0.5, 0.2, 0.3}, length * stiffness * force));
+        const auto at_rest = bound.compute(mesh.positions(), network, foundation);
+        REQUIRE((error.certified() && at_rest.certified()));
+        return std::array{error.position / length, error.convexity / stiffness, at_rest.position / length,
+                          error.reactions[0].radius / (length * stiffness)};
+    };
+    const auto expected = compute(1, 1);
+    for (const double unit : {0x1p-20, 0x1p20}) {  // exact
+        CHECK(compute(unit, 1) == expected);
+        CHECK(compute(1, unit) == expected);
+    }
 }
 
 TEST_CASE("a bound remembers nothing, and its copies are their own", "[error_bound]") {

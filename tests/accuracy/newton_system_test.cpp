@@ -52,15 +52,19 @@ struct Problem {
         }
     }
 
-    NewtonStep solve() const {
+    /// With forces in another unit.
+    NewtonStep solve(double unit = 1) const {
         NewtonSystem system(fixed);
         system.open(prescribed);
         for (Index i = 0; i < 6; ++i) {
-            for (Index j = 0; j <= i; ++j) system.add(i, j, H.block<3, 3>(3 * i, 3 * j));
-            system.add_force(i, F.segment<3>(3 * i));
+            for (Index j = 0; j <= i; ++j) system.add(i, j, unit * H.block<3, 3>(3 * i, 3 * j));
+            system.add_force(i, unit * F.segment<3>(3 * i));
         }
-        for (const auto& row : rows) system.add(row);
-        return system.solve(1);
+        for (auto row : rows) {
+            row.stiffening *= unit;
+            system.add(row);
+        }
+        return system.solve(unit);
     }
 
     Eigen::VectorXd gradient(std::size_t i) const {
@@ -121,6 +125,7 @@ TEST_CASE("where the matrix is not positive definite the step still goes downhil
         problem.prescribed.setZero();
         const Eigen::VectorXd step = problem.solve().step.reshaped();
         REQUIRE(is_finite(step));
+        for (const double unit : {0x1p-20, 0x1p20}) CHECK(problem.solve(unit).step.reshaped() == step);  // exact
         if (!step.isZero(0)) CHECK(problem.F.dot(step) > 0);
     }
 }

@@ -55,6 +55,13 @@ TEST_CASE("stiffness times a displacement is the change of the forces", "[stiffn
         scene.stiffness.multiply(scene.problem, displacement, found);
         CHECK((found - expected).norm() < 1e-7 * expected.norm());
         CHECK(inner(displacement, found) <= scene.stiffness.largest() * inner(displacement, displacement));
+        // Of a foundation much stiffer than the springs, and whatever was before.
+        Scene stiff(random, 1e3, 0.2);
+        stiff.assign();
+        CHECK(stiff.stiffness.largest() >= 1e3);
+        CHECK(stiff.stiffness.largest() <= 2 * (1e3 + 6 * 2.0));
+        stiff.assign();
+        CHECK(stiff.stiffness.largest() <= 2 * (1e3 + 6 * 2.0));
     }
 }
 

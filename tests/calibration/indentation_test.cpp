@@ -97,6 +97,16 @@ TEST_CASE("Depth begins where the moving tool first touches") {
     }
 }
 
+TEST_CASE("A tool that moves along a surface touches it far from where it started") {
+    const auto mesh = sheet<double>({.width = 1, .height = 1, .columns = 4, .rows = 4});
+    for (const Index corner : {0, mesh.vertex_count() - 1}) {
+        const Point from = point(mesh.positions(), corner) + Point(0, 0, 0.11);
+        const Point to = -0.8 * point(mesh.positions(), corner) + Point(0, 0, 0.01);
+        const Indentation indentation(mesh, Tool<double>{.position = from, .radius = 0.01}, to - from, linear_on(mesh));
+        CHECK(norm<double>(indentation.touching().position - to) < 1e-10);
+    }
+}
+
 TEST_CASE("Forces of an indentation are those that Newton's method of the tests finds") {
     Random random(2);
     const auto mesh = icosphere<double>({.radius = 1, .subdivisions = 1});

@@ -293,31 +293,39 @@ TEST_CASE("an open sheet is touched from either side, and the side of first cont
     const AabbTree<double> tree(mesh);
     for (const double side : {1.0, -1.0}) {
         ContactTracker<double> tracker(mesh);
-        Contact<double> contact;
-        for (int tick = 0; tick <= 20; ++tick) {
-            const Tool<double> tool{.position = {0.03, 0.02, side * (0.1 - 0.008 * tick)}, .radius = 0.05};
-            contact = tracker.update(tree, mesh.positions(), tool);
+        for (int tick = 0; tick <= 40; ++tick) {  // in, and out again
+            const double height = 0.1 - 0.008 * std::min(tick, 40 - tick);
+            const Tool<double> tool{.position = {0.03, 0.02, side * height}, .radius = 0.05};
+            const auto contact = tracker.update(tree, mesh.positions(), tool);
             CAPTURE(side, tick);
+            CHECK(contact.touching() == (height < 0.05));
             if (!contact.touching()) continue;
+            CHECK_FALSE(contact.closed);
             CHECK(contact.side == side);
             CHECK(contact.normal.z() * side > 0.999);
+            CHECK(contact.tunnelled == (height < 0));
+            CHECK(std::abs(contact.depth - (0.05 - height)) < 1e-12);
         }
-        CHECK(contact.tunnelled);
-        CHECK(std::abs(contact.depth - (0.05 + 0.06)) < 1e-12);
     }
 }
 
 TEST_CASE("a tool that flies through in one tick touches where it went through") {
     const auto mesh = membrane::sheet<double>({.width = 1, .height = 1, .columns = 10, .rows = 10});
     const AabbTree<double> tree(mesh);
-    ContactTracker<double> tracker(mesh);
-    CHECK_FALSE(tracker.update(tree, mesh.positions(), Tool<double>{.position = {0.1, 0.1, 1}}).touching());
-    const auto contact = tracker.update(tree, mesh.positions(), Tool<double>{.position = {-0.1, -0.1, -1e6}});
-    REQUIRE(contact.phase == ContactPhase::began);
-    CHECK(contact.tunnelled);
-    CHECK(contact.side == 1);
-    CHECK(std::abs(contact.point.x() - 0.1) < 1e-5);
-    CHECK(contact.depth > 0.9e6);
+    for (const double side : {1.0, -1.0}) {
+        ContactTracker<double> tracker(mesh);
+        const auto at = [&](double x, double height) {
+            return tracker.update(tree, mesh.positions(), Tool<double>{.position = {x, x, side * height}});
+        };
+        CHECK_FALSE(at(0.1, 1).touching());
+        const auto contact = at(-0.1, -1e5);
+        REQUIRE(contact.phase == ContactPhase::began);
+        CHECK(contact.tunnelled);
+        CHECK(contact.side == side);
+        CHECK(contact.normal.z() * side == 1);
+        CHECK(std::abs(contact.point.x() - 0.1) < 1e-5);
+        CHECK(contact.depth > 0.9e5);
+    }
 }
 
 TEST_CASE("a capsule touches with its ends, its middle and what it is stuck through") {
@@ -498,5 +506,260 @@ TEST_CASE("on an open surface a tool that grazes a crest is on the side it came 
         const auto contact = tracker.update(tree, x, tool);
         REQUIRE(contact.touching());
         CHECK(contact.side == 1);
+    }
+}
+
+namespace {
+
+/// A flat sheet in the plane z = 0 and a tool that moves beside its border x = 0.5.
+struct Beside {
+    TriangleMesh<double> mesh = membrane::sheet<double>({.width = 1, .height = 1, .columns = 10, .rows = 10});
+    double edge = membrane::LocalSurface<double>(mesh).mean_edge();
+    AabbTree<double> tree{mesh};
+    ContactTracker<double> tracker{mesh};
+    Points<double> x = mesh.positions();
+    Tool<double> tool{.radius = 0.02};
+    Vector rim{0.5, 0.03, 0};
+    Contact<double> contact;
+
+    /// Moves on, slowly, until the tool is `to`.
+    void go(const Tool<double>& to) {
+        const Tool<double> from = tool;
+        const double way = std::max((to.position - from.position).norm(), (to.axis - from.axis).norm());
+        const int ticks = contact.phase == ContactPhase::none && !tracked ? 1 : 1 + static_cast<int>(way / 0.01);
+        for (int tick = 1; tick <= ticks; ++tick) {
+            tool = to;
+            tool.position = from.position + double(tick) / ticks * (to.position - from.position);
+            tool.axis = from.axis + double(tick) / ticks * (to.axis - from.axis);
+            contact = tracker.update(tree, x, tool);
+        }
+        tracked = true;
+    }
+    void go(const Vector& to) {
+        Tool<double> moved = tool;
+        moved.position = to;
+        go(moved);
+    }
+    /// Moves around the border at this distance from it, by an angle from the upper normal.
+    void go_round(double distance, double begin, double end) {
+        for (int i = 0; i <= 40; ++i) {
+            const double angle = begin + (end - begin) * i / 40;
+            go(rim + distance * Vector(std::sin(angle), 0, std::cos(angle)));
+        }
+    }
+    /// To below the middle, and up until it touches.
+    void touch_from_below(double distance) {
+        go(Vector(0, 0.03, -distance));
+        go(Vector(0, 0.03, -0.9 * tool.radius));
+        REQUIRE(contact.touching());
+    }
+
+    bool tracked = false;
+};
+
+constexpr double pi = std::numbers::pi;
+
+}  // namespace
+
+TEST_CASE("a tool keeps its side of a sheet until it is clear of it, in closed forceps all the same") {
+    enum class Shape { sphere, tip_first, tip_last };
+    for (const auto shape : {Shape::sphere, Shape::tip_first, Shape::tip_last}) {
+        for (const bool grasping : {false, true}) {
+            for (const double edges : {0.5, 1.8, 2.2, 4.0}) {
+                CAPTURE(static_cast<int>(shape), grasping, edges);
+                Beside sheet;
+                // A shaft always points away from the sheet, or to it.
+                const auto at = [&](double angle, double distance, const Vector& foot) {
+                    const Vector outward(std::sin(angle), 0, std::cos(angle));
+                    const Vector tip = foot + distance * outward;
+                    Tool<double> tool{.position = tip, .radius = 0.02, .grasping = grasping};
+                    if (shape != Shape::sphere) tool.axis = 0.5 * outward;
+                    if (shape == Shape::tip_last) tool.position += tool.axis, tool.axis *= -1;
+                    sheet.go(tool);
+                };
+                const Vector middle(0.2, 0.03, 0);
+                const double distance = 0.02 + edges * sheet.edge;
+                at(0, distance, middle);
+                at(0, 0.018, middle);
+                REQUIRE(sheet.contact.touching());
+                at(0, distance, middle);
+                for (int i = 0; i <= 40; ++i) at(pi * i / 40, distance, sheet.rim);
+                at(pi, distance, middle);
+                at(pi, 0.018, middle);
+                REQUIRE(sheet.contact.touching());
+                const bool keeps = grasping || edges < 2;
+                CHECK(sheet.contact.side == (keeps ? 1 : -1));
+                CHECK(sheet.contact.tunnelled == keeps);
+                CHECK((sheet.contact.normal.z() > 0) == keeps);
+            }
+        }
+    }
+}
+
+TEST_CASE("what touches a border is on the side within 60 degrees of its normal, and else on neither") {
+    for (const double degrees : {0.0, 30.0, 58.0, 62.0, 90.0, 118.0, 122.0, 150.0}) {
+        CAPTURE(degrees);
+        Beside sheet;
+        const double angle = degrees * pi / 180;
+        sheet.go_round(0.07, angle, angle);
+        sheet.go_round(0.0199, angle, angle);
+        REQUIRE(sheet.contact.touching());
+        sheet.go_round(0.07, angle, pi);
+        sheet.touch_from_below(0.07);
+        CHECK(sheet.contact.side == (degrees < 60 ? 1 : -1));
+    }
+}
+
+namespace {
+
+/// The border pressed down, and a tool that slides off it, by as much as it keeps touching, to under the slope.
+struct SlidOff : Beside {
+    Vector normal = Vector(1, 0, 1).normalized();  // of the slope
+
+    explicit SlidOff(const Vector& axis, double bend) {
+        tool.axis = axis;
+        x.row(2) = -bend * (x.row(0).array() - 0.3).max(0);
+        tree.refit(x);
+        rim.z() = -0.2 * bend;
+        go(Vector(0.2, 0.03, 0.1));
+        go(Vector(0.2, 0.03, 0.019));
+        REQUIRE(contact.touching());
+        go_round(0.019, 0, 1.2 * pi);
+    }
+    void lift(double height) {
+        x.row(2).array() += height;
+        tree.refit(x);
+        tool.position.z() += height;
+        contact = tracker.update(tree, x, tool);
+    }
+};
+
+}  // namespace
+
+TEST_CASE("a tool that has slid off a border that it displaced may touch the other side, else not") {
+    for (const double bend : {0.0, 1.0}) {
+        for (const Vector& axis : {Vector(0, 0, 0), Vector(0, 0.2, 0)}) {
+            CAPTURE(bend, axis.y());
+            SlidOff sheet(axis, bend);
+            sheet.go_round(0.05, 1.2 * pi, 1.2 * pi);
+            if (bend > 0) CHECK_FALSE(sheet.contact.touching());
+            sheet.touch_from_below(0.25);
+            CHECK(sheet.contact.tunnelled == (bend == 0));
+            CHECK((sheet.contact.normal.z() < 0) == (bend > 0));
+        }
+    }
+}
+
+TEST_CASE("a shaft that has slid off a border is beneath it, and does not pull what it lifts") {
+    for (const double height : {0.0, -0.5, 0.5}) {
+        CAPTURE(height);
+        SlidOff sheet(Vector(0, 0.2, 0), 1);
+        sheet.go(Vector(0.4, 0.03, -0.1) - 0.019 * sheet.normal);
+        REQUIRE(sheet.contact.touching());
+        CHECK_FALSE(sheet.contact.tunnelled);
+        CHECK(sheet.contact.normal.dot(sheet.normal) < 0);
+        if (height != 0) sheet.lift(height);
+        CHECK(sheet.contact.touching() == (height <= 0));  // farther out than the membrane without it: nothing to push
+    }
+}
+
+TEST_CASE("a shaft through a ridge, both ends outside, is as deep as its middle") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
+    const AabbTree<double> tree(mesh);
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const Vector out = random.unit_vector(), along = out.cross(random.unit_vector()).normalized();
+        const double before = random.number(0.6, 1.2), behind = random.number(0.6, 1.2);  // lengths
+        ContactTracker<double> tracker(mesh);
+        Contact<double> contact;
+        for (double height = 1.05; height > 0.93; height -= 0.01) {
+            contact = tracker.update(
+                tree, mesh.positions(),
+                {.position = height * out - before * along, .axis = (before + behind) * along, .radius = 0.02});
+        }
+        REQUIRE(contact.touching());
+        CHECK(contact.tunnelled);
+        CHECK(contact.closed);
+        CHECK(contact.normal.dot(out) > 0.9);
+        const auto nearest = tree.closest_point(mesh.positions(), contact.axis_point);
+        CHECK(std::abs(contact.axis_point.dot(along)) < 0.05);
+        CHECK(contact.gap == Approx(-std::sqrt(nearest.squared_distance) - 0.02));
+    }
+}
+
+TEST_CASE("a sphere that is first seen behind a folded surface is inside where that winds round it") {
+    const auto ball = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
+    int outside = 0, inside = 0;
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const bool crumpled = random.chance(0.5);  // else a star
+        Points<double> x = ball.positions();
+        for (auto p : x.colwise()) p *= random.number(0.6, 1.4);
+        if (crumpled) x = test::jittered(ball.positions(), 0.8, random);
+        const TriangleMesh<double> mesh(x, ball.triangles());
+        const auto triangle = membrane::triangle_at(x, mesh.triangles().col(random.index(mesh.triangle_count())));
+        const Vector place = membrane::point_at(triangle, Vector(random.barycentric())) + 0.05 * random.vector();
+        const auto contact = ContactTracker<double>(mesh).update(AabbTree<double>(mesh), x,
+                                                                 Tool<double>{.position = place, .radius = 0.1});
+        REQUIRE(contact.touching());
+        const bool is_inside = std::abs(winding_number(x, mesh.triangles(), place)) > 0.5;
+        if (contact.tunnelled || !crumpled) CHECK(contact.tunnelled == is_inside);
+        ++(is_inside ? inside : outside);
+    }
+    CHECK((inside > 0 && outside > 0));
+}
+
+TEST_CASE("the candidates are all triangles within two rings, for some ticks after tunnelling within six") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
+    const AabbTree<double> tree(mesh);
+    const membrane::LocalSurface<double> surface(mesh);
+    ContactTracker<double> tracker(mesh);
+    const auto sorted = [](std::vector<Index> some) {
+        std::sort(some.begin(), some.end());
+        some.erase(std::unique(some.begin(), some.end()), some.end());
+        return some;
+    };
+    for (int tick = 0; tick < 40; ++tick) {
+        CAPTURE(tick);
+        const double height = tick == 10 ? -0.05 : 0.05;  // of the centre
+        const Tool<double> tool{.position = (1 + height) * Vector(0.1, 0.2 + 0.002 * tick, 1).normalized(),
+                                .radius = 0.1};
+        const auto contact = tracker.update(tree, mesh.positions(), tool);
+        REQUIRE(contact.tunnelled == (tick == 10));
+        std::vector<Index> expected, found;
+        for (const auto& listed : contact.triangles) expected.push_back(listed.triangle);
+        for (int ring = 0; ring < (tick >= 10 && tick < 26 ? 6 : 2); ++ring) {
+            for (const Index f : std::vector(expected)) {
+                surface.around_corners(f, [&](Index g) { expected.push_back(g); });
+            }
+            expected = sorted(expected);
+        }
+        for (const auto& listed : contact.candidates) found.push_back(listed.triangle);
+        CHECK(sorted(found).size() == found.size());
+        CHECK(sorted(found) == expected);
+    }
+}
+
+TEST_CASE("after a reset a tracker is as new") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
+    const AabbTree<double> tree(mesh);
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        ContactTracker<double> used(mesh, {.full_query_interval = 3}), fresh = used;
+        const auto any = [&] { return Tool<double>{.position = Vector(0, 0, random.number(0.9, 1.1)), .radius = 0.1}; };
+        for (Index i = random.index(20); i > 0; --i) (void)used.update(tree, mesh.positions(), any());
+        used.reset();
+        const Index before = used.full_query_count();
+        for (int tick = 0; tick < 20; ++tick) {
+            const auto tool = any();
+            const auto a = used.update(tree, mesh.positions(), tool), b = fresh.update(tree, mesh.positions(), tool);
+            REQUIRE((a.phase == b.phase && a.triangle == b.triangle && a.normal == b.normal && a.gap == b.gap));
+            REQUIRE((a.depth == b.depth && a.tunnelled == b.tunnelled));
+            REQUIRE(a.candidates.size() == b.candidates.size());
+            REQUIRE(used.full_query_count() - before == fresh.full_query_count());
+        }
     }
 }

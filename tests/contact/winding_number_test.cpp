@@ -81,3 +81,13 @@ TEST_CASE("a ray through corners and along edges is counted once") {
         }
     }
 }
+
+TEST_CASE("a point on the surface is inside or outside") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 1});
+    const LocalSurface<double> surface(mesh);
+    const AabbTree<double> tree(mesh);
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        const int number = winding_number(surface, tree, mesh.positions(), membrane::point(mesh.positions(), v));
+        CHECK((number == 0 || number == 1));
+    }
+}

@@ -90,6 +90,10 @@ TEST_CASE("signs of points a rounding apart do not contradict each other", "[cor
 }
 
 TEST_CASE("points on one line are known as such", "[core]") {
+    for (const int k : {0, 1, 2}) {  // on one line as seen from both other axes
+        const auto unit = [](int i) { return Vector3<double>::Unit(i % 3); };
+        CHECK_FALSE(on_one_line(Vector3<double>::Zero(), unit(k + 1), unit(k + 2)));
+    }
     for (int seed = 1; seed <= cases(2000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));

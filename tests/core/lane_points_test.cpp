@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/core/lane_points.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <numeric>
@@ -57,5 +58,32 @@ TEMPLATE_TEST_CASE("points are gathered from where they are, and scattered to wh
                     from[static_cast<std::size_t>(begins[i] / numbers_in_point)].number);
         }
         for (const Index i : free) REQUIRE(to[static_cast<std::size_t>(i)].point() == Vector3<S>(7, 8, 9));
+    }
+}
+
+TEMPLATE_TEST_CASE("operators on a padded point act on each of its four numbers", "[lanes]", float, double) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        std::array<S, 4> a, b;
+        for (std::size_t k = 0; k < 4; ++k) a[k] = random.number<S>(-1, 1), b[k] = random.number<S>(-1, 1);
+        const auto left = PaddedVector<S>::load(a.data()), right = PaddedVector<S>::load(b.data());
+        const auto numbers = [](const PaddedVector<S>& vector) {
+            std::array<S, 4> stored;
+            vector.store(stored.data());
+            return stored;
+        };
+        for (std::size_t k = 0; k < 4; ++k) {
+            REQUIRE(numbers(left + right)[k] == a[k] + b[k]);
+            REQUIRE(numbers(left - right)[k] == a[k] - b[k]);
+            REQUIRE(numbers(left * right)[k] == a[k] * b[k]);
+            REQUIRE(numbers(smaller(left, right))[k] == std::min(a[k], b[k]));
+            REQUIRE(numbers(larger(left, right))[k] == std::max(a[k], b[k]));
+            REQUIRE(numbers(PaddedVector<S>::load_point(a.data()))[k] == (k < 3 ? a[k] : 0));
+        }
+        REQUIRE(left.point() == Vector3<S>(a[0], a[1], a[2]));
+        REQUIRE(left.turned().point() == Vector3<S>(a[1], a[2], a[0]));
+        REQUIRE(left.sum() == (a[0] + a[1]) + (a[2] + a[3]));
     }
 }

@@ -19,6 +19,10 @@ TEMPLATE_TEST_CASE("a point is a column, from any kind of positions", "[core]", 
     CHECK(point(PointsRef<S>(x), 2) == Vector3<S>(3, 7, 11));
     CHECK(point(ConstPointsRef<S>(x), 0) == Vector3<S>(1, 5, 9));
     STATIC_REQUIRE(std::is_same_v<decltype(point(x, 0)), Vector3<S>>);
+    PointsRef<S> middle(x.middleCols(1, 2));
+    set_point(middle, 1, Vector3<S>(13, 14, 15));
+    CHECK(x.col(2) == Eigen::Matrix<S, 3, 1>(13, 14, 15));
+    CHECK(x.sum() == 78 - (3 + 7 + 11) + (13 + 14 + 15));  // no other number
 }
 
 TEMPLATE_TEST_CASE("references to positions bind to memory of any stride without a copy", "[core]", double, float) {

@@ -102,6 +102,16 @@ TEST_CASE("what is held does not rub, and what is no number is forgotten", "[fri
     CHECK(is_finite(feel(state)));
     state.tool.position.x() = 0.5;
     CHECK(feel(state).x() == 0);
+    for (int seed = 1; seed <= cases(2000); ++seed) {  // numbers of any size
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto any = [&] { return std::pow(10, random.number(-300.0, 300.0)); };
+        ContactFriction wild(press, {.coefficient = any(), .stiffness = any()});
+        const double depth = any();
+        for (int tick = 0; tick < 3; ++tick) {
+            REQUIRE(is_finite(wild(touching<double>({any(), any(), 0}, {0, 0, 1}, depth))));
+        }
+    }
     const auto refused = [&](const FrictionOptions& options) {
         return test::refusal([&] { const ContactFriction made(press, options); });
     };

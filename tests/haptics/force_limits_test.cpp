@@ -8,6 +8,9 @@
 #include <limits>
 #include <string>
 #include <utility>
+#include <vector>
+
+#include <membrane/core/snapshot.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -507,6 +510,25 @@ TEST_CASE("a limiter that restarts begins softly, with motors as warm as they ar
     CHECK(loop.tick({0.8, 0, 0}).x() == 0);
     CHECK(loop.tick({0.8, 0, 0}).x() == Approx(0.008));
     STATIC_REQUIRE(noexcept(loop.limit(std::declval<const Vector3<float>&>(), 0.0, 0)));
+}
+
+TEST_CASE("a limiter restored from a snapshot goes on with the same bits", "[limits]") {
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Loop<double> loop{ForceLimiter(devices::touch)};
+        for (Index i = random.index(200); i > 0; --i) loop.tick(5 * random.vector());
+        std::vector<std::byte> saved(snapshot_capacity(loop.limit));
+        REQUIRE(save_snapshot(saved, loop.limit) > 0);
+        auto other = loop;
+        for (Index i = random.index(200); i > 0; --i) other.tick(5 * random.vector(), 5e-3);
+        REQUIRE(restore_snapshot(saved, other.limit));
+        other.now = loop.now, other.solves = loop.solves;
+        for (int tick = 0; tick < 50; ++tick) {
+            const Vector3<double> force = 5 * random.vector();
+            REQUIRE(other.tick(force) == loop.tick(force));
+        }
+    }
 }
 
 TEST_CASE("limits that make no sense are refused by name", "[limits][bad]") {

@@ -50,9 +50,11 @@ TEMPLATE_TEST_CASE("touching, the force is depth and velocity along the normal",
         Random random(static_cast<std::uint64_t>(seed));
         const S depth = random.number<S>(0, S(0.01));
         const Vector3<S> normal = random.unit_vector<S>(), velocity = random.vector<S>();
-        const Vector3<S> force = feel(touching(depth, normal, velocity));
+        auto state = touching(depth, normal, velocity);
+        state.contact.body_velocity = random.vector<S>();
+        const Vector3<S> force = feel(state);
         // F = -k x - mu v along the normal, x and v being inward: it pushes out, or not at all.
-        const S inward = -dot(velocity, normal);
+        const S inward = dot(state.contact.body_velocity, normal) - dot(velocity, normal);
         const S expected = std::max(S(0), 100 * depth + S(0.5) * inward);
         REQUIRE(norm<S>(force - expected * normal) <= 32 * std::numeric_limits<S>::epsilon());
         REQUIRE(dot(force, normal) >= 0);

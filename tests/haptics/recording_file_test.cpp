@@ -110,6 +110,30 @@ TEST_CASE("the bytes of a recording are those of its description", "[recording]"
           head + first + bytes_of(crc(summed + first), 4) + second + bytes_of(crc(summed + first + second), 4));
 }
 
+TEST_CASE("snapshots follow the ticks, each before one of them, in their order", "[recording]") {
+    const auto with = [](std::size_t first, std::size_t second) {
+        return written(Recording<double>{.vertex_count = 642,
+                                         .ticks = std::vector<RecordedTick<double>>(2),
+                                         .snapshots = {{first, {std::byte{5}, std::byte{6}}}, {second, {}}}});
+    };
+    std::string expected = header(2, 8, 642, 2), summed = expected.substr(0, header_size - 4);
+    const std::string tick(14 * 8 + 1, '\0');
+    for (const std::string& part :
+         {tick, tick, bytes_of(2, 8), bytes_of(0, 8) + bytes_of(2, 8) + "\5\6", bytes_of(1, 8) + bytes_of(0, 8)}) {
+        summed += part;
+        expected += part + bytes_of(crc(summed), 4);
+    }
+    CHECK(with(0, 1) == expected);
+    std::istringstream file(expected);
+    const auto read = read_recording<double>(file).snapshots;
+    REQUIRE(read.size() == 2);
+    CHECK((read[0].tick == 0 && read[0].state == std::vector{std::byte{5}, std::byte{6}}));
+    CHECK((read[1].tick == 1 && read[1].state.empty()));
+    CHECK(refused(with(1, 1)) == "");
+    CHECK(refused(with(1, 0)) == "read_recording: snapshot 1 must be before a tick from 1 to 2, got 0");
+    CHECK(refused(with(2, 2)) == "read_recording: snapshot 0 must be before a tick from 0 to 2, got 2");
+}
+
 TEST_CASE("a header that is not right is refused by name", "[recording][bad]") {
     const std::string name = "read_recording: ";
     const auto good = header(1, 8, 642, 0);
@@ -166,7 +190,9 @@ TEMPLATE_TEST_CASE("any bit of a recording that is flipped, and any cut, is refu
                    float) {
     using S = TestType;
     Random random(2);
-    const auto bytes = written(test::wild_recording<S>(random, 4));
+    auto recording = test::wild_recording<S>(random, 4);
+    recording.snapshots = {{1, {std::byte{5}, std::byte{6}}}, {3, {}}};
+    const auto bytes = written(recording);
     for (std::size_t at = 0; at < bytes.size(); ++at) {
         CAPTURE(at);
         auto damaged = bytes;

@@ -203,7 +203,11 @@ TEST_CASE("a wall swings up at a desk where the theory of sampled loops says so"
 TEST_CASE("what is not a number does not move a hand", "[hand][bad]") {
     constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
     SimulatedHand<double> hand({.mass = 0.1, .damping = 2, .stiffness = 300});
+    hand.set_target({4, 5, 6}, {7, 8, 9});
+    REQUIRE(hand.advance({1, 0, 0}, 1e-3));
     hand.reset_to({1, 2, 3});
+    REQUIRE(hand.advance({0, 0, 0}, 1e-3));
+    CHECK(hand.position() == Vector(1, 2, 3));  // at rest, whatever was before
     REQUIRE(hand.advance({1, 0, 0}, 1e-3));
     const Vector position = hand.position(), velocity = hand.velocity();
     const auto stays = [&](const Vector& force, double dt) {

@@ -323,3 +323,26 @@ TEST_CASE("what repair cannot work with is refused", "[mesh][bad]") {
     const std::vector<Index> corners(t.triangles.data(), t.triangles.data() + 12);
     CHECK(repair(std::span(xyz), std::span(corners), {.orient = true}).triangles == t.triangles);
 }
+
+TEST_CASE("a vertex that is split is where it was, and its body as large", "[mesh][bad]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Surface<double> two = test::tetrahedron<double>(), other = two;
+        other.x *= -1;  // mirrored
+        for (Index f = 0; f < 4; ++f) other.turn(f);
+        two.add(other);
+        for (Index& v : two.triangles.reshaped()) v = v == 4 ? 0 : v;  // the corner at 0 is of both
+        two.x.colwise() += (10 * random.vector()).eigen();
+        const auto split = repaired(two, {.split_vertices = true, .flip_inward = true});
+        CHECK(split.report.split == 1);
+        CHECK(split.report.flipped == 0);
+    }
+}
+
+TEST_CASE("a surface of thousands of vertices is welded completely", "[mesh]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 4});
+    const auto welded = repair(mesh.positions(), mesh.triangles(), {.weld = 1e-9});
+    CHECK(welded.report.complete);
+    CHECK(welded.report.welded == 0);
+}

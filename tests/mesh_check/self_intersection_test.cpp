@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/mesh_check/self_intersection.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <set>
 #include <vector>
 
 #include "support/cases.hpp"
@@ -37,10 +41,20 @@ TEST_CASE("triangles meet where they cross, touch or lie on each other", "[mesh]
     for (const auto& p : {Vector3<double>(0, 0, 0), Vector3<double>(2, 0, 0), Vector3<double>(0, 2, 0)}) two.add(p);
     two.add(0, 1, 2);
     const auto with = [&](const Vector3<double>& a, const Vector3<double>& b, const Vector3<double>& c) {
-        Surface<double> both = two;
-        const Index i = both.add(a), j = both.add(b), k = both.add(c);
-        both.add(i, j, k);
-        return meetings(both) == 1;
+        std::set<Index> counts;  // with their corners in any order
+        for (std::array<Index, 3> first{0, 1, 2}; counts.empty() || first[0] != 0 || first[1] != 1;) {
+            std::array<Index, 3> second{3, 4, 5};
+            do {
+                Surface<double> both = two;
+                both.add(a), both.add(b), both.add(c);
+                both.triangles.col(0) << first[0], first[1], first[2];
+                both.add(second[0], second[1], second[2]);
+                counts.insert(meetings(both));
+            } while (std::next_permutation(second.begin(), second.end()));
+            std::next_permutation(first.begin(), first.end());
+        }
+        REQUIRE(counts.size() == 1);
+        return *counts.begin() == 1;
     };
     CHECK(with({0.5, 0.5, -1}, {0.5, 0.5, 1}, {3, 3, 0}));   // through it
     CHECK(with({0.5, 0.5, 0}, {0.5, 0.5, 1}, {1, 0.5, 1}));  // a corner in it
@@ -73,4 +87,21 @@ TEST_CASE("surfaces as they should be meet nowhere, however they are turned", "[
         if (seed % 2 == 0) flat.x = (random.rotation<double>() * flat.x).eval();
         REQUIRE(meetings(flat) == 0);
     }
+}
+
+TEST_CASE("a book all pages of which may lie on each other is not searched for ever", "[mesh]") {
+    Surface<double> book;
+    book.add(Vector3<double>(0, 0, 0));
+    book.add(Vector3<double>(0, 0, 1));
+    std::vector<Index> pages, own{0, 1};
+    for (Index i = 0; i < 40; ++i) {
+        own.push_back(book.add(Vector3<double>(std::cos(0.03 * i), std::sin(0.03 * i), 0.5)));
+        pages.push_back(book.add(0, 1, own.back()));
+    }
+    const auto searched = [&](std::int64_t effort) {
+        return for_each_self_intersection(book.x, book.triangles, pages, own, effort,
+                                          [](Index, Index) { CHECK(false); });
+    };
+    CHECK(searched(1'000'000));
+    CHECK_FALSE(searched(2000));
 }

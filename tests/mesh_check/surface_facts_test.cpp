@@ -56,6 +56,9 @@ TEST_CASE("the unit is guessed from the size", "[mesh]") {
     CHECK(likely_unit(0.0117) == LengthUnit::metre);  // a cornea
     CHECK(likely_unit(11.7) == LengthUnit::millimetre);
     CHECK(likely_unit(11700) == LengthUnit::micrometre);
-    CHECK(likely_unit(1e-5) == LengthUnit::unknown);
+    for (const double extent : {1.001e-3, 1.999}) CHECK(likely_unit(extent) == LengthUnit::metre);
+    for (const double extent : {2.001, 1.999e3}) CHECK(likely_unit(extent) == LengthUnit::millimetre);
+    for (const double extent : {2.001e3, 1.999e6}) CHECK(likely_unit(extent) == LengthUnit::micrometre);
+    for (const double extent : {1e-5, 0.999e-3, 2.001e6}) CHECK(likely_unit(extent) == LengthUnit::unknown);
     CHECK(likely_unit(1e9) == LengthUnit::unknown);
 }

@@ -9,6 +9,7 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "support/cases.hpp"
@@ -553,4 +554,35 @@ TEST_CASE("the work of validation is bounded", "[mesh]") {
     const MeshReport one_of_a_kind = validate(heap.x, heap.triangles, {.tolerance = 0.0, .max_findings_per_kind = 1});
     CHECK(one_of_a_kind.findings.size() <= 2);
     CHECK_THAT(to_string(one_of_a_kind), ContainsSubstring("components, one with triangle 0, one with triangle 1;"));
+}
+
+TEST_CASE("a vertex beside an edge is on it within the tolerance, to any side", "[mesh][bad]") {
+    const auto junctions = [](const Vector3<double>& off) {
+        Surface<double> two;
+        for (const double y : {0.0, 1.0}) two.add(Vector3<double>(0, y, 0));
+        two.add(0, 1, two.add(Vector3<double>(-1, 0.5, 0)));
+        for (const double y : {0.0, 0.5, 1.0}) two.add(Vector3<double>(0, y, 0));  // its edge is halved here
+        const Index far = two.add(Vector3<double>(1, 0.5, 0));
+        two.add(4, 3, far);
+        two.add(5, 4, far);
+        two.x.rightCols(4).colwise() += off.eigen();
+        return validate(two.x, two.triangles, {.tolerance = 0.01}).count(MeshDefect::t_junction);
+    };
+    for (const double sign : {-1.0, 1.0}) {
+        for (const int axis : {0, 1, 2}) CHECK(junctions(0.005 * sign * Vector3<double>::Unit(axis)) == 1);
+        CHECK(junctions(0.015 * sign * Vector3<double>::UnitZ()) == 0);
+    }
+}
+
+TEMPLATE_TEST_CASE("what has an unusable corner has no edge for another's vertex", "[mesh][bad]", double, float) {
+    using S = TestType;
+    const S far = std::sqrt(std::sqrt((std::numeric_limits<S>::max)()));
+    for (const auto& [end, expected] : {std::pair(far, 0U), std::pair(S(20), 1U)}) {
+        Surface<S> two;
+        two.add(Vector3<S>(0, 0, 0)), two.add(Vector3<S>(0, -1, 0)), two.add(Vector3<S>(end, 0, 0));
+        two.add(0, 1, 2);
+        two.add(Vector3<S>(5, 0, 0)), two.add(Vector3<S>(6, 1, 0)), two.add(Vector3<S>(4, 1, 0));
+        two.add(3, 4, 5);
+        CHECK(report_of(two).count(MeshDefect::t_junction) == expected);
+    }
 }

@@ -204,6 +204,21 @@ TEST_CASE("edges follow a length by place, progress is reported, few iterations 
     CHECK(quality_of(raw).smallest_angle < 20);
 }
 
+TEST_CASE("the first grid is as fine as the shortest edge wanted anywhere", "[distmesh]") {
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const Point low = 10 * random.vector(), size = random.vector(1.0, 2.0);
+        const auto part = [&] { return random.index(17) / 16.0; };
+        const Point finest = low + size.cwiseProduct(Point(part(), part(), part()));
+        DistMeshOptions options;
+        options.edge_length = [&](const Point& p) { return 0.01 + norm<double>(p - finest); };
+        CHECK(detail::spacing_for({low, low + size}, options) == Approx(0.008));
+        options.edge_length = [](const Point&) { return 1.0; };
+        CHECK(detail::spacing_for({low, low + size}, options) == Approx(size.minCoeff() / 12));
+    }
+}
+
 TEST_CASE("options that make no surface are refused by name", "[distmesh][bad]") {
     using test::refusal;
     const double infinity = std::numeric_limits<double>::infinity();

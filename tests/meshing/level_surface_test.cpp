@@ -60,6 +60,10 @@ TEST_CASE("a border is where two balls meet: in the plane of their circle, at it
         REQUIRE(std::abs(dot(found->point, axis)) < 1e-9);
         REQUIRE(std::abs(norm(found->point) - radius) < 1e-9);
         REQUIRE(norm<double>(found->normal - left.gradient(found->point)) < 1e-9);
+        const auto steep_left = [&](const Point& p) { return steepness * left(p); };
+        const auto steep = LevelSurface(trimmed(steep_left, right), left.bounds()).project_to_border(found->point);
+        REQUIRE(steep);
+        REQUIRE(norm<double>(steep->normal - found->normal) < 1e-6);
         REQUIRE(surface.distance(left.centre) == -1);
         REQUIRE(surface.beyond_border(right.centre + 3 * axis) == Approx(2 * steepness));
     }

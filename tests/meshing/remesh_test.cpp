@@ -86,6 +86,20 @@ TEST_CASE("spheres too coarse, too fine and uneven become even ones of the lengt
     }
 }
 
+TEST_CASE("a vertex too near to others moves away from them, the first one too", "[remesh]") {
+    const LevelSurface surface(Ball{}, around);
+    const auto even = icosphere({.radius = 1, .subdivisions = 1});
+    test::Random random(1);
+    for (Index v = 0; v < even.vertex_count(); ++v) {
+        CAPTURE(v);
+        Points<double> x = even.positions();
+        x.col(v) = (x.col(v) + 0.1 * point(x, v).cross(random.unit_vector()).normalized().eigen()).normalized();
+        const auto mesh = remesh(TriangleMesh<double>(x, even.triangles()), surface, 0.6, 1);
+        REQUIRE(mesh.vertex_count() == even.vertex_count());
+        CHECK((mesh.positions() - even.positions()).col(v).norm() < 0.9 * (x - even.positions()).col(v).norm());
+    }
+}
+
 TEST_CASE("a border stays on both surfaces and is as even as the rest", "[remesh]") {
     const HalfSpace half{.point = {0, 0, 0.4}, .normal = {0, 0, -1}};
     const LevelSurface surface(trimmed(Ball{}, half), around);

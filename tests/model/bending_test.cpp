@@ -119,6 +119,19 @@ TEST_CASE("no hinge curves more than the heights over its lines say", "[bending]
     CHECK(most > 0.9);
 }
 
+TEST_CASE("the less a hinge is folded, the less there is to round", "[bending]") {
+    const Hinge<double> hinge{.stiffness = 3, .rest = 0};
+    double before = 100;
+    for (const double lift : {1.0, 1e-2, 1e-4, 1e-6}) {
+        const Corners<double, 4> x{Vector3<double>(0, 0, 0), Vector3<double>(0, 1, 0), Vector3<double>(1, 0.5, 0),
+                                   Vector3<double>(-1, 0.5, 0)};
+        const double size = hinge.energy_change(x, 2, Vector3<double>(0, 0, lift)).size;
+        CHECK(size < before / 10);
+        CHECK(size > 0);
+        before = size;
+    }
+}
+
 TEST_CASE("hinges of equilateral triangles store what a plate does", "[bending]") {
     const double rigidity = 3e-6, radius = 1e4;
     for (int seed = 1; seed <= cases(20); ++seed) {

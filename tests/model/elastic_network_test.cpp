@@ -25,7 +25,8 @@ static_assert(ElasticNetwork<Tissue<Springs<float>, Elements<float, Hinge<float>
 static_assert(!ElasticNetwork<Springs<float>, double> && !ElasticNetwork<int, double>);
 
 TEST_CASE("changes of energy add up", "[elastic_network]") {
-    EnergyChange<double> sum{.change = -1, .size = 3};
+    EnergyChange<double> sum;
+    sum += {.change = -1, .size = 3};
     sum += {.change = 0.5, .size = 2};
     CHECK(sum.change == -0.5);
     CHECK(sum.size == 5);

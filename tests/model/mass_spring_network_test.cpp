@@ -531,6 +531,8 @@ TEST_CASE("a spring is an element: force, blocks and changes are of one energy",
         for (const auto& [i, towards] : {std::pair(0, edge_vector), std::pair(1, Vector3<double>(-edge_vector))}) {
             const auto pull = spring.force_on(x, static_cast<std::size_t>(i));
             REQUIRE(pull.force == spring_force(law, towards, k, rest).force());
+            const Eigen::Matrix3d exact = spring.hessian_block(x, static_cast<std::size_t>(i), 0) * (i == 0 ? 1 : -1);
+            REQUIRE(test::eigenvalues_of(dense(pull.hessian) - exact)[0] > -1e-12 * k);  // its positive part
         }
     };
     for (int seed = 1; seed <= cases(200); ++seed) {

@@ -127,3 +127,14 @@ TEST_CASE("what goes along with its body is not damped, and what stays behind is
         REQUIRE(more == Approx((3 + 0.5 / 1e-3) * norm<double>(longer - point(x, v))));
     }
 }
+
+TEST_CASE("the rotation of a body of floats is one of doubles to their last digits", "[moving_foundation]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Eigen::Matrix3f single = random.rotation<float>();
+        const Eigen::Matrix3d found = detail::rotation_in<double>(single);
+        CHECK((found * found.transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-14);
+        CHECK((found - single.cast<double>()).norm() < 1e-6);
+    }
+}

@@ -90,8 +90,9 @@ TEST_CASE("the second derivative of pressure, all triangles together", "[pressur
             const auto corners = pressed.where(placed, x);
             for (std::size_t i = 0; i < 3; ++i) {
                 for (std::size_t j = 0; j < 3; ++j) {
-                    whole.block<3, 3>(3 * placed.corners[i], 3 * placed.corners[j]) +=
-                        placed.element.hessian_block(corners, i, j);
+                    const Eigen::Matrix3d block = placed.element.hessian_block(corners, i, j);
+                    REQUIRE((block + block.transpose()).isZero(0));  // as of a product with another corner
+                    whole.block<3, 3>(3 * placed.corners[i], 3 * placed.corners[j]) += block;
                 }
             }
         }

@@ -141,6 +141,21 @@ TEMPLATE_TEST_CASE("no volume springs, no pull", "[network]", double, float) {
     STATIC_REQUIRE(std::is_empty_v<NoFoundation>);
 }
 
+TEMPLATE_TEST_CASE("beside springs that damp, one that does not is as it is alone", "[network]", double, float) {
+    using Wide = Lanes<TestType>;
+    const auto lanes = [](auto number_of) { return Wide::of([&](std::size_t i) { return TestType(number_of(i)); }); };
+    VolumeSpring<Wide> springs;
+    springs.stiffness = lanes([](std::size_t) { return 3; });
+    springs.rate = lanes([](std::size_t i) { return i; });  // none in the first
+    const auto position = lanes([](std::size_t i) { return 1 + i; });
+    const auto force = springs.force_on({position, position, position}).force;
+    for (std::size_t i = 0; i < Wide::count; ++i) {
+        const VolumeSpring<TestType> alone{.stiffness = 3, .rate = TestType(i)};
+        const auto number = TestType(1 + i);
+        CHECK(force[0][i] == alone.force_on({number, number, number}).force[0]);
+    }
+}
+
 TEST_CASE("volume springs own what they know", "[network]") {
     auto mesh = std::make_unique<TriangleMesh<double>>(icosphere({.radius = 1, .subdivisions = 0}));
     auto first = std::make_unique<VirtualVolumeSprings<double>>(

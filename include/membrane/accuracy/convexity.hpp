@@ -100,7 +100,7 @@ inline double BlockConvexity::eigenvalue_bound(const EquilibriumProblem& problem
     for (int round = 1; round < max_rounds && push_count_ > 0; ++round) {
         balance(best);
         const double now = sum_up(problem);
-        if (!(now > best + 0.01 * std::abs(best))) return (std::max)(best, now);
+        if (!(now > best + 0.01 * std::abs(best))) break;
         best = now;
     }
     return best;

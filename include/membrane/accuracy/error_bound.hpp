@@ -208,7 +208,7 @@ void ErrorBound<Convexity>::locate() noexcept {
         before = unbalanced_;
         const bool convex = refine();
         evaluate_residuals();
-        if (!is_finite(unbalanced_) || !is_finite(distance_)) return;
+        if (!is_finite(unbalanced_ + distance_)) return;
         error_.estimate = distance_;
         const bool fits = distance_ <= radius_ && radius_ <= 1.1 * distance_;
         if (!convex || !(fits || convex_within(1.05 * distance_))) {

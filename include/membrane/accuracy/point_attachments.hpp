@@ -68,7 +68,7 @@ bool PointAttachments::independent(IsFixed fixed) const noexcept {
     };
     for (const auto& term : terms()) {
         for (const Index v : term.corners) {
-            if (owners(v) + (fixed(v) ? 1 : 0) > 1 && owners(v) > 0) return false;
+            if (owners(v) + (fixed(v) ? 1 : 0) > 1) return false;
         }
     }
     return true;

@@ -239,7 +239,6 @@ std::optional<Eigen::VectorXd> FitSearch<Model>::residuals(const Eigen::VectorXd
     Eigen::VectorXd result(static_cast<Eigen::Index>(forces.size()));
     for (std::size_t i = 0; i < forces.size(); ++i) {
         const bool relative = table_.deviation.empty();
-        if (!is_finite(forces[i]) || (relative && forces[i] <= 0)) return std::nullopt;
         result[static_cast<Eigen::Index>(i)] =
             relative ? std::log(forces[i] / table_.force[i]) : (forces[i] - table_.force[i]) / table_.deviation[i];
     }
