@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <vector>
+
+/// Tables of one quantity by load, by the other program and by the library.
+///
+///     bench::Comparison table{.key = "pressure", .title = "...", .load = "Pa", .quantity = "mm", .loads = loads};
+///     table.reference = {"CalculiX", deflections, coarse_deflections, seconds};
+///     table.ours = {{"2,437 vertices", ...}};
+///     table.print();
+namespace bench {
+
+/// One column.
+struct Column {
+    std::string name;
+    std::vector<double> values;
+    std::vector<double> coarse = {};  ///< on a mesh of twice the edge length
+    double seconds = 0;
+
+    /// The change from the coarse mesh, relative; NaN without it.
+    [[nodiscard]] double mesh_change(std::size_t i) const {
+        return coarse.empty() ? std::numeric_limits<double>::quiet_NaN() : coarse[i] / values[i] - 1;
+    }
+};
+
+/// The first column of `ours` is the one that the bound is for; in the others one assumption is switched.
+struct Comparison {
+    std::string key, title, load, quantity;
+    double bound;           ///< of the relative difference
+    double bound_from = 0;  ///< for loads of at least this
+    std::vector<double> loads;
+    Column reference = {};
+    std::vector<Column> ours = {};
+
+    [[nodiscard]] double difference(const Column& column, std::size_t i) const {
+        return column.values[i] / reference.values[i] - 1;
+    }
+    /// The largest difference of a column where the bound counts.
+    [[nodiscard]] double largest_difference(const Column& column) const;
+    /// As a Markdown table: differences and changes in percent.
+    void print(std::FILE* file) const;
+    void write_tsv(const std::string& path) const;
+};
+
+inline double Comparison::largest_difference(const Column& column) const {
+    double largest = 0;
+    for (std::size_t i = 0; i < loads.size(); ++i) {
+        if (loads[i] < bound_from * (1 - 1e-9)) continue;
+        if (std::abs(difference(column, i)) > std::abs(largest)) largest = difference(column, i);
+    }
+    return largest;
+}
+
+inline void Comparison::print(std::FILE* file) const {
+    const bool kept = std::abs(largest_difference(ours.front())) <= bound;
+    std::fprintf(file, "\n### %s\n\nBound %g %%: %s, largest difference %+.2f %%. ", title.c_str(), 100 * bound,
+                 kept ? "kept" : "missed", 100 * largest_difference(ours.front()));
+    std::fprintf(file, "Time: CalculiX %.1f s", reference.seconds);
+    for (const Column& column : ours) std::fprintf(file, ", %s %.1f s", column.name.c_str(), column.seconds);
+    std::fprintf(file, ".\n\n| %s | CalculiX, %s | its mesh |", load.c_str(), quantity.c_str());
+    for (const Column& column : ours) {
+        std::fprintf(file, " %s |%s", column.name.c_str(), column.coarse.empty() ? "" : " its mesh |");
+    }
+    std::fprintf(file, "\n|---|---|---|");
+    for (const Column& column : ours) std::fprintf(file, "---|%s", column.coarse.empty() ? "" : "---|");
+    std::fprintf(file, "\n");
+    for (std::size_t i = 0; i < loads.size(); ++i) {
+        std::fprintf(file, "| %g | %.5g | %+.2f %% |", loads[i], reference.values[i], 100 * reference.mesh_change(i));
+        for (const Column& column : ours) {
+            std::fprintf(file, " %+.2f %% |", 100 * difference(column, i));
+            if (!column.coarse.empty()) std::fprintf(file, " %+.2f %% |", 100 * column.mesh_change(i));
+        }
+        std::fprintf(file, "\n");
+    }
+    std::fflush(file);
+}
+
+inline void Comparison::write_tsv(const std::string& path) const {
+    std::ofstream file(path);
+    file.precision(8);
+    file << "load\treference";
+    for (const Column& column : ours) file << '\t' << column.name;
+    file << '\n';
+    for (std::size_t i = 0; i < loads.size(); ++i) {
+        file << loads[i] << '\t' << reference.values[i];
+        for (const Column& column : ours) file << '\t' << column.values[i];
+        file << '\n';
+    }
+}
+
+}  // namespace bench

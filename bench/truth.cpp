@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "support/truth_flat.hpp"
+
+// truth FOLDER [--short] [SCENE...]: equilibria of the library beside those of CalculiX, another program with other
+// elements. Prints a Markdown table for each scene; writes truth.md and a .tsv for each plot to FOLDER.
+
+namespace {
+
+using bench::Comparison;
+using bench::truth::Effort;
+
+struct Scene {
+    const char* name;
+    Comparison (*compare)(const Effort&);
+};
+
+constexpr Scene scenes[] = {
+    {"pressure", bench::truth::pressure},
+    {"patch", bench::truth::patch},
+    {"foundation", bench::truth::foundation},
+};
+
+void run(const std::filesystem::path& folder, const std::vector<std::string>& names, const Effort& effort) {
+    std::FILE* page = std::fopen((folder / "truth.md").c_str(), "w");
+    for (const Scene& scene : scenes) {
+        if (!names.empty() && std::find(names.begin(), names.end(), scene.name) == names.end()) continue;
+        const Comparison table = scene.compare(effort);
+        for (std::FILE* file : {stdout, page}) table.print(file);
+        table.write_tsv(folder / ("truth_" + table.key + ".tsv"));
+    }
+    std::fclose(page);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        if (argc < 2) throw std::runtime_error("truth FOLDER [--short] [SCENE...]");
+        if (!bench::has_calculix()) {
+            std::fprintf(stderr, "truth: skipped, there is no ccx (Debian's calculix-ccx)\n");
+            return 0;
+        }
+        const std::filesystem::path folder = argv[1];
+        std::filesystem::create_directories(folder);
+        Effort effort{.folder = folder / "calculix"};
+        std::vector<std::string> names;
+        for (int i = 2; i < argc; ++i) {
+            if (std::strcmp(argv[i], "--short") == 0) {
+                effort = {.folder = effort.folder, .rings = 10, .across = 4, .loads = 1};
+            } else {
+                names.push_back(argv[i]);
+            }
+        }
+        run(folder, names, effort);
+        return 0;
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "truth: %s\n", error.what());
+        return 2;
+    }
+}
