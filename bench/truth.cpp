@@ -7,7 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "support/truth_ball.hpp"
+#include "support/truth_curved.hpp"
 #include "support/truth_flat.hpp"
+#include "support/truth_shell.hpp"
 
 // truth FOLDER [--short] [SCENE...]: equilibria of the library beside those of CalculiX, another program with other
 // elements. Prints a Markdown table for each scene; writes truth.md and a .tsv for each plot to FOLDER.
@@ -26,6 +29,17 @@ constexpr Scene scenes[] = {
     {"pressure", bench::truth::pressure},
     {"patch", bench::truth::patch},
     {"foundation", bench::truth::foundation},
+    {"cap", bench::truth::cap},
+    {"irregular", bench::truth::irregular_pressure},
+    {"irregular", bench::truth::irregular_patch},
+    {"ball", bench::truth::small_ball},
+    {"ball", bench::truth::middle_ball},
+    {"ball", bench::truth::large_ball},
+    {"capsule", bench::truth::capsule},
+    {"shell", bench::truth::dent},
+    {"shell", bench::truth::clamped_plate},
+    {"shell", bench::truth::hinged_plate},
+    {"tools", bench::truth::two_balls},
 };
 
 void run(const std::filesystem::path& folder, const std::vector<std::string>& names, const Effort& effort) {
@@ -54,7 +68,7 @@ int main(int argc, char** argv) {
         std::vector<std::string> names;
         for (int i = 2; i < argc; ++i) {
             if (std::strcmp(argv[i], "--short") == 0) {
-                effort = {.folder = effort.folder, .rings = 10, .across = 4, .loads = 1};
+                effort = {.folder = effort.folder, .rings = 14, .across = 4, .loads = 1};
             } else {
                 names.push_back(argv[i]);
             }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -16,8 +17,8 @@
 
 #include "shell_mesh.hpp"
 
-/// A scene in the input language of CalculiX, its run, and its results. Here all is in SI units; CalculiX gets mm, N and
-/// MPa.
+/// A scene in the input language of CalculiX, its run, and its results. Here all is in SI units; CalculiX gets
+/// mm, N and MPa.
 ///
 ///     bench::CalculixScene scene(mesh, {.young_modulus = 1e6, .poisson_ratio = 0.45, .thickness = 50e-6});
 ///     scene.name_nodes("RIM", rim);
@@ -47,8 +48,9 @@ struct Prescribed {
 /// One load step, to be reached from the one before.
 struct CalculixStep {
     std::vector<Prescribed> held;
-    double pressure = 0;         ///< on all quads, along +z or the outward normal [Pa]
-    double first_increment = 1;  ///< part of the step that is tried first
+    double pressure = 0;           ///< along the normal, +z on a flat mesh [Pa]
+    std::string loaded = "SHELL";  ///< quads under pressure, all by default
+    double first_increment = 1;    ///< part of the step that is tried first
 };
 
 /// Displacements and forces at the end of each step.
@@ -84,6 +86,17 @@ class CalculixScene {
 
     /// Prescribes displacements of each node on its own [m], as a `Prescribed` cannot.
     void name_displacements(const std::string& name, const std::vector<std::pair<Index, Vector3>>& nodes);
+
+    /// The quads whose nodes are all where `is_in(position)` holds.
+    template <class Predicate>
+    void name_quads(const std::string& name, Predicate is_in) {
+        model_ << "*ELSET,ELSET=" << name << '\n';
+        for (std::size_t q = 0; q < mesh_.quads.size(); ++q) {
+            const auto& quad = mesh_.quads[q];
+            const auto inside = [&](Index node) { return is_in(mesh_.nodes[static_cast<std::size_t>(node)]); };
+            if (std::all_of(quad.begin(), quad.end(), inside)) model_ << q + 1 << ",\n";
+        }
+    }
 
     /// A spring along z on each node, `stiffness` times its area [N/m^3].
     void add_foundation(double stiffness, const std::vector<double>& areas);
@@ -231,7 +244,7 @@ inline void CalculixScene::write(std::ostream& out, const CalculixStep& step) co
             }
         }
     }
-    if (step.pressure != 0) out << "*DLOAD,OP=NEW\nSHELL,P," << mpa * step.pressure << '\n';
+    if (step.pressure != 0) out << "*DLOAD,OP=NEW\n" << step.loaded << ",P," << mpa * step.pressure << '\n';
     for (const std::string& set : printed_) {
         out << "*NODE PRINT,NSET=" << set << ",FREQUENCY=1000\nU\n*NODE PRINT,NSET=" << set
             << ",FREQUENCY=1000,TOTALS=ONLY\nRF\n";

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -42,6 +43,7 @@ struct Sheet {
     double stretch = 1;           ///< on the mesh
     double rigidity = 0;          ///< of bending [N m]
     double pressure = 0;          ///< [Pa]
+    double loaded_radius = 1;     ///< the pressure is on triangles within this distance of the z axis [m]
     double foundation = 0;        ///< along the normal [Pa/m]
     std::vector<Index> pinned{};  ///< vertices that keep their positions
 
@@ -61,7 +63,21 @@ struct Sheet {
         std::vector<double> stiffness = membrane::vertex_areas(mesh);
         for (double& area : stiffness) area *= foundation;
         const auto springs = membrane::FoundationSprings(mesh, {.normal = stiffness, .tangential = 0.0});
-        return act(membrane::Tissue(none, triangles, bending, membrane::pressure(mesh, pressure)), springs);
+        return act(membrane::Tissue(none, triangles, bending, pressure_loads()), springs);
+    }
+
+    using Loads = membrane::Elements<double, membrane::PressureLoad<double>>;
+
+    [[nodiscard]] Loads pressure_loads() const {
+        const Loads everywhere = membrane::pressure(mesh, pressure);
+        std::vector<Loads::Instance> all(everywhere.all().begin(), everywhere.all().end());
+        const auto is_outside = [&](const auto& load) {
+            Vector3 middle = Vector3::Zero();
+            for (const Index v : load.corners) middle += membrane::point(mesh.positions(), v) / 3;
+            return std::hypot(middle.x(), middle.y()) > loaded_radius;
+        };
+        std::erase_if(all, is_outside);
+        return Loads(mesh, std::move(all));
     }
 };
 
@@ -89,6 +105,10 @@ struct Sheet {
         radii.push_back(patch + (radius - patch) * (grading * s + (1 - grading) * s * s));
     }
     return radii;
+}
+
+[[nodiscard]] inline std::string vertices_of(const Mesh& mesh) {
+    return std::to_string(mesh.vertex_count()) + " vertices";
 }
 
 /// The contact of a tool with the membrane at `x`, as in the first tick.

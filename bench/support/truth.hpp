@@ -51,6 +51,15 @@ template <class Solve>
     return column;
 }
 
+/// The column of `solve()`, on one mesh, with the time.
+template <class Solve>
+[[nodiscard]] Column single(const std::string& name, Solve solve) {
+    const double begin = processor_seconds();
+    Column column{.name = name, .values = solve()};
+    column.seconds = processor_seconds() - begin;
+    return column;
+}
+
 /// `value(i)` for each load.
 template <class Value>
 [[nodiscard]] std::vector<double> collected(const std::vector<double>& loads, Value value) {

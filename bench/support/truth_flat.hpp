@@ -25,10 +25,11 @@ inline const membrane::Material soft{.young_modulus = 1e6, .poisson_ratio = 0.45
 }
 
 /// The other program's disc: quads of the unstretched disc; the first step stretches it in its plane. Sets: RIM, X0 and
-/// Y0 (the planes of symmetry), MIDDLE, PATCH.
+/// Y0 (the planes of symmetry), MIDDLE, PATCH. `still` is prescribed in this step only.
 class FlatShell {
   public:
-    FlatShell(QuarterDiscOptions options, const ShellSection& section) : scene(scaled(std::move(options)), section) {
+    FlatShell(QuarterDiscOptions options, const ShellSection& section, const std::vector<Prescribed>& still = {})
+        : scene(scaled(std::move(options)), section) {
         const ShellMesh& mesh = scene.mesh();
         const double radius = disc_radius / disc_stretch, patch = patch_radius / disc_stretch, tiny = 1e-9 * radius;
         const auto rim = mesh.where([&](const Vector3& x) { return x.norm() > radius - tiny; });
@@ -49,6 +50,7 @@ class FlatShell {
         scene.name_displacements("PATCHSTRETCH", stretched(held_));
         auto flat = supports_;
         flat.push_back({"SHELLN", 3, 3, 0});
+        flat.insert(flat.end(), still.begin(), still.end());
         scene.add_step({.held = flat});
     }
 
@@ -170,7 +172,8 @@ class FlatShell {
 
 [[nodiscard]] inline Column calculix_patch(const Effort& effort, const std::string& name, double part, double sign,
                                            double foundation, const std::vector<double>& displacements) {
-    return compared(name, effort.across, [&](int across) {
+    const int fine = foundation > 0 ? 2 * effort.across : effort.across;  // springs at nodes converge slowly
+    const auto solve = [&](int across) {
         FlatShell shell(patch_disc(across), section_of(soft).thinned(part));
         if (foundation > 0) shell.scene.add_foundation(foundation, shell.stretched_areas());
         for (const double displacement : displacements) shell.add_patch_step(sign * 1e-3 * displacement);
@@ -181,7 +184,8 @@ class FlatShell {
             const double springs = foundation * shell.held_area() * 1e-3 * displacements[static_cast<std::size_t>(i)];
             return 4 * 1e3 * (sign * results.force("PATCH", i + 2).z() + springs);
         });
-    });
+    };
+    return part < 1 ? compared(name, fine, solve) : single(name, [&] { return solve(fine); });
 }
 
 [[nodiscard]] inline Comparison pressure(const Effort& effort) {
@@ -238,6 +242,58 @@ class FlatShell {
     table.ours.push_back(ours("graded", effort.rings, 0.3, 0));
     table.ours.push_back(ours("graded, with bending", effort.rings, 0.3, membrane::flexural_rigidity(soft)));
     table.ours.push_back(calculix_patch(effort, "CalculiX, real thickness", 1, -1, stiffness, table.loads));
+    return table;
+}
+
+/// The vertices of an irregular mesh that are nearest to the circle of the patch, moved onto it: then the patch is as
+/// large as it is meant to be.
+[[nodiscard]] inline Mesh with_patch_rim(const Mesh& mesh) {
+    Points x = mesh.positions();
+    for (const auto& corners : mesh.triangles().colwise()) {
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Index a = corners[static_cast<Eigen::Index>(k)], b = corners[static_cast<Eigen::Index>((k + 1) % 3)];
+            const double inside = mesh.positions().col(a).norm() - patch_radius;
+            const double outside = mesh.positions().col(b).norm() - patch_radius;
+            if (inside * outside > 0) continue;  // the edge does not cross the circle
+            const Index nearest = std::abs(inside) < std::abs(outside) ? a : b;
+            x.col(nearest) = patch_radius / mesh.positions().col(nearest).norm() * mesh.positions().col(nearest);
+        }
+    }
+    return {x, mesh.triangles()};
+}
+
+[[nodiscard]] inline Comparison irregular_pressure(const Effort& effort) {
+    Comparison table{.key = "irregular_pressure",
+                     .title = "5a. Pressure on a disc by DistMesh, beside the disc of rings",
+                     .load = "pressure [Pa]",
+                     .quantity = "height [mm]",
+                     .bound = 0.001,
+                     .loads = effort.some({100, 300, 500, 1000, 3000})};
+    table.reference = calculix_pressure(effort, table.loads);
+    table.ours.push_back(compared(vertices_of(irregular_disc(effort.rings)), effort.rings,
+                                  [&](int rings) { return heights(flat_sheet(irregular_disc(rings)), table.loads); }));
+    table.ours.push_back(compared("rings, " + effort.rings_name(), effort.rings,
+                                  [&](int rings) { return heights(flat_sheet(disc_with_patch(rings)), table.loads); }));
+    return table;
+}
+
+[[nodiscard]] inline Comparison irregular_patch(const Effort& effort) {
+    Comparison table{.key = "irregular_patch",
+                     .title = "5b. A patch on a disc by DistMesh, beside the disc of rings",
+                     .load = "displacement [mm]",
+                     .quantity = "force [mN]",
+                     .bound = 0.003,
+                     .loads = effort.some({0.1, 0.3, 0.5, 1, 1.5})};
+    table.reference = calculix_patch(effort, "CalculiX", 0.01, 1, 0, table.loads);
+    const Mesh fine = irregular_disc(effort.rings);
+    table.ours.push_back(compared(vertices_of(fine), effort.rings, [&](int rings) {
+        const Mesh mesh = with_patch_rim(irregular_disc(rings));
+        return patch_forces(flat_sheet(mesh), within(mesh, patch_radius * (1 + 1e-9)), 1, table.loads);
+    }));
+    table.ours.push_back(single("vertices within, not moved", [&] {
+        return patch_forces(flat_sheet(fine), within(fine, patch_radius), 1, table.loads);
+    }));
+    table.ours.push_back(patch_column("rings, " + effort.rings_name(), effort.rings, 1, 1, 0, 0, table.loads));
     return table;
 }
 
