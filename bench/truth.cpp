@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cstdio>
 #include <cstring>
 #include <exception>
 #include <filesystem>
-#include <map>
+#include <iterator>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -37,12 +39,17 @@ constexpr Scene scenes[] = {
     {"ball", bench::truth::large_ball},
     {"capsule", bench::truth::capsule},
     {"shell", bench::truth::dent},
-    {"shell", bench::truth::clamped_plate},
-    {"shell", bench::truth::hinged_plate},
+    {"shell", bench::truth::plate},
     {"tools", bench::truth::two_balls},
 };
 
 void run(const std::filesystem::path& folder, const std::vector<std::string>& names, const Effort& effort) {
+    for (const std::string& name : names) {
+        const auto is_named = [&](const Scene& scene) { return scene.name == name; };
+        if (std::none_of(std::begin(scenes), std::end(scenes), is_named)) {
+            throw std::runtime_error("there is no scene " + name);
+        }
+    }
     std::FILE* page = std::fopen((folder / "truth.md").c_str(), "w");
     for (const Scene& scene : scenes) {
         if (!names.empty() && std::find(names.begin(), names.end(), scene.name) == names.end()) continue;

@@ -125,10 +125,15 @@ inline membrane::Equilibrium Sheet::equilibrium(const Points& x, const std::vect
         const auto pressed = [&](std::size_t i) {
             return membrane::press(tools[i], contact_of(mesh, x, tools[i], trackers[i]));
         };
-        const auto solve = [&](const auto&... constraints) {
-            return membrane::equilibrium(x, mesh, tissue, springs, {}, constraints...);
+        const auto solve = [&](Index increments) {
+            const auto run = [&](const auto&... constraints) {
+                return membrane::equilibrium(x, mesh, tissue, springs, {.increments = increments}, constraints...);
+            };
+            if (tools.empty()) return run();
+            return tools.size() == 1 ? run(pressed(0)) : run(pressed(0), pressed(1));
         };
-        auto found = tools.empty() ? solve() : tools.size() == 1 ? solve(pressed(0)) : solve(pressed(0), pressed(1));
+        auto found = solve(1);
+        if (!found.converged) found = solve(16);  // a distant start
         if (!found.converged) throw std::runtime_error("no equilibrium");
         return found;
     });

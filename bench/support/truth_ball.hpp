@@ -43,7 +43,7 @@ struct BallScene {
 inline Column BallScene::calculix(const Effort& effort, const std::string& name, double part) const {
     return compared(name, effort.across, [&](int across) {
         const ShellSection section = section_of(soft).thinned(part);
-        FlatShell shell(x == 0 ? ball_disc(3 * across / 2, radius) : even_disc(3 * across), section,
+        FlatShell shell(x == 0 ? ball_disc(3 * across / 2, radius) : even_disc(5 * across / 2), section,
                         {{"BALL", 1, 3, 0}});
         // What touches is the shell's upper side, half its thickness off the middle.
         const Vector3 bottom(x, 0, section.thickness / 2 + start_gap * radius);
@@ -146,7 +146,7 @@ struct Placement {
                      .quantity = "force on each [mN]",
                      .bound = 0.01,
                      .bound_from = 0.1,
-                     .loads = effort.some({0.05, 0.1, 0.2, 0.5})};
+                     .loads = effort.some({0.1, 0.2, 0.5})};
     const BallScene scene{.radius = 1e-3, .x = 1.5e-3, .depths = table.loads};
     table.reference = scene.calculix(effort, "CalculiX", 0.1);
     table.ours.push_back(compared(effort.rings_name(), effort.rings, [&](int rings) {

@@ -245,18 +245,22 @@ class FlatShell {
     return table;
 }
 
-/// The vertices of an irregular mesh that are nearest to the circle of the patch, moved onto it: then the patch is as
-/// large as it is meant to be.
-[[nodiscard]] inline Mesh with_patch_rim(const Mesh& mesh) {
+/// The mesh with those vertices that are nearest to the circle of this radius around the z axis moved onto it, along
+/// the surface if that is a plane z = 0 or a sphere around the origin: then a load within is as large as it is meant to
+/// be.
+[[nodiscard]] inline Mesh with_circle(const Mesh& mesh, double radius) {
     Points x = mesh.positions();
+    const auto from_axis = [&](Index v) { return std::hypot(mesh.positions()(0, v), mesh.positions()(1, v)); };
     for (const auto& corners : mesh.triangles().colwise()) {
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Index a = corners[static_cast<Eigen::Index>(k)], b = corners[static_cast<Eigen::Index>((k + 1) % 3)];
-            const double inside = mesh.positions().col(a).norm() - patch_radius;
-            const double outside = mesh.positions().col(b).norm() - patch_radius;
+        for (Eigen::Index k = 0; k < 3; ++k) {
+            const Index a = corners[k], b = corners[(k + 1) % 3];
+            const double inside = from_axis(a) - radius, outside = from_axis(b) - radius;
             if (inside * outside > 0) continue;  // the edge does not cross the circle
             const Index nearest = std::abs(inside) < std::abs(outside) ? a : b;
-            x.col(nearest) = patch_radius / mesh.positions().col(nearest).norm() * mesh.positions().col(nearest);
+            const auto& from = mesh.positions().col(nearest);
+            const double height = from.z() > 0 ? std::sqrt(from.squaredNorm() - radius * radius) : 0;
+            x.col(nearest) = radius / from_axis(nearest) * from;
+            x(2, nearest) = height;
         }
     }
     return {x, mesh.triangles()};
@@ -287,7 +291,7 @@ class FlatShell {
     table.reference = calculix_patch(effort, "CalculiX", 0.01, 1, 0, table.loads);
     const Mesh fine = irregular_disc(effort.rings);
     table.ours.push_back(compared(vertices_of(fine), effort.rings, [&](int rings) {
-        const Mesh mesh = with_patch_rim(irregular_disc(rings));
+        const Mesh mesh = with_circle(irregular_disc(rings), patch_radius);
         return patch_forces(flat_sheet(mesh), within(mesh, patch_radius * (1 + 1e-9)), 1, table.loads);
     }));
     table.ours.push_back(single("vertices within, not moved", [&] {
