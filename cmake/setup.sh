@@ -88,6 +88,7 @@ example_packages=(g++ cmake ninja-build libeigen3-dev libcli11-dev nlohmann-json
     libtinyobjloader-dev zlib1g-dev gnuplot-nox)
 bench_packages=(g++ cmake ninja-build libeigen3-dev libbenchmark-dev nlohmann-json3-dev gnuplot-nox
     libbullet-dev libcgal-dev libembree-dev libfcl-dev)
+truth_packages=(calculix-ccx)
 check_packages=(clang clang-format-14 clang-tidy debootstrap doxygen g++-mingw-w64-x86-64-posix git libclang-rt-dev meson
     pkg-config python3 valgrind)
 

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "truth_flat.hpp"
+
+/// Rigid balls without friction, pressed into the flat disc: one in the middle, or two at once.
+namespace bench::truth {
+
+inline constexpr double start_gap = 0.01;  // between ball and sheet before the press, in radii
+
+/// Directions of a quarter of a ball's lower side, the angle from its bottom as the distance from the origin: fine
+/// where contact begins.
+[[nodiscard]] inline ShellMesh ball_directions(int across) {
+    const Zone around{.radius = 1.2, .rings = 2 * across, .growth = std::pow(12.0, 0.5 / across)};
+    return quarter_disc({.across = across, .core = 0.1, .zones = {around}});
+}
+
+/// Quads that are fine under a ball in the middle.
+[[nodiscard]] inline QuarterDiscOptions ball_disc(int across, double radius) {
+    const Zone under{.radius = radius, .rings = 2 * across};
+    const Zone outside{
+        .radius = disc_radius, .rings = 3 * across / 2, .growth = std::pow(disc_radius / radius, 1.0 / across)};
+    return {.across = across, .core = 0.25 * radius, .zones = {under, outside}};
+}
+
+/// A ball at (x, 0), to be compared with another program; if x is not 0, a second one at (-x, 0) does the same.
+struct BallScene {
+    double radius, x;            ///< [m]
+    std::vector<double> depths;  ///< of the lowest point under the flat sheet, in radii
+
+    /// The force on the ball at each depth [mN], in the limit of a membrane unless `part` of the thickness is 1.
+    [[nodiscard]] Column calculix(const Effort& effort, const std::string& name, double part) const;
+
+    /// The same by the library, on a disc; `edge` of the correction of the radius, none if it is 0 [m].
+    [[nodiscard]] std::vector<double> forces(const Mesh& mesh, double edge, double rigidity = 0) const;
+};
+
+inline Column BallScene::calculix(const Effort& effort, const std::string& name, double part) const {
+    return compared(name, effort.across, [&](int across) {
+        const ShellSection section = section_of(soft).thinned(part);
+        FlatShell shell(x == 0 ? ball_disc(3 * across / 2, radius) : even_disc(5 * across / 2), section,
+                        {{"BALL", 1, 3, 0}});
+        // What touches is the shell's upper side, half its thickness off the middle.
+        const Vector3 bottom(x, 0, section.thickness / 2 + start_gap * radius);
+        const ShellMesh quarter = ball_directions(3 * across);
+        shell.scene.add_ball("BALL", bottom, radius - section.thickness / 2, x == 0 ? quarter : mirrored(quarter, 0));
+        for (const double depth : depths) {
+            shell.add_step({{"BALL", 1, 2, 0}, {"BALL", 3, 3, -(depth + start_gap) * radius}});
+        }
+        shell.scene.print("BALL");
+        const auto results = shell.scene.run(effort.folder, "ball" + std::to_string(across));
+        const double parts = x == 0 ? 4 : 2;
+        return collected(depths, [&](int i) { return -parts * 1e3 * results.force("BALL", i + 2).z(); });
+    });
+}
+
+inline std::vector<double> BallScene::forces(const Mesh& mesh, double edge, double rigidity) const {
+    Sheet sheet = flat_sheet(mesh);
+    sheet.rigidity = rigidity;
+    Points position = mesh.positions();
+    std::vector<double> found;
+    for (const double depth : depths) {
+        Tool ball{.position = {x, 0, (1 - depth) * radius},
+                  .radius = edge > 0 ? membrane::tool_radius(radius, edge) : radius};
+        std::vector<Tool> tools{ball};
+        ball.position.x() = -x;
+        if (x != 0) tools.push_back(ball);
+        const auto equilibrium = sheet.equilibrium(position, tools);
+        position = equilibrium.x;
+        found.push_back(1e3 * equilibrium.reactions[0].z());
+    }
+    return found;
+}
+
+/// The disc of rings with its inner vertices moved by `offset` in the middle and less towards the rim.
+[[nodiscard]] inline Mesh shifted_disc(const Mesh& mesh, const Vector3& offset) {
+    Points x = mesh.positions();
+    for (auto position : x.colwise()) {
+        position += (1 - position.squaredNorm() / (disc_radius * disc_radius)) * offset.eigen();
+    }
+    return {x, mesh.triangles()};
+}
+
+/// Over a vertex, the middle of an edge and the middle of a triangle.
+struct Placement {
+    std::string name;
+    Mesh mesh;
+};
+
+[[nodiscard]] inline std::vector<Placement> placements(int rings) {
+    const Mesh mesh = disc_with_patch(rings);
+    const auto corners = mesh.triangles().col(0);
+    const auto& x = mesh.positions();
+    return {{"over a vertex", mesh},
+            {"over an edge", shifted_disc(mesh, -(x.col(corners[0]) + x.col(corners[1])) / 2)},
+            {"over a face", shifted_disc(mesh, -(x.col(corners[0]) + x.col(corners[1]) + x.col(corners[2])) / 3)}};
+}
+
+/// A ball of this radius, 1 % from a depth of a tenth of it on.
+[[nodiscard]] inline Comparison ball(const Effort& effort, const std::string& key, const std::string& title,
+                                     double radius) {
+    Comparison table{.key = key,
+                     .title = title,
+                     .load = "depth [radii]",
+                     .quantity = "force [mN]",
+                     .bound = 0.01,
+                     .bound_from = 0.1,
+                     .bounded = 3,
+                     .loads = effort.some({0.02, 0.05, 0.1, 0.2, 0.5})};
+    const BallScene scene{.radius = radius, .x = 0, .depths = table.loads};
+    table.reference = scene.calculix(effort, "CalculiX", 0.1);
+    const auto fine = placements(effort.rings), coarse = placements(effort.rings / 2);
+    for (std::size_t i = 0; i < fine.size(); ++i) {
+        table.ours.push_back(
+            single(fine[i].name, [&] { return scene.forces(fine[i].mesh, membrane::mean_edge(fine[i].mesh)); }));
+        table.ours.back().coarse = scene.forces(coarse[i].mesh, membrane::mean_edge(coarse[i].mesh));
+    }
+    table.ours.push_back(single("over a face, radius as it is", [&] { return scene.forces(fine[2].mesh, 0); }));
+    // Fine in the middle: rings of a quarter of the mean width.
+    const Mesh graded = ring_disc(ring_radii(0, 0, disc_radius, effort.rings, 0.25));
+    const double edge = disc_radius / effort.rings / 4;
+    table.ours.push_back(single("graded", [&] { return scene.forces(graded, edge); }));
+    table.ours.push_back(single("graded, radius as it is", [&] { return scene.forces(graded, 0); }));
+    return table;
+}
+
+[[nodiscard]] inline Comparison small_ball(const Effort& effort) {
+    return ball(effort, "ball_a", "6a. A ball of 0.5 mm", 0.5e-3);
+}
+[[nodiscard]] inline Comparison middle_ball(const Effort& effort) {
+    return ball(effort, "ball_b", "6b. A ball of 1 mm", 1e-3);
+}
+[[nodiscard]] inline Comparison large_ball(const Effort& effort) {
+    return ball(effort, "ball_c", "6c. A ball of 2 mm", 2e-3);
+}
+
+[[nodiscard]] inline Comparison two_balls(const Effort& effort) {
+    Comparison table{.key = "tools",
+                     .title = "9. Two balls of 1 mm at once, 3 mm apart",
+                     .load = "depth [radii]",
+                     .quantity = "force on each [mN]",
+                     .bound = 0.01,
+                     .bound_from = 0.1,
+                     .loads = effort.some({0.1, 0.2, 0.5})};
+    const BallScene scene{.radius = 1e-3, .x = 1.5e-3, .depths = table.loads};
+    table.reference = scene.calculix(effort, "CalculiX", 0.1);
+    table.ours.push_back(compared(effort.rings_name(), effort.rings, [&](int rings) {
+        const Mesh mesh = disc_with_patch(rings);
+        return scene.forces(mesh, membrane::mean_edge(mesh));
+    }));
+    const Mesh mesh = disc_with_patch(effort.rings);
+    table.ours.push_back(single("radius as it is", [&] { return scene.forces(mesh, 0); }));
+    table.ours.push_back(single("twice as fine", [&] {
+        const Mesh finer = disc_with_patch(2 * effort.rings);
+        return scene.forces(finer, membrane::mean_edge(finer));
+    }));
+    return table;
+}
+
+}  // namespace bench::truth
