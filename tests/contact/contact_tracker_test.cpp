@@ -525,8 +525,8 @@ struct Beside {
     /// Moves on, slowly, until the tool is `to`.
     void go(const Tool<double>& to) {
         const Tool<double> from = tool;
-        const double way = std::max((to.position - from.position).norm(), (to.axis - from.axis).norm());
-        const int ticks = contact.phase == ContactPhase::none && !tracked ? 1 : 1 + static_cast<int>(way / 0.01);
+        const double travel = std::max((to.position - from.position).norm(), (to.axis - from.axis).norm());
+        const int ticks = contact.phase == ContactPhase::none && !tracked ? 1 : 1 + static_cast<int>(travel / 0.01);
         for (int tick = 1; tick <= ticks; ++tick) {
             tool = to;
             tool.position = from.position + double(tick) / ticks * (to.position - from.position);
