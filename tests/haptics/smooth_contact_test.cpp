@@ -145,6 +145,19 @@ TEMPLATE_TEST_CASE("at a vertex its normal, on an edge both, beyond a border the
     }
 }
 
+TEST_CASE("far from its triangle, where the search for the proxy goes in circles, a contact has a normal", "[smooth]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = uneven_ball<double>(random, 1, 0.5);
+        const auto smooth = SmoothContact(mesh);
+        for (int i = 0; i < 20; ++i) {
+            const auto contact = touching<double>(random.index(mesh.triangle_count()), 0.02 * random.vector());
+            CHECK(norm(smooth(contact).normal) == Approx(1));
+        }
+    }
+}
+
 TEST_CASE("what is no contact, or not finite, or has no normal, stays as it is", "[smooth]") {
     const auto mesh = icosphere<double>({.radius = 0.01, .subdivisions = 1});
     const auto smooth = SmoothContact(mesh);

@@ -36,7 +36,8 @@ memory_limit = 6 << 30  # [bytes]
 
 # What the compiler or the processor decides, not the tests, and what only saves time.
 left_out = {"core/instruction_set.hpp", "core/version.hpp"}
-skipped_lines = re.compile(r"\s*(#|template|concept|requires|using|namespace|static_assert|friend|MEMBRANE_)|.*\breserve\(")
+skipped_lines = re.compile(r"\s*(#|template|concept|requires|using|namespace|static_assert|friend|MEMBRANE_)"
+                           r"|.*\breserve\(")
 
 # clang-format puts spaces around binary operators alone: neither templates nor references match.
 swaps = [(" + ", " - "), (" * ", " / "), (" < ", " <= "), (" > ", " >= "), (" < ", " > "), (" <= ", " >= "),
@@ -204,7 +205,8 @@ def write_headers(numbered, place):
     for header in {mutant.header for mutant in numbered.values()}:
         source = source_of(header)
         text = source.plain
-        for begin, end, form, i in sorted(((*rewritten(m), i) for i, m in numbered.items() if m.header == header), reverse=True):
+        forms = [(*rewritten(mutant), i) for i, mutant in numbered.items() if mutant.header == header]
+        for begin, end, form, i in sorted(forms, reverse=True):
             text = text[:begin] + form.replace("@", str(i)) + "\n" * text.count("\n", begin, end) + text[end:]
             for line in range(source.line_of(begin), source.line_of(end) + 1):
                 lines.setdefault((header, line), []).append(i)
@@ -271,16 +273,20 @@ def mutants_at(lines, printed, kind):
 def built(folder, numbered, support, arguments):
     """The folder's tests with all its mutants. Those that do not compile are taken from `numbered`."""
     place = scratch / folder
-    units = test_units(folder, numbered.values(), arguments.own, place) if place.mkdir(exist_ok=True) is None else []
+    place.mkdir(exist_ok=True)
+    units = test_units(folder, numbered.values(), arguments.own, place)
     prefix_file, program = place / "prefix.hpp", place / "tests"
     prefix_file.write_text(prefix.replace("COUNT", str(max(numbered) + 1)), encoding="utf-8")
     if not units or compile_one(prefix_file, place / "prefix.hpp.gch", "-x", "c++-header"):
         sys.exit(f"error: no tests of {folder}, or Catch2 or Eigen does not compile")
-    objects = [place / f"{unit.stem}.o" for unit in units]
-    waiting = dict(zip(units, objects))
+    objects = {unit: place / f"{unit.stem}.o" for unit in units}
+
+    def compile_unit(unit):
+        return compile_one(unit, objects[unit], f"-I{place}/include", "-include", prefix_file)
+
+    waiting = units
     while waiting:
         lines = write_headers(numbered, place)
-        compile_unit = lambda u: compile_one(u, waiting[u], f"-I{place}/include", "-include", prefix_file)
         with concurrent.futures.ThreadPoolExecutor(arguments.jobs) as workers:
             printed = dict(zip(waiting, workers.map(compile_unit, waiting)))
         failed = {unit: text for unit, text in printed.items() if text is not None}
@@ -290,8 +296,8 @@ def built(folder, numbered, support, arguments):
                 sys.exit(f"error: {unit} does not compile\n{text}")
             for i in at_fault & numbered.keys():
                 del numbered[i]
-        waiting = {unit: waiting[unit] for unit in failed}
-    result, text = run(["g++", *objects, *support, "-o", program, "-lmpfr", "-lgmp", "-pthread"], 600)
+        waiting = list(failed)
+    result, text = run(["g++", *objects.values(), *support, "-o", program, "-lmpfr", "-lgmp", "-pthread"], 600)
     if result != "passes":
         sys.exit(f"error: the tests of {folder} do not link\n{text}")
     return program

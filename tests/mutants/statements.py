@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Finds the statement around a place of a C++ file, and writes it so that one program holds it and a changed form of it.
+"""Finds the statement around a place of a C++ file, and writes it so that one program holds it and a changed form.
 
 Text only: it knows brackets, comments and texts, and the layout that clang-format gives, not names or types. What it
 cannot write with both forms it leaves out; what it writes wrongly does not compile.
@@ -32,7 +32,7 @@ class Statement:
 
 
 class Source:
-    """A file's code: its lines without comments. Texts and the preprocessor's lines are spaces; in `plain` they are not."""
+    """A file's code: its lines without comments. Texts and the preprocessor's lines are spaces, but not in `plain`."""
 
     def __init__(self, text):
         lines = [line[:len(code_of(line))] for line in text.splitlines()]

@@ -2,9 +2,11 @@
 #include <membrane/solve/vertex_colouring.hpp>
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include <membrane/core/snapshot.hpp>
 #include <membrane/model/mass_spring_network.hpp>
 
 #include "support/cases.hpp"
@@ -62,4 +64,19 @@ TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[v
             REQUIRE(std::ranges::equal(groups.ends(), ends));
         }
     }
+}
+
+TEST_CASE("a snapshot holds the groups", "[vertex_colouring]") {
+    Random random(1);
+    const auto mesh = test::random_surface<double>(random).mesh();
+    const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 1.0});
+    IndexSet set(mesh.vertex_count());
+    for (Index v = 0; v < mesh.vertex_count(); ++v) set.insert(v);
+    VertexColouring groups(mesh.vertex_count()), restored = groups;
+    groups.add(network, set, 0, static_cast<std::size_t>(set.count()));
+    REQUIRE(groups.ends().size() > 1);
+    std::vector<std::byte> buffer(snapshot_capacity(groups));
+    buffer.resize(save_snapshot(buffer, groups));
+    REQUIRE(restore_snapshot(buffer, restored));
+    CHECK(std::ranges::equal(restored.ends(), groups.ends()));
 }

@@ -33,22 +33,24 @@ template <class Found>
 
 namespace detail {
 
+/// An axis along which the projected area of `t` is not 0.
+[[nodiscard]] inline int axis_across(const Triangle<double>& t) noexcept {
+    int k = 0;
+    while (k < 2 && sign_of_area(t.a, t.b, t.c, k) == 0) ++k;
+    return k;
+}
+
 /// Whether the segment from p to q, which lies in the plane of `t`, meets it.
 [[nodiscard]] inline bool meets_in_plane(const Triangle<double>& t, const Vector3<double>& p,
                                          const Vector3<double>& q) noexcept {
-    int k = 0;  // an axis along which the projected area is not 0
-    while (sign_of_area(t.a, t.b, t.c, k) == 0) {
-        if (++k == 3) return false;
-    }
-    const int turn = sign_of_area(t.a, t.b, t.c, k);
+    const int k = axis_across(t), turn = sign_of_area(t.a, t.b, t.c, k);
     // They are apart if the line of a side of one has all of the other beyond it.
     for (int i = 0; i < 3; ++i) {
         const Vector3<double>&from = corner(t, i), &to = corner(t, (i + 1) % 3);
         if (turn * sign_of_area(from, to, p, k) < 0 && turn * sign_of_area(from, to, q, k) < 0) return false;
     }
     const int a = sign_of_area(p, q, t.a, k), b = sign_of_area(p, q, t.b, k), c = sign_of_area(p, q, t.c, k);
-    if (a == b && b == c) return false;
-    return true;
+    return a != b || b != c;
 }
 
 /// Whether the segment from p to q meets the triangle, touching included.
@@ -128,11 +130,8 @@ struct MeetingTriangles {
         if (dot(normal_s, normal_t) < -1e-14 * sizes) return false;
         effort -= 4;
         if (sign_of_volume(s.a, s.b, s.c, t.c) != 0) return false;
-        for (const int k : {0, 1, 2}) {
-            const int side = sign_of_area(s.a, s.b, s.c, k);
-            if (side != 0) return side == sign_of_area(s.a, s.b, t.c, k);
-        }
-        return false;
+        const int k = axis_across(s);
+        return sign_of_area(s.a, s.b, s.c, k) == sign_of_area(s.a, s.b, t.c, k);
     }
 };
 
