@@ -237,6 +237,11 @@ TEST_CASE("fibres side by side do what each does alone, to the bit", "[fibres]")
     }
 }
 
+TEST_CASE("a triangle of fibres without constants does nothing", "[fibres]") {
+    Random random(1);
+    test::check_nothing<FibreTriangle<double>>(random);
+}
+
 TEST_CASE("no update of a vertex of a ball of fibres raises the energy", "[fibres]") {
     for (int seed = 1; seed <= cases(30); ++seed) {
         CAPTURE(seed);

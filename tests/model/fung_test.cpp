@@ -182,6 +182,11 @@ TEST_CASE("Fung triangles side by side do what each does alone, to the bit", "[f
     }
 }
 
+TEST_CASE("a Fung triangle without constants does nothing", "[fung]") {
+    Random random(1);
+    test::check_nothing<FungTriangle<double>>(random);
+}
+
 TEST_CASE("no update of a vertex of a Fung ball raises the energy", "[fung]") {
     for (int seed = 1; seed <= cases(30); ++seed) {
         CAPTURE(seed);

@@ -136,6 +136,11 @@ TEST_CASE("neo-Hookean triangles side by side do what each does alone, to the bi
     }
 }
 
+TEST_CASE("a neo-Hookean triangle without constants does nothing", "[neo_hookean]") {
+    Random random(1);
+    test::check_nothing<NeoHookeanTriangle<double>>(random);
+}
+
 TEST_CASE("no update of a vertex of a neo-Hookean ball raises the energy", "[neo_hookean]") {
     for (int seed = 1; seed <= cases(30); ++seed) {
         CAPTURE(seed);

@@ -252,6 +252,21 @@ void check_finite(const E& element, const membrane::Corners<S, 3>& x, const memb
     }
 }
 
+/// An element whose constants are all zero, as in a lane without one: nothing, with all corners at one point.
+template <class E>
+void check_nothing(Random& random) {
+    const membrane::Vector3<double> at = random.vector(), displacement = random.vector();
+    const membrane::Corners<double, 3> x{at, at, at};
+    const E nothing{};
+    REQUIRE(nothing.energy(x) == 0);
+    for (std::size_t i = 0; i < 3; ++i) {
+        REQUIRE(nothing.force_on(x, i).force == membrane::Vector3<double>::Zero());
+        REQUIRE(nothing.force_on(x, i).hessian.trace() == 0);
+        const auto change = nothing.energy_change(x, i, displacement);
+        REQUIRE((change.change == 0 && change.size == 0));
+    }
+}
+
 template <class Get, class E>
 auto side_by_side(const std::array<E, membrane::Lanes<double>::count>& all, const Get& number) {
     return membrane::Lanes<double>::of([&](std::size_t l) { return number(all[l]); });

@@ -210,8 +210,8 @@ StrainResponse<N> FibreTriangle<Scalar>::response(const N& strain) const noexcep
     const N within = smaller<N>(larger<N>(strain, 0), most), beyond = larger<N>(strain - most, 0);
     const N growth = lane_by_lane<N>([](auto z) { return std::expm1(z); }, b * within * within);
     const N stiff = k * (1 + growth), slope = stiff * within, curvature = stiff * (1 + 2 * b * within * within);
-    return {k * growth / (2 * b) + beyond * (slope + curvature * beyond / 2), slope + curvature * beyond,
-            select<N>(strain > 0, curvature, 0)};
+    return {k * detail::quotient_or_zero<N>(growth, 2 * b) + beyond * (slope + curvature * beyond / 2),
+            slope + curvature * beyond, select<N>(strain > 0, curvature, 0)};
 }
 
 // As for `FungTriangle`, over the part of the strain from 0 to the limit, and over what is beyond.
@@ -234,7 +234,8 @@ EnergyChange<N> FibreTriangle<Scalar>::energy_change(const Corners<N, 3>& x, std
     };
     const N top = larger<N>(within, reached), middle = parts.above + by.above / 2;
     const N slopes = rate(within, parts.above) + (1 + growth) * rate(reached, parts.above + by.above);
-    return {stiff * (growth / (2 * b) + (1 + larger<N>(growth, 0)) * by.above * rate(top, middle)),
+    return {stiff * (detail::quotient_or_zero<N>(growth, 2 * b) +
+                     (1 + larger<N>(growth, 0)) * by.above * rate(top, middle)),
             stiff * slopes * change.size};
 }
 

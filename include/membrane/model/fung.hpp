@@ -109,7 +109,8 @@ StrainResponse<N> FungTriangle<Scalar>::response(const N& strain) const noexcept
     const N within = smaller<N>(strain, static_cast<N>(limit));
     const N growth = lane_by_lane<N>([](auto z) { return std::expm1(z); }, b * within);
     const N slope = k * (1 + growth);
-    return {k * growth / b + slope * parts.above * (1 + b * parts.above / 2), slope * (1 + b * parts.above), slope * b};
+    return {k * detail::quotient_or_zero<N>(growth, b) + slope * parts.above * (1 + b * parts.above / 2),
+            slope * (1 + b * parts.above), slope * b};
 }
 
 // Up to the limit the energy grows by exp(b z) (exp(b dz) - 1), z the strain before; beyond, by a polynomial of slope
@@ -126,7 +127,8 @@ EnergyChange<N> FungTriangle<Scalar>::energy_change(const Corners<N, 3>& x, std:
     const N growth = lane_by_lane<N>([](auto z) { return std::expm1(z); }, b * by.below);
     const N beyond = by.above * (1 + b * (parts.above + by.above / 2));
     const N slopes = 1 + b * parts.above + (1 + growth) * (1 + b * (parts.above + by.above));
-    return {slope * (growth / b + (1 + larger<N>(growth, 0)) * beyond), slope * slopes * strain.size};
+    return {slope * (detail::quotient_or_zero<N>(growth, b) + (1 + larger<N>(growth, 0)) * beyond),
+            slope * slopes * strain.size};
 }
 
 template <Real Scalar>

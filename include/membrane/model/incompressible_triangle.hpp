@@ -178,6 +178,12 @@ template <Number N, Number Scalar>
     return {static_cast<N>(a[0]), static_cast<N>(a[1])};
 }
 
+/// a / b, or zero for b = 0: an element whose constants are all zero, as in a lane without one, has no energy.
+template <Number N>
+[[nodiscard]] N quotient_or_zero(const N& a, const N& b) noexcept {
+    return select<N>(b > 0, a / select<N>(b > 0, b, 1), 0);
+}
+
 /// Force and Hessian of an energy of one invariant.
 template <Number N>
 [[nodiscard]] CornerForce<N> corner_force(const StrainResponse<N>& energy, const InvariantSlope<N>& strain) noexcept {
