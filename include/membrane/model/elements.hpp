@@ -60,7 +60,8 @@ using Corners = std::array<Vector3<Scalar>, count>;
 /// Optional, for speed, and satisfied by the elements of this library:
 /// - `CornerForce::remainder`: with it most updates need no evaluation of the energy.
 /// - `E` is `E<Scalar>`, its members are `Scalar`s, and it takes `Lanes` as constants and as positions: several elements
-///   of one kind at once, each with the same bits as alone.
+///   of one kind at once, each with the same bits as alone. With all constants zero it has neither force nor energy, also
+///   where all corners coincide: lanes without an element have such a one.
 /// - `E::orders` and `in_order(i)`: in the order `orders[i]` of the corners, with the constants `in_order(i)`, the element
 ///   is the same. Corners that come to the same place are evaluated together.
 template <class E>
