@@ -49,6 +49,26 @@ Numbers<S> wild_numbers(Random& random) {
 }
 
 template <class S>
+MEMBRANE_NOINLINE void write(S& number, S value) {
+    number = value;
+}
+
+template <class S>
+MEMBRANE_NOINLINE Lanes<S> all_before_write(S& number) {
+    const Lanes<S> lanes = number;
+    write(number, S(-1));
+    return lanes;
+}
+
+template <class S>
+MEMBRANE_NOINLINE Lanes<S> each_before_write(S& number) {
+    return Lanes<S>::of([&](std::size_t i) {
+        write(number, static_cast<S>(i));
+        return number;
+    });
+}
+
+template <class S>
 bool same(S a, S b) {
     return bits(a) == bits(b) || (std::isnan(a) && std::isnan(b));  // which NaN is for the processor to say
 }
@@ -128,6 +148,16 @@ TEMPLATE_TEST_CASE("lanes are set one by one, all at once, and from numbers in a
     CHECK(any(sum >= 2));
     CHECK(any(true));
     CHECK_FALSE(any(false));
+}
+
+TEMPLATE_TEST_CASE("a lane keeps its number when the memory it came from changes", "[lanes]", float, double) {
+    using S = TestType;
+    S number = 7;
+    const auto all = all_before_write(number), each = each_before_write(number);
+    for (std::size_t i = 0; i < Lanes<S>::count; ++i) {
+        CHECK(all[i] == 7);
+        CHECK(each[i] == static_cast<S>(i));
+    }
 }
 
 TEMPLATE_TEST_CASE("masks are joined lane by lane", "[lanes]", float, double) {

@@ -3,8 +3,12 @@
 // Runs 24 scenes in double and in float, and prints a hash of all positions, forces and reports after 1, 10, ... ticks:
 //
 //     scenes [--ticks 10000] [--threads 1] [--scene NAME]
+//     scenes [--ticks 1000] [--threads 1] --record FILE
+//     scenes --replay FILE
 //
-// One line for each: scene, scalar, ticks, hash. The program itself calls no mathematical function but the square root,
+// One line for each: scene, scalar, ticks, hash. `--record` instead writes a recording of a hand, with a snapshot in the
+// middle; `--replay` replays one, prints its ticks, whether the snapshot is one of this machine, and how many forces
+// differ, and returns 1 if one does. The program itself calls no mathematical function but the square root,
 // whose result IEEE 754 determines.
 #include <algorithm>
 #include <array>
@@ -13,6 +17,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -41,7 +46,8 @@ using membrane::Index;
 struct Request {
     int ticks = 10'000;
     int threads = 1;
-    std::string scene;  // all, if empty
+    std::string scene;           // all, if empty
+    std::string record, replay;  // files
 };
 
 /// FNV-1a over the bits of numbers, independent of the order of bytes in memory.
@@ -221,8 +227,13 @@ class Loop {
         if (variant.grasps) strokes_.grasp();
     }
 
-    void tick() {
-        const auto tool = strokes_.template next<Scalar>(variant_.radius, variant_.axis);
+    [[nodiscard]] membrane::Tool<Scalar> next_tool() {
+        return strokes_.template next<Scalar>(variant_.radius, variant_.axis);
+    }
+
+    void tick() { tick(next_tool()); }
+
+    void tick(const membrane::Tool<Scalar>& tool) {
         const auto contact = tracker_.update(tree_, x_, tool);
         const auto grasp = grasper_.update(contact, x_, tool);
         if (variant_.two_tools) {
@@ -335,14 +346,25 @@ class AtHand : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
            const Foundation& foundation)
         : Base(name, mesh, network, foundation, {}, membrane::AnyExecutor()), smooth_(mesh) {}
 
-    void tick() {
-        Base::tick();
+    void tick() { tick(this->next_tool()); }
+
+    void tick(const membrane::Tool<Scalar>& tool) {
+        Base::tick(tool);
         const auto smoothed = smooth_(this->contact_);
         const auto force = feel_({this->tool_, smoothed, this->report_});
-        const auto felt = limit_(force.template cast<double>(), static_cast<double>(this->tool_.time), ++steps_);
+        felt_ = limit_(force.template cast<double>(), static_cast<double>(this->tool_.time), ++steps_);
         this->hash_.add(force);
-        this->hash_.add(felt);
+        this->hash_.add(felt_);
     }
+
+    [[nodiscard]] membrane::Vector3<Scalar> felt() const { return felt_.template cast<Scalar>(); }
+
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.solver_, self.tracker_, self.grasper_, self.x_, self.feel_, self.limit_, self.steps_);
+    }
+
+    void refit() { this->tree_.refit(this->x_); }
 
   private:
     membrane::SmoothContact<Scalar> smooth_;
@@ -351,7 +373,47 @@ class AtHand : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
         membrane::FrictionOptions{.coefficient = 0.3, .stiffness = 400}};
     membrane::ForceLimiter limit_{membrane::devices::touch};
     std::uint64_t steps_ = 0;
+    Vector felt_ = Vector::Zero();
 };
+
+template <class Scalar, class Hand>
+bool record(const Request& request, Hand&& hand, Index vertex_count) {
+    const int ticks = std::min(request.ticks, 1000);
+    membrane::Recorder<Scalar> recorder(static_cast<std::size_t>(ticks), vertex_count,
+                                        {.count = 1, .bytes = membrane::snapshot_capacity(hand)});
+    for (int tick = 0; tick < ticks; ++tick) {
+        if (tick == ticks / 2 && !recorder.add_snapshot(hand)) return false;
+        const auto tool = hand.next_tool();
+        hand.tick(tool);
+        recorder.add(tool, hand.felt());
+    }
+    std::ofstream file(request.record, std::ios::binary);
+    write_recording(file, recorder.recording());
+    return file.good();
+}
+
+/// From the first tick, and again from the snapshot.
+template <class Scalar, class Hand>
+bool replay(const Request& request, Hand&& hand, Hand&& other_hand, Index vertex_count) {
+    std::ifstream file(request.replay, std::ios::binary);
+    const auto recording = membrane::read_recording<Scalar>(file, vertex_count);
+    membrane::ReplayDevice<Scalar> device(recording);
+    const auto run = [&](Hand& some) {
+        while (device.running()) {
+            some.tick(device.read());
+            device.write(some.felt());
+        }
+    };
+    run(hand);
+    const bool restored = device.start_from(recording.ticks.size(), other_hand);
+    if (restored) {
+        other_hand.refit();
+        run(other_hand);
+    }
+    std::printf("%zu ticks, snapshot %s, %zu differ\n", recording.ticks.size(), restored ? "restored" : "refused",
+                device.differing());
+    return device.differing() == 0;
+}
 
 /// Runs a loop and prints its hashes.
 template <class Scalar, class Loop>
@@ -372,6 +434,12 @@ class Scenes {
   public:
     explicit Scenes(const Request& request) : request_(request) {}
 
+    bool run_recording() {
+        const auto ball = sphere<Scalar>(2);
+        if (request_.replay.empty()) return record<Scalar>(request_, hand(ball), ball.vertex_count());
+        return replay<Scalar>(request_, hand(ball), hand(ball), ball.vertex_count());
+    }
+
     void run_all() {
         const auto ball = sphere<Scalar>(2);
         run_on_springs(ball);
@@ -391,6 +459,11 @@ class Scenes {
     }
     static auto foundation(const membrane::TriangleMesh<Scalar>& mesh) {
         return membrane::VirtualVolumeSprings(mesh, {.stiffness = Scalar(20), .damping = Scalar(0.02)});
+    }
+
+    static auto hand(const membrane::TriangleMesh<Scalar>& ball) {
+        using Hand = AtHand<Scalar, decltype(network(ball)), decltype(foundation(ball))>;
+        return Hand("hand", ball, network(ball), foundation(ball));
     }
 
     template <class Network, class Foundation, class Rule = membrane::BlockStep>
@@ -431,7 +504,7 @@ class Scenes {
         loop("safe_step", ball, network(ball), foundation(ball), Variant<Scalar, membrane::SafeStep>{});
         loop("breadth_first", ball, network(ball), foundation(ball),
              V{.options = {.layers = 4, .order = membrane::UpdateOrder::breadth_first}});
-        const membrane::ThreadPool pool(static_cast<std::size_t>(request_.threads));
+        const membrane::ThreadPool pool(request_.threads);
         const auto fine = sphere<Scalar>(3);
         loop("threads", fine, network(fine), foundation(fine),
              V{.options = {.layers = membrane::unlimited, .order = membrane::UpdateOrder::colour_all}},
@@ -452,10 +525,7 @@ class Scenes {
         };
         body("turning_body", false);
         body("beating_body", true);
-        if (asked("hand")) {
-            run<Scalar>(request_, "hand",
-                        AtHand<Scalar, Network, Foundation>("hand", ball, network(ball), foundation(ball)));
-        }
+        if (asked("hand")) run<Scalar>(request_, "hand", hand(ball));
     }
 
     void run_tissues(const membrane::TriangleMesh<Scalar>& ball) {
@@ -486,9 +556,14 @@ int main(int argc, char** argv) {
             request.threads = std::atoi(argv[i + 1]);
         else if (name == "--scene")
             request.scene = argv[i + 1];
+        else if (name == "--record")
+            request.record = argv[i + 1];
+        else if (name == "--replay")
+            request.replay = argv[i + 1];
         else
             return std::fprintf(stderr, "scenes: unknown option %s\n", argv[i]), 2;
     }
+    if (!request.record.empty() || !request.replay.empty()) return Scenes<double>(request).run_recording() ? 0 : 1;
     Scenes<double>(request).run_all();
     Scenes<float>(request).run_all();
 }

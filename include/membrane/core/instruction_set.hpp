@@ -68,6 +68,17 @@ inline namespace MEMBRANE_INSTRUCTION_SET MEMBRANE_ABI_TAG {}
 
 namespace detail {
 
+/// `number`, before it is put into a lane. For WebAssembly, clang before 16 reads a number from memory into all lanes by
+/// one instruction, and moves this behind stores and calls that change the number there. After an `asm` the number is
+/// in a register.
+template <Real Scalar>
+[[nodiscard]] MEMBRANE_INLINE Scalar for_lane(Scalar number) noexcept {
+#if defined(__wasm_simd128__) && defined(__clang__) && __clang_major__ < 16
+    if (!__builtin_constant_p(number)) asm("" : "+r"(number));
+#endif
+    return number;
+}
+
 // An object of such a type may also come from another unit as a member of a type that names no instruction set. So a
 // unit that constructs it defines a symbol, and a unit that uses it refers to that symbol. If only units for other sets
 // construct it, the symbol is undefined. If units for each set construct it, a mix is not detected, but harmless: the
@@ -119,7 +130,7 @@ struct Register {
     using Mask = decltype(Type{} < Type{});  ///< all bits of a number, or none
 
     /// The same number `size` times; a zero keeps its sign.
-    [[nodiscard]] MEMBRANE_INLINE static Type all(Scalar number) noexcept { return number - Type{}; }
+    [[nodiscard]] MEMBRANE_INLINE static Type all(Scalar number) noexcept { return detail::for_lane(number) - Type{}; }
 
     /// `yes` where `mask` is set, `no` elsewhere.
     [[nodiscard]] MEMBRANE_INLINE static Type choose(Mask mask, Type yes, Type no) noexcept { return mask ? yes : no; }
@@ -178,7 +189,7 @@ struct Register {
         else
             return _mm_maskload_ps(from, _mm_setr_epi32(-1, -1, -1, 0));
 #else
-        return Type{from[0], from[1], from[2], 0};
+        return Type{detail::for_lane(from[0]), detail::for_lane(from[1]), detail::for_lane(from[2]), 0};
 #endif
     }
 };

@@ -65,7 +65,7 @@ class PaddedVector {
             const Part all = Registers::load_three(from);
             return {all, all};
         } else {
-            return {Part{from[0], from[1]}, Part{from[2], 0}};
+            return {Part{detail::for_lane(from[0]), detail::for_lane(from[1])}, Part{detail::for_lane(from[2]), 0}};
         }
     }
 

@@ -52,14 +52,15 @@ class Lanes {
     /// `at(i)` in lane i.
     template <class At>
     [[nodiscard]] static Lanes of(const At& at) noexcept {
+        const auto number = [&](std::size_t i) MEMBRANE_INLINE_LAMBDA { return detail::for_lane<Scalar>(at(i)); };
         Lanes lanes;
         for (std::size_t i = 0; i < parts; ++i) {
             const std::size_t k = i * width;
-            if constexpr (width == 2) lanes.parts_[i] = Part{at(k), at(k + 1)};
-            if constexpr (width == 4) lanes.parts_[i] = Part{at(k), at(k + 1), at(k + 2), at(k + 3)};
+            if constexpr (width == 2) lanes.parts_[i] = Part{number(k), number(k + 1)};
+            if constexpr (width == 4) lanes.parts_[i] = Part{number(k), number(k + 1), number(k + 2), number(k + 3)};
             if constexpr (width == 8) {
-                lanes.parts_[i] =
-                    Part{at(k), at(k + 1), at(k + 2), at(k + 3), at(k + 4), at(k + 5), at(k + 6), at(k + 7)};
+                lanes.parts_[i] = Part{number(k),     number(k + 1), number(k + 2), number(k + 3),
+                                       number(k + 4), number(k + 5), number(k + 6), number(k + 7)};
             }
         }
         return lanes;

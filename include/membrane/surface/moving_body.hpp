@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include <membrane/core/arctangent.hpp>
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/surface/normals.hpp>
 #include <membrane/surface/triangle.hpp>
@@ -159,7 +160,7 @@ template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> rotation_vector(const Eigen::Matrix<Scalar, 3, 3>& r) noexcept {
     const Vector3<Scalar> twice_sine(r(2, 1) - r(1, 2), r(0, 2) - r(2, 0), r(1, 0) - r(0, 1));
     const Scalar sine = norm(twice_sine) / 2, cosine = ((r(0, 0) + r(1, 1)) + r(2, 2) - 1) / 2;
-    return sine > 0 ? Vector3<Scalar>(std::atan2(sine, cosine) / (2 * sine) * twice_sine) : Vector3<Scalar>(twice_sine);
+    return sine > 0 ? Vector3<Scalar>(arctangent(sine, cosine) / (2 * sine) * twice_sine) : Vector3<Scalar>(twice_sine);
 }
 
 template <Real Scalar>

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include <membrane/core/arctangent.hpp>
 #include <membrane/core/compressed_rows.hpp>
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/lane_points.hpp>
@@ -148,7 +149,7 @@ MEMBRANE_INLINE PaddedVector<Scalar> area_within(const OneRing& ring, const Inde
 /// The angle between two sides [rad].
 template <Real Scalar>
 [[nodiscard]] Scalar angle_between(const Vector3<Scalar>& a, const Vector3<Scalar>& b) noexcept {
-    return std::atan2(norm(cross(a, b)), dot(a, b));
+    return arctangent(norm(cross(a, b)), dot(a, b));
 }
 
 }  // namespace detail
