@@ -53,7 +53,7 @@ template <class Scene>
 [[gnu::always_inline]] inline void visit(const Scene& scene, Index v, const membrane::VertexState<S>& state) noexcept {
     const S compliance = Rule{}.compliance(state);
     if (compliance * state.stiffness >= 2) std::abort();
-    const auto by = membrane::backtracked<Rule>(scene, v, compliance * state.force);
+    const auto by = membrane::backtracked<Rule>(scene, v, state, compliance * state.force);
     scene.state.set_position(v, membrane::point(scene.x, v) + by);
 }
 
