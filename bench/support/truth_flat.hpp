@@ -258,7 +258,8 @@ class FlatShell {
             if (inside * outside > 0) continue;  // the edge does not cross the circle
             const Index nearest = std::abs(inside) < std::abs(outside) ? a : b;
             const auto& from = mesh.positions().col(nearest);
-            const double height = from.z() > 0 ? std::sqrt(from.squaredNorm() - radius * radius) : 0;
+            const bool is_flat = std::abs(from.z()) < 1e-6 * from.norm();
+            const double height = is_flat ? 0 : std::sqrt(from.squaredNorm() - radius * radius);
             x.col(nearest) = radius / from_axis(nearest) * from;
             x(2, nearest) = height;
         }

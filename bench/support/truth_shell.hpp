@@ -76,8 +76,6 @@ namespace bench::truth {
                                   [&](int rings) { return dent_depths(irregular(rings), rigidity, table.loads); }));
     table.ours.push_back(compared("rings", effort.rings,
                                   [&](int rings) { return dent_depths(ring_cornea(rings), rigidity, table.loads); }));
-    table.ours.push_back(
-        single("rings, without bending", [&] { return dent_depths(ring_cornea(effort.rings), 0, table.loads); }));
     return table;
 }
 
