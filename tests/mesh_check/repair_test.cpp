@@ -340,9 +340,13 @@ TEST_CASE("a vertex that is split is where it was, and its body as large", "[mes
     }
 }
 
-TEST_CASE("a surface of thousands of vertices is welded completely", "[mesh]") {
-    const auto mesh = icosphere({.radius = 1, .subdivisions = 4});
-    const auto welded = repair(mesh.positions(), mesh.triangles(), {.weld = 1e-9});
+TEST_CASE("two surfaces of thousands of vertices are welded completely", "[mesh]") {
+    const auto one = test::surface_of(icosphere({.radius = 1, .subdivisions = 4}));
+    const Index count = one.vertex_count();
+    auto two = one;
+    two.add(one);
+    two.x.rightCols(count).array() += 1e-10;
+    const auto welded = repair(two.x, two.triangles, {.weld = 1e-9});
     CHECK(welded.report.complete);
-    CHECK(welded.report.welded == 0);
+    CHECK(welded.report.welded == count);
 }
