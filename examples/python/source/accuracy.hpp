@@ -6,8 +6,8 @@
 /// Long calls.
 namespace membrane_python {
 
-/// What `call(network, foundation)` returns, with the types of both, without Python's lock. An error that a law of Python
-/// raised meanwhile is raised in place of the one that follows from it.
+/// What `call(network, foundation)` returns, with the types of both, without Python's lock. An error that a law of
+/// Python raised meanwhile is raised in place of the one that follows from it.
 template <class Call>
 [[nodiscard]] auto unlocked(const Network& network, const Foundation& foundation, Call call) {
     try {

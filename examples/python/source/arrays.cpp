@@ -86,11 +86,11 @@ void check_count(std::string_view component, std::string_view what, Eigen::Index
 }
 
 void check_moved(std::string_view component, const Moved& moved, Index vertex_count) {
-    if (moved.vertices.empty()) return;
-    const auto [least, most] = std::minmax_element(moved.vertices.begin(), moved.vertices.end());
-    if (*least >= 0 && *most < vertex_count) return;
-    membrane::refuse(component, "moved vertices must be 0 to ", vertex_count - 1, ", got ",
-                     *least < 0 ? *least : *most);
+    // A negative index is a large one without sign; one maximum is faster than std::minmax_element by iterators.
+    unsigned most = 0;
+    for (const Index v : moved.vertices) most = (std::max)(most, static_cast<unsigned>(v));
+    if (moved.vertices.empty() || most < static_cast<unsigned>(vertex_count)) return;
+    membrane::refuse(component, "moved vertices must be 0 to ", vertex_count - 1, ", got ", static_cast<Index>(most));
 }
 
 }  // namespace membrane_python

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <pybind11/stl.h>
 
+#include "loop_call.hpp"
 #include "types.hpp"
 
 namespace membrane_python {
@@ -69,8 +70,8 @@ void bind_tree(py::module_& module) {
         return Tree{membrane::AabbTree(mesh, o), mesh.vertex_count()};
     }),
                      py::arg("mesh"));
-    tree.def(
-        "refit",
+    def_in_loop(
+        tree, "refit",
         [](Tree& self, Positions x, const std::optional<Moved>& moved) {
             check_count("AabbTree", "x", x.count, self.vertex_count);
             if (!moved) return self.tree.refit(x.map());
@@ -125,8 +126,8 @@ void bind_tracking(py::module_& module) {
         return Tracker{membrane::ContactTracker(mesh, o), mesh.vertex_count()};
     }),
                      py::arg("mesh"));
-    tracker.def(
-        "update",
+    def_in_loop<py::return_value_policy::reference_internal>(
+        tracker, "update",
         [](Tracker& self, const Tree& tree, Positions x, const Tool& tool) -> Contact& {
             check_count("ContactTracker", "x", x.count, self.vertex_count);
             check_count("ContactTracker", "the tree", tree.vertex_count, self.vertex_count);
@@ -134,8 +135,7 @@ void bind_tracking(py::module_& module) {
             self.contact.vertex_count = self.vertex_count;
             return self.contact;
         },
-        py::arg("tree"), py::arg("x"), py::arg("tool"), py::return_value_policy::reference_internal,
-        doc("ContactTracker::update"));
+        py::arg("tree"), py::arg("x"), py::arg("tool"), doc("ContactTracker::update"));
     tracker.def(
         "reset", [](Tracker& self) { self.tracker.reset(); }, doc("ContactTracker::reset"));
 
@@ -146,15 +146,14 @@ void bind_tracking(py::module_& module) {
         return Forceps{membrane::Grasper(mesh, o), mesh.vertex_count()};
     }),
                            py::arg("mesh"));
-    grasper.def(
-        "update",
+    def_in_loop<py::return_value_policy::reference_internal>(
+        grasper, "update",
         [](Forceps& self, const Contact& contact, Positions x, const Tool& tool) -> Grasp& {
             check_count("Grasper", "x", x.count, self.vertex_count);
             check_count("Grasper", "the contact", contact.vertex_count, self.vertex_count);
             return self.grasp = self.grasper.update(contact, x.map(), tool);
         },
-        py::arg("contact"), py::arg("x"), py::arg("tool"), py::return_value_policy::reference_internal,
-        doc("Grasper::update"));
+        py::arg("contact"), py::arg("x"), py::arg("tool"), doc("Grasper::update"));
     grasper.def(
         "reset", [](Forceps& self) { self.grasper.reset(); }, doc("Grasper::reset"));
 }

@@ -42,11 +42,14 @@ ErrorReport& report_of(BoundOf& self, Positions x, const Network& network, const
             return ErrorReport{};
         }
     };
-    self.report = std::visit(
-        [&](const auto& volume) {
-            return std::apply([&](const auto&... each) { return find(volume, each...); }, constraints.all);
-        },
-        foundation.any);
+    {
+        const py::gil_scoped_release unlock;
+        self.report = std::visit(
+            [&](const auto& volume) {
+                return std::apply([&](const auto&... each) { return find(volume, each...); }, constraints.all);
+            },
+            foundation.any);
+    }
     self.report.reactions = self.report.reactions.first((std::min)(self.report.reactions.size(), constraints.count));
     return self.report;
 }

@@ -6,10 +6,12 @@
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/force_limits.hpp>
 #include <membrane/haptics/script.hpp>
+#include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 
 #include <fstream>
 
+#include "loop_call.hpp"
 #include "types.hpp"
 
 namespace membrane_python {
@@ -19,6 +21,44 @@ namespace {
 using State = membrane::HapticState<double>;
 using membrane::DeviceProfile;
 using membrane::ForceLimiter;
+
+/// A hand that a program of Python chooses while it runs.
+struct AnyHand {
+    std::variant<membrane::IdealHand<double>, membrane::SimulatedHand<double>> any;
+
+    void reset_to(const Vector& position) noexcept {
+        std::visit([&](auto& hand) { hand.reset_to(position); }, any);
+    }
+    void set_target(const Vector& target, const Vector& velocity) noexcept {
+        std::visit([&](auto& hand) { hand.set_target(target, velocity); }, any);
+    }
+    void advance(const Vector& force, double dt) noexcept {
+        std::visit([&](auto& hand) { static_cast<void>(hand.advance(force, dt)); }, any);
+    }
+    [[nodiscard]] const Vector& position() const noexcept {
+        return std::visit([](const auto& hand) -> const Vector& { return hand.position(); }, any);
+    }
+    [[nodiscard]] const Vector& velocity() const noexcept {
+        return std::visit([](const auto& hand) -> const Vector& { return hand.velocity(); }, any);
+    }
+};
+static_assert(membrane::CheckedHand<AnyHand, double>);
+
+using Device = membrane::ScriptedDevice<double, AnyHand>;
+using Friction = membrane::ContactFriction<membrane::SpringDamperForce, double>;
+
+}  // namespace
+
+template <>
+inline constexpr bool is_in_loop<membrane::SpringDamperForce> = true;
+template <>
+inline constexpr bool is_in_loop<membrane::ReactionForce> = true;
+template <>
+inline constexpr bool is_in_loop<Friction> = true;
+template <>
+inline constexpr bool is_in_loop<Device> = true;
+
+namespace {
 
 /// A profile that owns its name.
 struct Profile : DeviceProfile {
@@ -32,16 +72,16 @@ struct Profile : DeviceProfile {
 };
 
 /// The force of a policy at the end of a tick.
-template <class Policy>
-[[nodiscard]] Vector force_of(Policy& policy, const Tool& tool, const Contact& contact, const StepReport& report,
-                              const Grasp* grasp) {
-    return policy(State{tool, contact, report, grasp != nullptr ? *grasp : Grasp{}});
-}
-
 template <class Class>
 void def_call(Class& policy) {
-    policy.def("__call__", &force_of<typename Class::type>, py::arg("tool"), py::arg("contact"), py::arg("report"),
-               py::arg("grasp") = py::none(), doc("SpringDamperForce::operator()"));
+    using Policy = typename Class::type;
+    def_in_loop(
+        policy, "__call__",
+        [](Policy& self, const Tool& tool, const Contact& contact, const StepReport& report, const Grasp* grasp) {
+            return self(State{tool, contact, report, grasp != nullptr ? *grasp : Grasp{}});
+        },
+        py::arg("tool"), py::arg("contact"), py::arg("report"), py::arg("grasp") = py::none(),
+        doc("SpringDamperForce::operator()"));
 }
 
 void bind_policies(py::module_& module) {
@@ -59,7 +99,6 @@ void bind_policies(py::module_& module) {
     def_call(reaction);
 
     using membrane::FrictionOptions;
-    using Friction = membrane::ContactFriction<SpringDamperForce, double>;
     auto friction = py::class_<Friction>(module, "ContactFriction", doc("ContactFriction"));
     const Keywords options("FrictionOptions", std::pair("coefficient", &FrictionOptions::coefficient),
                            std::pair("stiffness", &FrictionOptions::stiffness));
@@ -140,7 +179,22 @@ void bind_limiter(py::module_& module) {
         .def("reset", &ForceLimiter::reset, doc("ForceLimiter::reset"));
 }
 
-void bind_device(py::module_& module) {
+void bind_hand(py::module_& module) {
+    using membrane::HandOptions;
+    using Hand = membrane::SimulatedHand<double>;
+    auto hand = py::class_<Hand>(module, "SimulatedHand", doc("SimulatedHand"));
+    const Keywords options("HandOptions", std::pair("mass", &HandOptions::mass),
+                           std::pair("damping", &HandOptions::damping),
+                           std::pair("stiffness", &HandOptions::stiffness));
+    options.def_init(hand, options.taking<>([](const HandOptions& o) { return Hand(o); }));
+    hand.def("reset_to", &Hand::reset_to, py::arg("position"), doc("SimulatedHand::reset_to"))
+        .def("set_target", &Hand::set_target, py::arg("target"), py::arg("velocity"), doc("SimulatedHand::set_target"))
+        .def("advance", &Hand::advance, py::arg("force"), py::arg("dt"), doc("SimulatedHand::advance"))
+        .def_property_readonly("position", &Hand::position, doc("SimulatedHand::position"))
+        .def_property_readonly("velocity", &Hand::velocity, doc("SimulatedHand::velocity"));
+}
+
+void bind_waypoints(py::module_& module) {
     using Waypoint = membrane::Waypoint<double>;
     auto waypoint = py::class_<Waypoint>(module, "Waypoint", doc("Waypoint"));
     waypoint
@@ -166,23 +220,30 @@ void bind_device(py::module_& module) {
             return membrane::read_script<double>(file);
         },
         py::arg("path"), doc("read_script"));
+}
 
+void bind_device(py::module_& module) {
+    using Waypoint = membrane::Waypoint<double>;
     using membrane::ScriptedDeviceOptions;
-    using Device = membrane::ScriptedDevice<double>;
+    using OptionalHand = const std::optional<membrane::SimulatedHand<double>>&;
     auto device = py::class_<Device>(module, "ScriptedDevice", doc("ScriptedDevice"));
     const Keywords options("ScriptedDeviceOptions", std::pair("tick", &ScriptedDeviceOptions::tick),
                            std::pair("radius", &ScriptedDeviceOptions::radius));
-    options.def_init(
-        device,
-        options.taking<const std::vector<Waypoint>&>(
-            [](const std::vector<Waypoint>& script, const ScriptedDeviceOptions& o) { return Device(script, o); }),
-        py::arg("script"));
+    options.def_init(device,
+                     options.taking<const std::vector<Waypoint>&, OptionalHand>(
+                         [](const std::vector<Waypoint>& script, OptionalHand hand, const ScriptedDeviceOptions& o) {
+                             return hand ? Device(script, o, AnyHand{*hand}) : Device(script, o);
+                         }),
+                     py::arg("script"), py::arg("hand") = py::none());
     device.def_property_readonly("running", &Device::running, doc("ScriptedDevice::running"))
-        .def("read", &Device::read, doc("ScriptedDevice::read"))
-        .def("write", &Device::write, py::arg("force"), doc("ScriptedDevice::write"))
         .def_property_readonly("force", &Device::force, doc("ScriptedDevice::force"))
         .def_property_readonly("time", &Device::time, doc("ScriptedDevice::time"))
         .def("reset", &Device::reset, doc("ScriptedDevice::reset"));
+    def_in_loop(
+        device, "read", [](Device& self) { return self.read(); }, doc("ScriptedDevice::read"));
+    def_in_loop(
+        device, "write", [](Device& self, const Vector& force) { self.write(force); }, py::arg("force"),
+        doc("ScriptedDevice::write"));
 }
 
 }  // namespace
@@ -191,6 +252,8 @@ void bind_haptics(py::module_& module) {
     bind_policies(module);
     bind_profiles(module);
     bind_limiter(module);
+    bind_hand(module);
+    bind_waypoints(module);
     bind_device(module);
 }
 

@@ -1,19 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include <pybind11/stl.h>
-#include <membrane/accuracy/choose_settings.hpp>
 
-#include "accuracy.hpp"
+#include "settings.hpp"
 
 namespace membrane_python {
 
 namespace {
 
-using Trajectory = membrane::ToolTrajectory<double>;
-using References = std::vector<membrane::ReferenceTick>;
-using membrane::TrialResult;
-using Choice = membrane::ChosenSettings<double>;
-using Experiment = membrane::GridSearchOptions<double>;
 using membrane::Requirement;
+using membrane::TrialResult;
 
 /// A trajectory, with its mesh's number of vertices.
 struct Path {
@@ -27,12 +22,11 @@ void check(const char* name, const Mesh& mesh, const Network& network, const Fou
 }
 
 [[nodiscard]] Choice choose(const Mesh& mesh, const Network& network, const Foundation& foundation, const Path& path,
-                            double force_error, double time, const Experiment& experiment) {
+                            double force_error, double time, const Rule& rule, const Experiment& experiment) {
     check("choose_settings", mesh, network, foundation, path);
-    return unlocked(network, foundation, [&](const auto& springs, const auto& volume) {
-        return membrane::choose_settings(mesh, springs, volume, path.trajectory,
-                                         Requirement{.force_error = force_error, .time = time}, experiment);
-    });
+    const Scene scene{mesh, network, foundation, path.trajectory};
+    const Requirement requirement{.force_error = force_error, .time = time};
+    return std::visit([&](const auto& one) { return choose_settings(scene, requirement, experiment, one); }, rule);
 }
 
 [[nodiscard]] References references_of(const Mesh& mesh, const Network& network, const Foundation& foundation,
@@ -44,11 +38,11 @@ void check(const char* name, const Mesh& mesh, const Network& network, const Fou
 }
 
 [[nodiscard]] TrialResult trial(const Mesh& mesh, const Network& network, const Foundation& foundation,
-                                const Path& path, const References& references, const SolverOptions& options) {
+                                const Path& path, const References& references, const Rule& rule,
+                                const SolverOptions& options) {
     check("run_trial", mesh, network, foundation, path);
-    return unlocked(network, foundation, [&](const auto& springs, const auto& volume) {
-        return membrane::run_trial(mesh, springs, volume, path.trajectory, references, options);
-    });
+    const Scene scene{mesh, network, foundation, path.trajectory};
+    return std::visit([&](const auto& one) { return run_trial(scene, references, options, one); }, rule);
 }
 
 void bind_results(py::module_& module) {
@@ -86,22 +80,26 @@ void bind_settings(py::module_& module) {
             "dt", [](const Path& self) { return self.trajectory.dt(); }, doc("ToolTrajectory::dt"));
     const auto mesh = py::arg("mesh"), network = py::arg("network"), foundation = py::arg("foundation"),
                trajectory = py::arg("trajectory");
+    const auto rule = py::arg("rule") = membrane::BlockStep{};
     module.def("equilibria", &references_of, mesh, network, foundation, trajectory, py::arg("tick_stride") = 1,
                doc("equilibria"));
     const auto keywords = solver_keywords();
     keywords.def(
         module, "run_trial",
-        keywords.taking<const Mesh&, const Network&, const Foundation&, const Path&, const References&>(&trial), mesh,
-        network, foundation, trajectory, py::arg("references"));
+        keywords.taking<const Mesh&, const Network&, const Foundation&, const Path&, const References&, const Rule&>(
+            &trial),
+        mesh, network, foundation, trajectory, py::arg("references"), rule);
     const Keywords options(
         "GridSearchOptions", std::pair("layers", &Experiment::layers), std::pair("sweeps", &Experiment::sweeps),
         std::pair("contact_iterations", &Experiment::contact_iterations), std::pair("others", &Experiment::others),
         std::pair("safety_factor", &Experiment::safety_factor), std::pair("tick_stride", &Experiment::tick_stride),
         std::pair("repetitions", &Experiment::repetitions));
-    options.def(module, "choose_settings",
-                options.taking<const Mesh&, const Network&, const Foundation&, const Path&, double, double>(&choose),
-                mesh, network, foundation, trajectory, py::arg("force_error") = Requirement{}.force_error,
-                py::arg("time") = Requirement{}.time);
+    options.def(
+        module, "choose_settings",
+        options.taking<const Mesh&, const Network&, const Foundation&, const Path&, double, double, const Rule&>(
+            &choose),
+        mesh, network, foundation, trajectory, py::arg("force_error") = Requirement{}.force_error,
+        py::arg("time") = Requirement{}.time, rule);
 }
 
 }  // namespace membrane_python

@@ -3,6 +3,7 @@
 
 #include <pybind11/stl.h>
 
+#include "loop_call.hpp"
 #include "solver.hpp"
 
 namespace membrane_python {
@@ -39,25 +40,26 @@ void bind_report(py::module_& module) {
         .value("unstable", StepStatus::unstable, doc("StepStatus::unstable"))
         .value("too_many_contact_points", StepStatus::too_many_contact_points,
                doc("StepStatus::too_many_contact_points"));
-    py::class_<StepReport>(module, "StepReport", doc("StepReport"))
-        .def_readonly("status", &StepReport::status, doc("StepReport::status"))
+    auto report = py::class_<StepReport>(module, "StepReport", doc("StepReport"));
+    report.def_readonly("status", &StepReport::status, doc("StepReport::status"))
         .def_readonly("converged", &StepReport::converged, doc("StepReport::converged"))
         .def_readonly("out_of_time", &StepReport::out_of_time, doc("StepReport::out_of_time"))
         .def_readonly("residual", &StepReport::residual, doc("StepReport::residual"))
         .def_readonly("vertex_updates", &StepReport::vertex_updates, doc("StepReport::vertex_updates"))
-        .def_property_readonly(
-            "moved", [](const py::object& self) { return view(self.cast<const StepReport&>().moved, self); },
-            doc("StepReport::moved"))
-        .def_property_readonly(
-            "reactions", [](const py::object& self) { return view(self.cast<const StepReport&>().reactions, self); },
-            doc("StepReport::reactions"))
         .def("total_reaction", &StepReport::total_reaction, doc("StepReport::total_reaction"));
+    def_property_in_loop(
+        report, "moved", [](const py::object& self) { return view(self.cast<const StepReport&>().moved, self); },
+        doc("StepReport::moved"));
+    def_property_in_loop(
+        report, "reactions",
+        [](const py::object& self) { return view(self.cast<const StepReport&>().reactions, self); },
+        doc("StepReport::reactions"));
 }
 
 void bind_constraints(py::module_& module) {
     py::class_<Acting>(module, "Constraint", doc("Constraint"));
-    module.def(
-        "press",
+    def_in_loop(
+        module, "press",
         [](const Tool& tool, const py::object& contact, const Grasp* grasp) {
             const auto& of = contact.cast<const Contact&>();
             return Acting{.any = membrane::press<double>(tool, of, grasp != nullptr ? *grasp : Grasp{}),
@@ -103,6 +105,7 @@ void bind_rules(py::module_& module) {
     };
     bind("BlockStep", membrane::BlockStep{});
     bind("SafeStep", membrane::SafeStep{});
+    py::class_<membrane::MassStep>(module, "MassStep", doc("MassStep")).def(py::init());
     auto options = py::class_<SolverOptions>(module, "SolverOptions", doc("SolverOptions"));
     const auto keywords = solver_keywords();
     keywords.def_init(options, keywords.taking<>([](const SolverOptions& o) { return (o.check(), o); }));
@@ -118,22 +121,21 @@ void bind_solver(py::module_& module) {
     const auto keywords = solver_keywords();
     keywords.def_init(solver, keywords.taking<const Network&, const Rule&>(&solver_of), py::arg("network"),
                       py::arg("rule") = membrane::BlockStep{});
-    solver.def(
-        "step",
+    def_in_loop<py::return_value_policy::reference_internal>(
+        solver, "step",
         [](Solver& self, MovingPositions x, double dt, const Network& network, const Foundation& foundation,
            const py::args& constraints) -> StepReport& {
             return step(self, std::numeric_limits<double>::infinity(), x, dt, network, foundation, constraints);
         },
-        py::arg("x"), py::arg("dt"), py::arg("network"), py::arg("foundation"),
-        py::return_value_policy::reference_internal, doc("QuasiStaticSolver::step"));
-    solver.def(
-        "step_within",
+        py::arg("x"), py::arg("dt"), py::arg("network"), py::arg("foundation"), doc("QuasiStaticSolver::step"));
+    def_in_loop<py::return_value_policy::reference_internal>(
+        solver, "step_within",
         [](Solver& self, double seconds, MovingPositions x, double dt, const Network& network,
            const Foundation& foundation, const py::args& constraints) -> StepReport& {
             return step(self, (std::max)(seconds, 0.0), x, dt, network, foundation, constraints);
         },
         py::arg("seconds"), py::arg("x"), py::arg("dt"), py::arg("network"), py::arg("foundation"),
-        py::return_value_policy::reference_internal, doc("QuasiStaticSolver::step_until"));
+        doc("QuasiStaticSolver::step_until"));
     solver.def(
         "wake",
         [](Solver& self, const Moved& vertices) {

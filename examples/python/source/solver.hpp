@@ -17,9 +17,9 @@ namespace membrane_python {
 template <class Rule>
 using SolverOf = membrane::QuasiStaticSolver<double, Rule>;
 
-/// A solver of either rule, and the report of its last step.
+/// A solver of one of the rules, and the report of its last step.
 struct Solver {
-    std::variant<SolverOf<membrane::BlockStep>, SolverOf<membrane::SafeStep>> any;
+    std::variant<SolverOf<membrane::BlockStep>, SolverOf<membrane::SafeStep>, SolverOf<membrane::MassStep>> any;
     Index vertex_count;
     StepReport report = {};
 };
@@ -33,7 +33,7 @@ struct StepArguments {
     double seconds = std::numeric_limits<double>::infinity();
 };
 
-/// One step. Compiled once for each rule and foundation: solve_block.cpp, solve_safe.cpp.
+/// One step. Compiled once for each rule and foundation: solve_block.cpp and its neighbours.
 template <class Rule, class Volume>
 [[nodiscard]] StepReport take_step(SolverOf<Rule>& solver, const StepArguments& arguments, const Volume& volume);
 
@@ -44,6 +44,7 @@ template <class Rule, class Volume>
 
 MEMBRANE_PYTHON_STEPS(extern template, membrane::BlockStep);
 MEMBRANE_PYTHON_STEPS(extern template, membrane::SafeStep);
+MEMBRANE_PYTHON_STEPS(extern template, membrane::MassStep);
 
 namespace detail {
 

@@ -11,7 +11,9 @@
 
 namespace membrane_python {
 
-TableSpring::TableSpring(const std::vector<double>& strain, const std::vector<double>& tension) {
+namespace {
+
+void check_table(const std::vector<double>& strain, const std::vector<double>& tension) {
     constexpr auto name = "TableSpring";
     const std::size_t rows = strain.size();
     if (rows < 2 || tension.size() != rows) {
@@ -29,28 +31,48 @@ TableSpring::TableSpring(const std::vector<double>& strain, const std::vector<do
             membrane::refuse(name, "tension ", i, " must be at least ", tension[i - 1], ", got ", tension[i]);
         }
     }
-    std::vector<Piece> pieces;
-    double energy = 0;
-    for (std::size_t i = 0; i + 1 < rows; ++i) {
-        const double width = strain[i + 1] - strain[i];
-        pieces.push_back({strain[i], tension[i], energy, (tension[i + 1] - tension[i]) / width});
-        energy += width * (tension[i] + tension[i + 1]) / 2;
-    }
-    pieces_ = std::make_shared<const std::vector<Piece>>(pieces);
-    const Piece& rest = piece_at(0);
-    const double at_rest = rest.tension - rest.slope * rest.strain;
+    const auto above = std::upper_bound(strain.begin() + 1, strain.end() - 1, 0.0) - strain.begin();
+    const auto i = static_cast<std::size_t>(above);
+    const double slope = (tension[i] - tension[i - 1]) / (strain[i] - strain[i - 1]);
+    const double at_rest = tension[i - 1] - slope * strain[i - 1];
     if (std::abs(at_rest) > 1e-12 * (std::max)(std::abs(tension.front()), std::abs(tension.back()))) {
         membrane::refuse(name, "the tension at strain 0 must be 0, got ", at_rest);
     }
-    const double energy_at_rest = rest.energy - (rest.tension - rest.slope * rest.strain / 2) * rest.strain;
-    for (Piece& piece : pieces) piece.energy -= energy_at_rest;
+}
+
+}  // namespace
+
+TableSpring::TableSpring(const std::vector<double>& strain, const std::vector<double>& tension) {
+    check_table(strain, tension);
+    const std::size_t rows = strain.size();
+    const auto slope_above = [&](std::size_t i) { return (tension[i + 1] - tension[i]) / (strain[i + 1] - strain[i]); };
+    // From rest outwards: near rest the energy is then no difference of large numbers, whose rounding would hide the
+    // gain of an update.
+    Piece end{0, 0, 0, 0};
+    const auto piece_to = [&](double far, double pull, double slope) {
+        const Piece piece{end.strain, end.tension, end.energy, slope};
+        end = {far, pull, end.energy + (far - end.strain) * (end.tension + pull) / 2, 0};
+        return piece;
+    };
+    std::vector<Piece> pieces;
+    for (std::size_t i = rows; i-- > 0;) {  // an interval or its part below rest, from its upper end
+        if (strain[i] < 0) pieces.push_back(piece_to(strain[i], tension[i], slope_above((std::min)(i, rows - 2))));
+    }
+    if (pieces.empty()) pieces.push_back({0, 0, 0, slope_above(0)});
+    std::reverse(pieces.begin(), pieces.end());
+    const std::size_t below = pieces.size();
+    end = {0, 0, 0, 0};
+    for (std::size_t i = 0; i < rows; ++i) {  // above rest, from its lower end
+        if (strain[i] > 0) pieces.push_back(piece_to(strain[i], tension[i], slope_above(i == 0 ? 0 : i - 1)));
+    }
+    if (pieces.size() == below) pieces.push_back({0, 0, 0, slope_above(rows - 2)});
     pieces_ = std::make_shared<const std::vector<Piece>>(std::move(pieces));
 }
 
 const TableSpring::Piece& TableSpring::piece_at(double strain) const noexcept {
-    const auto above = std::upper_bound(pieces_->begin() + 1, pieces_->end(), strain,
+    const auto above = std::upper_bound(pieces_->begin(), pieces_->end(), strain,
                                         [](double at, const Piece& piece) { return at < piece.strain; });
-    return *(above - 1);
+    return strain < 0 ? *above : *(above - 1);
 }
 
 SpringResponse<double> TableSpring::operator()(const SpringState<double>& spring) const noexcept {

@@ -30,7 +30,7 @@ class TableSpring {
     SpringResponse<double> operator()(const SpringState<double>& spring) const noexcept;
 
   private:
-    struct Piece {  // of the table: relative tension and energy at its start, and the slope from there
+    struct Piece {  // of the table: relative tension and energy at its end that is nearer to rest, slope from there
         double strain, tension, energy, slope;
     };
     [[nodiscard]] const Piece& piece_at(double strain) const noexcept;
@@ -38,8 +38,8 @@ class TableSpring {
     std::shared_ptr<const std::vector<Piece>> pieces_;
 };
 
-/// A law that is a function of Python: function(stiffness, rest_length, length) returns tension [N], stiffness [N/m] and
-/// energy [J]. Of an error the first is kept for `rethrow`; the response then is not finite, and a step is refused.
+/// A law that is a function of Python: function(stiffness, rest_length, length) returns tension [N], stiffness [N/m]
+/// and energy [J]. Of an error the first is kept for `rethrow`; the response then is not finite, and a step is refused.
 class PythonSpring {
   public:
     explicit PythonSpring(py::function function);

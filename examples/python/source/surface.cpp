@@ -2,17 +2,12 @@
 #include <pybind11/stl.h>
 #include <membrane/model/spring_stiffness.hpp>
 
+#include "loop_call.hpp"
 #include "types.hpp"
 
 namespace membrane_python {
 
 namespace {
-
-/// Normals, with the number of vertices.
-struct Normals {
-    membrane::VertexNormals<double> normals;
-    Index vertex_count;
-};
 
 void bind_mesh(py::module_& module) {
     py::class_<Mesh>(module, "TriangleMesh", doc("TriangleMesh"))
@@ -65,23 +60,24 @@ void bind_shapes(py::module_& module) {
 }
 
 void bind_normals(py::module_& module) {
-    py::class_<Normals>(module, "VertexNormals", doc("VertexNormals"))
+    auto normals = py::class_<Normals>(module, "VertexNormals", doc("VertexNormals"));
+    normals
         .def(py::init([](const Mesh& mesh) {
                  return Normals{membrane::VertexNormals(mesh), mesh.vertex_count()};
              }),
              py::arg("mesh"), doc("VertexNormals::VertexNormals"))
-        .def(
-            "update",
-            [](Normals& self, Positions x, const std::optional<Moved>& moved) {
-                check_count("VertexNormals", "x", x.count, self.vertex_count);
-                if (!moved) return self.normals.update(x.map());
-                check_moved("VertexNormals", *moved, self.vertex_count);
-                (void)self.normals.update(x.map(), moved->vertices);
-            },
-            py::arg("x"), py::arg("moved") = py::none(), doc("VertexNormals::update"))
         .def_property_readonly(
             "values", [](const py::object& self) { return view(self.cast<const Normals&>().normals.values(), self); },
             doc("VertexNormals::values"));
+    def_in_loop(
+        normals, "update",
+        [](Normals& self, Positions x, const std::optional<Moved>& moved) {
+            check_count("VertexNormals", "x", x.count, self.vertex_count);
+            if (!moved) return self.normals.update(x.map());
+            check_moved("VertexNormals", *moved, self.vertex_count);
+            (void)self.normals.update(x.map(), moved->vertices);
+        },
+        py::arg("x"), py::arg("moved") = py::none(), doc("VertexNormals::update"));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 
 #include "arrays.hpp"
 #include "documentation.hpp"
+#include "instances.hpp"
 #include "springs.hpp"
 
 /// What the classes of Python hold. Numbers are doubles; where the library has a type parameter there is a variant.
@@ -68,7 +69,11 @@ struct Contact : membrane::Contact<double> {
     Index vertex_count = 0;
 };
 
-/// Boxes, tracker, grasper, normals: with the number of vertices, so that arrays are checked.
+/// Normals, boxes, tracker, grasper: with the number of vertices, so that arrays are checked.
+struct Normals {
+    membrane::VertexNormals<double> normals;
+    Index vertex_count;
+};
 struct Tree {
     membrane::AabbTree<double> tree;
     Index vertex_count;
@@ -98,6 +103,36 @@ struct Acting {
         return std::visit([](const auto& one) { return membrane::ConstraintRef<double>(one); }, any);
     }
 };
+
+struct Solver;
+
+///@{
+/// Classes of the loop.
+template <>
+inline constexpr bool is_in_loop<Tool> = true;
+template <>
+inline constexpr bool is_in_loop<Grasp> = true;
+template <>
+inline constexpr bool is_in_loop<StepReport> = true;
+template <>
+inline constexpr bool is_in_loop<Network> = true;
+template <>
+inline constexpr bool is_in_loop<Foundation> = true;
+template <>
+inline constexpr bool is_in_loop<Contact> = true;
+template <>
+inline constexpr bool is_in_loop<Normals> = true;
+template <>
+inline constexpr bool is_in_loop<Tree> = true;
+template <>
+inline constexpr bool is_in_loop<Tracker> = true;
+template <>
+inline constexpr bool is_in_loop<Forceps> = true;
+template <>
+inline constexpr bool is_in_loop<Acting> = true;
+template <>
+inline constexpr bool is_in_loop<Solver> = true;
+///@}
 
 inline constexpr std::size_t max_constraints = membrane::StepState<double>::max_constraints;
 
@@ -141,7 +176,7 @@ struct Constraints {
                     std::pair("max_packed_vertices", &SolverOptions::max_packed_vertices));
 }
 
-using Rule = std::variant<membrane::BlockStep, membrane::SafeStep>;
+using Rule = std::variant<membrane::BlockStep, membrane::SafeStep, membrane::MassStep>;
 
 /// Refuses a membrane whose parts are of different meshes.
 void check_fit(std::string_view component, Index vertex_count, Eigen::Index points, const Network& network,

@@ -93,6 +93,84 @@ def offline():
     return numpy.concatenate([points.ravel(), found.constants])
 
 
+def published():
+    """A hand that yields presses a sphere, by the rule as published."""
+    mesh = membrane.icosphere(subdivisions=2)
+    network = membrane.MassSpringNetwork(mesh, stiffness=40.0, mass=2e-4)
+    foundation = membrane.VirtualVolumeSprings(mesh, stiffness=8.0, damping=0.02)
+    solver = membrane.QuasiStaticSolver(network, membrane.MassStep(), layers=6, sweeps=4)
+    tree = membrane.AabbTree(mesh)
+    tracker = membrane.ContactTracker(mesh)
+    feel = membrane.ReactionForce()
+    device = membrane.ScriptedDevice([(0.0, (0, 0, 13e-3)), (0.2, (1e-3, 0, 9e-3))], radius=2e-3,
+                                     hand=membrane.SimulatedHand(mass=0.1, damping=2, stiffness=300))
+    x = mesh.positions.copy()
+    rows = []
+    while device.running:
+        tool = device.read()
+        contact = tracker.update(tree, x, tool)
+        report = solver.step(x, dt, network, foundation, membrane.press(tool, contact))
+        tree.refit(x, report.moved)
+        device.write(feel(tool, contact, report))
+        rows += [device.force, tool.position, tool.velocity]
+    return numpy.vstack([rows, x])
+
+
+def cubic(k, rest_length, length):
+    """Tension, stiffness and energy of a law with a cubic term."""
+    e = length - rest_length
+    return k * (e + 1e5 * (e * e * e)), k * (1 + 3e5 * (e * e)), k * (e * e / 2 + 1e5 * (e * e * e * e) / 4)
+
+
+def law():
+    """Steps under a tool and their equilibrium, of springs by a law of the user's."""
+    mesh = membrane.icosphere(subdivisions=2)
+    network = membrane.MassSpringNetwork(mesh, membrane.PythonSpring(cubic), stiffness=40.0)
+    foundation = membrane.VirtualVolumeSprings(mesh, stiffness=8.0)
+    solver = membrane.QuasiStaticSolver(network, layers=membrane.unlimited, sweeps=8)
+    tree = membrane.AabbTree(mesh)
+    tracker = membrane.ContactTracker(mesh)
+    tool = membrane.Tool(position=(0, 0, 11e-3), radius=2e-3)
+    x = mesh.positions.copy()
+    forces = []
+    for _ in range(20):
+        contact = tracker.update(tree, x, tool)
+        report = solver.step(x, dt, network, foundation, membrane.press(tool, contact))
+        tree.refit(x, report.moved)
+        forces.append(report.reactions[0].copy())
+    contact = tracker.update(tree, x, tool)
+    rest = membrane.equilibrium(x, mesh, network, foundation, membrane.press(tool, contact))
+    return numpy.vstack([forces, x, rest.x, rest.reactions])
+
+
+def accuracy():
+    """Trials of each rule, and the error bounds of a state in contact and of one that is pulled."""
+    mesh = membrane.icosphere(subdivisions=2)
+    network = membrane.MassSpringNetwork(mesh, stiffness=40.0, mass=2e-4)
+    foundation = membrane.VirtualVolumeSprings(mesh, stiffness=8.0)
+    tools = [membrane.Tool(position=(0, 0, 12e-3 - 2e-5 * tick), radius=2e-3, time=1e-3 * tick) for tick in range(40)]
+    trajectory = membrane.ToolTrajectory(mesh, tools, dt)
+    references = membrane.equilibria(mesh, network, foundation, trajectory, tick_stride=10)
+    rows = [reference.x for reference in references]
+    for rule in (membrane.BlockStep(), membrane.SafeStep(), membrane.MassStep()):
+        for layers in (0, 8):
+            result = membrane.run_trial(mesh, network, foundation, trajectory, references, rule, layers=layers,
+                                        sweeps=4)
+            rows.append(numpy.array([[result.force_error, result.position_error, result.layers_reached]]))
+
+    def show(error):
+        return numpy.array([[error.position, error.convexity, error.reactions[0].radius], error.reactions[0].centre])
+
+    bound = membrane.ErrorBound(network)
+    contact = membrane.ContactTracker(mesh).update(membrane.AabbTree(mesh), mesh.positions, tools[-1])
+    press = membrane.press(tools[-1], contact)
+    rest = membrane.equilibrium(mesh.positions, mesh, network, foundation, press)
+    rows.append(show(bound.compute(references[-1].x, network, foundation, press, rest=rest, mesh=mesh)))
+    pull = membrane.pull(0, 1.001 * mesh.positions[0])
+    rows.append(show(bound.compute(mesh.positions, network, foundation, pull)))
+    return numpy.vstack(rows)
+
+
 def time_ticks(ticks):
     """The loop of the README for this number of ticks: the nanoseconds of each."""
     mesh = membrane.icosphere(radius=10e-3, subdivisions=3)
@@ -105,16 +183,16 @@ def time_ticks(ticks):
     normals = membrane.VertexNormals(mesh)
     script = [(0.2 * i, (0, 0, 11.9e-3 if i % 2 == 0 else 10.5e-3)) for i in range(ticks // 200 + 1)]
     device = membrane.ScriptedDevice(script, radius=2e-3)
-    press, clock = membrane.press, time.perf_counter_ns
+    clock = time.perf_counter_ns
     x = mesh.positions.copy()
     times = []
     for _ in range(ticks):
         start = clock()
         tool = device.read()
         contact = tracker.update(tree, x, tool)
-        report = solver.step(x, dt, network, foundation, press(tool, contact))
-        tree.refit(x, report)
-        normals.update(x, report)
+        report = solver.step(x, dt, network, foundation, membrane.press(tool, contact))
+        tree.refit(x, report.moved)
+        normals.update(x, report.moved)
         device.write(feel(tool, contact, report))
         times.append(clock() - start)
     return times

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// same_loop NAME: the loops and calls of loops.py in C++, and what they compute with all digits, for the tests to compare.
+// same_loop NAME: the loops and calls of loops.py in C++, and what they compute with all digits, for the tests to
+// compare.
 // same_loop time TICKS: the nanoseconds of each tick of the first loop, for overhead.py.
 #include <chrono>
 #include <cstdio>
@@ -8,9 +9,12 @@
 #include <string_view>
 
 #include <membrane/accuracy/equilibrium.hpp>
+#include <membrane/accuracy/error_bound.hpp>
+#include <membrane/accuracy/trial.hpp>
 #include <membrane/calibration/fit.hpp>
 #include <membrane/calibration/indentation.hpp>
 #include <membrane/haptics/force_limits.hpp>
+#include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/meshing/distmesh.hpp>
 #include <membrane/model/foundation_layer.hpp>
@@ -126,6 +130,106 @@ void offline() {
     for (const double constant : found.constants) std::printf("%.17g\n", constant);
 }
 
+/// A hand that yields presses a sphere, by the rule as published.
+void published() {
+    using Hand = membrane::SimulatedHand<double>;
+    const auto mesh = membrane::icosphere<double>({.subdivisions = 2});
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0, .mass = 2e-4});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4}, membrane::MassStep{});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    const auto feel = membrane::ReactionForce{};
+    auto device =
+        membrane::ScriptedDevice<double, Hand>({{0.0, {0, 0, 13e-3}}, {0.2, {1e-3, 0, 9e-3}}}, {.radius = 2e-3},
+                                               Hand({.mass = 0.1, .damping = 2, .stiffness = 300}));
+    auto x = mesh.positions();
+    while (device.running()) {
+        const auto tool = device.read();
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+        tree.refit(x, report.moved);
+        device.write(feel({tool, contact, report}));
+        print(device.force());
+        print(tool.position);
+        print(tool.velocity);
+    }
+    print_points(x);
+}
+
+/// A law of the user's.
+struct Cubic {
+    membrane::SpringResponse<double> operator()(const membrane::SpringState<double>& spring) const noexcept {
+        const double k = spring.stiffness, e = spring.length - spring.rest_length;
+        return {.tension = k * (e + 1e5 * (e * e * e)),
+                .stiffness = k * (1 + 3e5 * (e * e)),
+                .energy = k * (e * e / 2 + 1e5 * (e * e * e * e) / 4)};
+    }
+};
+
+/// Steps under a tool and their equilibrium, of springs by a law of the user's.
+void law() {
+    const auto mesh = membrane::icosphere<double>({.subdivisions = 2});
+    const auto network = membrane::MassSpringNetwork(mesh, Cubic{}, {.stiffness = 40.0});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = 8});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    const membrane::Tool<double> tool{.position = {0, 0, 11e-3}, .radius = 2e-3};
+    auto x = mesh.positions();
+    for (int tick = 0; tick < 20; ++tick) {
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+        tree.refit(x, report.moved);
+        print(report.reactions[0]);
+    }
+    print_points(x);
+    const auto contact = tracker.update(tree, x, tool);
+    const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
+    print_points(rest.x);
+    print(rest.reactions[0]);
+}
+
+template <class Rule>
+void print_trial(const auto& mesh, const auto& network, const auto& foundation, const auto& trajectory,
+                 const auto& references, const Rule& rule) {
+    for (const membrane::Index layers : {0, 8}) {
+        const auto result = membrane::run_trial(mesh, network, foundation, trajectory, references,
+                                                {.layers = layers, .sweeps = 4}, rule);
+        std::printf("%.17g %.17g %d\n", result.force_error, result.position_error, result.layers_reached);
+    }
+}
+
+/// Trials of each rule, and the error bounds of a state in contact and of one that is pulled.
+void accuracy() {
+    const auto mesh = membrane::icosphere<double>({.subdivisions = 2});
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0, .mass = 2e-4});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0});
+    std::vector<membrane::Tool<double>> tools;
+    for (int tick = 0; tick < 40; ++tick)
+        tools.push_back({.position = {0, 0, 12e-3 - 2e-5 * tick}, .radius = 2e-3, .time = 1e-3 * tick});
+    const membrane::ToolTrajectory trajectory(mesh, tools, dt);
+    const auto references = membrane::equilibria(mesh, network, foundation, trajectory, 10);
+    for (const auto& reference : references) print_points(reference.x);
+    print_trial(mesh, network, foundation, trajectory, references, membrane::BlockStep{});
+    print_trial(mesh, network, foundation, trajectory, references, membrane::SafeStep{});
+    print_trial(mesh, network, foundation, trajectory, references, membrane::MassStep{});
+
+    const auto show = [](const membrane::ErrorReport& error) {
+        std::printf("%.17g %.17g %.17g\n", error.position, error.convexity, error.reactions[0].radius);
+        const auto& centre = error.reactions[0].centre;
+        std::printf("%.17g %.17g %.17g\n", centre.x(), centre.y(), centre.z());
+    };
+    membrane::ErrorBound bound(network);
+    const auto contact =
+        membrane::ContactTracker(mesh).update(membrane::AabbTree(mesh), mesh.positions(), tools.back());
+    const auto pressing = press(tools.back(), contact);
+    const auto rest = membrane::equilibrium(mesh.positions(), mesh, network, foundation, {}, pressing);
+    show(bound.compute(rest, references.back().x, mesh, network, foundation, pressing));
+    const auto pulled = membrane::pull(0, Vector(1.001 * membrane::point(mesh.positions(), 0)));
+    show(bound.compute(mesh.positions(), network, foundation, pulled));
+}
+
 /// The loop of the README for `ticks` ticks: a tool goes in and out.
 void time_ticks(int ticks) {
     const auto mesh = membrane::icosphere<double>({.radius = 10e-3, .subdivisions = 3});
@@ -159,15 +263,12 @@ void time_ticks(int ticks) {
 
 int main(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";
-    if (name == "sphere") {
-        sphere();
-    } else if (name == "cap") {
-        cap();
-    } else if (name == "offline") {
-        offline();
-    } else if (name == "time" && argc > 2) {
-        time_ticks(std::atoi(argv[2]));
-    } else {
-        return 2;
+    const std::pair<std::string_view, void (*)()> scenes[] = {{"sphere", sphere},   {"cap", cap},
+                                                              {"offline", offline}, {"published", published},
+                                                              {"law", law},         {"accuracy", accuracy}};
+    for (const auto& [scene, run] : scenes) {
+        if (name == scene) return run(), 0;
     }
+    if (name != "time" || argc < 3) return 2;
+    time_ticks(std::atoi(argv[2]));
 }

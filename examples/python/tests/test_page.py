@@ -75,7 +75,7 @@ def test_a_wrong_type_is_found_by_the_stubs(tmp_path):
     assert run.returncode == 1 and "Found 2 errors" in run.stdout
 
 
-@pytest.mark.parametrize("name", ["figure_4", "fit", "sweep"])
+@pytest.mark.parametrize("name", ["figure_4", "trade", "fit", "convergence", "sweep"])
 def test_examples_run(name, tmp_path):
     run = subprocess.run([sys.executable, HERE / f"scripts/{name}.py"], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0 and run.stdout, run.stderr

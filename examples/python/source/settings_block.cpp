@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: MIT
+#include "settings.hpp"
+
+namespace membrane_python {
+
+MEMBRANE_PYTHON_SETTINGS(template, membrane::BlockStep);
+
+}  // namespace membrane_python
