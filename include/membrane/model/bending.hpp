@@ -78,20 +78,20 @@ class Fold {
         : edge(x[1] - x[0]), left(cross<N>(edge, x[2] - x[0])), third(x[3] - x[0]), right(cross<N>(third, edge)) {
         const N on_left = squared_norm(left), on_right = squared_norm(right);
         valid = (on_left > 0) & (on_right > 0);
-        by_left = 1 / select<N>(valid, on_left, 1), by_right = 1 / select<N>(valid, on_right, 1);
-        square = squared_norm(edge), length = root_of<N>(square);
+        by_left_ = 1 / select<N>(valid, on_left, 1), by_right_ = 1 / select<N>(valid, on_right, 1);
+        square_ = squared_norm(edge), length_ = root_of<N>(square_);
     }
 
     [[nodiscard]] N angle() const noexcept {
-        return if_valid(arctangent<N>(-length * dot<N>(left, third), dot(left, right)));
+        return if_valid(arctangent<N>(-length_ * dot<N>(left, third), dot(left, right)));
     }
 
     [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
-        const N turn_left = if_valid(-length * by_left), turn_right = if_valid(-length * by_right);
+        const N turn_left = if_valid(-length_ * by_left_), turn_right = if_valid(-length_ * by_right_);
         if (i == 2) return turn_left * left;
         if (i == 3) return turn_right * right;
         // The angle does not change if the hinge is translated, or rotated about its edge.
-        const N per_square = 1 / select<N>(valid, square, 1);
+        const N per_square = 1 / select<N>(valid, square_, 1);
         const N on_left = per_square * dot<N>(edge, x[2] - x[0]), on_right = per_square * dot<N>(edge, x[3] - x[0]);
         return i == 0 ? Vector3<N>(((on_left - 1) * turn_left) * left + ((on_right - 1) * turn_right) * right)
                       : Vector3<N>((-on_left * turn_left) * left + (-on_right * turn_right) * right);
@@ -100,10 +100,10 @@ class Fold {
     /// 1 / h^2: no eigenvalue of the angle's second derivative by corner i is larger. At an apex h is its distance from the
     /// edge; at the edge's corners it is a sum, over the distances from the two lines through the other end and an apex.
     [[nodiscard]] N curvature(const Corners<N, 4>& x, std::size_t i) const noexcept {
-        if (i == 2) return square * by_left;
-        if (i == 3) return square * by_right;
+        if (i == 2) return square_ * by_left_;
+        if (i == 3) return square_ * by_right_;
         const Vector3<N>& end = x[1 - i];
-        return squared_norm<N>(x[2] - end) * by_left + squared_norm<N>(x[3] - end) * by_right;
+        return squared_norm<N>(x[2] - end) * by_left_ + squared_norm<N>(x[3] - end) * by_right_;
     }
 
     [[nodiscard]] N if_valid(const N& number) const noexcept { return select<N>(valid, number, 0); }
@@ -112,8 +112,8 @@ class Fold {
     decltype(N() < N()) valid;  // both triangles have areas
 
   private:
-    N by_left, by_right;  // the inverse squares of twice the areas
-    N square, length;     // of the edge
+    N by_left_, by_right_;  // the inverse squares of twice the areas
+    N square_, length_;     // of the edge
 };
 
 /// `angle` less a whole turn if it is beyond half a turn [rad]. @pre between -2 pi and 2 pi
