@@ -159,6 +159,23 @@ double inflated_height_of(const Make& make, double pressure, membrane::Index rin
     return rest.x(2, 0);
 }
 
+/// The energy for a strain continues beyond `limit` with its first two derivatives, which are those of the energy on
+/// both sides.
+template <class E>
+void check_response(const E& element, double limit) {
+    const auto before = element.response(limit * (1 - 1e-9)), after = element.response(limit * (1 + 1e-9));
+    REQUIRE(after.energy == Approx(before.energy).epsilon(1e-6));
+    REQUIRE(after.slope == Approx(before.slope).epsilon(1e-6));
+    REQUIRE(after.curvature == Approx(before.curvature).epsilon(1e-6));
+    for (const double strain : {0.3 * limit, 2 * limit}) {
+        const double h = 1e-5 * limit;
+        const auto low = element.response(strain - h), here = element.response(strain),
+                   high = element.response(strain + h);
+        REQUIRE(here.slope == Approx((high.energy - low.energy) / (2 * h)).epsilon(1e-6));
+        REQUIRE(here.curvature == Approx((high.slope - low.slope) / (2 * h)).epsilon(1e-6));
+    }
+}
+
 inline membrane::MassSpringNetwork<double, membrane::LinearSpring> no_springs(
     const membrane::TriangleMesh<double>& mesh) {
     return {mesh, membrane::LinearSpring{}, {.stiffness = 0.0}};
