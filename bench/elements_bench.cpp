@@ -3,7 +3,10 @@
 #include <vector>
 
 #include <membrane/model/bending.hpp>
+#include <membrane/model/fibres.hpp>
 #include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/fung.hpp>
+#include <membrane/model/neo_hookean.hpp>
 #include <membrane/model/pressure.hpp>
 #include <membrane/model/spring_stiffness.hpp>
 #include <membrane/model/tissue.hpp>
@@ -42,6 +45,13 @@ struct Disc {
     [[nodiscard]] auto triangles() const { return membrane::triangular_springs(mesh, material, 1.02); }
     [[nodiscard]] auto hinges() const { return membrane::bending_springs(mesh, membrane::flexural_rigidity(material)); }
     [[nodiscard]] auto pressure() const { return membrane::pressure(mesh, 100.0); }
+    [[nodiscard]] auto neo_hookean() const { return membrane::neo_hookean(mesh, material, 1.02); }
+    [[nodiscard]] auto fung() const { return membrane::fung(mesh, material, {}, 1.02); }
+    [[nodiscard]] auto fibres() const {
+        const auto along_x = membrane::fibre_directions(mesh, [](const auto&) { return Eigen::Vector3d::UnitX(); });
+        return membrane::fibres(mesh, {.stiffness = material.young_modulus / 4, .thickness = material.thickness},
+                                {along_x}, 1.02);
+    }
 };
 
 /// Median of the time of a step [s].
@@ -96,6 +106,10 @@ const bool registered = [] {
     in_both("triangles_pressure_bending", [](const auto& disc) {
         return membrane::Tissue(disc.none(), disc.triangles(), disc.pressure(), disc.hinges());
     });
+    in_both("neo_hookean", [](const auto& disc) { return membrane::Tissue(disc.none(), disc.neo_hookean()); });
+    in_both("neo_hookean_fibres",
+            [](const auto& disc) { return membrane::Tissue(disc.none(), disc.neo_hookean(), disc.fibres()); });
+    in_both("fung", [](const auto& disc) { return membrane::Tissue(disc.none(), disc.fung()); });
     return true;
 }();
 

@@ -115,6 +115,27 @@ TEST_CASE("the energy of fibres is smooth at their limit, and continuous where t
     }
 }
 
+TEST_CASE("fibres are the same in each order of their triangle's corners", "[fibres]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const test::DeformedTriangle triangle(random, 1, test::random_deformation(random, 0.8, 1.3));
+        const double angle = random.number(0.0, 6.3);
+        const FibreTriangle<double> element{incompressible_triangle(triangle.rest),
+                                            {std::cos(angle), std::sin(angle)},
+                                            1,
+                                            10,
+                                            random.number(0.0, 0.3),
+                                            0.7};
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto& order = element.orders[i];
+            const auto& x = triangle.now;
+            REQUIRE(element.in_order(i).strain(Corners<double, 3>{x[order[0]], x[order[1]], x[order[2]]}) ==
+                    Approx(element.strain(x)).epsilon(1e-12).margin(1e-12));
+        }
+    }
+}
+
 TEST_CASE("a patch has the stress of its fibres in each kind of stretch", "[fibres]") {
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);

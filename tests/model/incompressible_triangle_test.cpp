@@ -93,6 +93,24 @@ TEST_CASE("the change of the invariant is exact for displacements of any size", 
     }
 }
 
+TEST_CASE("a rest shape is the same in each order of its corners", "[incompressible]") {
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const test::DeformedTriangle triangle(random, 1, test::random_deformation(random, 0.1, 2));
+        const auto rest = incompressible_triangle(triangle.rest);
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto& order = rest.orders[i];
+            REQUIRE(order[0] == i);
+            const auto ordered = rest.in_order(i);
+            const auto& x = triangle.now;
+            REQUIRE(ordered.invariant(Corners<double, 3>{x[order[0]], x[order[1]], x[order[2]]}) ==
+                    Approx(rest.invariant(x)).epsilon(1e-12).margin(1e-12));
+            REQUIRE(ordered.area() == Approx(rest.area()).epsilon(1e-12));
+        }
+    }
+}
+
 TEST_CASE("no eigenvalue of a corner's Hessian is below that of the invariant", "[incompressible]") {
     int exact = 0;
     for (int seed = 1; seed <= cases(1000); ++seed) {

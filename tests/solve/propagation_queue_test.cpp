@@ -8,6 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include <membrane/model/bending.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
@@ -238,5 +241,35 @@ TEST_CASE("or all beyond the first together, which makes one layer of them", "[q
             begin = end;
         }
         REQUIRE(begin == queue.vertices().size());
+    }
+}
+
+TEST_CASE("layers of a tissue are counted along edges, also where hinges couple vertices beyond them", "[queue]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = test::random_surface<double>(random).mesh();
+        const Material material{.young_modulus = 1e5, .poisson_ratio = 0.3, .thickness = 1e-4};
+        const auto springs = MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 1.0});
+        const auto none = MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 0.0});
+        const Tissue tissue(none, triangular_springs(mesh, material), bending_springs(mesh, 1e-6));
+        const std::vector<Index> seeds{random.index(mesh.vertex_count()), random.index(mesh.vertex_count())};
+        const Index layers = random.index(6);
+        PropagationQueue along_springs(mesh.vertex_count()), of_tissue(mesh.vertex_count());
+        along_springs.build(springs, seeds, layers);
+        of_tissue.build(tissue, seeds, layers);
+        REQUIRE(of_tissue.layer_count() == along_springs.layer_count());
+        for (Index k = 0; k < of_tissue.layer_count(); ++k) {
+            REQUIRE(set_of(of_tissue.layer(k)) == set_of(along_springs.layer(k)));
+        }
+        of_tissue.group(tissue);
+        std::size_t begin = 0;
+        for (const std::size_t end : of_tissue.colour_ends()) {
+            const auto group = set_of(of_tissue.vertices().subspan(begin, end - begin));
+            for (const Index v : group) {
+                for (const auto& coupled : tissue.neighbours(v)) REQUIRE(!group.contains(coupled.other));
+            }
+            begin = end;
+        }
     }
 }

@@ -31,7 +31,7 @@ inline constexpr auto arctangent_series<float> = std::to_array<float>({-0.333333
 /// `std::atan2(y, x)` [rad], to four epsilons; zero at the origin, NaN unless both are finite. It has the same bits on
 /// every machine, which the standard library does not promise: by sums, products, one division and comparisons.
 template <Number N>
-[[nodiscard]] N arctangent(const N& y, const N& x) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N arctangent(const N& y, const N& x) noexcept {
     using std::abs;
     using Scalar = Each<N>;
     constexpr Scalar pi = std::numbers::pi_v<Scalar>, tangent_of_eighth = std::numbers::sqrt2_v<Scalar> - 1;

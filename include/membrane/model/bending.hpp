@@ -39,6 +39,8 @@ namespace membrane {
 template <Number Scalar>
 struct Hinge {
     static constexpr std::size_t corner_count = 4;  ///< two of the edge, two apexes
+    static constexpr std::array<std::array<std::size_t, 2>, 5> edges{
+        {{0, 1}, {0, 2}, {1, 2}, {0, 3}, {1, 3}}};  ///< see `Element`
     static constexpr std::array<std::array<std::size_t, 4>, 4> orders{
         {{0, 1, 2, 3}, {1, 0, 3, 2}, {0, 1, 2, 3}, {1, 0, 3, 2}}};  ///< see `Element`
 
@@ -74,7 +76,7 @@ namespace detail {
 template <Number N>
 class Fold {
   public:
-    explicit Fold(const Corners<N, 4>& x) noexcept
+    MEMBRANE_INLINE explicit Fold(const Corners<N, 4>& x) noexcept
         : edge(x[1] - x[0]), left(cross<N>(edge, x[2] - x[0])), third(x[3] - x[0]), right(cross<N>(third, edge)) {
         const N on_left = squared_norm(left), on_right = squared_norm(right);
         valid = (on_left > 0) & (on_right > 0);
@@ -82,11 +84,11 @@ class Fold {
         square_ = squared_norm(edge), length_ = root_of<N>(square_);
     }
 
-    [[nodiscard]] N angle() const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE N angle() const noexcept {
         return if_valid(arctangent<N>(-length_ * dot<N>(left, third), dot(left, right)));
     }
 
-    [[nodiscard]] Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE Vector3<N> slope(const Corners<N, 4>& x, std::size_t i) const noexcept {
         const N turn_left = if_valid(-length_ * by_left_), turn_right = if_valid(-length_ * by_right_);
         if (i == 2) return turn_left * left;
         if (i == 3) return turn_right * right;
@@ -99,14 +101,14 @@ class Fold {
 
     /// 1 / h^2: no eigenvalue of the angle's second derivative by corner i is larger. At an apex h is its distance from the
     /// edge; at the edge's corners it is a sum, over the distances from the two lines through the other end and an apex.
-    [[nodiscard]] N curvature(const Corners<N, 4>& x, std::size_t i) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE N curvature(const Corners<N, 4>& x, std::size_t i) const noexcept {
         if (i == 2) return square_ * by_left_;
         if (i == 3) return square_ * by_right_;
         const Vector3<N>& end = x[1 - i];
         return squared_norm<N>(x[2] - end) * by_left_ + squared_norm<N>(x[3] - end) * by_right_;
     }
 
-    [[nodiscard]] N if_valid(const N& number) const noexcept { return select<N>(valid, number, 0); }
+    [[nodiscard]] MEMBRANE_INLINE N if_valid(const N& number) const noexcept { return select<N>(valid, number, 0); }
 
     Vector3<N> edge, left, third, right;
     decltype(N() < N()) valid;  // both triangles have areas
@@ -118,7 +120,7 @@ class Fold {
 
 /// `angle` less a whole turn if it is beyond half a turn [rad]. @pre between -2 pi and 2 pi
 template <Number N>
-[[nodiscard]] N within_half_turn(const N& angle) noexcept {
+[[nodiscard]] MEMBRANE_INLINE N within_half_turn(const N& angle) noexcept {
     constexpr auto half = std::numbers::pi_v<Each<N>>;
     using std::abs;
     return select<N>(abs(angle) > half, angle - select<N>(angle > 0, 2 * half, -2 * half), angle);
@@ -128,7 +130,7 @@ template <Number N>
 
 template <Number Scalar>
 template <Number N>
-CornerForce<N> Hinge<Scalar>::force_on(const Corners<N, 4>& x, std::size_t i) const noexcept {
+MEMBRANE_INLINE CornerForce<N> Hinge<Scalar>::force_on(const Corners<N, 4>& x, std::size_t i) const noexcept {
     using std::abs;
     const detail::Fold<N> fold(x);
     const N k = static_cast<N>(stiffness), curvature = fold.curvature(x, i);

@@ -57,6 +57,9 @@ using Corners = std::array<Vector3<Scalar>, count>;
 /// of energy belong to one energy; `hessian_block(x, i, j)` is its second derivative by corners i and j [N/m], or an
 /// approximation with which Newton's method still converges.
 ///
+/// Optional, where not all corners are joined by edges of the mesh:
+/// - `E::edges`: the pairs of corners that are. A `PropagationQueue` counts its layers along edges.
+///
 /// Optional, for speed, and satisfied by the elements of this library:
 /// - `CornerForce::remainder`: with it most updates need no evaluation of the energy.
 /// - `E` is `E<Scalar>`, its members are `Scalar`s, and it takes `Lanes` as constants and as positions: several elements
@@ -96,6 +99,21 @@ struct ElementInstance {
 };
 
 namespace detail {
+
+/// The pairs of corners that edges of the mesh join.
+template <class E>
+[[nodiscard]] constexpr auto edges_of() noexcept {
+    if constexpr (requires { E::edges; }) {
+        return E::edges;
+    } else {
+        constexpr std::size_t n = E::corner_count;
+        std::array<std::array<std::size_t, 2>, n*(n - 1) / 2> all{};
+        for (std::size_t j = 1, k = 0; j < n; ++j) {
+            for (std::size_t i = 0; i < j; ++i) all[k++] = {i, j};
+        }
+        return all;
+    }
+}
 
 /// The order of corners in which an element is evaluated at corner `i`.
 template <class E>

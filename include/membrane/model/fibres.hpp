@@ -50,7 +50,8 @@ struct FibreMaterial {
 /// Finite if no edge is longer than 1e5 times the lengths at rest in float, 1e60 times in double.
 template <Number Scalar>
 struct FibreTriangle {
-    static constexpr std::size_t corner_count = 3;  ///< the triangle's
+    static constexpr std::size_t corner_count = 3;                          ///< the triangle's
+    static constexpr auto orders = IncompressibleTriangle<Scalar>::orders;  ///< see `Element`
 
     IncompressibleTriangle<Scalar> rest;  ///< shape
     std::array<Scalar, 2> direction;      ///< unit vector at rest; the first axis is along the edge from corner 0 to 1
@@ -89,6 +90,7 @@ struct FibreTriangle {
                                                 const Vector3<N>& displacement) const noexcept;
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 3>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
+    [[nodiscard]] FibreTriangle in_order(std::size_t i) const noexcept;
     ///@}
 
     /// Mean of the two principal tensions, force per current width [N/m].
@@ -250,6 +252,19 @@ Eigen::Matrix3d FibreTriangle<Scalar>::hessian_block(const Corners<double, 3>& x
                                       2 * along<double>() * turns * Eigen::Matrix3d::Identity();
     return energy.slope * of_strain +
            energy.curvature * strain_slope(x, i).gradient * strain_slope(x, j).gradient.transpose();
+}
+
+template <Number Scalar>
+FibreTriangle<Scalar> FibreTriangle<Scalar>::in_order(std::size_t i) const noexcept {
+    if (i == 0) return *this;
+    const auto x = rest.corners();
+    const Vector3<double> axis = direction_or_zero<double>(x[orders[i][1]] - x[i]);
+    const double u = direction[0], v = direction[1];
+    auto ordered = *this;
+    ordered.rest = rest.in_order(i);
+    ordered.direction = {static_cast<Scalar>(axis[0] * u + axis[1] * v),
+                         static_cast<Scalar>(axis[0] * v - axis[1] * u)};
+    return ordered;
 }
 
 template <Number Scalar>

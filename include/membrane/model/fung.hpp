@@ -42,7 +42,8 @@ struct FungOptions {
 /// Finite if no edge is longer than 1e5 times the lengths at rest in float, 1e60 times in double.
 template <Number Scalar>
 struct FungTriangle {
-    static constexpr std::size_t corner_count = 3;  ///< the triangle's
+    static constexpr std::size_t corner_count = 3;                          ///< the triangle's
+    static constexpr auto orders = IncompressibleTriangle<Scalar>::orders;  ///< see `Element`
 
     IncompressibleTriangle<Scalar> rest;  ///< shape
     Scalar stiffness;                     ///< area thickness mu / 2 [J]
@@ -71,6 +72,9 @@ struct FungTriangle {
         const auto energy = response<double>(rest.invariant(x));
         const auto a = rest.invariant_slope(x, i).gradient, b = rest.invariant_slope(x, j).gradient;
         return energy.slope * rest.invariant_hessian(x, i, j) + energy.curvature * a * b.transpose();
+    }
+    [[nodiscard]] FungTriangle in_order(std::size_t i) const noexcept {
+        return {rest.in_order(i), stiffness, stiffening, limit};
     }
     ///@}
 

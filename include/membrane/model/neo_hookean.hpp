@@ -20,7 +20,8 @@ namespace membrane {
 /// Finite if no edge is longer than 1e8 times the lengths at rest in float, 1e70 times in double.
 template <Number Scalar>
 struct NeoHookeanTriangle {
-    static constexpr std::size_t corner_count = 3;  ///< the triangle's
+    static constexpr std::size_t corner_count = 3;                          ///< the triangle's
+    static constexpr auto orders = IncompressibleTriangle<Scalar>::orders;  ///< see `Element`
 
     IncompressibleTriangle<Scalar> rest;  ///< shape
     Scalar stiffness;                     ///< area thickness mu / 2 [J]
@@ -29,7 +30,11 @@ struct NeoHookeanTriangle {
     /// As `Element` requires.
     template <Number N>
     [[nodiscard]] CornerForce<N> force_on(const Corners<N, 3>& x, std::size_t i) const noexcept {
-        return detail::corner_force<N>({0, static_cast<N>(stiffness), 0}, rest.invariant_slope(x, i));
+        const auto k = static_cast<N>(stiffness);
+        CornerForce<N> result = detail::corner_force<N>({0, k, 0}, rest.invariant_slope(x, i));
+        result.remainder = rest.invariant_remainder(x, i);
+        result.remainder.fourth *= k;
+        return result;
     }
     template <Number N>
     [[nodiscard]] N energy(const Corners<N, 3>& x) const noexcept {
@@ -45,6 +50,7 @@ struct NeoHookeanTriangle {
                                                 std::size_t j) const noexcept {
         return static_cast<double>(stiffness) * rest.invariant_hessian(x, i, j);
     }
+    [[nodiscard]] NeoHookeanTriangle in_order(std::size_t i) const noexcept { return {rest.in_order(i), stiffness}; }
     ///@}
 
     /// Mean of the two principal tensions, force per current width [N/m].

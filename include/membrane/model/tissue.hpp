@@ -62,6 +62,9 @@ class Tissue {
         Index other;  ///< the other vertex
     };
 
+    /// The neighbours of vertex `v` that a spring or an edge of an element joins to it.
+    [[nodiscard]] std::span<const Neighbour> joined(Index v) const noexcept { return joined_[v]; }
+
     ///@{
     /// As `ElasticNetwork` requires. Masses, viscosities and pins are those of the springs. The tolerance is the
     /// largest of springs and elements.
@@ -97,7 +100,7 @@ class Tissue {
 
     Springs springs_;
     std::tuple<Kinds...> kinds_;
-    CompressedRows<Neighbour> neighbours_;
+    CompressedRows<Neighbour> neighbours_, joined_;
     Scalar force_tolerance_;
 };
 
@@ -116,24 +119,34 @@ Tissue<Springs, Kinds...>::Tissue(const Springs& springs, const Kinds&... kinds)
 
 template <class Springs, class... Kinds>
 void Tissue<Springs, Kinds...>::join() {
-    std::vector<std::pair<Index, Index>> pairs;
+    using Pairs = std::vector<std::pair<Index, Index>>;
+    Pairs coupled, joined;
     for (Index v = 0; v < vertex_count(); ++v) {
-        for (const auto& end : springs_.neighbours(v)) pairs.emplace_back(v, end.other);
+        for (const auto& end : springs_.neighbours(v)) joined.emplace_back(v, end.other);
     }
-    for_each_kind([&](const auto& elements) {
+    for_each_kind([&]<class E>(const Elements<Scalar, E>& elements) {
         for (const auto& instance : elements.all()) {
             for (const Index a : instance.corners) {
                 for (const Index b : instance.corners) {
-                    if (a != b) pairs.emplace_back(a, b);
+                    if (a != b) coupled.emplace_back(a, b);
                 }
+            }
+            for (const auto& [i, j] : detail::edges_of<E>()) {
+                joined.emplace_back(instance.corners[i], instance.corners[j]);
+                joined.emplace_back(instance.corners[j], instance.corners[i]);
             }
         }
     });
-    std::sort(pairs.begin(), pairs.end());
-    pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-    neighbours_ = CompressedRows<Neighbour>(vertex_count(), [&](auto put) {
-        for (const auto& [v, other] : pairs) put(v, Neighbour{other});
-    });
+    coupled.insert(coupled.end(), joined.begin(), joined.end());
+    const auto rows = [&](Pairs& pairs) {
+        std::sort(pairs.begin(), pairs.end());
+        pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
+        return CompressedRows<Neighbour>(vertex_count(), [&](auto put) {
+            for (const auto& [v, other] : pairs) put(v, Neighbour{other});
+        });
+    };
+    neighbours_ = rows(coupled);
+    joined_ = rows(joined);
 }
 
 template <class Springs, class... Kinds>

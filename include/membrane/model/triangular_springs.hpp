@@ -66,19 +66,20 @@ struct OtherCorners {
 };
 
 template <Number N>
-[[nodiscard]] Vector3<N> squares_of_edges(const Corners<N, 3>& x) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<N> squares_of_edges(const Corners<N, 3>& x) noexcept {
     return {squared_norm<N>(x[2] - x[1]), squared_norm<N>(x[0] - x[2]), squared_norm<N>(x[1] - x[0])};
 }
 
 // K d, the derivative of the energy by the squared edges [N/m]: half the force on an edge over its length.
 template <Number N, Number Scalar>
-[[nodiscard]] Vector3<N> times(const Symmetric3<Scalar>& k, const Vector3<N>& d) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<N> times(const Symmetric3<Scalar>& k, const Vector3<N>& d) noexcept {
     const auto cast = [](const Scalar& number) { return static_cast<N>(number); };
     return Symmetric3<N>{cast(k.xx), cast(k.yy), cast(k.zz), cast(k.xy), cast(k.xz), cast(k.yz)} * d;
 }
 
 template <Number N, Number Scalar>
-[[nodiscard]] Vector3<N> stretch(const TriangularSpring<Scalar>& spring, const Corners<N, 3>& x) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<N> stretch(const TriangularSpring<Scalar>& spring,
+                                                 const Corners<N, 3>& x) noexcept {
     return squares_of_edges(x) - spring.rest.template cast<N>();
 }
 
@@ -110,7 +111,8 @@ template <Number Scalar>
 
 template <Number Scalar>
 template <Number N>
-CornerForce<N> TriangularSpring<Scalar>::force_on(const Corners<N, 3>& x, std::size_t i) const noexcept {
+MEMBRANE_INLINE CornerForce<N> TriangularSpring<Scalar>::force_on(const Corners<N, 3>& x,
+                                                                  std::size_t i) const noexcept {
     const detail::OtherCorners other(i);
     const Vector3<N> tensions = detail::times(stiffness, detail::stretch(*this, x));
     const N to_next = 2 * tensions[static_cast<Eigen::Index>(other.last)];

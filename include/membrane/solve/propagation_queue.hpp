@@ -16,8 +16,8 @@
 namespace membrane {
 
 /// Vertices in the order of a breadth-first search from the seeds, [Liu07] 2.2: the seeds are layer 0, layer k holds
-/// the vertices at k springs from the nearest seed, until `group` merges layers. Within a layer the order is
-/// breadth-first, or by groups.
+/// the vertices at k springs or edges of elements from the nearest seed, until `group` merges layers. Within a layer the
+/// order is breadth-first, or by groups.
 class PropagationQueue {
   public:
     /// An empty queue. Cost: O(V) memory.
@@ -79,6 +79,20 @@ class PropagationQueue {
     VertexColouring colouring_;
 };
 
+namespace detail {
+
+/// The vertices one layer from `v`: its neighbours, without those to which only an element couples it, and no edge.
+template <class Network>
+[[nodiscard]] auto joined_to(const Network& network, Index v) noexcept {
+    if constexpr (requires { network.joined(v); }) {
+        return network.joined(v);
+    } else {
+        return network.neighbours(v);
+    }
+}
+
+}  // namespace detail
+
 template <class Network>
 void PropagationQueue::build(const Network& network, std::span<const Index> seeds, Index layers) noexcept {
     clear();
@@ -96,7 +110,7 @@ bool PropagationQueue::grow(const Network& network) noexcept {
     if (layer_count() == 0) return false;
     const std::size_t end = vertices().size();
     for (const Index v : layer(layer_count() - 1)) {
-        for (const auto& joined : network.neighbours(v)) {
+        for (const auto& joined : detail::joined_to(network, v)) {
             if (!network.pinned(joined.other)) reached_.insert(joined.other);
         }
     }
