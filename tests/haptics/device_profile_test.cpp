@@ -9,7 +9,7 @@
 
 using namespace membrane;
 
-TEST_CASE("the stock devices are valid, and as strong as their makers say", "[profile]") {
+TEST_CASE("the stock devices are valid, their numbers those of such devices", "[profile]") {
     for (const auto& device : {devices::touch, devices::phantom_desktop, devices::premium_1_5, devices::premium_3_0,
                                devices::omega, devices::delta, devices::sigma}) {
         CAPTURE(std::string(device.name));

@@ -60,6 +60,9 @@ TEST_CASE("tissues are materials, typical ones within the range", "[material]") 
     }
     // [Fisher69] gives dyn/cm^2.
     CHECK(materials::lens_capsule().upper.young_modulus == Approx(6e7 * 1e-5 / 1e-4));
+    // [Jones92] gives the tension of the sheet per strain.
+    const Material retina = materials::retina().typical;
+    CHECK(retina.young_modulus * retina.thickness == Approx(2).epsilon(0.05));
     const auto has_ratio = [](const MaterialRange& tissue, double ratio) {
         return tissue.typical.poisson_ratio == ratio && tissue.lower.poisson_ratio == ratio &&
                tissue.upper.poisson_ratio == ratio;

@@ -138,7 +138,8 @@ void bind_profiles(py::module_& module) {
                     py::arg("name"));
     fields.def_fields(profile);
     profile.def_readonly("name", &Profile::owned, doc("DeviceProfile::name"));
-    auto devices = module.def_submodule("devices", "Profiles of haptic devices, from their makers' data sheets.");
+    auto devices =
+        module.def_submodule("devices", "Profiles of haptic devices: compare them with the data sheet of yours.");
     using namespace membrane::devices;
     const std::pair<const char*, const DeviceProfile&> all[] = {{"touch", touch},
                                                                 {"phantom_desktop", phantom_desktop},

@@ -27,9 +27,10 @@ struct DeviceProfile {
     void check() const;
 };
 
-/// Forces, stiffness, back-drive friction and resolution are from the manufacturers' data sheets. If a sheet gives
-/// several directions, the stiffness is the lowest. Damping is published only for the PHANToM 1.0 [Diolaiti06], the
-/// predecessor of the Premium.
+/// Compare a profile with the data sheet of your device. Peak forces and stiffnesses agree with the settings of CHAI3D
+/// (`CPhantomDevices.cpp`, `CDeltaDevices.cpp` in github.com/chai3d/chai3d), but for the stiffness of the Touch: 400
+/// N/m there, 700 N/m for the Omni. Continuous forces, back-drive friction and resolutions are of no source that can be
+/// checked. Damping is published only for the PHANToM 1.0 [Diolaiti06], the predecessor of the Premium.
 namespace devices {
 
 /// 3D Systems Touch, formerly Geomagic Touch and SensAble PHANTOM Omni.
@@ -66,11 +67,11 @@ inline constexpr DeviceProfile premium_3_0{.name = "PHANTOM Premium 3.0",
                                            .resolution = 20e-6};
 
 ///@{
-/// Force Dimension publishes one force, without a time limit, and no friction. Without friction a resolution would rule
-/// out every stiffness, so the resolution is neglected.
+/// Of these, one force is known, and no friction. Without friction a resolution would rule out every stiffness, so the
+/// resolution is neglected. Those of the sigma are CHAI3D's.
 inline constexpr DeviceProfile omega{.name = "omega", .peak_force = 12, .continuous_force = 12, .stiffness = 5000};
 inline constexpr DeviceProfile delta{.name = "delta", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
-inline constexpr DeviceProfile sigma{.name = "sigma", .peak_force = 20, .continuous_force = 20, .stiffness = 5000};
+inline constexpr DeviceProfile sigma{.name = "sigma", .peak_force = 12, .continuous_force = 12, .stiffness = 4000};
 ///@}
 
 }  // namespace devices

@@ -24,7 +24,9 @@
 ///     const auto tissue = membrane::Tissue(springs, matrix, collagen);
 namespace membrane {
 
-/// Fibres of one kind.
+/// Fibres of one kind. The defaults of `stiffening` and `stretch_limit` are placeholders, of no tissue: take the first
+/// from a fit to your measurements. The limit keeps the exponential within the range of numbers; set it above the
+/// stretches of your scene.
 struct FibreMaterial {
     double stiffness = 0;        ///< k1, a quarter of Young's modulus of taut fibres at rest [Pa], positive
     double stiffening = 10;      ///< k2, positive

@@ -18,7 +18,8 @@
 ///     const auto tissue = membrane::Tissue(springs, sheet);
 namespace membrane {
 
-/// How a `FungTriangle` stiffens.
+/// How a `FungTriangle` stiffens. Both defaults are placeholders, of no tissue: take `stiffening` from a fit to your
+/// measurements. The limit keeps the exponential within the range of numbers; set it above the stretches of your scene.
 struct FungOptions {
     double stiffening = 10;      ///< b, positive
     double stretch_limit = 1.3;  ///< above 1: from the I1 of this stretch in all directions on, the energy is quadratic

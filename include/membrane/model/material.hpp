@@ -58,33 +58,42 @@ struct MaterialRange {
     ///@}
 };
 
-/// Tissues of the human eye. They stiffen when stretched, and differ between eyes and between experiments: these
-/// constants are a start, not a measurement. If no density of the tissue is known, it is that of water, 1000.
+/// Tissues of the eye. They stiffen when stretched, and differ between eyes and between experiments: these constants
+/// are a start, not a measurement; `bench/run tissue` compares them with measured eyes. Densities are that of water,
+/// 1000: not measured, and of no effect in a quasi-static step.
 namespace materials {
 
-/// In vivo 0.25 +- 0.1 MPa (mean and deviation, aged 21) at the pressure in the eye [Pye20]; more with age and pressure
-/// [Elsheikh07]. 0.535 mm thick in the middle, 95 % within 0.06 mm [Doughty00]. A Poisson ratio of 0.49 is the value
-/// that such studies assume.
+/// For a tool that presses, human: 0.25 +- 0.10 MPa (mean and deviation, aged 21) in vivo at the pressure in the eye,
+/// from tonometry [Pye20]; against a tonometer's plate the model is then 1.4 times too stiff. For stretch by a rising
+/// pressure it is three times too soft: what [Poloxamer20] measured needs 0.75 MPa. The middle is 0.529 +- 0.036 mm
+/// thick in one population [Eballe10], 0.544 +- 0.033 mm in another [Kadhim16]: the typical value is between the means,
+/// the range holds 95 % of both. The Poisson ratio is assumed, that of tissue full of water.
 [[nodiscard]] constexpr MaterialRange cornea() noexcept {
     return {{.young_modulus = 0.25e6, .poisson_ratio = 0.49, .thickness = 0.535e-3},
-            {.young_modulus = 0.15e6, .poisson_ratio = 0.49, .thickness = 0.475e-3},
-            {.young_modulus = 0.35e6, .poisson_ratio = 0.49, .thickness = 0.595e-3}};
+            {.young_modulus = 0.15e6, .poisson_ratio = 0.49, .thickness = 0.46e-3},
+            {.young_modulus = 0.35e6, .poisson_ratio = 0.49, .thickness = 0.61e-3}};
 }
 
-/// 6 MPa in childhood, 3 MPa at 60, 1.5 MPa in extreme old age, Poisson ratio 0.47, all in stretch [Fisher69]. 11 to 15
-/// um thick at the anterior pole, up to 16 um around it, 3.5 um at the posterior pole [Barraquer06].
+/// For stretch, human: 6 MPa in childhood, 3 MPa at 60, 1.5 MPa in extreme old age, Poisson ratio 0.47 [Fisher69]. 11
+/// to 15 um thick at the anterior pole, up to 16 um around it, 3.5 um at the posterior pole [Barraquer06]; the typical
+/// value is the middle of the anterior range. Other experiments: the stiffness of the empty bag does not depend on age
+/// [Ziebarth08]; 0.28 to 2 MPa by swelling in salt, of the pig [Powell10]; 0.02 to 0.13 MPa by indentation with an
+/// atomic force microscope [Ziebarth11].
 [[nodiscard]] constexpr MaterialRange lens_capsule() noexcept {
     return {{.young_modulus = 3e6, .poisson_ratio = 0.47, .thickness = 13e-6},
             {.young_modulus = 1.5e6, .poisson_ratio = 0.47, .thickness = 3.5e-6},
             {.young_modulus = 6e6, .poisson_ratio = 0.47, .thickness = 16e-6}};
 }
 
-/// 20 kPa, of cattle [Jones92]. An order of magnitude: experiments spread over about a decade [Ferrara21]. 0.2 to 0.3
-/// mm thick, less with age [Alamouti03]. The Poisson ratio is that of tissue full of water, not measured.
+/// An order of magnitude. A sheet of the retina of cattle has a tension of about 2 N/m per strain, an E of the order of
+/// 20 kPa for the thickness in that experiment [Jones92]; the pig's has 5.5 kPa [Milan25]. Near the human macula it is
+/// 0.277 +- 0.034 mm thick in the centre, 0.326 +- 0.020 and 0.282 +- 0.015 mm in rings around it [Macula21]. Typical
+/// are this thickness and the modulus with which it has 2 N/m. The Poisson ratio is that of tissue full of water, not
+/// measured.
 [[nodiscard]] constexpr MaterialRange retina() noexcept {
-    return {{.young_modulus = 2e4, .poisson_ratio = 0.49, .thickness = 0.25e-3},
-            {.young_modulus = 1e4, .poisson_ratio = 0.49, .thickness = 0.2e-3},
-            {.young_modulus = 1e5, .poisson_ratio = 0.49, .thickness = 0.3e-3}};
+    return {{.young_modulus = 7e3, .poisson_ratio = 0.49, .thickness = 0.28e-3},
+            {.young_modulus = 5.5e3, .poisson_ratio = 0.49, .thickness = 0.24e-3},
+            {.young_modulus = 2e4, .poisson_ratio = 0.49, .thickness = 0.35e-3}};
 }
 
 }  // namespace materials
