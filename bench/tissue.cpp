@@ -15,6 +15,7 @@
 #include <membrane/model/material.hpp>
 
 #include "support/tissue_experiments.hpp"
+#include "support/tissue_strip.hpp"
 
 // tissue FOLDER [--short]: published experiments on eyes beside the library's numbers for them, from constants that
 // others published and fitted. Writes Markdown tables to tissue.md, and a .tsv for each plot, to FOLDER.
@@ -66,6 +67,26 @@ void print(const membrane::Fit& fit, const std::vector<Experiment>& pigs, std::F
 // A bag of two discs, as a stiffness per diameter [mN/mm].
 double bag(double modulus, double front) {
     return bag_stiffness({.young_modulus = modulus, .poisson_ratio = 0.47, .thickness = front}, 3.5e-6) / 2;
+}
+
+// Strips of another treatment, by the curve through the two points of the fresh ones.
+void print_strips(std::FILE* file) {
+    const auto [modulus, stiffening] = strip_through(fresh_amnion);
+    const membrane::Fit fit = fitted_strip();
+    std::fprintf(
+        file,
+        "\n### Amnion in tension\n\nThe exponential spring through the two points of fresh strips: %.2f MPa at "
+        "rest, stiffening %.1f. `fit` of all four points: %.2f MPa (%.2f to %.2f), %.1f (%.1f to %.1f), misfit %.1f "
+        "deviations.\n\n| acellular strips, stress at a strain of | measured | from fresh strips | off, in "
+        "deviations | fitted |\n|---|---|---|---|---|\n",
+        modulus, stiffening, fit.constants[0], fit.intervals[0].lower, fit.intervals[0].upper, fit.constants[1],
+        fit.intervals[1].lower, fit.intervals[1].upper, fit.misfit);
+    for (const StripPoint& point : acellular_amnion) {
+        const double predicted = strip_stress(modulus, stiffening, point.strain);
+        std::fprintf(file, "| %.1f %% | %.3f +- %.3f MPa | %.3f | %+.1f | %.3f |\n", 100 * point.strain, point.stress,
+                     point.deviation, predicted, (predicted - point.stress) / point.deviation,
+                     strip_stress(fit.constants[0], fit.constants[1], point.strain));
+    }
 }
 
 // What has no mean with a deviation, and what the model misses.
@@ -128,8 +149,7 @@ struct Band {
 const std::vector<double> pressures{2.5, 5, 10, 15, 20, 25, 27.25, 30};  // [mmHg]
 
 // Rise [um] and thinning [%] over the pressure.
-void write_inflation(const std::filesystem::path& path, const Eye& eye, const std::vector<Variant>& variants,
-                     int rings) {
+void write_inflation(const std::filesystem::path& path, const Eye& eye, const std::vector<Eye>& variants, int rings) {
     Band rises, thins;
     const auto add = [&](const Eye& changed) {
         std::vector<double> up, thinner;
@@ -146,7 +166,7 @@ void write_inflation(const std::filesystem::path& path, const Eye& eye, const st
         }
     };
     add(eye);
-    for (const Variant& variant : variants) add(variant.eye);
+    for (const Eye& variant : variants) add(variant);
     write(path, "pressure\trise\tlow\thigh\tthinning\tlow\thigh",
           {pressures, rises.curve, rises.low, rises.high, thins.curve, thins.low, thins.high});
 }
@@ -161,7 +181,7 @@ void write_punch(const std::filesystem::path& path, int rings) {
         forces.add(found);
     };
     add(pig_sclera);
-    for (const Variant& variant : pig_sclera_variants()) add(variant.eye);
+    for (const Eye& variant : pig_sclera_variants()) add(variant);
     write(path, "depth\tforce\tlow\thigh", {depths, forces.curve, forces.low, forces.high});
 }
 
@@ -182,6 +202,25 @@ void write_ratios(const std::filesystem::path& path, const std::vector<Experimen
     write(path, "predicted\tlow\thigh\tmeasured_low\tmeasured_high\tfitted", columns);
 }
 
+void write_strips(const std::filesystem::path& path) {
+    const auto [modulus, stiffening] = strip_through(fresh_amnion);
+    std::vector<std::vector<double>> columns(2);
+    for (int i = 0; i <= 36; ++i) {
+        columns[0].push_back(i);
+        columns[1].push_back(strip_stress(modulus, stiffening, 0.01 * i));
+    }
+    write(path, "strain\tstress", columns);
+}
+
+void write_bags(const std::filesystem::path& path) {
+    std::vector<std::vector<double>> columns(4);
+    for (const double modulus : {1.5, 3.0, 6.0}) {
+        const double values[]{modulus, bag(1e6 * modulus, 13e-6), bag(1e6 * modulus, 11e-6), bag(1e6 * modulus, 15e-6)};
+        for (std::size_t c = 0; c < columns.size(); ++c) columns[c].push_back(values[c]);
+    }
+    write(path, "modulus\tstiffness\tlow\thigh", columns);
+}
+
 void run(const std::filesystem::path& folder, int rings) {
     const std::vector<Experiment> rows{
         pig_cornea_rises(rings),
@@ -189,18 +228,25 @@ void run(const std::filesystem::path& folder, int rings) {
         pig_sclera_pressed(rings),
         cornea_thins("human", human_cornea, 2.85, 0.09, human_cornea_variants(), "[Pye20] [Atchison05] [Rufer05]",
                      rings)};
+    for (const Experiment& row : rows) {
+        if (std::abs(row.table_error()) > 0.01)
+            throw std::runtime_error("the table by moduli is too coarse: " + row.name);
+    }
     const std::vector<Experiment> pigs(rows.begin(), rows.end() - 1);
     const membrane::Fit fit = one_modulus(pigs);
     std::FILE* page = std::fopen((folder / "tissue.md").c_str(), "w");
     if (page == nullptr) throw std::runtime_error("cannot write " + (folder / "tissue.md").string());
     print(rows, page);
     print(fit, pigs, page);
+    print_strips(page);
     print_others(rows[0], page);
     std::fclose(page);
     write_ratios(folder / "tissue_ratios.tsv", rows, pigs.size(), fit.constants[0]);
     write_inflation(folder / "tissue_pig.tsv", pig_cornea, pig_cornea_variants(), rings / 2);
     write_inflation(folder / "tissue_human.tsv", human_cornea, human_cornea_variants(), rings / 2);
     write_punch(folder / "tissue_punch.tsv", rings);
+    write_strips(folder / "tissue_strips.tsv");
+    write_bags(folder / "tissue_bags.tsv");
 }
 
 }  // namespace

@@ -1,10 +1,10 @@
 # Run in the folder of the tables of `bench/run tissue`: published experiments and the library's numbers for them.
 # Bands: the published constants changed one at a time. Points: mean and deviation.
-set terminal svg size 900,760 font 'Helvetica,Arial,sans-serif,12' background '#ffffff'
+set terminal svg size 900,1100 font 'Helvetica,Arial,sans-serif,12' background '#ffffff'
 set output 'tissue.svg'
 set datafile separator tab
 set datafile columnheaders
-set multiplot layout 2,2 title 'Measured on eyes, and from the constants that others published' font ',15'
+set multiplot layout 3,2 title 'Measured on tissue, and from the constants that others published' font ',15'
 set grid lc '#d8d8d8' lw 0.7
 set border 3 lc '#444444'
 set xtics nomirror
@@ -62,6 +62,39 @@ EOD
 plot $measured using 1:2:3 with filledcurves lc rgb '#1a1a1a' title 'measured, 130 ± 20 N/m', \
      'tissue_punch.tsv' using 1:3:4 with filledcurves lc rgb '#2471a3' title 'band', \
      '' using 1:2 with lines lw 2 lc rgb '#2471a3' title 'E 0.188 MPa, of the cornea'
+
+set title 'Strips of amnion'
+set xlabel 'strain [%]'
+set ylabel 'MPa'
+set xrange [0:37]
+set yrange [0:1.2]
+$fresh << EOD
+strain	stress	deviation
+11.808	0.144	0.037
+32.695	0.820	0.028
+EOD
+$acellular << EOD
+strain	stress	deviation
+12.2	0.142	0.026
+33.777	0.796	0.045
+EOD
+plot 'tissue_strips.tsv' using 1:2 with lines lw 2 lc rgb '#2471a3' title 'through the fresh ones', \
+     $fresh using 1:2:3 with yerrorbars pt 7 ps 0.7 lw 1.5 lc rgb '#1a1a1a' title 'measured, fresh', \
+     $acellular using 1:2:3 with yerrorbars pt 6 ps 0.7 lw 1.5 lc rgb '#c0392b' title 'measured, acellular'
+
+set title 'Empty lens bag, pulled at its rim'
+set xlabel 'E [MPa]'
+set ylabel 'mN/mm'
+set xrange [0.5:7]
+set yrange [0:900]
+$range << EOD
+modulus	low	high
+0.5	25.2	342.7
+7	25.2	342.7
+EOD
+plot $range using 1:2:3 with filledcurves lc rgb '#1a1a1a' title 'measured, all of 22', \
+     'tissue_bags.tsv' using 1:2:3:4 with yerrorbars pt 7 ps 0.7 lw 1.5 lc rgb '#2471a3' \
+         title 'capsule of 11 to 15 µm, and 3.5 µm'
 
 set title 'Predicted over measured'
 set xlabel 'ratio'
