@@ -17,7 +17,7 @@
 #include "support/tissue_experiments.hpp"
 #include "support/tissue_strip.hpp"
 
-// tissue FOLDER [--short]: published experiments on eyes beside the library's numbers for them, from constants that
+// tissue FOLDER [--short]: published experiments on tissue beside the library's numbers for them, from constants that
 // others published and fitted. Writes Markdown tables to tissue.md, and a .tsv for each plot, to FOLDER.
 
 namespace {
