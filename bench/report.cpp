@@ -68,6 +68,27 @@ Table trade_table(const std::string& vertices) {
             .scene = "/vertices:" + vertices};
 }
 
+/// The error of the solver, and what viscosity adds to the force.
+Table damped_table() {
+    Table table{.topic = "trade",
+                .key = "trade_damped",
+                .title = "A damped foundation, 3 layers: the error of the force in percent",
+                .rows = {},
+                .column = "sweeps",
+                .columns = {1, 2, 4, 8, 16}};
+    for (const std::string vertices : {"162", "642", "2562"}) {
+        const std::string scene =
+            "scene:slide_damped/foundation:0.2/scalar:double/rule:block/predicted:1/layers:3/contact_iterations:3/"
+            "vertices:" +
+            vertices;
+        table.rows.push_back({vertices + " vertices", scene});
+        table.rows.push_back({"  from the exact step, " + vertices, scene, Row::percent, "exact_error", ""});
+        table.rows.push_back({"  viscosity adds, " + vertices, scene, Row::percent, "viscous", ""});
+        table.rows.push_back({"  from equilibrium, " + vertices, scene, Row::percent, "force_error", ""});
+    }
+    return table;
+}
+
 /// By one integer option, the others at their defaults.
 Table option_table(const std::string& option, const std::string& title, const std::vector<int>& numbers) {
     Table table{.topic = "defaults",
@@ -219,6 +240,7 @@ const std::vector<Table> all_tables{
       {"build", "tree/build"}}},
     trade_table("162"),
     trade_table("642"),
+    damped_table(),
     option_table("layers", "Time of a tick, and error of its force in percent, by layers: the default is 6",
                  {1, 2, 3, 4, 6, 8, 12}),
     option_table("sweeps", "The same by sweeps: the default is 2", {1, 2, 3, 4, 6, 8}),

@@ -9,7 +9,8 @@
 #include "support/strokes.hpp"
 
 // Time against accuracy. A tool of 3 mm on a sphere of 10 mm, 1.5 mm deep: sliding along it at 50 mm/s, or put down at
-// several points; by rule, layers, sweeps and contact iterations. The error is against the equilibrium of the tick.
+// several points; by rule, layers, sweeps and contact iterations. The error is against the equilibrium of the tick; on a
+// damped foundation also against the exact step, solved to the end, beside what viscosity adds.
 //
 // With MEMBRANE_FULL_GRID set, all combinations; without, those that tables and plot show and some more.
 
@@ -54,6 +55,10 @@ membrane::TrialResult play_by(const Setting& setting) {
 void measure(benchmark::State& state, const Setting& setting) {
     for (auto _ : state) record(state, setting.scalar == "float" ? play_by<float>(setting) : play_by<double>(setting));
     if (setting.rule == "published") state.counters["part"] = stable_part(setting);
+    if (!setting.place.is_damped()) return;
+    const auto exact = play(setting.place, options_of<double>(setting), membrane::BlockStep{}, 1, true);
+    state.counters["exact_error"] = exact.force_error;
+    state.counters["viscous"] = viscous_difference(references_of(setting.place, true), references_of(setting.place));
 }
 
 /// Without the full grid: all rules where the plot compares them; without prediction only settings near the paper or
@@ -114,6 +119,11 @@ const bool added = [] {
     }
     for (const auto& setting : settings) {
         if (all || is_shown(setting)) add(setting);
+    }
+    for (const int vertices : {162, 642, 2562}) {
+        for (const Index sweeps : {1, 2, 4, 8, 16}) {
+            add({{"slide_damped", vertices, 0.2}, "block", "double", true, 3, sweeps, 3});
+        }
     }
     return true;
 }();

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <membrane/accuracy/trial.hpp>
@@ -24,12 +25,14 @@ using membrane::Real;
 
 inline constexpr double wide_tool = 3e-3, deep = 1.5e-3;  // radius and depth [m]
 
-/// A scene by its name, `slide`, `put_down` or `draw_out`, its number of vertices, and its foundation stiffness over
-/// the spring stiffness, `part`.
+/// A scene by its name, `slide`, `slide_damped`, `put_down` or `draw_out`, its number of vertices, and its foundation
+/// stiffness over the spring stiffness, `part`.
 struct Place {
     std::string scene;
     int vertices;
     double part;
+
+    [[nodiscard]] bool is_damped() const { return scene == "slide_damped"; }
 
     friend auto operator<=>(const Place&, const Place&) = default;
 };
@@ -85,12 +88,13 @@ struct StrokeScene {
     explicit StrokeScene(const Place& place, double mass = 1)
         : mesh(sphere_of<Scalar>(place.vertices)),
           network(mesh, {}, {.stiffness = Scalar(stiffness), .mass = static_cast<Scalar>(mass)}),
-          volume(mesh, {.stiffness = static_cast<Scalar>(place.part * stiffness)}),
+          volume(mesh, {.stiffness = static_cast<Scalar>(place.part * stiffness),
+                        .damping = place.is_damped() ? Scalar(0.02) : Scalar(0)}),  // [N s/m]
           stroke(mesh, tools_of(place), Scalar(tick)) {}
 
     [[nodiscard]] static std::vector<membrane::Tool<Scalar>> tools_of(const Place& place) {
         std::vector<membrane::Tool<Scalar>> tools;
-        const auto stroke = place.scene == "slide" ? slide() : place.scene == "draw_out" ? draw_out() : put_down();
+        const auto stroke = place.scene == "draw_out" ? draw_out() : place.scene == "put_down" ? put_down() : slide();
         for (const auto& tool : stroke) {
             tools.push_back({.position = tool.position.template cast<Scalar>(),
                              .radius = static_cast<Scalar>(tool.radius),
@@ -105,25 +109,29 @@ struct StrokeScene {
     membrane::ToolTrajectory<Scalar> stroke;
 };
 
-/// The equilibria of every sixth tick: in `put_down`, the last tick of each press. Computed once.
-[[nodiscard]] inline const std::vector<membrane::ReferenceTick>& references_of(const Place& place) {
-    static std::map<Place, std::vector<membrane::ReferenceTick>> known;
-    auto& references = known[place];
+using References = std::vector<membrane::ReferenceTick>;
+
+/// The equilibria of every sixth tick, or the exact steps, with the damping: in `put_down`, the last tick of each press.
+/// Computed once.
+[[nodiscard]] inline const References& references_of(const Place& place, bool with_damping = false) {
+    static std::map<std::pair<Place, bool>, References> known;
+    auto& references = known[{place, with_damping}];
     if (!references.empty()) return references;
     const StrokeScene<double> scene(place);
     constexpr Index tick_stride = 6;
-    references = equilibria(scene.mesh, scene.network, scene.volume, scene.stroke, tick_stride);
+    references = with_damping ? exact_steps(scene.mesh, scene.network, scene.volume, scene.stroke, tick_stride)
+                              : equilibria(scene.mesh, scene.network, scene.volume, scene.stroke, tick_stride);
     require(references.size() == static_cast<std::size_t>(scene.stroke.ticks() / tick_stride),
-            "all ticks have an equilibrium");
+            "all ticks have a reference");
     return references;
 }
 
 template <Real Scalar, class Rule>
 [[nodiscard]] membrane::TrialResult play(const Place& place, const membrane::SolverOptions<Scalar>& options,
-                                         const Rule& rule, double mass = 1) {
+                                         const Rule& rule, double mass = 1, bool with_damping = false) {
     const StrokeScene<Scalar> scene(place, mass);
-    return run_trial(scene.mesh, scene.network, scene.volume, scene.stroke, references_of(place), options, rule,
-                     ProcessorSeconds{});
+    return run_trial(scene.mesh, scene.network, scene.volume, scene.stroke, references_of(place, with_damping), options,
+                     rule, ProcessorSeconds{});
 }
 
 /// By (4), with the lightest mass that is stable in the whole scene: reduces `part`, dt^2 stiffness / mass, from 0.5 in

@@ -319,6 +319,78 @@ TEST_CASE("of all settings the cheapest that keeps the error, the most accurate 
     CHECK(all_tried <= 64 * cases(200));
 }
 
+TEST_CASE("with error and time the cheapest that keeps both, or the one that gives way is named") {
+    int both = 0, error_gives_way = 0, time_gives_way = 0;
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const KnownOutcomes known(random);
+        const double error = std::pow(10, random.number(-4.0, 0.0)), time = std::pow(10, random.number(-6.5, -3.0));
+        const auto attempt = [&](const SolverOptions<double>& options) { return known.of(options); };
+        const auto choice = choose_settings(GridSearchOptions<double>{}, {.force_error = error, .time = time}, attempt);
+        const double most = error / GridSearchOptions<double>{}.safety_factor;
+        CHECK(choice.keeps_error == (choice.force_error <= most));
+        CHECK(choice.keeps_time == (choice.time <= time));
+        CHECK(choice.satisfied == (choice.keeps_error && choice.keeps_time));
+        const auto cheapest =
+            known.best(by_time, [&](const TrialResult& o) { return o.force_error <= most && o.time <= time; });
+        const auto in_time = known.best(by_error, [&](const TrialResult& o) { return o.time <= time; });
+        if (cheapest.layers != no_index) {
+            ++both;
+            CHECK(choice.satisfied);
+            check_same(choice, cheapest);
+        } else if (in_time.layers != no_index) {
+            ++error_gives_way;
+            CHECK((choice.keeps_time && !choice.keeps_error));
+            CHECK(choice.force_error == known.of(in_time).force_error);
+        } else {
+            ++time_gives_way;
+            CHECK_FALSE(choice.keeps_time);
+            CHECK(choice.time == known.of(known.best(by_time, [](const TrialResult&) { return true; })).time);
+        }
+    }
+    CHECK(std::min({both, error_gives_way, time_gives_way}) > cases(200) / 20);
+}
+
+TEST_CASE("the solver gets of the error what the mesh leaves, and at least half") {
+    const auto attempt = [](const SolverOptions<double>& o) {
+        return TrialResult{.force_error = 1.0 / o.sweeps, .time = 1e-6 * o.sweeps, .layers_reached = o.layers};
+    };
+    const GridSearchOptions<double> experiment{.layers = {1}, .contact_iterations = {1}, .safety_factor = 1};
+    const auto choose = [&](double error, double mesh_error) {
+        return choose_settings(experiment, {.force_error = error, .mesh_error = mesh_error}, attempt);
+    };
+    CHECK(choose(0.25, 0).options.sweeps == 4);
+    CHECK(choose(0.25, 0).edge_factor == 1);
+    CHECK(choose(0.25, 0.08).options.sweeps == 6);
+    CHECK(choose(0.25, -0.08).options.sweeps == 6);
+    CHECK(choose(0.25, 0.08).edge_factor == 1);
+    CHECK(choose(0.25, 0.125).options.sweeps == 8);
+    CHECK(choose(0.25, 0.125).edge_factor == 1);
+    CHECK(choose(0.25, 0.5).options.sweeps == 8);
+    CHECK(choose(0.25, 0.5).edge_factor == 0.5);  // a fourth of the error
+    CHECK(choose(0.25, -0.5).satisfied);          // of what is required of the solver
+}
+
+TEST_CASE("a choice says for which motion it holds, and how far single ticks are off") {
+    const SmallScene scene;
+    const auto choice = scene.choose({.force_error = 0.02});
+    CHECK(choice.max_force_error >= choice.force_error);
+    CHECK(choice.max_force_error <= std::sqrt(choice.ticks_compared) * choice.force_error * (1 + 1e-12));
+    CHECK(choice.max_speed == Approx(std::sqrt(2.0) * 0.05));  // 5e-5 m along and down in 1 ms
+    CHECK(choice.max_displacement > 0.8e-3);                   // 1 mm deep, less where the mesh is flat
+    CHECK(choice.max_displacement < 1.2e-3);
+}
+
+TEST_CASE("without viscosity the error is that of the solver alone") {
+    SmallScene scene;
+    scene.foundation = VirtualVolumeSprings(scene.mesh, {.stiffness = 8.0, .damping = 0.05});
+    const auto with = scene.choose({.force_error = 0.01}, {.repetitions = 1});
+    const auto without = scene.choose({.force_error = 0.01}, {.repetitions = 1, .count_viscosity = false});
+    CHECK_FALSE(with.satisfied);  // no setting undoes the damping
+    CHECK(without.satisfied);
+}
+
 TEST_CASE("layers that no tool reaches are not tried") {
     for (int seed = 1; seed <= cases(40); ++seed) {
         CAPTURE(seed);
@@ -411,9 +483,10 @@ TEST_CASE("what makes no sense is refused") {
         return refusal([&] { (void)scene.choose(wanted, experiment); });
     };
     const double nan = std::numeric_limits<double>::quiet_NaN();
-    CHECK(refused({}) == "choose_settings: either a force_error or a time must be required, got 0 and 0 s");
-    CHECK(refused({.force_error = 0.1, .time = 0.2}) ==
-          "choose_settings: either a force_error or a time must be required, got 0.1 and 0.2 s");
+    CHECK(refused({}) == "choose_settings: a force_error or a time must be required, got none");
+    CHECK(refused({.time = 1, .mesh_error = 0.1}) ==
+          "choose_settings: mesh_error must be finite and come with a required force_error, got 0.1");
+    CHECK_THAT(refused({.force_error = 1, .mesh_error = nan}), ContainsSubstring("mesh_error must be finite"));
     CHECK(refused({.force_error = -1}) ==
           "choose_settings: the required force_error must be finite and positive, got -1");
     CHECK_THAT(refused({.force_error = nan}), ContainsSubstring("force_error must be finite and positive, got"));

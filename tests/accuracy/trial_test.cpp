@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numeric>
 #include <span>
 #include <string>
 #include <tuple>
@@ -165,6 +166,32 @@ TEST_CASE("the errors of a trial are those to the equilibrium of each tick") {
     }
 }
 
+TEST_CASE("the largest error of a tick, and the motion, are those of the ticks one by one") {
+    const Scene<double> scene;
+    const SolverOptions<double> options{.layers = 4, .sweeps = 2};
+    const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke());
+    const auto outcome = scene.play(scene.stroke(), references, options);
+    auto stroke = scene.stroke();
+    QuasiStaticSolver solver(scene.network, options);
+    Points<double> x = scene.mesh.positions();
+    std::vector<Index> moved;
+    double largest = 0, squares = 0, far = 0;
+    for (Index tick = 0; tick < scene.ticks(); ++tick) {
+        const auto [presses, pulls] = stroke(tick, x, moved);
+        const auto report = solver.step(x, dt, scene.network, scene.foundation, presses, pulls);
+        moved.assign(report.moved.begin(), report.moved.end());
+        const auto& rest = references[static_cast<std::size_t>(tick)];
+        double error = 0;
+        for (std::size_t i = 0; i < 2; ++i) error += (report.reactions[i] - rest.reactions[i]).squaredNorm();
+        largest = std::max(largest, error);
+        squares += rest.force * rest.force / static_cast<double>(references.size());
+        far = std::max(far, (x - scene.mesh.positions()).colwise().norm().maxCoeff());
+    }
+    CHECK(outcome.max_force_error == Approx(std::sqrt(largest / squares)));
+    CHECK(outcome.max_displacement == Approx(far));
+    CHECK(outcome.max_speed == Approx(0.1));  // 1e-4 m a tick, in, out and up; 5e-5 along. The last 1e-3 are let go
+}
+
 TEST_CASE("more of everything is nearer to the equilibrium") {
     const Scene<double> scene;
     const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke());
@@ -182,6 +209,107 @@ TEST_CASE("more of everything is nearer to the equilibrium") {
     CHECK(displacement < 1e-4 * radius);
     CHECK(scene.play(scene.stroke(), references, {.layers = 64}).layers_reached < 12);
     CHECK(scene.play(scene.stroke(), references, {.layers = 2}).layers_reached == 2);
+}
+
+/// A vertex of a mesh without springs, drawn out along its radius at a constant speed.
+struct Draw {
+    static constexpr double speed = 0.02;  // [m/s]
+    Point from = icosphere<double>({.radius = radius, .subdivisions = 2}).positions().col(5);
+
+    Index ticks() const { return 20; }
+    double dt() const { return 1e-3; }
+    std::tuple<VertexAttachment<double>> operator()(Index tick, const ConstPointsRef<double>&,
+                                                    std::span<const Index>) const {
+        return {pull(5, from + speed * dt() * (tick + 1) * from.normalized())};
+    }
+};
+
+TEST_CASE("damping adds its coefficient times the speed to a vertex drawn out of its foundation") {
+    const Scene<double> scene;
+    const MassSpringNetwork<double, LinearSpring> slack(scene.mesh, {}, {.stiffness = 1e-9});
+    for (const double damping : {0.0, 0.02, 0.3}) {
+        const VirtualVolumeSprings foundation(scene.mesh, {.stiffness = 8.0, .damping = damping});
+        const auto exact = exact_steps(scene.mesh, slack, foundation, Draw{});
+        const auto still = equilibria(scene.mesh, slack, foundation, Draw{});
+        REQUIRE(exact.size() == 20);
+        double elastic = 0;  // sum of squares
+        for (const auto& step : exact) {
+            const double out = Draw::speed * 1e-3 * (step.tick + 1);
+            CHECK(step.force == Approx(8.0 * out + damping * Draw::speed));
+            elastic += 64 * out * out;
+        }
+        CHECK(viscous_difference(exact, still) ==
+              Approx(std::sqrt(20 * std::pow(damping * Draw::speed, 2) / elastic)).margin(1e-6));
+    }
+}
+
+/// The foundation during one tick, as an equilibrium sees it.
+struct InOneTick {
+    const VirtualVolumeSprings<double>& foundation;
+    const Points<double>& before;
+
+    VertexForce<double> force_on(Index v, const Point& position, const Point&, double) const noexcept {
+        return foundation.force_on(v, position, point(before, v), dt);
+    }
+};
+
+/// The largest difference of exact steps from Newton's method with the damping of the tick, of a force over the largest
+/// of all and of a position over the radius.
+template <class History>
+std::pair<double, double> off_newton(const Scene<double>& scene, History history) {
+    const VirtualVolumeSprings foundation(scene.mesh, {.stiffness = 8.0, .damping = 0.02});
+    const auto exact = exact_steps(scene.mesh, scene.network, foundation, history);
+    REQUIRE(exact.size() == static_cast<std::size_t>(history.ticks()));
+    std::vector<Index> all(static_cast<std::size_t>(scene.mesh.vertex_count()));
+    std::iota(all.begin(), all.end(), 0);
+    Points<double> x = scene.mesh.positions();
+    double largest = 0, force = 0, position = 0;
+    for (const auto& step : exact) {
+        CAPTURE(step.tick);
+        const auto constraints = history(step.tick, x, all);
+        const auto solve = [&](const auto&... each) {
+            return equilibrium(x, scene.mesh, scene.network, InOneTick{foundation, x},
+                               {.max_iterations = 2000, .tolerance = 1e-10}, each...);
+        };
+        const auto newton = std::apply(solve, constraints);
+        REQUIRE(newton.converged);
+        for (std::size_t i = 0; i < step.reactions.size(); ++i) {
+            force = std::max(force, norm<double>(step.reactions[i] - newton.reactions[i]));
+        }
+        position = std::max(position, (step.x - newton.x).colwise().norm().maxCoeff());
+        largest = std::max(largest, step.force);
+        x = step.x;
+    }
+    return {force / largest, position / radius};
+}
+
+TEST_CASE("exact steps are those of Newton's method with the damping of the tick") {
+    const Scene<double> scene;
+    const auto [force, position] = off_newton(scene, Pinch{});
+    CHECK(force < 1e-6);
+    CHECK(position < 1e-6);
+    // A step is pressed at the triangles of its contact, an equilibrium everywhere.
+    const auto [pressed_force, pressed_position] = off_newton(scene, scene.stroke());
+    CHECK(pressed_force < 5e-3);
+    CHECK(pressed_position < 2e-3);
+}
+
+TEST_CASE("without damping exact steps are equilibria, and a solver that goes on is all right by them") {
+    const Scene<double> scene;
+    const auto still = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke(), 4);
+    CHECK(viscous_difference(exact_steps(scene.mesh, scene.network, scene.foundation, scene.stroke(), 4), still) <
+          1e-4);
+    const VirtualVolumeSprings foundation(scene.mesh, {.stiffness = 8.0, .damping = 0.02});
+    const auto exact = exact_steps(scene.mesh, scene.network, foundation, scene.stroke());
+    const auto slow = equilibria(scene.mesh, scene.network, foundation, scene.stroke());
+    const SolverOptions<double> many{.layers = 64, .sweeps = 64, .contact_iterations = 8};
+    const auto play = [&](const std::vector<ReferenceTick>& references) {
+        return run_trial(scene.mesh, scene.network, foundation, scene.stroke(), references, many).force_error;
+    };
+    const double viscous = viscous_difference(exact, slow);
+    CHECK(viscous > 0.02);
+    CHECK(play(exact) < 1e-3);
+    CHECK(play(slow) == Approx(viscous).epsilon(0.05));
 }
 
 TEST_CASE("floats are set against the same equilibria") {
@@ -256,6 +384,17 @@ TEST_CASE("a stroke or a trial that makes no sense is refused") {
     CHECK(refusal([&] { (void)references_of(Odd{.step = -1}); }) ==
           "equilibria: dt of the history must be finite and positive [s], got -1");
     CHECK(refusal([&] { (void)references_of(Odd{}, 0); }) == "equilibria: tick_stride must be at least 1, got 0");
+    const auto exact = [&](const auto& history, Index tick_stride) {
+        return refusal([&] { (void)exact_steps(scene.mesh, scene.network, scene.foundation, history, tick_stride); });
+    };
+    CHECK(exact(Odd{.count = 0}, 1) == "exact_steps: the history must have a tick, got 0");
+    CHECK(exact(Odd{}, 0) == "exact_steps: tick_stride must be at least 1, got 0");
+    CHECK(refusal([&] { (void)viscous_difference({}, {}); }) ==
+          "viscous_difference: both must have a tick with a force in common, got none");
+    const std::vector<ReferenceTick> first{{.tick = 3, .x = {}, .reactions = {Point(1, 0, 0)}, .force = 1}};
+    const std::vector<ReferenceTick> second{{.tick = 3, .x = {}, .reactions = {}, .force = 0}};
+    CHECK(refusal([&] { (void)viscous_difference(first, second); }) ==
+          "viscous_difference: tick 3 must have as many reactions in both, got 1 and 0");
 
     auto references = references_of(Pinch{}, 5);
     const std::string others =

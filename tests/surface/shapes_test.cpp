@@ -236,6 +236,33 @@ TEST_CASE("shapes are of double unless asked otherwise, with defaults that work"
     CHECK(spherical_cap<float>().positions() == spherical_cap<double>().positions().cast<float>());
 }
 
+TEMPLATE_TEST_CASE("a refined mesh halves each edge and keeps the vertices", "[shapes]", double, float) {
+    using S = TestType;
+    const auto mesh = sheet<S>({.width = 0.1, .height = 0.06, .columns = 5, .rows = 4});
+    const auto finer = refined(mesh);
+    const Adjacency before(mesh), after(finer);
+    CHECK(finer.triangle_count() == 4 * mesh.triangle_count());
+    CHECK(finer.vertex_count() == mesh.vertex_count() + static_cast<Index>(before.edges().size()));
+    CHECK(finer.positions().leftCols(mesh.vertex_count()) == mesh.positions());
+    CHECK(after.border_vertices().size() == 2 * before.border_vertices().size());
+    const EdgeLengths coarse(mesh), fine(finer);
+    CHECK(fine.shortest == Approx(coarse.shortest / 2));
+    CHECK(fine.longest == Approx(coarse.longest / 2));
+    for (const auto& corners : finer.triangles().colwise()) {
+        CHECK(area_vector(triangle_at(finer.positions(), corners)).z() == Approx(0.1 * 0.06 / 160));
+    }
+    // On a sphere, by a function of its own, it is the next icosphere.
+    const auto sphere = icosphere<double>({.radius = 1, .subdivisions = 2});
+    const auto on_sphere = [](const Vector3<double>& a, const Vector3<double>& b) {
+        return Vector3<double>((a + b) / norm<double>(a + b));
+    };
+    const auto next = icosphere<double>({.radius = 1, .subdivisions = 3});
+    CHECK((refined(sphere, on_sphere).positions() - next.positions()).norm() < 1e-12);
+    CHECK(refined(sphere, on_sphere).triangles() == next.triangles());
+    const auto nowhere = [](const auto&, const auto&) { return Vector3<double>(0, 0, std::nan("")); };
+    CHECK_FALSE(test::refusal([&] { (void)refined(mesh, nowhere); }).empty());
+}
+
 TEMPLATE_TEST_CASE("options that make no shape are refused", "[shapes][bad]", double, float) {
     using S = TestType;
     using test::refusal;

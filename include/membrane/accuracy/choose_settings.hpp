@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 #include <span>
@@ -21,10 +22,13 @@
 ///     auto solver = membrane::QuasiStaticSolver(network, choice.options);
 namespace membrane {
 
-/// The requirement: exactly one of the two.
+/// The requirement: an error, a time, or both.
 struct Requirement {
     double force_error = 0;  ///< upper bound, see `TrialResult`; the cheapest setting within it is chosen
-    double time = 0;         ///< upper bound of the mean tick [s]; the most accurate setting within it is chosen
+    double time = 0;         ///< upper bound of the mean tick [s]; alone, the most accurate setting within it is chosen
+    /// Relative error of the mesh's force, from `estimated_mesh_error`; its sign does not count. Not 0: `force_error` is
+    /// that of mesh and solver together, of which the solver gets what the mesh leaves, and at least half.
+    double mesh_error = 0;
 };
 
 /// The grid: every number of layers with every number of sweeps and of contact iterations.
@@ -42,6 +46,9 @@ struct GridSearchOptions {
     double safety_factor = 1.8;
     Index tick_stride = 1;  ///< errors are taken in every `tick_stride`-th tick; more than 1 needs fewer equilibria
     Index repetitions = 3;  ///< of each setting; the shortest time counts
+    /// Errors are against the equilibria, and contain the viscous force of a damped foundation; or against the exact
+    /// steps, see `exact_steps`, without it.
+    bool count_viscosity = true;
 
     /// @throws InvalidInput for an option out of its range
     void check() const;
@@ -51,9 +58,17 @@ struct GridSearchOptions {
 template <Real Scalar>
 struct ChosenSettings : TrialResult {
     SolverOptions<Scalar> options;  ///< of the chosen setting
-    /// Whether `time` is at most the required time, or `force_error` at most the required error over `safety_factor`.
-    /// If no setting satisfies this, the chosen one comes closest.
+    /// Whether `time` is at most the required time, and `force_error` at most the required error of the solver over
+    /// `safety_factor`. If no setting satisfies this, the chosen one comes closest: if both are required, the error
+    /// gives way, and only if no setting keeps the time, the time.
     bool satisfied = false;
+    ///@{
+    /// Which of the two the chosen setting keeps; true for one that is not required.
+    bool keeps_error = true, keeps_time = true;
+    ///@}
+    /// Estimate of the factor by which all edges must be multiplied for the required error of mesh and solver; 1 if the
+    /// mesh is fine enough or `mesh_error` is not given. On the finer mesh the settings are to be chosen again.
+    double edge_factor = 1;
 };
 
 /// The best solver setting for this membrane and load history, found by experiment, as [Liu07] finds the threshold of
@@ -69,8 +84,11 @@ struct ChosenSettings : TrialResult {
 /// and 82 % took at most 1.5 times the time of the cheapest setting that keeps it. A required time has no safety
 /// factor.
 ///
-/// @throws InvalidInput for a required error or time that is not positive, neither or both of them, an option out of
-/// its range, a history without a felt force or without an equilibrium, and for arguments that `run_trial` and
+/// The required error is that of the rms: single ticks are off by up to `max_force_error`. It holds for motion like
+/// that of the history, up to its `max_speed` and `max_displacement`: a faster or deeper tool has larger errors.
+///
+/// @throws InvalidInput for a required error or time that is not positive, neither of them, a `mesh_error` that is not
+/// finite or without a required error, an option out of its range, a history without a felt force or without an equilibrium, and for arguments that `run_trial` and
 /// `equilibria` refuse. Offline. Cost: an `equilibrium` for each compared tick, and about 30 to 300 runs of the
 /// history, repetitions included.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
@@ -90,14 +108,22 @@ namespace detail {
 inline constexpr std::string_view choose_name = "choose_settings";
 
 inline void check(const Requirement& requirement) {
-    if ((requirement.force_error != 0) == (requirement.time != 0)) {
-        refuse(choose_name, "either a force_error or a time must be required, got ", requirement.force_error, " and ",
-               requirement.time, " s");
+    const auto [error, time, mesh_error] = requirement;
+    if (error == 0 && time == 0) refuse(choose_name, "a force_error or a time must be required, got none");
+    if (!is_finite(error) || error < 0) {
+        refuse(choose_name, "the required force_error must be finite and positive, got ", error);
     }
-    const double number = requirement.time != 0 ? requirement.time : requirement.force_error;
-    if (is_finite(number) && number > 0) return;
-    refuse(choose_name, "the required ", requirement.time != 0 ? "time" : "force_error", " must be finite and positive",
-           requirement.time != 0 ? " [s]" : "", ", got ", number);
+    if (!is_finite(time) || time < 0) {
+        refuse(choose_name, "the required time must be finite and positive [s], got ", time);
+    }
+    if (!is_finite(mesh_error) || (mesh_error != 0 && error == 0)) {
+        refuse(choose_name, "mesh_error must be finite and come with a required force_error, got ", mesh_error);
+    }
+}
+
+/// The required error of the solver: what the mesh leaves, and at least half.
+[[nodiscard]] inline double solver_error(const Requirement& requirement) noexcept {
+    return requirement.force_error - (std::min)(std::abs(requirement.mesh_error), requirement.force_error / 2);
 }
 
 /// Whether `setting` has at least the layers, sweeps and contact iterations of `other`.
@@ -133,6 +159,7 @@ template <Real Scalar>
 template <Real Scalar>
 class Search {
   public:
+    /// By the error or the time, one of which is positive.
     Search(const GridSearchOptions<Scalar>& experiment, const Requirement& requirement)
         : layers_(experiment.layers),
           time_required_(requirement.time > 0),
@@ -153,7 +180,7 @@ class Search {
     }
 
     void add(const SolverOptions<Scalar>& setting, const TrialResult& result) {
-        ChosenSettings<Scalar> now{result, setting, false};
+        ChosenSettings<Scalar> now{result, setting};
         now.satisfied = now.advanced && (time_required_ ? now.time <= max_time_ : now.force_error <= max_error_);
         if (tried_.empty() || is_better(now, best_)) best_ = now;
         if (!time_required_ && now.satisfied) max_time_ = best_.time;
@@ -180,6 +207,27 @@ class Search {
     bool time_required_;
     double max_error_, max_time_;  // max_time_ [s]: required, or that of the best
 };
+
+/// The best setting for a required error or a required time.
+template <Real Scalar, class Attempt>
+[[nodiscard]] ChosenSettings<Scalar> choose_one(const GridSearchOptions<Scalar>& experiment,
+                                                const Requirement& requirement, Attempt& attempt) {
+    const auto settings = settings_of(experiment);
+    Search<Scalar> search(experiment, requirement);
+    if (requirement.force_error > 0) {  // first finds the sweeps needed, with all else at its maximum
+        const auto most = settings.back();
+        for (const auto& setting : settings) {
+            if (setting.layers != most.layers || setting.contact_iterations != most.contact_iterations) continue;
+            search.add(setting, attempt(setting));
+            if (search.best().satisfied) break;
+        }
+        if (!search.best().satisfied) return search.best();
+    }
+    for (const auto& setting : settings) {
+        if (!search.is_needless(setting)) search.add(setting, attempt(setting));
+    }
+    return search.best();
+}
 
 }  // namespace detail
 
@@ -209,21 +257,19 @@ ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experime
                                        Attempt attempt) {
     detail::check(requirement);
     experiment.check();
-    const auto settings = detail::settings_of(experiment);
-    detail::Search<Scalar> search(experiment, requirement);
-    if (requirement.force_error > 0) {  // first finds the sweeps needed, with all else at its maximum
-        const auto most = settings.back();
-        for (const auto& setting : settings) {
-            if (setting.layers != most.layers || setting.contact_iterations != most.contact_iterations) continue;
-            search.add(setting, attempt(setting));
-            if (search.best().satisfied) break;
-        }
-        if (!search.best().satisfied) return search.best();
+    const double error = detail::solver_error(requirement), time = requirement.time;
+    ChosenSettings<Scalar> choice = error > 0 ? detail::choose_one(experiment, {.force_error = error}, attempt)
+                                              : detail::choose_one(experiment, {.time = time}, attempt);
+    const bool both = error > 0 && time > 0;
+    if (both && !(choice.satisfied && choice.time <= time)) {
+        choice = detail::choose_one(experiment, {.time = time}, attempt);
     }
-    for (const auto& setting : settings) {
-        if (!search.is_needless(setting)) search.add(setting, attempt(setting));
-    }
-    return search.best();
+    choice.keeps_error = error == 0 || choice.force_error <= error / experiment.safety_factor;
+    choice.keeps_time = time == 0 || choice.time <= time;
+    choice.satisfied = choice.advanced && choice.keeps_error && choice.keeps_time;
+    const double mesh_error = std::abs(requirement.mesh_error), allowed = requirement.force_error - error;
+    if (mesh_error > allowed) choice.edge_factor = std::sqrt(allowed / mesh_error);
+    return choice;
 }
 
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
@@ -234,7 +280,9 @@ ChosenSettings<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const N
                                        const Rule& rule, const Clock& clock) {
     detail::check(requirement);
     experiment.check();
-    const auto references = equilibria(mesh, network, volume, history, experiment.tick_stride);
+    const auto references = experiment.count_viscosity
+                                ? equilibria(mesh, network, volume, history, experiment.tick_stride)
+                                : exact_steps(mesh, network, volume, history, experiment.tick_stride);
     if (std::none_of(references.begin(), references.end(),
                      [](const ReferenceTick& reference) { return reference.force > 0; })) {
         refuse(detail::choose_name, "the history must have a tick with a felt force at equilibrium, got none");

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include <membrane/core/check.hpp>
+#include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
@@ -70,6 +71,21 @@ template <Real Scalar = double>
 template <Real Scalar = double>
 [[nodiscard]] TriangleMesh<Scalar> spherical_cap(const SphericalCapOptions& options = {});
 
+/// The point in the middle between two [m].
+struct Midpoint {
+    /// (a + b) / 2.
+    [[nodiscard]] Vector3<double> operator()(const Vector3<double>& a, const Vector3<double>& b) const noexcept {
+        return (a + b) / 2;
+    }
+};
+
+/// The mesh with each edge halved and each triangle split into four. Its first vertices are those of `mesh`; then comes
+/// one for each edge from a to b, at `between(a, b)` [m]: `Midpoint` keeps the shape of the mesh, a user-defined function
+/// puts the vertex on the surface or the border that the mesh approximates.
+/// @throws InvalidInput for a position that is not finite. O(F log F).
+template <Real Scalar, class Between = Midpoint>
+[[nodiscard]] TriangleMesh<Scalar> refined(const TriangleMesh<Scalar>& mesh, Between between = {});
+
 namespace detail {
 
 inline void check_length(std::string_view shape, std::string_view option, double length) {
@@ -81,13 +97,13 @@ inline void check_count(std::string_view shape, std::string_view option, Index c
 }
 
 /// Splits every triangle into four. `x` has capacity for the new vertices from `vertex_count` on, which grows by one
-/// for each edge. New vertices lie on the unit sphere.
-inline Triangles subdivided(const Triangles& triangles, Points<double>& x, Index& vertex_count) {
+/// for each edge. The new vertex of an edge from a to b is at `between(a, b)`.
+template <class Between>
+Triangles subdivided(const Triangles& triangles, Points<double>& x, Index& vertex_count, Between between) {
     Triangles midpoints(3, triangles.cols());
     for_each_edge(half_edges(triangles), [&](std::span<const HalfEdge> sides) {
         for (const HalfEdge& side : sides) midpoints(side.side, side.triangle) = vertex_count;
-        const Vector3<double> middle = point(x, sides[0].first) + point(x, sides[0].second);
-        x.col(vertex_count++) = middle / norm(middle);
+        x.col(vertex_count++) = between(point(x, sides[0].first), point(x, sides[0].second));
     });
     Triangles finer(3, 4 * triangles.cols());
     for (Eigen::Index f = 0; f < triangles.cols(); ++f) {
@@ -124,6 +140,15 @@ TriangleMesh<Scalar> concentric(Index rings, Position position) {
 
 }  // namespace detail
 
+template <Real Scalar, class Between>
+TriangleMesh<Scalar> refined(const TriangleMesh<Scalar>& mesh, Between between) {
+    Index vertex_count = mesh.vertex_count();
+    Points<double> x(3, vertex_count + static_cast<Index>(Adjacency(mesh).edges().size()));
+    x.leftCols(vertex_count) = mesh.positions().template cast<double>();
+    const Triangles triangles = detail::subdivided(mesh.triangles(), x, vertex_count, between);
+    return TriangleMesh<Scalar>(x.cast<Scalar>(), triangles);
+}
+
 template <Real Scalar>
 TriangleMesh<Scalar> icosphere(const IcosphereOptions& options) {
     detail::check_length("icosphere", "radius", options.radius);
@@ -145,8 +170,12 @@ TriangleMesh<Scalar> icosphere(const IcosphereOptions& options) {
     triangles << 0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 5, 5,  //
         2, 5, 4, 10, 8, 6, 3, 8, 7, 10, 9, 5, 11, 6, 11, 9, 6, 9, 10, 7,      //
         4, 2, 8, 5, 10, 3, 7, 6, 10, 8, 4, 11, 9, 9, 7, 11, 8, 6, 7, 11;
+    const auto onto_sphere = [](const Vector3<double>& a, const Vector3<double>& b) {
+        const Vector3<double> sum = a + b;
+        return Vector3<double>(sum / norm(sum));
+    };
     for (Index level = 0; level < options.subdivisions; ++level) {
-        triangles = detail::subdivided(triangles, x, vertex_count);
+        triangles = detail::subdivided(triangles, x, vertex_count, onto_sphere);
     }
     return TriangleMesh<Scalar>((options.radius * x).cast<Scalar>(), triangles);
 }
