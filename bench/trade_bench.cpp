@@ -9,8 +9,8 @@
 #include "support/strokes.hpp"
 
 // Time against accuracy. A tool of 3 mm on a sphere of 10 mm, 1.5 mm deep: sliding along it at 50 mm/s, or put down at
-// several points; by rule, layers, sweeps and contact iterations. The error is against the equilibrium of the tick; on a
-// damped foundation also against the exact step, solved to the end, beside what viscosity adds.
+// several points; by rule, layers, sweeps and contact iterations. The error is against the equilibrium of the tick; on
+// a damped foundation also against the exact step, solved to the end, beside what viscosity adds.
 //
 // With MEMBRANE_FULL_GRID set, all combinations; without, those that tables and plot show and some more.
 

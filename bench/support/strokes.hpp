@@ -111,7 +111,7 @@ struct StrokeScene {
 
 using References = std::vector<membrane::ReferenceTick>;
 
-/// The equilibria of every sixth tick, or the exact steps, with the damping: in `put_down`, the last tick of each press.
+/// The equilibria of every sixth tick, in `put_down` the last of each press; or the exact steps, with the damping.
 /// Computed once.
 [[nodiscard]] inline const References& references_of(const Place& place, bool with_damping = false) {
     static std::map<std::pair<Place, bool>, References> known;

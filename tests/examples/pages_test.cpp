@@ -76,6 +76,10 @@
 #include <membrane/accuracy/error_bound.hpp>
 // [/bound]
 
+// [mesh_error]
+#include <membrane/accuracy/mesh_error.hpp>
+// [/mesh_error]
+
 // [settings]
 #include <membrane/accuracy/choose_settings.hpp>
 // [/settings]
@@ -84,6 +88,9 @@
 #include <membrane/calibration/fit.hpp>
 #include <membrane/calibration/indentation.hpp>
 // [/fit]
+
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
 
 #include "support/catch.hpp"
 
@@ -589,12 +596,37 @@ TEST_CASE_METHOD(AtRest, "pages: settings") {
     // [settings]
     const auto trajectory = membrane::ToolTrajectory(mesh, tools, 1e-3);  // a tool for each tick of 1 ms
     const auto choice =
-        membrane::choose_settings(mesh, network, foundation, trajectory, {.force_error = 0.05});  // or .time
+        membrane::choose_settings(mesh, network, foundation, trajectory, {.force_error = 0.05});  // .time, or both
     if (!choice.satisfied) std::puts("No setting is accurate enough. The nearest one:");
-    std::printf("%g of the force, %g s\n", choice.force_error, choice.time);  // as measured in the trial
+    std::printf("%g of the force, at most %g, in %g s\n", choice.force_error, choice.max_force_error, choice.time);
+    std::printf("Up to %g m/s and %g m deep.\n", choice.max_speed, choice.max_displacement);  // as in the trial
     auto solver = membrane::QuasiStaticSolver(network, choice.options);
     // [/settings]
     CHECK(choice.satisfied);
+}
+
+TEST_CASE("pages: mesh_error") {
+    const auto mesh = membrane::disc({.radius = 5e-3, .rings = 12});
+    const membrane::Material material{.young_modulus = 1e6, .poisson_ratio = 0.45, .thickness = 50e-6};
+    const membrane::Tool<double> tool{.position = {0, 0, 1.6e-3}, .radius = 2e-3};
+    // [mesh_error]
+    const auto force = [&](const membrane::TriangleMesh<double>& any) {  // the scene on any mesh
+        const membrane::MassSpringNetwork none(any, membrane::LinearSpring{},
+                                               {.stiffness = 0.0, .pinned = border(any)});
+        const membrane::Tissue tissue(none, membrane::triangular_springs(any, material, 1.02));
+        membrane::ContactTracker<double> tracker(any);
+        const auto contact = tracker.update(membrane::AabbTree(any), any.positions(), tool);
+        const auto found =
+            membrane::equilibrium(any.positions(), any, tissue, membrane::NoFoundation{}, {}, press(tool, contact));
+        return found.reactions[0].norm();
+    };
+    const auto estimate = membrane::estimated_mesh_error(mesh, force);
+    const double error = estimate.error();            // of the force, relative
+    const double edges = estimate.edge_factor(0.01);  // for an error of 1 %: edges this much as long
+    // [/mesh_error]
+    CHECK(error > 0.001);
+    CHECK(error < 0.1);
+    CHECK(edges == Approx(std::sqrt(0.01 / error)));
 }
 
 TEST_CASE_METHOD(Touched, "pages: surface") {

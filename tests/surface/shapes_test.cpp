@@ -13,6 +13,7 @@
 #include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/boost/graph/helpers.h>
 #include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/triangle.hpp>
 
 #include "support/catch.hpp"
 #include "support/cgal_mesh.hpp"

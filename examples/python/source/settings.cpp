@@ -22,10 +22,11 @@ void check(const char* name, const Mesh& mesh, const Network& network, const Fou
 }
 
 [[nodiscard]] Choice choose(const Mesh& mesh, const Network& network, const Foundation& foundation, const Path& path,
-                            double force_error, double time, const Rule& rule, const Experiment& experiment) {
+                            double force_error, double time, const Rule& rule, double mesh_error,
+                            const Experiment& experiment) {
     check("choose_settings", mesh, network, foundation, path);
     const Scene scene{mesh, network, foundation, path.trajectory};
-    const Requirement requirement{.force_error = force_error, .time = time};
+    const Requirement requirement{.force_error = force_error, .time = time, .mesh_error = mesh_error};
     return std::visit([&](const auto& one) { return choose_settings(scene, requirement, experiment, one); }, rule);
 }
 
@@ -52,10 +53,16 @@ void bind_results(py::module_& module) {
         .def_readonly("time", &TrialResult::time, doc("TrialResult::time"))
         .def_readonly("layers_reached", &TrialResult::layers_reached, doc("TrialResult::layers_reached"))
         .def_readonly("ticks_compared", &TrialResult::ticks_compared, doc("TrialResult::ticks_compared"))
-        .def_readonly("advanced", &TrialResult::advanced, doc("TrialResult::advanced"));
+        .def_readonly("advanced", &TrialResult::advanced, doc("TrialResult::advanced"))
+        .def_readonly("max_force_error", &TrialResult::max_force_error, doc("TrialResult::max_force_error"))
+        .def_readonly("max_speed", &TrialResult::max_speed, doc("TrialResult::max_speed"))
+        .def_readonly("max_displacement", &TrialResult::max_displacement, doc("TrialResult::max_displacement"));
     py::class_<Choice, TrialResult>(module, "ChosenSettings", doc("ChosenSettings"))
         .def_readonly("options", &Choice::options, doc("ChosenSettings::options"))
-        .def_readonly("satisfied", &Choice::satisfied, doc("ChosenSettings::satisfied"));
+        .def_readonly("satisfied", &Choice::satisfied, doc("ChosenSettings::satisfied"))
+        .def_readonly("keeps_error", &Choice::keeps_error, doc("ChosenSettings::keeps_error"))
+        .def_readonly("keeps_time", &Choice::keeps_time, doc("ChosenSettings::keeps_time"))
+        .def_readonly("edge_factor", &Choice::edge_factor, doc("ChosenSettings::edge_factor"));
     using membrane::ReferenceTick;
     py::class_<ReferenceTick>(module, "ReferenceTick", doc("ReferenceTick"))
         .def_readonly("tick", &ReferenceTick::tick, doc("ReferenceTick::tick"))
@@ -93,13 +100,12 @@ void bind_settings(py::module_& module) {
         "GridSearchOptions", std::pair("layers", &Experiment::layers), std::pair("sweeps", &Experiment::sweeps),
         std::pair("contact_iterations", &Experiment::contact_iterations), std::pair("others", &Experiment::others),
         std::pair("safety_factor", &Experiment::safety_factor), std::pair("tick_stride", &Experiment::tick_stride),
-        std::pair("repetitions", &Experiment::repetitions));
-    options.def(
-        module, "choose_settings",
-        options.taking<const Mesh&, const Network&, const Foundation&, const Path&, double, double, const Rule&>(
-            &choose),
-        mesh, network, foundation, trajectory, py::arg("force_error") = Requirement{}.force_error,
-        py::arg("time") = Requirement{}.time, rule);
+        std::pair("repetitions", &Experiment::repetitions), std::pair("count_viscosity", &Experiment::count_viscosity));
+    options.def(module, "choose_settings",
+                options.taking<const Mesh&, const Network&, const Foundation&, const Path&, double, double, const Rule&,
+                               double>(&choose),
+                mesh, network, foundation, trajectory, py::arg("force_error") = Requirement{}.force_error,
+                py::arg("time") = Requirement{}.time, rule, py::arg("mesh_error") = Requirement{}.mesh_error);
 }
 
 }  // namespace membrane_python

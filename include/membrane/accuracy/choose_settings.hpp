@@ -19,6 +19,8 @@
 ///     const auto trajectory = membrane::ToolTrajectory(mesh, tools, 1e-3);  // recorded: one tool for each tick
 ///     const auto choice = membrane::choose_settings(mesh, network, foundation, trajectory, {.force_error = 0.01});
 ///     if (!choice.satisfied) ...                                               // no setting of the grid is sufficient
+///     choice.force_error, choice.max_force_error;                              // rms of the ticks, and the largest
+///     choice.max_speed, choice.max_displacement;                               // for motion up to these [m/s], [m]
 ///     auto solver = membrane::QuasiStaticSolver(network, choice.options);
 namespace membrane {
 
@@ -26,8 +28,8 @@ namespace membrane {
 struct Requirement {
     double force_error = 0;  ///< upper bound, see `TrialResult`; the cheapest setting within it is chosen
     double time = 0;         ///< upper bound of the mean tick [s]; alone, the most accurate setting within it is chosen
-    /// Relative error of the mesh's force, from `estimated_mesh_error`; its sign does not count. Not 0: `force_error` is
-    /// that of mesh and solver together, of which the solver gets what the mesh leaves, and at least half.
+    /// Relative error of the force by the mesh, from `estimated_mesh_error`; its sign does not count. If it is not 0,
+    /// `force_error` is that of mesh and solver together: the solver gets what the mesh leaves, and at least half.
     double mesh_error = 0;
 };
 
@@ -59,15 +61,16 @@ template <Real Scalar>
 struct ChosenSettings : TrialResult {
     SolverOptions<Scalar> options;  ///< of the chosen setting
     /// Whether `time` is at most the required time, and `force_error` at most the required error of the solver over
-    /// `safety_factor`. If no setting satisfies this, the chosen one comes closest: if both are required, the error
-    /// gives way, and only if no setting keeps the time, the time.
+    /// `safety_factor`. If no setting satisfies this, the chosen one comes closest; if both are required, it is
+    /// the most accurate that keeps the time, or the one with the shortest.
     bool satisfied = false;
     ///@{
     /// Which of the two the chosen setting keeps; true for one that is not required.
     bool keeps_error = true, keeps_time = true;
     ///@}
-    /// Estimate of the factor by which all edges must be multiplied for the required error of mesh and solver; 1 if the
-    /// mesh is fine enough or `mesh_error` is not given. On the finer mesh the settings are to be chosen again.
+    /// Estimate of the factor by which all edges must be multiplied for the required error of mesh and solver, if the
+    /// mesh's error is proportional to the square of its edges; 1 if the mesh is fine enough or `mesh_error` is 0. On
+    /// the finer mesh the settings are to be chosen again.
     double edge_factor = 1;
 };
 
@@ -88,9 +91,9 @@ struct ChosenSettings : TrialResult {
 /// that of the history, up to its `max_speed` and `max_displacement`: a faster or deeper tool has larger errors.
 ///
 /// @throws InvalidInput for a required error or time that is not positive, neither of them, a `mesh_error` that is not
-/// finite or without a required error, an option out of its range, a history without a felt force or without an equilibrium, and for arguments that `run_trial` and
-/// `equilibria` refuse. Offline. Cost: an `equilibrium` for each compared tick, and about 30 to 300 runs of the
-/// history, repetitions included.
+/// finite or without a required error, an option out of its range, a history without a felt force or without an
+/// equilibrium, and for arguments that `run_trial` and `equilibria` refuse. Offline. Cost: an `equilibrium` for each
+/// compared tick, and about 30 to 300 runs of the history, repetitions included; up to twice as many for both.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History, StepRule<Scalar> Rule = BlockStep, class Clock = SteadySeconds>
 [[nodiscard]] ChosenSettings<Scalar> choose_settings(

@@ -119,8 +119,8 @@ struct ReferenceTick {
 
 /// The equilibrium of every tick, or of every `tick_stride`-th, each started from the positions of the tick before. In
 /// a tick without one the solver takes a step with all layers and 16 sweeps. A tick without a converged equilibrium is
-/// left out. Equilibria are static: with a damped foundation the error of a setting includes the viscous force, of which
-/// `exact_steps` and `viscous_difference` tell the two apart.
+/// left out. Equilibria are static: with a damped foundation the error of a setting includes the viscous force, see
+/// `exact_steps`.
 /// @throws InvalidInput for arguments that `equilibrium` refuses, a history without ticks or with a `dt` that is not
 /// finite and positive, or a `tick_stride` below 1. Offline. Cost: an `equilibrium` for each `tick_stride`-th tick, and
 /// a step for each other tick.
@@ -133,16 +133,16 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
 /// foundation, each step solved to the end from the exact positions of the tick before. Against these references the
 /// error of a setting is that of its solver alone. A tick is left out if its step was refused or its residual exceeds
 /// 1e-6 of the largest force so far.
-/// @throws InvalidInput as `equilibria`. Offline. Cost: in each tick up to 4,000 sweeps over all vertices, usually 30 to
-/// 400.
+/// @throws InvalidInput as `equilibria`. Offline. Cost: usually 30 to 400 sweeps over all vertices in each tick, at most
+/// 4,000.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History>
 [[nodiscard]] std::vector<ReferenceTick> exact_steps(const TriangleMesh<Scalar>& mesh, const Network& network,
                                                      const Volume& volume, History history, Index tick_stride = 1);
 
 /// What damping adds to the force: rms over the ticks that both have of the difference of their reactions, over the rms
-/// of the equilibria's; all reactions count. 0.06: a slow tool feels 6 % less or more.
-/// @throws InvalidInput if the two have no tick in common, or other numbers of reactions. O(ticks).
+/// of the equilibria's. All reactions count.
+/// @throws InvalidInput if the two have no tick with a force in common, or other numbers of reactions. O(ticks).
 [[nodiscard]] inline double viscous_difference(std::span<const ReferenceTick> exact,
                                                std::span<const ReferenceTick> equilibria);
 
