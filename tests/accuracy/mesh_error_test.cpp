@@ -197,39 +197,50 @@ struct Dome {
     }
 };
 
-/// The method not taken, by recovery: at each vertex the mean of the displacement's gradient over the triangles around
-/// it; the energy of the difference of the gradient from these means, over the energy stored.
+/// The gradient of the displacement in each triangle, and its mean over the triangles around each vertex.
+struct Gradients {
+    template <class Springs>
+    Gradients(const Mesh& mesh, const Springs& springs, const Points<double>& x)
+        : at_vertices(static_cast<std::size_t>(mesh.vertex_count()), Eigen::Matrix3d::Zero()) {
+        const Points<double> moved = x - mesh.positions();
+        std::vector<double> areas(at_vertices.size(), 0.0);
+        for (const auto& spring : springs.all()) {
+            const auto at = spring.where(mesh.positions());
+            const Point normal = cross<double>(at[1] - at[0], at[2] - at[0]);
+            Eigen::Matrix3d gradient = Eigen::Matrix3d::Zero();
+            for (std::size_t i = 0; i < 3; ++i) {
+                const Point slope = cross<double>(normal, at[(i + 2) % 3] - at[(i + 1) % 3]) / squared_norm(normal);
+                gradient += moved.col(spring.corners[i]) * slope.eigen().transpose();
+            }
+            in_triangles.push_back(gradient);
+            for (const Index v : spring.corners) {
+                at_vertices[static_cast<std::size_t>(v)] += norm(normal) * gradient;
+                areas[static_cast<std::size_t>(v)] += norm(normal);
+            }
+        }
+        for (std::size_t v = 0; v < areas.size(); ++v) at_vertices[v] /= areas[v];
+    }
+
+    std::vector<Eigen::Matrix3d> in_triangles, at_vertices;
+};
+
+/// By another method, recovery: the energy of the difference between the gradient in the triangles and the means at the
+/// vertices, interpolated, over the energy stored.
 double recovered_error(const Mesh& mesh, const Sheet& sheet, const Points<double>& x) {
     const auto springs = triangular_springs(mesh, sheet.material, sheet.stretch);
-    const Points<double> moved = x - mesh.positions();
-    const auto count = static_cast<std::size_t>(mesh.vertex_count());
-    std::vector<Eigen::Matrix3d> gradients, means(count, Eigen::Matrix3d::Zero());
-    std::vector<double> areas(count, 0.0);
-    for (const auto& spring : springs.all()) {
-        const auto at = spring.where(mesh.positions());
-        const Point twice_area = cross<double>(at[1] - at[0], at[2] - at[0]);
-        Eigen::Matrix3d gradient = Eigen::Matrix3d::Zero();
-        for (std::size_t i = 0; i < 3; ++i) {
-            const Point slope = cross<double>(twice_area, at[(i + 2) % 3] - at[(i + 1) % 3]) / squared_norm(twice_area);
-            gradient += moved.col(spring.corners[i]) * slope.eigen().transpose();
-        }
-        gradients.push_back(gradient);
-        for (const Index v : spring.corners) {
-            means[static_cast<std::size_t>(v)] += norm(twice_area) * gradient;
-            areas[static_cast<std::size_t>(v)] += norm(twice_area);
-        }
-    }
-    for (std::size_t v = 0; v < count; ++v) means[v] /= areas[v];
+    const Gradients gradients(mesh, springs, x);
     double error = 0, stored = 0;
-    auto gradient = gradients.begin();
+    auto gradient = gradients.in_triangles.begin();
     for (const auto& spring : springs.all()) {
         const auto at = spring.where(mesh.positions()), here = spring.where(x);
         const Point centre = (at[0] + at[1] + at[2]) / 3;
+        const auto mean = [&](std::size_t i) {
+            return gradients.at_vertices[static_cast<std::size_t>(spring.corners[i % 3])];
+        };
         const double energy = spring.element.energy(here);
         stored += energy - spring.element.energy(at);
         for (std::size_t side = 0; side < 3; ++side) {  // the middles of the sides integrate squares
-            const auto mean_at = [&](std::size_t i) { return means[static_cast<std::size_t>(spring.corners[i % 3])]; };
-            const Eigen::Matrix3d change = (mean_at(side) + mean_at(side + 1)) / 2 - *gradient;
+            const Eigen::Matrix3d change = (mean(side) + mean(side + 1)) / 2 - *gradient;
             auto there = here;
             double linear = 0;
             for (std::size_t i = 0; i < 3; ++i) {
