@@ -295,7 +295,8 @@ def test_settings_are_found():
                                       sweeps=[1, 4], contact_iterations=[2], tick_stride=10, repetitions=1)
     assert choice.satisfied and choice.force_error <= 0.05 and choice.options.sweeps in (1, 4)
     assert choice.keeps_error and choice.keeps_time and choice.edge_factor == 1
-    assert choice.max_force_error >= choice.force_error and choice.max_displacement > 0 and abs(choice.max_speed - 0.02) < 1e-9
+    assert choice.max_force_error >= choice.force_error
+    assert choice.max_displacement > 0 and abs(choice.max_speed - 0.02) < 1e-9
     again = membrane.run_trial(mesh, network, foundation, trajectory, references, layers=choice.options.layers,
                                sweeps=choice.options.sweeps, contact_iterations=choice.options.contact_iterations)
     assert again.force_error == choice.force_error
