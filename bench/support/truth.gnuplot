@@ -82,6 +82,7 @@ edge = 5.0 / 28  # [mm]
 names = 'vertex edge face'
 radius(ball) = ball eq 'a' ? 0.5 : ball eq 'b' ? 1 : 2
 set xlabel 'depth / edge'
+set xrange [0.05:10]
 set yrange [-30:45]
 set key top right
 plot_of(first, step) = sprintf("plot 0 lc '#999999' notitle, for [b in 'a b c'] for [i = 0:2] 'truth_ball_'.b.'.tsv' using ($1 * radius(b) / edge):(difference(%d + %d * i)) title (b eq 'a' ? 'over a '.word(names, i + 1) : '') lc rgb colour(i + 1) pt 7", first, step)

@@ -135,7 +135,7 @@ struct Placement {
         table.ours.push_back(
             single(place.name + ", smaller radius", [&] { return scene.forces(place.mesh, Ball::smaller); }));
     }
-    const Mesh graded = disc_for_load(effort.rings, radius / 2);
+    const Mesh graded = disc_for_loads(effort.rings, {{.radius = radius / 2}});
     const std::string name = "graded by DistMesh, " + vertices_of(graded);
     table.ours.push_back(single(name + ", corrected", [&] { return scene.forces(graded, Ball::corrected); }));
     table.ours.push_back(single(name + ", radius as it is", [&] { return scene.forces(graded, Ball::as_it_is); }));
@@ -167,6 +167,10 @@ struct Placement {
     const Mesh mesh = disc_with_patch(effort.rings);
     table.ours.push_back(single("radius as it is", [&] { return scene.forces(mesh, Ball::as_it_is); }));
     table.ours.push_back(single("smaller radius", [&] { return scene.forces(mesh, Ball::smaller); }));
+    const Mesh graded = disc_for_loads(effort.rings, {{.centre = {scene.x, 0, 0}, .radius = scene.radius / 2},
+                                                      {.centre = {-scene.x, 0, 0}, .radius = scene.radius / 2}});
+    table.ours.push_back(single("graded by DistMesh, " + vertices_of(graded) + ", corrected",
+                                [&] { return scene.forces(graded, Ball::corrected); }));
     return table;
 }
 

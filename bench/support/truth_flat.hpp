@@ -127,13 +127,14 @@ class FlatShell {
         flat, {.edge_length = disc_radius / rings, .bounds = membrane::Bounds{{-r, -r, -r / 8}, {r, r, r / 8}}});
 }
 
-/// A disc by DistMesh whose edges grow from a load of this radius in the middle, a foundation of this stiffness [Pa/m]
-/// below; about as many vertices as `rings` rings.
-[[nodiscard]] inline Mesh disc_for_load(int rings, double load_radius, double foundation = 0) {
+/// A disc by DistMesh whose edges grow from these loads, a foundation of this stiffness [Pa/m] below; about as many
+/// vertices as `rings` rings.
+[[nodiscard]] inline Mesh disc_for_loads(int rings, const std::vector<membrane::GradedLoad>& loads,
+                                         double foundation = 0) {
     const auto flat = membrane::trimmed(membrane::HalfSpace{}, membrane::Ball{.radius = disc_radius});
     const double r = 1.1 * disc_radius, edge = disc_radius / rings;
     const auto length = membrane::graded_edge_length({.longest = 1.3 * edge,
-                                                      .loads = {{.radius = load_radius}},
+                                                      .loads = loads,
                                                       .tension = tension_of(soft, disc_stretch),
                                                       .foundation = foundation,
                                                       .resolution = 8 * rings / 28.0,
@@ -278,7 +279,7 @@ class FlatShell {
         return patch_column(name, rings, grading, -1, stiffness, rigidity, table.loads);
     };
     const auto disc = [&](int rings) {
-        return with_circle(disc_for_load(rings, patch_radius, stiffness), patch_radius);
+        return with_circle(disc_for_loads(rings, {{.radius = patch_radius}}, stiffness), patch_radius);
     };
     table.ours.push_back(
         compared("graded by DistMesh, " + vertices_of(disc(effort.rings)), effort.rings, [&](int rings) {
