@@ -199,6 +199,18 @@ TEST_CASE("no offset without a ball's force, and what is refused") {
     CHECK(offset.z() > 0);
     CHECK(std::hypot(offset.x(), offset.y()) == 0);
 
+    Points<double> wild = x;
+    for (const Index v : contact.corners) wild.col(v).setConstant(std::numeric_limits<double>::quiet_NaN());
+    const membrane::ContactTriangle listed{0, contact.corners};
+    contact.triangles = {&listed, 1};
+    CHECK(correction(x, contact, {0, 0, 1e-4}).z() > 0);
+    CHECK(membrane::is_finite(correction(wild, contact, {0, 0, 1e-4})));
+
+    Points<double> flat = x;
+    for (const Index v : contact.corners) flat.col(v) = x.col(contact.corners[0]);
+    const FacetCorrection<double> degenerate(Mesh(flat, mesh.triangles()), {.tension = 2});
+    CHECK(membrane::is_finite(degenerate(x, contact, {0, 0, 1e-4})));
+
     const auto refused = [&](const membrane::FacetCorrectionOptions& options) {
         return test::refusal([&] { FacetCorrection<double>(mesh, options); });
     };

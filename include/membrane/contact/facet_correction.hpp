@@ -58,7 +58,7 @@ class FacetCorrection {
     FacetCorrection(const TriangleMesh<Scalar>& mesh, const FacetCorrectionOptions& options);
 
     /// The displacement of the tool from where it is to where it must press, along `reaction`, the force on it [N];
-    /// zero without a contact or a force. `contact` is the one that the step had, `x` the positions [m].
+    /// zero without a contact or a force, or if a number is not finite. `contact` is the one that the step had, `x` the positions [m].
     /// Online. Cost: linear in `contact.triangles`.
     [[nodiscard]] Vector3<Scalar> operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
                                              const Vector3<Scalar>& reaction) const noexcept;
@@ -159,7 +159,8 @@ FacetCorrection<Scalar>::FacetCorrection(const TriangleMesh<Scalar>& mesh, const
         Scalar weight = 0;
         for (const auto& side : sides) {
             const Vector3<Scalar> a = at(side.first) - at(side.apex), b = at(side.second) - at(side.apex);
-            weight += dot(a, b) / norm(cross(a, b));
+            const Scalar area = norm(cross(a, b));
+            if (area > 0) weight += dot(a, b) / area;
         }
         weight = (std::max)(weight, std::numeric_limits<Scalar>::min());
         const Scalar length = norm<Scalar>(at(sides[0].second) - at(sides[0].first));
@@ -196,6 +197,7 @@ Vector3<Scalar> FacetCorrection<Scalar>::operator()(const ConstPointsRef<Scalar>
     }
     const double radius = contact.radius, a = contact_radius(radius, force);
     const double depth = facet_depth(a / edge, foot.weights.template cast<double>()) * (a * a / radius);
+    if (!is_finite(depth)) return Vector3<Scalar>::Zero();
     return static_cast<Scalar>(depth) * direction;
 }
 
