@@ -15,7 +15,7 @@
 #include "support/truth_shell.hpp"
 
 // truth FOLDER [--short] [SCENE...]: equilibria of the library beside those of CalculiX, another program with other
-// elements. Prints a Markdown table for each scene; writes truth.md and a .tsv for each plot to FOLDER.
+// elements. Prints a Markdown table for each scene and one of all; writes truth.md and a .tsv for each plot to FOLDER.
 
 namespace {
 
@@ -50,12 +50,20 @@ void run(const std::filesystem::path& folder, const std::vector<std::string>& na
             throw std::runtime_error("there is no scene " + name);
         }
     }
+    std::vector<Comparison> tables;
     std::FILE* page = std::fopen((folder / "truth.md").c_str(), "w");
     for (const Scene& scene : scenes) {
         if (!names.empty() && std::find(names.begin(), names.end(), scene.name) == names.end()) continue;
         const Comparison table = scene.compare(effort);
         for (std::FILE* file : {stdout, page}) table.print(file);
         table.write_tsv(folder / ("truth_" + table.key + ".tsv"));
+        tables.push_back(table);
+    }
+    for (std::FILE* file : {stdout, page}) {
+        std::fprintf(
+            file,
+            "\n| scene | largest difference | bound | largest with an assumption switched |\n|---|---|---|---|\n");
+        for (const Comparison& table : tables) table.print_summary(file);
     }
     std::fclose(page);
 }

@@ -46,21 +46,46 @@ struct Comparison {
     }
     /// The largest difference where the bound counts.
     [[nodiscard]] double largest_difference() const;
+    /// Of one column, where the bound counts.
+    [[nodiscard]] double largest_difference(const Column& column) const;
+    /// A row of the table of all scenes: difference, bound, and the other column that differs most.
+    void print_summary(std::FILE* file) const;
     /// As a Markdown table: differences and changes in percent.
     void print(std::FILE* file) const;
     void print_rows(std::FILE* file) const;
     void write_tsv(const std::string& path) const;
 };
 
+inline double Comparison::largest_difference(const Column& column) const {
+    double largest = 0;
+    for (std::size_t i = 0; i < loads.size(); ++i) {
+        const double found = difference(column, i);
+        if (loads[i] > bound_from * (1 - 1e-9) && !(std::abs(found) <= std::abs(largest))) largest = found;
+    }
+    return largest;
+}
+
 inline double Comparison::largest_difference() const {
     double largest = 0;
     for (std::size_t c = 0; c < bounded; ++c) {
-        for (std::size_t i = 0; i < loads.size(); ++i) {
-            const double found = difference(ours[c], i);
-            if (loads[i] > bound_from * (1 - 1e-9) && !(std::abs(found) <= std::abs(largest))) largest = found;
-        }
+        const double found = largest_difference(ours[c]);
+        if (!(std::abs(found) <= std::abs(largest))) largest = found;
     }
     return largest;
+}
+
+inline void Comparison::print_summary(std::FILE* file) const {
+    const double largest = largest_difference();
+    const char* const mark = std::abs(largest) <= bound ? "" : "**";
+    std::fprintf(file, "| %s | %s%+.2g %%%s | %g %% |", title.c_str(), mark, 100 * largest, mark, 100 * bound);
+    std::size_t other = bounded;
+    for (std::size_t c = bounded; c < ours.size(); ++c) {
+        if (std::abs(largest_difference(ours[c])) > std::abs(largest_difference(ours[other]))) other = c;
+    }
+    if (other < ours.size()) {
+        std::fprintf(file, " %+.2g %%: %s", 100 * largest_difference(ours[other]), ours[other].name.c_str());
+    }
+    std::fprintf(file, " |\n");
 }
 
 inline void Comparison::print(std::FILE* file) const {

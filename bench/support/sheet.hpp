@@ -13,6 +13,7 @@
 
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/facet_correction.hpp>
 #include <membrane/model/bending.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/pressure.hpp>
@@ -36,6 +37,11 @@ using Points = membrane::Points<double>;
 using Mesh = membrane::TriangleMesh<double>;
 using Tool = membrane::Tool<double>;
 
+/// The force per present length in a flat sheet stretched in all directions (St Venant-Kirchhoff) [N/m].
+[[nodiscard]] inline double tension_of(const membrane::Material& material, double stretch) {
+    return material.biaxial_stiffness() * (stretch * stretch - 1) / 2;
+}
+
 /// A membrane under constant loads.
 struct Sheet {
     Mesh mesh;
@@ -49,6 +55,10 @@ struct Sheet {
 
     /// The equilibrium with pinned vertices where `x` has them. @throws std::runtime_error if none is found
     [[nodiscard]] membrane::Equilibrium equilibrium(const Points& x, const std::vector<Tool>& tools = {}) const;
+
+    /// The same with balls moved back by what flat triangles lack (`FacetCorrection`), by Aitken's iteration. `x` must
+    /// be less deep.
+    [[nodiscard]] membrane::Equilibrium corrected_equilibrium(const Points& x, const std::vector<Tool>& balls) const;
 
     /// The force of the membrane on these vertices at `x` [N].
     [[nodiscard]] Vector3 force_on(const std::vector<Index>& vertices, const Points& x) const;
@@ -137,6 +147,32 @@ inline membrane::Equilibrium Sheet::equilibrium(const Points& x, const std::vect
         if (!found.converged) throw std::runtime_error("no equilibrium");
         return found;
     });
+}
+
+inline membrane::Equilibrium Sheet::corrected_equilibrium(const Points& x, const std::vector<Tool>& balls) const {
+    const membrane::FacetCorrection<double> correction(
+        mesh, {.tension = tension_of(material, stretch), .stiffness = material.young_modulus * material.thickness});
+    std::vector<Tool> pressed = balls;
+    std::vector<Vector3> before(balls.size(), Vector3::Zero());
+    std::vector<double> part(balls.size(), 0.7);
+    for (int turn = 0; turn < 30; ++turn) {
+        const auto found = equilibrium(x, pressed);
+        bool done = true;
+        for (std::size_t i = 0; i < balls.size(); ++i) {
+            membrane::ContactTracker<double> tracker(mesh);
+            const auto contact = contact_of(mesh, x, pressed[i], tracker);
+            const Vector3 offset = pressed[i].position - balls[i].position;
+            const Vector3 change = correction(found.x, contact, found.reactions[i]) - offset;
+            done = done && norm(change) < 1e-5 * balls[i].radius;
+            const Vector3 difference = change - before[i];
+            if (turn > 0) part[i] *= -dot(before[i], difference) / squared_norm(difference);
+            part[i] = std::clamp(part[i], 0.2, 1.0);
+            pressed[i].position += part[i] * change;
+            before[i] = change;
+        }
+        if (done) return found;
+    }
+    throw std::runtime_error("the correction does not converge");
 }
 
 inline Vector3 Sheet::force_on(const std::vector<Index>& vertices, const Points& x) const {

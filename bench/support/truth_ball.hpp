@@ -28,6 +28,13 @@ inline constexpr double start_gap = 0.01;  // between ball and sheet before the 
     return {.across = across, .core = 0.25 * radius, .zones = {under, outside}};
 }
 
+/// What stands for the ball on flat triangles.
+enum class Ball {
+    as_it_is,
+    smaller,    ///< by `tool_radius()` of the mean edge
+    corrected,  ///< moved back by `FacetCorrection`
+};
+
 /// A ball at (x, 0), to be compared with another program; if x is not 0, a second one at (-x, 0) does the same.
 struct BallScene {
     double radius, x;            ///< [m]
@@ -36,8 +43,11 @@ struct BallScene {
     /// The force on the ball at each depth [mN], in the limit of a membrane unless `part` of the thickness is 1.
     [[nodiscard]] Column calculix(const Effort& effort, const std::string& name, double part) const;
 
-    /// The same by the library, on a disc; `edge` of the correction of the radius, none if it is 0 [m].
-    [[nodiscard]] std::vector<double> forces(const Mesh& mesh, double edge, double rigidity = 0) const;
+    /// The same by the library, on a disc whose edges are this long under the ball [m].
+    [[nodiscard]] std::vector<double> forces(const Mesh& mesh, Ball kind, double edge) const;
+    [[nodiscard]] std::vector<double> forces(const Mesh& mesh, Ball kind) const {
+        return forces(mesh, kind, membrane::mean_edge(mesh));
+    }
 };
 
 inline Column BallScene::calculix(const Effort& effort, const std::string& name, double part) const {
@@ -59,18 +69,18 @@ inline Column BallScene::calculix(const Effort& effort, const std::string& name,
     });
 }
 
-inline std::vector<double> BallScene::forces(const Mesh& mesh, double edge, double rigidity) const {
-    Sheet sheet = flat_sheet(mesh);
-    sheet.rigidity = rigidity;
+inline std::vector<double> BallScene::forces(const Mesh& mesh, Ball kind, double edge) const {
+    const Sheet sheet = flat_sheet(mesh);
     Points position = mesh.positions();
     std::vector<double> found;
     for (const double depth : depths) {
         Tool ball{.position = {x, 0, (1 - depth) * radius},
-                  .radius = edge > 0 ? membrane::tool_radius(radius, edge) : radius};
+                  .radius = kind == Ball::smaller ? membrane::tool_radius(radius, edge) : radius};
         std::vector<Tool> tools{ball};
         ball.position.x() = -x;
         if (x != 0) tools.push_back(ball);
-        const auto equilibrium = sheet.equilibrium(position, tools);
+        const auto equilibrium =
+            kind == Ball::corrected ? sheet.corrected_equilibrium(position, tools) : sheet.equilibrium(position, tools);
         position = equilibrium.x;
         found.push_back(1e3 * equilibrium.reactions[0].z());
     }
@@ -116,16 +126,19 @@ struct Placement {
     table.reference = scene.calculix(effort, "CalculiX", 0.1);
     const auto fine = placements(effort.rings), coarse = placements(effort.rings / 2);
     for (std::size_t i = 0; i < fine.size(); ++i) {
-        table.ours.push_back(
-            single(fine[i].name, [&] { return scene.forces(fine[i].mesh, membrane::mean_edge(fine[i].mesh)); }));
-        table.ours.back().coarse = scene.forces(coarse[i].mesh, membrane::mean_edge(coarse[i].mesh));
+        table.ours.push_back(single(fine[i].name, [&] { return scene.forces(fine[i].mesh, Ball::corrected); }));
+        table.ours.back().coarse = scene.forces(coarse[i].mesh, Ball::corrected);
     }
-    table.ours.push_back(single("over a face, radius as it is", [&] { return scene.forces(fine[2].mesh, 0); }));
-    // Fine in the middle: rings of a quarter of the mean width.
-    const Mesh graded = ring_disc(ring_radii(0, 0, disc_radius, effort.rings, 0.25));
-    const double edge = disc_radius / effort.rings / 4;
-    table.ours.push_back(single("graded", [&] { return scene.forces(graded, edge); }));
-    table.ours.push_back(single("graded, radius as it is", [&] { return scene.forces(graded, 0); }));
+    for (const auto& place : fine) {
+        table.ours.push_back(
+            single(place.name + ", radius as it is", [&] { return scene.forces(place.mesh, Ball::as_it_is); }));
+        table.ours.push_back(
+            single(place.name + ", smaller radius", [&] { return scene.forces(place.mesh, Ball::smaller); }));
+    }
+    const Mesh graded = disc_for_loads(effort.rings, {{.radius = radius / 2}});
+    const std::string name = "graded by DistMesh, " + vertices_of(graded);
+    table.ours.push_back(single(name + ", corrected", [&] { return scene.forces(graded, Ball::corrected); }));
+    table.ours.push_back(single(name + ", radius as it is", [&] { return scene.forces(graded, Ball::as_it_is); }));
     return table;
 }
 
@@ -149,16 +162,15 @@ struct Placement {
                      .loads = effort.some({0.1, 0.2, 0.5})};
     const BallScene scene{.radius = 1e-3, .x = 1.5e-3, .depths = table.loads};
     table.reference = scene.calculix(effort, "CalculiX", 0.1);
-    table.ours.push_back(compared(effort.rings_name(), effort.rings, [&](int rings) {
-        const Mesh mesh = disc_with_patch(rings);
-        return scene.forces(mesh, membrane::mean_edge(mesh));
-    }));
+    table.ours.push_back(compared(effort.rings_name(), effort.rings,
+                                  [&](int rings) { return scene.forces(disc_with_patch(rings), Ball::corrected); }));
     const Mesh mesh = disc_with_patch(effort.rings);
-    table.ours.push_back(single("radius as it is", [&] { return scene.forces(mesh, 0); }));
-    table.ours.push_back(single("twice as fine", [&] {
-        const Mesh finer = disc_with_patch(2 * effort.rings);
-        return scene.forces(finer, membrane::mean_edge(finer));
-    }));
+    table.ours.push_back(single("radius as it is", [&] { return scene.forces(mesh, Ball::as_it_is); }));
+    table.ours.push_back(single("smaller radius", [&] { return scene.forces(mesh, Ball::smaller); }));
+    const Mesh graded = disc_for_loads(effort.rings, {{.centre = {scene.x, 0, 0}, .radius = scene.radius / 2},
+                                                      {.centre = {-scene.x, 0, 0}, .radius = scene.radius / 2}});
+    table.ours.push_back(single("graded by DistMesh, " + vertices_of(graded) + ", corrected",
+                                [&] { return scene.forces(graded, Ball::corrected); }));
     return table;
 }
 

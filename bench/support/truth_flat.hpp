@@ -8,6 +8,7 @@
 #include <vector>
 
 #include <membrane/meshing/distmesh.hpp>
+#include <membrane/meshing/graded_edge_length.hpp>
 
 #include "calculix.hpp"
 #include "comparison.hpp"
@@ -126,6 +127,23 @@ class FlatShell {
         flat, {.edge_length = disc_radius / rings, .bounds = membrane::Bounds{{-r, -r, -r / 8}, {r, r, r / 8}}});
 }
 
+/// A disc by DistMesh whose edges grow from these loads, a foundation of this stiffness [Pa/m] below; about as many
+/// vertices as `rings` rings.
+[[nodiscard]] inline Mesh disc_for_loads(int rings, const std::vector<membrane::GradedLoad>& loads,
+                                         double foundation = 0) {
+    const auto flat = membrane::trimmed(membrane::HalfSpace{}, membrane::Ball{.radius = disc_radius});
+    const double r = 1.1 * disc_radius, edge = disc_radius / rings;
+    const auto length = membrane::graded_edge_length({.longest = 1.3 * edge,
+                                                      .loads = loads,
+                                                      .tension = tension_of(soft, disc_stretch),
+                                                      .foundation = foundation,
+                                                      .resolution = 8 * rings / 28.0,
+                                                      .growth = 0.15});
+    return membrane::distmesh(
+        flat,
+        {.edge_length = length, .bounds = membrane::Bounds{{-r, -r, -r / 8}, {r, r, r / 8}}, .spacing = edge / 2});
+}
+
 /// The height of the middle under each pressure [mm].
 [[nodiscard]] inline std::vector<double> heights(Sheet sheet, const std::vector<double>& pressures) {
     Points x = sheet.mesh.positions();
@@ -201,6 +219,28 @@ class FlatShell {
     return table;
 }
 
+/// The mesh with those vertices that are nearest to the circle of this radius around the z axis moved onto it, along
+/// the surface if that is a plane z = 0 or a sphere around the origin: then a load within is as large as it is meant to
+/// be.
+[[nodiscard]] inline Mesh with_circle(const Mesh& mesh, double radius) {
+    Points x = mesh.positions();
+    const auto from_axis = [&](Index v) { return std::hypot(mesh.positions()(0, v), mesh.positions()(1, v)); };
+    for (const auto& corners : mesh.triangles().colwise()) {
+        for (Eigen::Index k = 0; k < 3; ++k) {
+            const Index a = corners[k], b = corners[(k + 1) % 3];
+            const double inside = from_axis(a) - radius, outside = from_axis(b) - radius;
+            if (inside * outside > 0) continue;  // the edge does not cross the circle
+            const Index nearest = std::abs(inside) < std::abs(outside) ? a : b;
+            const auto& from = mesh.positions().col(nearest);
+            const bool is_flat = std::abs(from.z()) < 1e-6 * from.norm();
+            const double height = is_flat ? 0 : std::sqrt(from.squaredNorm() - radius * radius);
+            x.col(nearest) = radius / from_axis(nearest) * from;
+            x(2, nearest) = height;
+        }
+    }
+    return {x, mesh.triangles()};
+}
+
 [[nodiscard]] inline Column patch_column(const std::string& name, int rings, double grading, double sign,
                                          double foundation, double rigidity, const std::vector<double>& loads) {
     return compared(name, rings, [&](int count) {
@@ -238,33 +278,20 @@ class FlatShell {
     const auto ours = [&](const std::string& name, int rings, double grading, double rigidity) {
         return patch_column(name, rings, grading, -1, stiffness, rigidity, table.loads);
     };
-    table.ours.push_back(ours(effort.rings_name(), effort.rings, 1, 0));
-    table.ours.push_back(ours("graded", effort.rings, 0.3, 0));
-    table.ours.push_back(ours("graded, with bending", effort.rings, 0.3, membrane::flexural_rigidity(soft)));
+    const auto disc = [&](int rings) {
+        return with_circle(disc_for_loads(rings, {{.radius = patch_radius}}, stiffness), patch_radius);
+    };
+    table.ours.push_back(
+        compared("graded by DistMesh, " + vertices_of(disc(effort.rings)), effort.rings, [&](int rings) {
+            Sheet sheet = flat_sheet(disc(rings));
+            sheet.foundation = stiffness;
+            return patch_forces(sheet, within(sheet.mesh, patch_radius * (1 + 1e-9)), -1, table.loads);
+        }));
+    table.ours.push_back(ours("even, " + effort.rings_name(), effort.rings, 1, 0));
+    table.ours.push_back(ours("graded rings", effort.rings, 0.3, 0));
+    table.ours.push_back(ours("graded rings, with bending", effort.rings, 0.3, membrane::flexural_rigidity(soft)));
     table.ours.push_back(calculix_patch(effort, "CalculiX, real thickness", 1, -1, stiffness, table.loads));
     return table;
-}
-
-/// The mesh with those vertices that are nearest to the circle of this radius around the z axis moved onto it, along
-/// the surface if that is a plane z = 0 or a sphere around the origin: then a load within is as large as it is meant to
-/// be.
-[[nodiscard]] inline Mesh with_circle(const Mesh& mesh, double radius) {
-    Points x = mesh.positions();
-    const auto from_axis = [&](Index v) { return std::hypot(mesh.positions()(0, v), mesh.positions()(1, v)); };
-    for (const auto& corners : mesh.triangles().colwise()) {
-        for (Eigen::Index k = 0; k < 3; ++k) {
-            const Index a = corners[k], b = corners[(k + 1) % 3];
-            const double inside = from_axis(a) - radius, outside = from_axis(b) - radius;
-            if (inside * outside > 0) continue;  // the edge does not cross the circle
-            const Index nearest = std::abs(inside) < std::abs(outside) ? a : b;
-            const auto& from = mesh.positions().col(nearest);
-            const bool is_flat = std::abs(from.z()) < 1e-6 * from.norm();
-            const double height = is_flat ? 0 : std::sqrt(from.squaredNorm() - radius * radius);
-            x.col(nearest) = radius / from_axis(nearest) * from;
-            x(2, nearest) = height;
-        }
-    }
-    return {x, mesh.triangles()};
 }
 
 [[nodiscard]] inline Comparison irregular_pressure(const Effort& effort) {

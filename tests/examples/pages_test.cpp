@@ -53,9 +53,17 @@
 #include <membrane/core/snapshot.hpp>
 // [/snapshot]
 
+// [facets]
+#include <membrane/contact/facet_correction.hpp>
+// [/facets]
+
 // [distmesh]
 #include <membrane/meshing/distmesh.hpp>
 // [/distmesh]
+
+// [graded]
+#include <membrane/meshing/graded_edge_length.hpp>
+// [/graded]
 
 // [validate]
 #include <membrane/mesh_check/repair.hpp>
@@ -184,6 +192,27 @@ TEST_CASE_METHOD(Touched, "pages: device of one's own") {
         device.write(reaction({tool, contact, report}));
     }
     CHECK(driver.force[2] > 0.01);
+}
+
+TEST_CASE_METHOD(Touched, "pages: facets") {
+    Driver driver;
+    OwnDevice device(driver);
+    x = mesh.positions();
+    tracker.reset();
+    // [facets]
+    const membrane::FacetCorrection<double> correction(mesh, {.tension = 0.5});  // [N/m]
+    Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+    while (device.running()) {
+        const auto tool = device.read();
+        auto pressed = tool;
+        pressed.position += offset;
+        const auto contact = tracker.update(tree, x, pressed);
+        const auto report = solver.step(x, dt, network, foundation, press(pressed, contact));
+        tree.refit(x, report.moved);
+        offset += (correction(x, contact, report.reactions[0]) - offset) / 2;
+    }
+    // [/facets]
+    CHECK(offset.norm() > 0);
 }
 
 TEST_CASE_METHOD(AtRest, "pages: time steps of other lengths, and late ticks") {
@@ -515,6 +544,14 @@ TEST_CASE("pages: meshes from formulas") {
     const auto ring = membrane::distmesh(
         torus, {.edge_length = 0.8e-3, .bounds = membrane::Bounds{{-0.01, -0.01, -0.003}, {0.01, 0.01, 0.003}}});
     // [/distmesh]
+    // [graded]
+    const auto length = membrane::graded_edge_length({.longest = 0.8e-3,
+                                                      .loads = {{.centre = {0, 0, 8e-3}, .radius = 0.5e-3}},
+                                                      .tension = 1.8,       // [N/m]
+                                                      .foundation = 2e7});  // [Pa/m]
+    const auto graded = membrane::distmesh(membrane::Ball{.radius = 8e-3}, {.edge_length = length});
+    // [/graded]
+    CHECK(membrane::mean_edge(graded) < 0.8e-3);
     CHECK(membrane::validate(lens).facts.closed());
     CHECK(membrane::validate(cornea).facts.borders == 1);
     CHECK(membrane::validate(ring).facts.genus == 1);
