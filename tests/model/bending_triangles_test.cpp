@@ -448,6 +448,19 @@ TEST_CASE("the force on a rigid patch converges in second order", "[bending_tria
         0.02);
 }
 
+TEST_CASE("a clamped rim resists a cone, a supported one turns", "[bending_triangles]") {
+    const auto mesh = disc<double>({.radius = 1, .rings = 6});
+    // [clamped]
+    const auto rim = border(mesh);
+    const auto clamped = bending_triangles(mesh, {.rigidity = rigidity, .poisson_ratio = nu, .clamped = rim});
+    const auto hinged = bending_triangles(mesh, {.rigidity = rigidity, .poisson_ratio = nu, .supported = rim});
+    // [/clamped]
+    Points<double> x = mesh.positions();
+    for (Index v = 0; v < x.cols(); ++v) x(2, v) = 1e-3 * (1 - x.col(v).norm());
+    CHECK(energy_of(clamped, x) > 1.2 * energy_of(hinged, x));
+    CHECK(energy_of(hinged, x) > 0);
+}
+
 TEST_CASE("a mesh with holes is at rest, in float as well", "[bending_triangles]") {
     for (int seed = 1; seed <= cases(30); ++seed) {
         CAPTURE(seed);
