@@ -46,6 +46,9 @@ struct BendingTriangle {
     /// Three of the triangle; number 3 + k is the apex beyond the side from corner k to the next, 6 + 2 k and 7 + 2 k are
     /// those beyond the apex' sides to corner k and to the next. Where there is none, any vertex with weight 0.
     static constexpr std::size_t corner_count = 12;
+    static constexpr std::array<std::array<std::size_t, 2>, 21> edges{
+        {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {1, 4}, {2, 4},  {2, 5},  {0, 5},  {0, 6}, {3, 6},
+         {3, 7}, {1, 7}, {1, 8}, {4, 8}, {4, 9}, {2, 9}, {2, 10}, {5, 10}, {5, 11}, {0, 11}}};  ///< see `Element`
     static constexpr std::array<std::array<std::size_t, 12>, 12> orders = [] {
         std::array<std::array<std::size_t, 12>, 12> all{};
         for (std::size_t i = 0; i < 12; ++i) {
@@ -96,7 +99,7 @@ namespace detail {
 template <Number N>
 class TrianglePlane {
   public:
-    explicit TrianglePlane(const Corners<N, 12>& x) noexcept {
+    MEMBRANE_INLINE explicit TrianglePlane(const Corners<N, 12>& x) noexcept {
         const Vector3<N> across = cross<N>(x[1] - x[0], x[2] - x[0]);
         const N square = squared_norm(across);
         valid = square > 0;
@@ -105,7 +108,7 @@ class TrianglePlane {
     }
 
     /// Gradient of barycentric coordinate `i` [1/m]: its inverse length is the corner's distance from the opposite side.
-    [[nodiscard]] Vector3<N> gradient(const Corners<N, 12>& x, std::size_t i) const noexcept {
+    [[nodiscard]] MEMBRANE_INLINE Vector3<N> gradient(const Corners<N, 12>& x, std::size_t i) const noexcept {
         return per_area_ * cross<N>(normal, x[(i + 2) % 3] - x[(i + 1) % 3]);
     }
 
@@ -118,8 +121,8 @@ class TrianglePlane {
 
 /// The sum over the outer corners of their weights times their coordinate along `direction`, from `origin` on.
 template <Number N, Number Scalar>
-[[nodiscard]] Vector3<N> weighted(const BendingTriangle<Scalar>& element, const Corners<N, 12>& x,
-                                  const Vector3<N>& direction, const Vector3<N>& origin) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<N> weighted(const BendingTriangle<Scalar>& element, const Corners<N, 12>& x,
+                                                  const Vector3<N>& direction, const Vector3<N>& origin) noexcept {
     Vector3<N> sum = dot<N>(direction, element.tangent.template cast<N>()) * element.by_tilt.template cast<N>();
     for (std::size_t k = 0; k < 9; ++k) {
         sum += dot<N>(direction, x[3 + k] - origin) * element.by_height[k].template cast<N>();
@@ -128,15 +131,15 @@ template <Number N, Number Scalar>
 }
 
 template <Number N, Number Scalar>
-[[nodiscard]] Vector3<N> bent_by(const BendingTriangle<Scalar>& element, const Corners<N, 12>& x,
-                                 const TrianglePlane<N>& plane) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<N> bent_by(const BendingTriangle<Scalar>& element, const Corners<N, 12>& x,
+                                                 const TrianglePlane<N>& plane) noexcept {
     return weighted<N>(element, x, plane.normal, x[0]) - element.rest.template cast<N>();
 }
 
 /// The derivative of r by corner `i` along the normal; other displacements do not change r.
 template <Number N, Number Scalar>
-[[nodiscard]] Vector3<N> slope_of(const BendingTriangle<Scalar>& element, const Corners<N, 12>& x,
-                                  const Vector3<N>& gradient, std::size_t i) noexcept {
+[[nodiscard]] MEMBRANE_INLINE Vector3<N> slope_of(const BendingTriangle<Scalar>& element, const Corners<N, 12>& x,
+                                                  const Vector3<N>& gradient, std::size_t i) noexcept {
     if (i >= 3) return element.by_height[i - 3].template cast<N>();
     return -weighted<N>(element, x, gradient, x[(i + 1) % 3]);
 }
@@ -150,7 +153,8 @@ template <Number N, Number Scalar>
 // r + rest becomes (r + rest) cos a + h r' sin a, r' its derivative by c.
 template <Number Scalar>
 template <Number N>
-CornerForce<N> BendingTriangle<Scalar>::force_on(const Corners<N, 12>& x, std::size_t i) const noexcept {
+MEMBRANE_INLINE CornerForce<N> BendingTriangle<Scalar>::force_on(const Corners<N, 12>& x,
+                                                                 std::size_t i) const noexcept {
     using std::abs;
     const detail::TrianglePlane<N> plane(x);
     const Vector3<N> bent = detail::bent_by<N>(*this, x, plane);
@@ -174,14 +178,14 @@ CornerForce<N> BendingTriangle<Scalar>::force_on(const Corners<N, 12>& x, std::s
 
 template <Number Scalar>
 template <Number N>
-N BendingTriangle<Scalar>::energy(const Corners<N, 12>& x) const noexcept {
+MEMBRANE_INLINE N BendingTriangle<Scalar>::energy(const Corners<N, 12>& x) const noexcept {
     return squared_norm(detail::bent_by<N>(*this, x, detail::TrianglePlane<N>(x))) / 2;
 }
 
 template <Number Scalar>
 template <Number N>
-EnergyChange<N> BendingTriangle<Scalar>::energy_change(const Corners<N, 12>& x, std::size_t i,
-                                                       const Vector3<N>& displacement) const noexcept {
+MEMBRANE_INLINE EnergyChange<N> BendingTriangle<Scalar>::energy_change(const Corners<N, 12>& x, std::size_t i,
+                                                                       const Vector3<N>& displacement) const noexcept {
     auto there = x;
     there[i] += displacement;
     const Vector3<N> before = detail::bent_by<N>(*this, x, detail::TrianglePlane<N>(x));
@@ -335,7 +339,13 @@ std::array<Index, 12> BendingMesh<Scalar>::corners_of(Index f) const {
         put(6 + 2 * k, free_beyond(g, a, apex));
         put(7 + 2 * k, free_beyond(g, apex, b));
     }
-    std::replace(all.begin(), all.end(), Index(-1), all[0]);
+    for (Index k = 0; k < 3;
+         ++k) {  // where there is none, a vertex of the triangle that edges join to the same corners
+        for (const auto& [place, v] : {std::pair{3 + k, k + 2}, std::pair{6 + 2 * k, k + 1}, std::pair{7 + 2 * k, k}}) {
+            Index& here = all[static_cast<std::size_t>(place)];
+            if (here < 0) here = corner(f, v);
+        }
+    }
     return all;
 }
 
