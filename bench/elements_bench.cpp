@@ -3,6 +3,7 @@
 #include <vector>
 
 #include <membrane/model/bending.hpp>
+#include <membrane/model/bending_triangles.hpp>
 #include <membrane/model/fibres.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/fung.hpp>
@@ -44,6 +45,11 @@ struct Disc {
     }
     [[nodiscard]] auto triangles() const { return membrane::triangular_springs(mesh, material, 1.02); }
     [[nodiscard]] auto hinges() const { return membrane::bending_springs(mesh, membrane::flexural_rigidity(material)); }
+    [[nodiscard]] auto plates() const {
+        return membrane::bending_triangles(mesh, {.rigidity = membrane::flexural_rigidity(material),
+                                                  .poisson_ratio = material.poisson_ratio,
+                                                  .clamped = membrane::border(mesh)});
+    }
     [[nodiscard]] auto pressure() const { return membrane::pressure(mesh, 100.0); }
     [[nodiscard]] auto neo_hookean() const { return membrane::neo_hookean(mesh, material, 1.02); }
     [[nodiscard]] auto fung() const { return membrane::fung(mesh, material, {}, 1.02); }
@@ -110,6 +116,9 @@ const bool registered = [] {
     in_both("neo_hookean_fibres",
             [](const auto& disc) { return membrane::Tissue(disc.none(), disc.neo_hookean(), disc.fibres()); });
     in_both("fung", [](const auto& disc) { return membrane::Tissue(disc.none(), disc.fung()); });
+    in_both("triangles_pressure_bending_triangles", [](const auto& disc) {
+        return membrane::Tissue(disc.none(), disc.triangles(), disc.pressure(), disc.plates());
+    });
     return true;
 }();
 

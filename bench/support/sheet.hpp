@@ -15,6 +15,7 @@
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/contact/facet_correction.hpp>
 #include <membrane/model/bending.hpp>
+#include <membrane/model/bending_triangles.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/pressure.hpp>
 #include <membrane/model/spring_stiffness.hpp>
@@ -48,6 +49,7 @@ struct Sheet {
     membrane::Material material;
     double stretch = 1;           ///< on the mesh
     double rigidity = 0;          ///< of bending [N m]
+    bool hinges = true;           ///< whether hinges bend, or triangles
     double pressure = 0;          ///< [Pa]
     double loaded_radius = 1;     ///< the pressure is on triangles within this distance of the z axis [m]
     double foundation = 0;        ///< along the normal [Pa/m]
@@ -69,11 +71,13 @@ struct Sheet {
         const auto none =
             membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 0.0, .pinned = pinned});
         const auto triangles = membrane::triangular_springs(mesh, material, stretch);
-        const auto bending = membrane::bending_springs(mesh, rigidity);
+        const auto bending = membrane::bending_triangles(
+            mesh, {.rigidity = hinges ? 0 : rigidity, .poisson_ratio = material.poisson_ratio, .supported = pinned});
+        const auto folding = membrane::bending_springs(mesh, hinges ? rigidity : 0);
         std::vector<double> stiffness = membrane::vertex_areas(mesh);
         for (double& area : stiffness) area *= foundation;
         const auto springs = membrane::FoundationSprings(mesh, {.normal = stiffness, .tangential = 0.0});
-        return act(membrane::Tissue(none, triangles, bending, pressure_loads()), springs);
+        return act(membrane::Tissue(none, triangles, bending, folding, pressure_loads()), springs);
     }
 
     using Loads = membrane::Elements<double, membrane::PressureLoad<double>>;

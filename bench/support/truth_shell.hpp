@@ -40,10 +40,11 @@ namespace bench::truth {
 }
 
 /// How deep the middle of a cornea goes [mm]; NaN from where there is no equilibrium nearby.
-[[nodiscard]] inline std::vector<double> dent_depths(Mesh mesh, double rigidity, const std::vector<double>& pressures) {
+[[nodiscard]] inline std::vector<double> dent_depths(Mesh mesh, const std::vector<double>& pressures, bool hinges) {
     Sheet sheet{.mesh = std::move(mesh),
                 .material = membrane::materials::cornea().typical,
-                .rigidity = rigidity,
+                .rigidity = membrane::flexural_rigidity(membrane::materials::cornea().typical),
+                .hinges = hinges,
                 .loaded_radius = loaded_radius()};
     sheet.pinned = membrane::border(sheet.mesh);
     Points x = sheet.mesh.positions();
@@ -68,14 +69,16 @@ namespace bench::truth {
                      .bounded = 2,
                      .loads = effort.some({200, 500, 1000, 2000})};
     table.reference = calculix_dent(effort, table.loads);
-    const double rigidity = membrane::flexural_rigidity(membrane::materials::cornea().typical);
     const auto irregular = [&](int rings) {
         return with_circle(dome_sheet(cornea, membrane::materials::cornea().typical, rings).mesh, loaded_radius());
     };
-    table.ours.push_back(compared("DistMesh", effort.rings,
-                                  [&](int rings) { return dent_depths(irregular(rings), rigidity, table.loads); }));
-    table.ours.push_back(compared("rings", effort.rings,
-                                  [&](int rings) { return dent_depths(ring_cornea(rings), rigidity, table.loads); }));
+    for (const bool hinges : {false, true}) {
+        const std::string by = hinges ? ", hinges" : "";
+        table.ours.push_back(compared("DistMesh" + by, effort.rings,
+                                      [&](int rings) { return dent_depths(irregular(rings), table.loads, hinges); }));
+        table.ours.push_back(compared("rings" + by, effort.rings,
+                                      [&](int rings) { return dent_depths(ring_cornea(rings), table.loads, hinges); }));
+    }
     return table;
 }
 
@@ -100,8 +103,8 @@ inline const membrane::Material thick{.young_modulus = 1e6, .poisson_ratio = 0.4
     });
 }
 
-[[nodiscard]] inline std::vector<double> plate_heights(int rings, const std::vector<double>& pressures) {
-    Sheet sheet{.mesh = disc_with_patch(rings), .material = thick};
+[[nodiscard]] inline std::vector<double> plate_heights(Mesh mesh, const std::vector<double>& pressures, bool hinges) {
+    Sheet sheet{.mesh = std::move(mesh), .material = thick, .hinges = hinges};
     sheet.rigidity = membrane::flexural_rigidity(thick);
     sheet.pinned = membrane::border(sheet.mesh);
     return heights(sheet, pressures);
@@ -113,10 +116,18 @@ inline const membrane::Material thick{.young_modulus = 1e6, .poisson_ratio = 0.4
                      .load = "pressure [Pa]",
                      .quantity = "height [mm]",
                      .bound = 0.03,
+                     .bounded = 2,
                      .loads = effort.some({10, 30, 100, 300, 1000})};
     table.reference = calculix_plate(effort, table.loads);
-    table.ours.push_back(
-        compared(effort.rings_name(), effort.rings, [&](int rings) { return plate_heights(rings, table.loads); }));
+    for (const bool hinges : {false, true}) {
+        const std::string by = hinges ? ", hinges" : "";
+        table.ours.push_back(compared("DistMesh" + by, effort.rings, [&](int rings) {
+            return plate_heights(irregular_disc(rings), table.loads, hinges);
+        }));
+        table.ours.push_back(compared("rings" + by, effort.rings, [&](int rings) {
+            return plate_heights(disc_with_patch(rings), table.loads, hinges);
+        }));
+    }
     return table;
 }
 
