@@ -162,7 +162,7 @@ FacetCorrection<Scalar>::FacetCorrection(const TriangleMesh<Scalar>& mesh, const
             const Scalar area = norm(cross(a, b));
             if (area > 0) weight += dot(a, b) / area;
         }
-        weight = (std::max)(weight, std::numeric_limits<Scalar>::min());
+        weight = (std::max)(weight, (std::numeric_limits<Scalar>::min)());
         const Scalar length = norm<Scalar>(at(sides[0].second) - at(sides[0].first));
         for (const auto v : {static_cast<std::size_t>(sides[0].first), static_cast<std::size_t>(sides[0].second)}) {
             edge_[v] += weight * length;
