@@ -199,6 +199,7 @@ TEST_CASE_METHOD(Touched, "pages: facets") {
     OwnDevice device(driver);
     x = mesh.positions();
     tracker.reset();
+    const membrane::ReactionForce force;
     // [facets]
     const membrane::FacetCorrection<double> correction(mesh, {.tension = 0.5});  // [N/m]
     Eigen::Vector3d offset = Eigen::Vector3d::Zero();
@@ -210,9 +211,11 @@ TEST_CASE_METHOD(Touched, "pages: facets") {
         const auto report = solver.step(x, dt, network, foundation, press(pressed, contact));
         tree.refit(x, report.moved);
         offset += (correction(x, contact, report.reactions[0]) - offset) / 2;
+        device.write(force({tool, contact, report}));
     }
     // [/facets]
     CHECK(offset.norm() > 0);
+    CHECK(driver.force[2] > 0.01);
 }
 
 TEST_CASE_METHOD(AtRest, "pages: time steps of other lengths, and late ticks") {
