@@ -311,7 +311,25 @@ class BendingMesh {
         return g < 0 || is_held(g) ? -1 : beyond(f, a, b);
     }
 
+    /// The plane between the two triangles of a side.
+    struct SideFrame {
+        Vector3<double> middle, out, along;  // a point [m], unit vectors
+        double length;                       // of the side [m]
+    };
+
+    /// The three sides of a triangle: what their slopes add to r [(N m)^(1/2)], and the outward normals.
+    struct Sides {
+        Eigen::Matrix3d by_slope;
+        std::array<Vector3<double>, 3> out;
+    };
+
+    [[nodiscard]] bool is_held_side(Index f, Index k) const noexcept {
+        return is_clamped(corner(f, k)) && is_clamped(corner(f, k + 1));
+    }
+
     [[nodiscard]] std::array<Index, 12> corners_of(Index f) const;
+    void make_exact(Slope& slope, const SideFrame& side) const;
+    [[nodiscard]] Sides sides_of(Index f) const;
     [[nodiscard]] Slope slope_at(Index f, Index side) const;
 
     const TriangleMesh<Scalar>& mesh_;
@@ -349,8 +367,27 @@ std::array<Index, 12> BendingMesh<Scalar>::corners_of(Index f) const {
     return all;
 }
 
-/// Beyond the two triangles, the smallest weights (in the sense of least squares) that make the slope exact for heights
-/// which are quadratic in the plane between the triangles; or if there are too few vertices, nearly so.
+/// Adds to the weights what they miss for heights that are quadratic, by the smallest changes in the sense of least
+/// squares; if there are too few vertices, nearly so. Then the weights are in 1/m.
+template <Real Scalar>
+void BendingMesh<Scalar>::make_exact(Slope& slope, const SideFrame& side) const {
+    constexpr double exact = 1e3;  // linear heights first
+    Eigen::Matrix<double, 6, Eigen::Dynamic> terms(6, static_cast<Eigen::Index>(slope.count));
+    Eigen::Matrix<double, 6, 1> missing{0, exact, 0, 0, 0, 0};
+    for (std::size_t i = 0; i < slope.count; ++i) {
+        const Vector3<double> by = (at(slope.vertices[i]) - side.middle) / side.length;
+        const double x = dot(by, side.out), y = dot(by, side.along);
+        const auto column = static_cast<Eigen::Index>(i);
+        terms.col(column) << exact, exact * x, exact * y, x * x, x * y, y * y;
+        missing -= slope.weights[i] * terms.col(column);
+    }
+    const Eigen::VectorXd added = terms.completeOrthogonalDecomposition().solve(missing);
+    for (std::size_t i = 0; i < slope.count; ++i) {
+        slope.weights[i] = (slope.weights[i] + added[static_cast<Eigen::Index>(i)]) / side.length;
+    }
+}
+
+/// The mean slope of the two triangles, each by the other's extent, and what their neighbours add to make it exact.
 template <Real Scalar>
 auto BendingMesh<Scalar>::slope_at(Index f, Index side) const -> Slope {
     const Index a = corner(f, side), b = corner(f, side + 1), c = corner(f, side + 2), g = neighbours_(side, f);
@@ -384,35 +421,21 @@ auto BendingMesh<Scalar>::slope_at(Index f, Index side) const -> Slope {
             if (v >= 0) slope.add(v);
         }
     }
-    constexpr double exact = 1e3;  // linear heights first
-    Eigen::Matrix<double, 6, Eigen::Dynamic> terms(6, static_cast<Eigen::Index>(slope.count));
-    Eigen::Matrix<double, 6, 1> missing{0, exact, 0, 0, 0, 0};
-    for (std::size_t i = 0; i < slope.count; ++i) {
-        const Vector3<double> by = (at(slope.vertices[i]) - middle) / length;
-        const double x = dot(by, out), y = dot(by, along);
-        const auto column = static_cast<Eigen::Index>(i);
-        terms.col(column) << exact, exact * x, exact * y, x * x, x * y, y * y;
-        missing -= slope.weights[i] * terms.col(column);
-    }
-    const Eigen::VectorXd added = terms.completeOrthogonalDecomposition().solve(missing);
-    for (std::size_t i = 0; i < slope.count; ++i) {
-        slope.weights[i] = (slope.weights[i] + added[static_cast<Eigen::Index>(i)]) / length;
-    }
+    make_exact(slope, {middle, out, along, length});
     return slope;
 }
 
 template <Real Scalar>
-auto BendingMesh<Scalar>::element(Index f) const -> ElementInstance<Element> {
-    const std::array<Index, 12> corners = corners_of(f);
-    const Vector3<double> first = at(corners[1]) - at(corners[0]), second = at(corners[2]) - at(corners[0]);
+auto BendingMesh<Scalar>::sides_of(Index f) const -> Sides {
+    const Vector3<double> first = at(corner(f, 1)) - at(corner(f, 0)), second = at(corner(f, 2)) - at(corner(f, 0));
     const Vector3<double> u = first / norm(first), normal = cross(first, second) / norm(cross(first, second));
     const Vector3<double> v = cross(normal, u);
     const double nu = options_.poisson_ratio, area = norm(cross(first, second)) / 2;
     // |r|^2 / 2 is the energy of the curvature (k_uu, k_vv, 2 k_uv) = sum of l / A s (m_u^2, m_v^2, 2 m_u m_v).
     Eigen::Matrix3d by_curvature;
     by_curvature << 1, nu, 0, 0, std::sqrt(1 - nu * nu), 0, 0, 0, std::sqrt((1 - nu) / 2);
-    Eigen::Matrix3d by_slope;
-    std::array<Vector3<double>, 3> out;
+    Sides sides;
+    auto& [by_slope, out] = sides;
     for (Index k = 0; k < 3; ++k) {
         const Vector3<double> side = at(corner(f, k + 1)) - at(corner(f, k));
         const Vector3<double> m = cross<double>(side, normal) / norm(side);
@@ -422,19 +445,27 @@ auto BendingMesh<Scalar>::element(Index f) const -> ElementInstance<Element> {
             std::sqrt(options_.rigidity / area) * norm(side) * by_curvature * Eigen::Vector3d(x * x, y * y, 2 * x * y);
     }
     // The slope at a border that bends freely is the one of least energy.
-    const auto is_held_side = [&](Index k) { return is_clamped(corner(f, k)) && is_clamped(corner(f, k + 1)); };
     for (Index k = 0; k < 3; ++k) {
-        if (neighbours_(k, f) >= 0 || is_held_side(k)) continue;
+        if (neighbours_(k, f) >= 0 || is_held_side(f, k)) continue;
         const double square = by_slope.col(k).squaredNorm();
         if (!(square > 1e-20 * options_.rigidity)) continue;  // two such sides already
         const Eigen::Vector3d free = by_slope.col(k);
         by_slope -= free * (free.transpose() * by_slope) / square;
     }
+    return sides;
+}
+
+template <Real Scalar>
+auto BendingMesh<Scalar>::element(Index f) const -> ElementInstance<Element> {
+    const std::array<Index, 12> corners = corners_of(f);
+    const auto [by_slope, out] = sides_of(f);
     BendingTriangle<double> element{{}, Vector3<double>::Zero(), Vector3<double>::Zero(), Vector3<double>::Zero()};
     element.by_height.fill(Vector3<double>::Zero());
     for (Index k = 0; k < 3; ++k) {
         if (neighbours_(k, f) < 0) {
-            if (is_held_side(k)) element.by_tilt = by_slope.col(k), element.tangent = out[static_cast<std::size_t>(k)];
+            if (!is_held_side(f, k)) continue;
+            element.by_tilt = by_slope.col(k);
+            element.tangent = out[static_cast<std::size_t>(k)];
             continue;
         }
         const Slope slope = slope_at(f, k);
