@@ -49,18 +49,16 @@ plot 1 dt 2 lc '#999999' notitle, -1 dt 2 lc '#999999' notitle, \
 do for [ball in 'a b c'] {
     set title '6' . ball . '. ball of ' . (ball eq 'a' ? '0.5' : ball eq 'b' ? '1' : '2') . ' mm'
     set xlabel 'depth [radii]'
-    set yrange [-5:5]
-    set key bottom right
+    set yrange [-5:8]
     plot 1 dt 2 lc '#999999' notitle, -1 dt 2 lc '#999999' notitle, \
          for [i = 3:5] 'truth_ball_' . ball . '.tsv' using 1:(difference(i)) \
              title word('vertex edge face', i - 2) lc rgb colour(i - 2) pt 7, \
          '' using 1:(difference(12)) title 'graded DistMesh' lc rgb colour(4) pt 7
 }
 
-set key top right
 set title '8. shells that bend'
 set xlabel 'Pa'
-set yrange [-20:140]
+set yrange [-10:20]
 plot 3 dt 2 lc '#999999' notitle, -3 dt 2 lc '#999999' notitle, \
      'truth_shell.tsv' using 1:(difference(3)) title 'cornea, DistMesh' lc rgb colour(2) pt 7, \
      '' using 1:(difference(4)) title 'cornea, rings' lc rgb colour(1) pt 7, \
