@@ -410,7 +410,6 @@ auto BendingMesh<Scalar>::slope_at(Index f, Index side) const -> Slope {
     const Vector3<double> out = through / norm(through);
     const double x_c = dot<double>(at(c) - middle, out) / length, x_d = dot<double>(at(d) - middle, out) / length;
     const double y_c = dot<double>(at(c) - middle, along) / length, y_d = dot<double>(at(d) - middle, along) / length;
-    // The slopes of both triangles, each by the other's extent.
     const double by_c = x_d / (x_c * (x_d - x_c)), by_d = -x_c / (x_d * (x_d - x_c));
     slope.add(a, -by_c * (0.5 - y_c) - by_d * (0.5 - y_d));
     slope.add(b, -by_c * (0.5 + y_c) - by_d * (0.5 + y_d));
