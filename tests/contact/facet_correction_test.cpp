@@ -19,6 +19,7 @@
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/facet_lattice.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
 
@@ -122,9 +123,22 @@ TEST_CASE("small contacts lack the logarithm from the triangle's size down, and 
     for (int i = 0; i < 100; ++i) {
         const Point w = random.barycentric();
         const double pairs = w[0] * w[1] + w[1] * w[2] + w[2] * w[0];
-        const double ratio = 0.05;
+        const double ratio = 0.05 * std::pow(1e-6, random.number());
         const double exact = std::log(disc / ratio) + 0.5 + 2 * std::numbers::pi / std::sqrt(3.0) * pairs;
         CHECK(membrane::facet_depth(ratio, w) == Approx(exact).margin(0.03));
+    }
+}
+
+TEST_CASE("what facets lack is that of a linear membrane on a regular triangulation, anywhere, for any contact") {
+    const test::FacetLattice lattice;
+    const int count = cases(40, 400);
+    for (int seed = 1; seed <= count; ++seed) {
+        test::Random random(static_cast<unsigned>(seed));
+        const Point w = random.barycentric();
+        const auto exact = lattice.press(0.03 * std::pow(100, (seed - random.number()) / count), w);
+        const double depth = membrane::facet_depth(exact.ratio, w);
+        CAPTURE(seed, exact.ratio, exact.missing, depth);
+        CHECK(std::abs(depth - exact.missing) < 0.03);
     }
 }
 

@@ -58,7 +58,8 @@ class FacetCorrection {
     FacetCorrection(const TriangleMesh<Scalar>& mesh, const FacetCorrectionOptions& options);
 
     /// The displacement of the tool from where it is to where it must press, along `reaction`, the force on it [N];
-    /// zero without a contact or a force, or if a number is not finite. `contact` is the one that the step had, `x` the positions [m].
+    /// zero without a contact or a force, or if a number is not finite. `contact` is the one that the step had, `x` the
+    /// positions [m].
     /// Online. Cost: linear in `contact.triangles`.
     [[nodiscard]] Vector3<Scalar> operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
                                              const Vector3<Scalar>& reaction) const noexcept;
@@ -80,7 +81,8 @@ namespace detail {
 inline constexpr std::string_view facet_correction_name = "FacetCorrection";
 
 /// f at a / h: coefficients of 1, s, 27 w0 w1 w2 and s^2, s = 3 sum_{i<j} w_i w_j. By least squares over the triangle,
-/// from the equilibria of a regular triangulation of 1,801 vertices under a paraboloid (projected Gauss-Seidel).
+/// from the equilibria of a regular triangulation of 1,801 vertices under a paraboloid (projected Gauss-Seidel); the tests compute it anew. Between
+/// the rows f changes with the logarithm of a / h.
 struct FacetDepth {
     double ratio;
     std::array<double, 4> of;
@@ -137,10 +139,10 @@ inline double facet_depth(double ratio, const Vector3<double>& weights) noexcept
         return ((row.of[0] + row.of[1] * s) + row.of[2] * product) + row.of[3] * (s * s);
     };
     const auto above = std::find_if(rows.begin(), rows.end(), [&](const auto& row) { return row.ratio > ratio; });
-    if (above == rows.begin()) return value(rows.front());
+    if (above == rows.begin()) return value(rows.front()) + std::log(rows.front().ratio / ratio);
     if (above == rows.end()) return value(rows.back()) * (rows.back().ratio / ratio) * (rows.back().ratio / ratio);
     const auto& below = *(above - 1);
-    const double part = (ratio - below.ratio) / (above->ratio - below.ratio);
+    const double part = std::log(ratio / below.ratio) / std::log(above->ratio / below.ratio);
     return (1 - part) * value(below) + part * value(*above);
 }
 
