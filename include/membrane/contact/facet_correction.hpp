@@ -81,8 +81,8 @@ namespace detail {
 inline constexpr std::string_view facet_correction_name = "FacetCorrection";
 
 /// f at a / h: coefficients of 1, s, 27 w0 w1 w2 and s^2, s = 3 sum_{i<j} w_i w_j. By least squares over the triangle,
-/// from the equilibria of a regular triangulation of 1,801 vertices under a paraboloid (projected Gauss-Seidel); the tests compute it anew. Between
-/// the rows f changes with the logarithm of a / h.
+/// from the equilibria of a regular triangulation of 1,801 vertices under a paraboloid (projected Gauss-Seidel); the
+/// tests compute it anew. Between the rows f changes with the logarithm of a / h.
 struct FacetDepth {
     double ratio;
     std::array<double, 4> of;
