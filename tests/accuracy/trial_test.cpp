@@ -55,6 +55,21 @@ struct Scene {
                      const SolverOptions<Scalar>& options = {}, const Rule& rule = {}, const Clock& clock = {}) const {
         return run_trial(mesh, network, foundation, history, references, options, rule, clock);
     }
+
+    /// Plays the stroke: each(tick, x, report, constraints...) after every step.
+    template <class Each>
+    void play_each(const SolverOptions<Scalar>& options, Each each) const {
+        auto history = stroke();
+        QuasiStaticSolver solver(network, options);
+        Points<Scalar> x = mesh.positions();
+        std::vector<Index> moved;
+        for (Index tick = 0; tick < ticks(); ++tick) {
+            const auto [presses, pulls] = history(tick, x, moved);
+            const auto report = solver.step(x, Scalar(dt), network, foundation, presses, pulls);
+            moved.assign(report.moved.begin(), report.moved.end());
+            each(tick, x, report, presses, pulls);
+        }
+    }
 };
 
 /// A vertex is pulled out, a load turns, others are pinned.
@@ -138,26 +153,19 @@ TEST_CASE("the errors of a trial are those to the equilibrium of each tick") {
         REQUIRE(references.size() == static_cast<std::size_t>(scene.ticks() / tick_stride));
         const auto outcome = scene.play(scene.stroke(), references, options);
 
-        auto stroke = scene.stroke();
-        QuasiStaticSolver solver(scene.network, options);
-        Points<double> x = scene.mesh.positions();
-        std::vector<Index> moved;
         double errors = 0, squares = 0, displacements = 0;
-        for (Index tick = 0; tick < scene.ticks(); ++tick) {
-            const auto [presses, pulls] = stroke(tick, x, moved);
-            const auto report = solver.step(x, dt, scene.network, scene.foundation, presses, pulls);
-            moved.assign(report.moved.begin(), report.moved.end());
-            if ((tick + 1) % tick_stride != 0) continue;
+        scene.play_each(options, [&](Index tick, const auto& x, const auto& report, const auto&... constraints) {
+            if ((tick + 1) % tick_stride != 0) return;
             const auto& rest = references[static_cast<std::size_t>(tick / tick_stride)];
             CHECK(rest.tick == tick);
-            const auto exact = equilibrium(x, scene.mesh, scene.network, scene.foundation, {}, presses, pulls);
+            const auto exact = equilibrium(x, scene.mesh, scene.network, scene.foundation, {}, constraints...);
             CHECK((exact.x - rest.x).norm() < 0.02 * radius);
             for (std::size_t i = 0; i < 2; ++i) {
                 errors += (report.reactions[i] - rest.reactions[i]).squaredNorm();
                 squares += rest.reactions[i].squaredNorm();
             }
             displacements += std::pow((x - rest.x).colwise().norm().maxCoeff(), 2);
-        }
+        });
         CHECK(outcome.force_error == Approx(std::sqrt(errors / squares)));
         CHECK(outcome.position_error == Approx(std::sqrt(displacements / static_cast<double>(references.size()))));
         CHECK(outcome.force_error < 0.1);
@@ -171,22 +179,15 @@ TEST_CASE("the largest error of a tick, and the motion, are those of the ticks o
     const SolverOptions<double> options{.layers = 4, .sweeps = 2};
     const auto references = equilibria(scene.mesh, scene.network, scene.foundation, scene.stroke());
     const auto outcome = scene.play(scene.stroke(), references, options);
-    auto stroke = scene.stroke();
-    QuasiStaticSolver solver(scene.network, options);
-    Points<double> x = scene.mesh.positions();
-    std::vector<Index> moved;
     double largest = 0, squares = 0, far = 0;
-    for (Index tick = 0; tick < scene.ticks(); ++tick) {
-        const auto [presses, pulls] = stroke(tick, x, moved);
-        const auto report = solver.step(x, dt, scene.network, scene.foundation, presses, pulls);
-        moved.assign(report.moved.begin(), report.moved.end());
+    scene.play_each(options, [&](Index tick, const auto& x, const auto& report, const auto&...) {
         const auto& rest = references[static_cast<std::size_t>(tick)];
         double error = 0;
         for (std::size_t i = 0; i < 2; ++i) error += (report.reactions[i] - rest.reactions[i]).squaredNorm();
         largest = std::max(largest, error);
         squares += rest.force * rest.force / static_cast<double>(references.size());
         far = std::max(far, (x - scene.mesh.positions()).colwise().norm().maxCoeff());
-    }
+    });
     CHECK(outcome.max_force_error == Approx(std::sqrt(largest / squares)));
     CHECK(outcome.max_displacement == Approx(far));
     CHECK(outcome.max_speed == Approx(0.1));  // 1e-4 m a tick, in, out and up; 5e-5 along. The last 1e-3 are let go

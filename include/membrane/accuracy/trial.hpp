@@ -205,11 +205,12 @@ template <class Constraints, class Square>
 }
 
 template <Real Scalar, CheckedLoadHistory<Scalar> History>
-void check_history(std::string_view component, const History& history) {
+void check_history(std::string_view component, const History& history, Index tick_stride = 1) {
     if (history.ticks() < 1) refuse(component, "the history must have a tick, got ", history.ticks());
     if (!is_finite(history.dt()) || !(history.dt() > 0)) {
         refuse(component, "dt of the history must be finite and positive [s], got ", history.dt());
     }
+    if (tick_stride < 1) refuse(component, "tick_stride must be at least 1, got ", tick_stride);
 }
 
 /// Sums over the ticks of a trial.
@@ -326,8 +327,7 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
           CheckedLoadHistory<Scalar> History>
 std::vector<ReferenceTick> equilibria(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
                                       History history, Index tick_stride) {
-    detail::check_history<Scalar>("equilibria", history);
-    if (tick_stride < 1) refuse("equilibria", "tick_stride must be at least 1, got ", tick_stride);
+    detail::check_history<Scalar>("equilibria", history, tick_stride);
     std::vector<Index> all(static_cast<std::size_t>(mesh.vertex_count()));
     std::iota(all.begin(), all.end(), 0);
     QuasiStaticSolver<Scalar> between(network, {.layers = unlimited, .sweeps = 16});
@@ -356,8 +356,7 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
           CheckedLoadHistory<Scalar> History>
 std::vector<ReferenceTick> exact_steps(const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
                                        History history, Index tick_stride) {
-    detail::check_history<Scalar>("exact_steps", history);
-    if (tick_stride < 1) refuse("exact_steps", "tick_stride must be at least 1, got ", tick_stride);
+    detail::check_history<Scalar>("exact_steps", history, tick_stride);
     QuasiStaticSolver<Scalar> solver(network, {.layers = unlimited, .sweeps = 4000});
     std::vector<Index> all(static_cast<std::size_t>(mesh.vertex_count()));
     std::iota(all.begin(), all.end(), 0);
