@@ -357,8 +357,8 @@ std::array<Index, 12> BendingMesh<Scalar>::corners_of(Index f) const {
         put(6 + 2 * k, free_beyond(g, a, apex));
         put(7 + 2 * k, free_beyond(g, apex, b));
     }
-    for (Index k = 0; k < 3;
-         ++k) {  // where there is none, a vertex of the triangle that edges join to the same corners
+    // Where there is none, a vertex of the triangle that edges join to the same corners.
+    for (Index k = 0; k < 3; ++k) {
         for (const auto& [place, v] : {std::pair{3 + k, k + 2}, std::pair{6 + 2 * k, k + 1}, std::pair{7 + 2 * k, k}}) {
             Index& here = all[static_cast<std::size_t>(place)];
             if (here < 0) here = corner(f, v);
