@@ -111,24 +111,25 @@ std::vector<Index> visited(Query query) {
 template <class S>
 constexpr bool online = [](AabbTree<S>* tree, const AabbTree<S>* const_tree, const ConstPointsRef<S>* x,
                            const Vector3<S>* p, std::span<const Index>* moved, void (*visit)(Index)) {
-    return noexcept(tree->refit(*x))&& noexcept(tree->refit(*x, *moved))&& noexcept(const_tree->closest_point(
-        *x,
-        *p))&& noexcept(const_tree
-                            ->first_hit(
-                                *x, *p,
-                                *p))&& noexcept(const_tree
-                                                    ->overlap_sphere(
-                                                        *x, *p, S(1),
-                                                        visit))&& noexcept(const_tree
-                                                                               ->overlap_box(
-                                                                                   *x, *p, *p,
-                                                                                   visit))&& noexcept(const_tree
-                                                                                                          ->overlap_capsule(
-                                                                                                              *x, *p,
-                                                                                                              *p, S(1),
-                                                                                                              visit));
+    return std::min({noexcept(tree->refit(*x)), noexcept(tree->refit(*x, *moved)),
+                     noexcept(const_tree->closest_point(*x, *p)), noexcept(const_tree->first_hit(*x, *p, *p)),
+                     noexcept(const_tree->overlap_sphere(*x, *p, S(1), visit)),
+                     noexcept(const_tree->overlap_box(*x, *p, *p, visit)),
+                     noexcept(const_tree->overlap_capsule(*x, *p, *p, S(1), visit))});
 }(nullptr, nullptr, nullptr, nullptr, nullptr, nullptr);
 static_assert(online<float> && online<double>);
+
+/// Calls `query(scene, random, i)` so many times in each of so many scenes, once deformed.
+template <class S, class Query>
+void for_each_query(int scenes, int queries, Query query) {
+    for (int seed = 1; seed <= scenes; ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        auto scene = random_scene<S>(random);
+        scene.deform(random);
+        for (int i = 0; i < queries; ++i) query(scene, random, i);
+    }
+}
 
 /// So many queries in each of so many rounds; in the long run in ten times as many scenes.
 template <class S>
@@ -166,103 +167,77 @@ TEST_CASE("the same in single precision", "[tree]") { compare_closest_points<flo
 TEMPLATE_TEST_CASE("a sphere touches the triangles that are near enough", "[tree]", float, double) {
     using S = TestType;
     int touching = 0;
-    for (int seed = 1; seed <= cases(1000); ++seed) {
-        CAPTURE(seed);
-        Random random(static_cast<std::uint64_t>(seed));
-        auto scene = random_scene<S>(random);
-        scene.deform(random);
-        for (int i = 0; i < 20; ++i) {
-            const auto q = scene.query(random);
-            const S radius = scene.size * random.number<S>(0, S(0.4));
-            const auto found = visited([&](auto visit) { scene.tree.overlap_sphere(scene.x, q, radius, visit); });
-            const auto expected = test::all_that<S>(scene.x, scene.mesh.triangles(), [&](const auto& t) {
-                return test::squared_distance<S>(t, q) <= radius * radius;
-            });
-            if (found != expected) FAIL_CHECK(found.size() << " instead of " << expected.size());
-            touching += static_cast<int>(found.size());
-        }
-    }
+    for_each_query<S>(cases(1000), 20, [&](const Scene<S>& scene, Random& random, int) {
+        const auto q = scene.query(random);
+        const S radius = scene.size * random.number<S>(0, S(0.4));
+        const auto found = visited([&](auto visit) { scene.tree.overlap_sphere(scene.x, q, radius, visit); });
+        const auto expected = test::all_that<S>(scene.x, scene.mesh.triangles(), [&](const auto& t) {
+            return test::squared_distance<S>(t, q) <= radius * radius;
+        });
+        if (found != expected) FAIL_CHECK(found.size() << " instead of " << expected.size());
+        touching += static_cast<int>(found.size());
+    });
     CHECK(touching > cases(100'000));
 }
 
 TEMPLATE_TEST_CASE("a box touches the triangles that it leaves something of", "[tree]", float, double) {
     using S = TestType;
     int touching = 0;
-    for (int seed = 1; seed <= cases(400); ++seed) {
-        CAPTURE(seed);
-        Random random(static_cast<std::uint64_t>(seed));
-        auto scene = random_scene<S>(random);
-        scene.deform(random);
-        for (int i = 0; i < 10; ++i) {
-            const auto low = scene.query_beside(random);
-            const Vector3<S> high = low + scene.size * random.vector<S>(0, S(0.6));
-            const auto found = visited([&](auto visit) { scene.tree.overlap_box(scene.x, low, high, visit); });
-            const auto expected = test::all_that<Long>(scene.x, scene.mesh.triangles(), [&](const auto& t) {
-                return test::meet_box(t, exact(low), exact(high));
-            });
-            if (found != expected) FAIL_CHECK(found.size() << " instead of " << expected.size());
-            touching += static_cast<int>(found.size());
-        }
-    }
+    for_each_query<S>(cases(400), 10, [&](const Scene<S>& scene, Random& random, int) {
+        const auto low = scene.query_beside(random);
+        const Vector3<S> high = low + scene.size * random.vector<S>(0, S(0.6));
+        const auto found = visited([&](auto visit) { scene.tree.overlap_box(scene.x, low, high, visit); });
+        const auto expected = test::all_that<Long>(
+            scene.x, scene.mesh.triangles(), [&](const auto& t) { return test::meet_box(t, exact(low), exact(high)); });
+        if (found != expected) FAIL_CHECK(found.size() << " instead of " << expected.size());
+        touching += static_cast<int>(found.size());
+    });
     CHECK(touching > cases(10'000));
 }
 
 TEMPLATE_TEST_CASE("a capsule touches the triangles that are near enough to its axis", "[tree]", float, double) {
     using S = TestType;
     int touching = 0;
-    for (int seed = 1; seed <= cases(40); ++seed) {
-        CAPTURE(seed);
-        Random random(static_cast<std::uint64_t>(seed));
-        auto scene = random_scene<S>(random);
-        scene.deform(random);
-        for (int i = 0; i < 4; ++i) {
-            const auto p = scene.query(random), q = i == 0 ? p : scene.query(random);
-            const S radius = scene.size * random.number<S>(S(0.001), S(0.2));
-            const auto found = visited([&](auto visit) { scene.tree.overlap_capsule(scene.x, p, q, radius, visit); });
-            const auto expected = test::all_that<Long>(scene.x, scene.mesh.triangles(), [&](const auto& t) {
-                return std::sqrt(test::squared_distance_by_search(t, exact(p), exact(q))) <= Long(radius);
-            });
-            if (found != expected) FAIL_CHECK(found.size() << " instead of " << expected.size());
-            touching += static_cast<int>(found.size());
-        }
-    }
+    for_each_query<S>(cases(40), 4, [&](const Scene<S>& scene, Random& random, int i) {
+        const auto p = scene.query(random), q = i == 0 ? p : scene.query(random);
+        const S radius = scene.size * random.number<S>(S(0.001), S(0.2));
+        const auto found = visited([&](auto visit) { scene.tree.overlap_capsule(scene.x, p, q, radius, visit); });
+        const auto expected = test::all_that<Long>(scene.x, scene.mesh.triangles(), [&](const auto& t) {
+            return std::sqrt(test::squared_distance_by_search(t, exact(p), exact(q))) <= Long(radius);
+        });
+        if (found != expected) FAIL_CHECK(found.size() << " instead of " << expected.size());
+        touching += static_cast<int>(found.size());
+    });
     CHECK(touching > cases(200));
 }
 
 TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tree]", float, double) {
     using S = TestType;
     int hits = 0;
-    for (int seed = 1; seed <= cases(1000); ++seed) {
-        CAPTURE(seed);
-        Random random(static_cast<std::uint64_t>(seed));
-        auto scene = random_scene<S>(random);
-        scene.deform(random);
-        for (int i = 0; i < 20; ++i) {
-            const Vector3<S> from = scene.query_beside(random), to = from + 2 * (scene.query_beside(random) - from);
-            const auto hit = scene.tree.first_hit(scene.x, from, to);
-            const auto all = test::all_that<Long>(scene.x, scene.mesh.triangles(),
-                                                  [&](const auto& t) { return test::meet(t, exact(from), exact(to)); });
-            if ((hit.triangle == no_index) != all.empty()) FAIL_CHECK(all.size() << " are hit");
-            if (hit.triangle == no_index || all.empty()) {
-                CHECK((hit.fraction == 1 || hit.triangle != no_index));
-                continue;
-            }
-            ++hits;
-            Long first = 1;
-            for (const Index f : all) {
-                const auto t = test::brute_triangle<Long>(scene.triangle(f));
-                const Long above = test::volume(t.a, t.b, t.c, exact(from));
-                first = std::min(first, above / (above - test::volume(t.a, t.b, t.c, exact(to))));
-            }
-            const auto triangle = scene.triangle(hit.triangle);
-            const Vector3<S> segment = to - from, normal = area_vector(triangle);
-            const S slope = std::abs(dot(segment, normal)) / (norm(segment) * norm(normal));
-            const S slack = 256 * std::numeric_limits<S>::epsilon() * scene.scale(from) / slope;
-            if (!(std::abs(hit.fraction - first) * norm(segment) <= slack))
-                FAIL_CHECK(hit.fraction << ", not " << first);
-            CHECK(norm<S>(point_at(triangle, hit.barycentric) - (from + hit.fraction * segment)) <= slack);
+    for_each_query<S>(cases(1000), 20, [&](const Scene<S>& scene, Random& random, int) {
+        const Vector3<S> from = scene.query_beside(random), to = from + 2 * (scene.query_beside(random) - from);
+        const auto hit = scene.tree.first_hit(scene.x, from, to);
+        const auto all = test::all_that<Long>(scene.x, scene.mesh.triangles(),
+                                              [&](const auto& t) { return test::meet(t, exact(from), exact(to)); });
+        if ((hit.triangle == no_index) != all.empty()) FAIL_CHECK(all.size() << " are hit");
+        if (hit.triangle == no_index || all.empty()) {
+            CHECK((hit.fraction == 1 || hit.triangle != no_index));
+            return;
         }
-    }
+        ++hits;
+        Long first = 1;
+        for (const Index f : all) {
+            const auto t = test::brute_triangle<Long>(scene.triangle(f));
+            const Long above = test::volume(t.a, t.b, t.c, exact(from));
+            first = std::min(first, above / (above - test::volume(t.a, t.b, t.c, exact(to))));
+        }
+        const auto triangle = scene.triangle(hit.triangle);
+        const Vector3<S> segment = to - from, normal = area_vector(triangle);
+        const S slope = std::abs(dot(segment, normal)) / (norm(segment) * norm(normal));
+        const S slack = 256 * std::numeric_limits<S>::epsilon() * scene.scale(from) / slope;
+        if (!(std::abs(hit.fraction - first) * norm(segment) <= slack)) FAIL_CHECK(hit.fraction << ", not " << first);
+        CHECK(norm<S>(point_at(triangle, hit.barycentric) - (from + hit.fraction * segment)) <= slack);
+    });
     CHECK(hits > cases(5000));
 }
 
