@@ -63,9 +63,10 @@ template <Number N>
 template <Number N>
 [[nodiscard]] Vector3<N> point_at(const Triangle<N>& triangle, const Vector3<N>& barycentric) noexcept;
 
-/// The point of the triangle nearest to `q`; several triangles at once give the same bits. A triangle whose height is
-/// below sqrt(epsilon) of its edges counts as its three edges, which moves the point by at most that height. If a
-/// triangle is not finite, or the square of its area overflows, its distance is infinite.
+/// The point of the triangle nearest to `q`; several triangles at once give the same bits. Accurate to some epsilon times
+/// edge^2 / height, for the longest edge and the height above it. A triangle whose height is below sqrt(epsilon) of its
+/// edges counts as its three edges, which moves the point by at most that height. If a triangle is not finite, or the
+/// square of its area overflows, its distance is infinite.
 template <Number N>
 [[nodiscard]] TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept;
 
