@@ -28,9 +28,9 @@ using Values = std::vector<double>;
 /// A measured curve and the model's values at the same points.
 struct Curve {
     std::string name, unit;
-    Values at, measured;
-    Values predicted, low, high;  ///< from the constants of others, and with those of each other set
-    Values fitted;
+    Values at{}, measured{};
+    Values predicted{}, low{}, high{};  ///< from the constants of others, and with those of each other set
+    Values fitted{};
 
     void vary(const Values& other) {
         if (low.empty()) low = high = predicted;
@@ -120,22 +120,28 @@ std::vector<Curve> mouse_curves() {
     return curves;
 }
 
-/// A human eye: from moduli of strips of sclera, [Sclera88] 2.9 +- 1.4 in front and 1.8 +- 1.1 MPa behind, and by
-/// `stiffening_globe`. Variants: their ends, the thinnest sclera and that half way to the pole, the ends of the area.
-Curve eye_curve(const membrane::Fit& fit) {
+/// A human eye by one law, with the thinnest sclera and that half way to the pole, and the ends of its area.
+Curve eye_curve(const std::string& name, Law law, const Values& constants, const membrane::Fit& fit) {
     const Globe eye{globe_radius(sclera_area), mean_thickness()};
-    const auto by = [](const Globe& globe, double modulus) {
-        return growths(globe, rubber, Values{modulus}, globe_pressures);
-    };
-    Curve curve{.name = "human eye, its volume from 10 to 40 mmHg", .unit = "ul", .at = globe_pressures};
+    Curve curve{.name = "human eye, 10 to 40 mmHg, " + name, .unit = "ul", .at = globe_pressures};
     for (const double pressure : globe_pressures) curve.measured.push_back(measured_growth(pressure));
-    constexpr double modulus = (2.9 + 1.8) / 2;
-    curve.predicted = by(eye, modulus);
-    for (const double other : {2.9 + 1.4, 1.8 - 1.1}) curve.vary(by(eye, other));
-    for (const double thickness : {0.42e-3, 0.65e-3}) curve.vary(by({eye.radius, thickness}, modulus));
-    for (const double area : {14.5e-4, 18.1e-4}) curve.vary(by({globe_radius(area), eye.thickness}, modulus));
+    curve.predicted = growths(eye, law, constants, globe_pressures);
+    for (const double thickness : {0.42e-3, 0.65e-3})
+        curve.vary(growths({eye.radius, thickness}, law, constants, globe_pressures));
+    for (const double area : {14.5e-4, 18.1e-4})
+        curve.vary(growths({globe_radius(area), eye.thickness}, law, constants, globe_pressures));
     curve.fitted = growths(eye, stiffening_globe, fit.constants, globe_pressures);
     return curve;
+}
+
+/// From moduli of strips of sclera, [Sclera88] 2.9 +- 1.4 in front and 1.8 +- 1.1 MPa behind; and from sclera under
+/// pressure.
+std::vector<Curve> eye_curves(const membrane::Fit& fit) {
+    const Globe eye{globe_radius(sclera_area), mean_thickness()};
+    Curve strips = eye_curve("from strips", rubber, {(2.9 + 1.8) / 2}, fit);
+    for (const double modulus : {2.9 + 1.4, 1.8 - 1.1})
+        strips.vary(growths(eye, rubber, Values{modulus}, globe_pressures));
+    return {strips, eye_curve("from sclera under pressure", springs_in_matrix, sclera_constants, fit)};
 }
 
 void print(const std::vector<Curve>& curves, std::FILE* file) {
@@ -204,7 +210,7 @@ void run(const std::filesystem::path& folder) {
     std::vector<Curve> curves = pig_curves();
     const std::vector<Curve> mice = mouse_curves();
     curves.insert(curves.end(), mice.begin(), mice.end());
-    curves.push_back(eye_curve(eye));
+    for (const Curve& curve : eye_curves(eye)) curves.push_back(curve);
     std::FILE* page = std::fopen((folder / "tissue_curves.md").c_str(), "w");
     if (page == nullptr) throw std::runtime_error("cannot write " + (folder / "tissue_curves.md").string());
     print(curves, page);

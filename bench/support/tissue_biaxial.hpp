@@ -39,12 +39,9 @@ struct Biaxial {
     return {x, membrane::Triangles(corners)};
 }
 
-/// True stresses [MPa] of a sheet of these elements, 1 m thick at rest and incompressible. By virtual work: the sum of
-/// force times rest position is the nominal stress of the square, that times the stretch the true one.
-template <class... Kinds>
-[[nodiscard]] Pair stresses_of(const Mesh& square, const Pair& stretch, const Kinds&... elements) {
-    const membrane::MassSpringNetwork none(square, membrane::LinearSpring{}, {.stiffness = 0.0});
-    const membrane::Tissue tissue(none, elements...);
+/// True stresses [MPa] of a tissue of this square, 1 m thick at rest and incompressible: by virtual work, the sum of
+/// force times position over the volume, which is 1 m^3.
+[[nodiscard]] Pair true_stresses(const Mesh& square, const Pair& stretch, const auto& tissue) {
     Points x = square.positions();
     x.row(0) *= stretch[0];
     x.row(1) *= stretch[1];
@@ -57,6 +54,12 @@ template <class... Kinds>
         }
     }
     return sum;
+}
+
+/// The same of these elements.
+[[nodiscard]] Pair stresses_of(const Mesh& square, const Pair& stretch, const auto&... elements) {
+    const membrane::MassSpringNetwork none(square, membrane::LinearSpring{}, {.stiffness = 0.0});
+    return true_stresses(square, stretch, membrane::Tissue(none, elements...));
 }
 
 /// A law with its positive constants, moduli in MPa.

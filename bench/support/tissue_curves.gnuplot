@@ -45,11 +45,14 @@ set xlabel 'pressure [mmHg]'
 set ylabel 'growth from 10 mmHg on [µl]'
 set format y '%g'
 set xtics 5
-set ytics 100
 set xrange [10:41]
-set yrange [0:400]
-plot data index 18 using 1:4:5 with filledcurves lc rgb along title 'band', \
-     '' index 18 using 1:3 with lines lw 2 lc rgb along title 'from strips of sclera', \
-     '' index 18 using 1:6 with lines lw 1.5 dt 2 lc rgb along title 'fitted, E at rest and stiffening', \
-     '' index 18 using 1:2 with points pt 7 ps 0.6 lc rgb '#1a1a1a' title 'measured, by the author''s equation'
+set yrange [0:140]
+set ytics 20
+set key opaque
+plot data index 18 using 1:4:5 with filledcurves lc rgb across notitle, \
+     data index 19 using 1:4:5 with filledcurves lc rgb along notitle, \
+     data index 18 using 1:3 with lines lw 2 lc rgb across title 'from strips of sclera', \
+     data index 19 using 1:3 with lines lw 2 lc rgb along title 'from sclera under pressure', \
+     data index 18 using 1:6 with lines lw 1.5 dt 2 lc rgb '#1a1a1a' title 'fitted', \
+     data index 18 using 1:2 with points pt 7 ps 0.6 lc rgb '#1a1a1a' title 'measured, by the author''s equation'
 unset multiplot

@@ -88,6 +88,20 @@ inline const std::vector<double> globe_pressures{12.5, 15, 17.5, 20, 22.5, 25, 2
     return stiffening_sheet(constants, stretch, 1.01);
 }
 
+/// Collagen of all directions in a matrix, under equal stretches. Constants C1, C3 [MPa] and C4: the matrix has the
+/// energy C1 (I1 - 3), and a fibre the true stress C3 (exp(C4 (stretch - 1)) - 1), half of which acts in each direction.
+/// The fibres are exponential springs along the edges and the diagonal of the square, three springs' worth to each axis.
+[[nodiscard]] inline Pair springs_in_matrix(std::span<const double> constants, const Pair& stretch) {
+    const Mesh square = unit_square();
+    const membrane::Material matrix{.young_modulus = 6e6 * constants[0], .poisson_ratio = 0.5, .thickness = 1};
+    const membrane::ExponentialSpring law{.stiffening = constants[2], .strain_limit = 0.04};
+    const membrane::MassSpringNetwork fibres(square, law, {.stiffness = 1e6 * constants[1] * constants[2] / 6});
+    return true_stresses(square, stretch, membrane::Tissue(fibres, membrane::neo_hookean(square, matrix)));
+}
+
+/// [Sclera20] table 2, after Girard and others; the units are taken as MPa, as those of its other rows.
+inline const std::vector<double> sclera_constants{0.805, 0.01269, 1102.25};
+
 /// E at rest and stiffening, by `fit` to the measured growth.
 [[nodiscard]] inline membrane::Fit fitted_globe(const Globe& globe) {
     membrane::ForceTable table;
