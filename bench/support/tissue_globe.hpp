@@ -77,7 +77,7 @@ inline constexpr double sclera_area = 16.3e-4;
     return found;
 }
 
-/// Enucleated human eyes, the author's fit of his measurement: (cube root of pressure - that of 10 mmHg) / k, k = 0.03
+/// Enucleated human eyes, the author's equation for measurements: (cube root of pressure - that of 10 mmHg) / k, k = 0.03
 /// mmHg^(1/3)/ul [VanDerWerff81]. "Over a wide range" of pressures; the one here is assumed.
 [[nodiscard]] inline double measured_growth(double pressure) { return (std::cbrt(pressure) - std::cbrt(10.0)) / 0.03; }
 
