@@ -89,6 +89,7 @@ TEST_CASE("a hinge pulls with the derivative of its energy, however far it is fo
         const auto hinge = hinge_of(k, angle + random.number(-0.3, 0.3));
         test::check_element(hinge, x, 0.2 * size, k, random);
         const auto at_rest = hinge_of(k, angle_of(x));
+        REQUIRE(at_rest.rest() == Approx(angle_of(x)));
         test::check_hessian(at_rest, x, 0.2 * size, k);
         known += test::check_remainder(hinge, x, 0.2 * size, k, random);
         for (std::size_t i = 0; i < 4; ++i) {  // seen from each corner the same

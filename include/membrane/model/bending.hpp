@@ -47,6 +47,9 @@ struct Hinge {
     Scalar rest_sine = 0;    ///< sine of the angle at rest
     Scalar rest_cosine = 1;  ///< its cosine
 
+    /// The angle at rest, between -pi and pi [rad].
+    [[nodiscard]] Scalar rest() const noexcept { return arctangent(rest_sine, rest_cosine); }
+
     ///@{
     /// As `Element` requires.
     template <Number N>
