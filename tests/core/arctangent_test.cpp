@@ -42,7 +42,16 @@ TEMPLATE_TEST_CASE("each lane has the bits of its number alone", "[arctangent][l
     Random random(2);
     for (int i = 0; i < cases(10'000); ++i) {
         const auto numbers = [&] { return Lanes<S>::of([&](std::size_t) { return random.number(S(-1), S(1)); }); };
-        const Lanes<S> y = numbers(), x = numbers(), angle = arctangent(y, x);
-        for (std::size_t l = 0; l < Lanes<S>::count; ++l) REQUIRE(angle[l] == arctangent(y[l], x[l]));
+        const Lanes<S> y = numbers();
+        Lanes<S> x = numbers();
+        if (random.chance(0.5)) x = 3 + x;  // small angles in all lanes
+        if (random.chance(0.1)) x.set(1, std::numeric_limits<S>::infinity());
+        if (random.chance(0.1)) x.set(0, std::numeric_limits<S>::quiet_NaN());
+        const Lanes<S> angle = arctangent(y, x);
+        for (std::size_t l = 0; l < Lanes<S>::count; ++l) {
+            const S alone = arctangent(y[l], x[l]);
+            REQUIRE((angle[l] == alone || (std::isnan(angle[l]) && std::isnan(alone))));
+            REQUIRE(std::isnan(alone) != std::isfinite(x[l]));
+        }
     }
 }

@@ -56,6 +56,14 @@ std::pair<double, double> energy_and_area(const Elements<double, Hinge<double>>&
     return {energy, area};
 }
 
+/// A hinge at rest at `angle`.
+Hinge<double> hinge_of(double stiffness, double angle) {
+    return {.stiffness = stiffness, .rest_sine = std::sin(angle), .rest_cosine = std::cos(angle)};
+}
+
+/// The fold angle.
+double angle_of(const Corners<double, 4>& x) { return detail::Fold<double>(x).angle_from_rest(Hinge<double>{}); }
+
 }  // namespace
 
 TEST_CASE("a hinge pulls with the derivative of its energy, however far it is folded", "[bending]") {
@@ -72,15 +80,16 @@ TEST_CASE("a hinge pulls with the derivative of its energy, however far it is fo
                    Eigen::Vector3d(random.number(-0.2, 1.2), side * away * std::cos(lift), away * std::sin(lift));
         };
         Corners<double, 4> x{Eigen::Vector3d::Zero(), size * Eigen::Vector3d::UnitX(), apex(1, 0), apex(-1, -angle)};
-        const Hinge<double> flat{.stiffness = k, .rest = 0};
+        const Hinge<double> flat{.stiffness = k};
         REQUIRE(flat.energy(x) == Approx(k * angle * angle / 2));
-        REQUIRE(detail::Fold<double>(x).angle() == Approx(angle));
+        REQUIRE(angle_of(x) == Approx(angle));
         const Eigen::Matrix3d turn = random.rotation();
         const Eigen::Vector3d shift = size * random.vector();
         for (auto& corner : x) corner = turn * corner + shift;
-        const Hinge<double> hinge{.stiffness = k, .rest = angle + random.number(-0.3, 0.3)};
+        const auto hinge = hinge_of(k, angle + random.number(-0.3, 0.3));
         test::check_element(hinge, x, 0.2 * size, k, random);
-        const Hinge<double> at_rest{.stiffness = k, .rest = detail::Fold<double>(x).angle()};
+        const auto at_rest = hinge_of(k, angle_of(x));
+        REQUIRE(at_rest.rest() == Approx(angle_of(x)));
         test::check_hessian(at_rest, x, 0.2 * size, k);
         known += test::check_remainder(hinge, x, 0.2 * size, k, random);
         for (std::size_t i = 0; i < 4; ++i) {  // seen from each corner the same
@@ -100,15 +109,15 @@ TEST_CASE("no hinge curves more than the heights over its lines say", "[bending]
         for (auto& corner : x) corner = std::exp(random.number(-1.0, 1.0)) * random.vector();
         const detail::Fold<double> fold(x);
         for (std::size_t corner = 0; corner < 4; ++corner) {
-            const double curvature = fold.curvature(x, corner), h = 1e-5 / std::sqrt(curvature);
+            const double curvature = fold.curvature(corner), h = 1e-5 / std::sqrt(curvature);
             Eigen::Matrix3d second;
             for (Eigen::Index k = 0; k < 3; ++k) {
                 auto before = x, after = x;
                 before[corner][k] -= h, after[corner][k] += h;
-                second.col(k) = (detail::Fold<double>(after).slope(after, corner) -
-                                 detail::Fold<double>(before).slope(before, corner))
-                                    .eigen() /
-                                (2 * h);
+                second.col(k) =
+                    (detail::Fold<double>(after).descent(corner) - detail::Fold<double>(before).descent(corner))
+                        .eigen() /
+                    (2 * h);
             }
             const Eigen::Matrix3d symmetric = (second + second.transpose()) / 2;
             const double largest = test::eigenvalues_of(symmetric).cwiseAbs().maxCoeff();
@@ -120,7 +129,7 @@ TEST_CASE("no hinge curves more than the heights over its lines say", "[bending]
 }
 
 TEST_CASE("the less a hinge is folded, the less there is to round", "[bending]") {
-    const Hinge<double> hinge{.stiffness = 3, .rest = 0};
+    const Hinge<double> hinge{.stiffness = 3};
     double before = 100;
     for (const double lift : {1.0, 1e-2, 1e-4, 1e-6}) {
         const Corners<double, 4> x{Vector3<double>(0, 0, 0), Vector3<double>(0, 1, 0), Vector3<double>(1, 0.5, 0),
@@ -205,14 +214,15 @@ TEST_CASE("hinges side by side do what each does alone, to the bit", "[bending]"
         Random random(static_cast<std::uint64_t>(seed));
         std::array<Hinge<double>, Wide::count> hinges;
         std::array<Corners<double, 4>, Wide::count> x;
-        for (auto& hinge : hinges) hinge = {random.number(0.1, 2.0), random.number(-3.0, 3.0)};
+        for (auto& hinge : hinges) hinge = hinge_of(random.number(0.1, 2.0), random.number(-3.0, 3.0));
         for (auto& corners : x) {
             for (auto& corner : corners) corner = random.vector();
         }
         if (random.chance(0.3)) x[1][2] = x[1][0];  // without an area
         test::check_lanes(hinges, x, 0.1 * random.vector(), [](const auto& all) {
             return Hinge<Wide>{Wide::of([&](std::size_t l) { return all[l].stiffness; }),
-                               Wide::of([&](std::size_t l) { return all[l].rest; })};
+                               Wide::of([&](std::size_t l) { return all[l].rest_sine; }),
+                               Wide::of([&](std::size_t l) { return all[l].rest_cosine; })};
         });
     }
 }

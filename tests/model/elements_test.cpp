@@ -42,6 +42,12 @@ TEST_CASE("each vertex has its elements, which corner it is and where the others
             });
             for (const Index w : mesh.triangles().reshaped()) expected += w == v ? 1 : 0;
             REQUIRE(found == expected);
+            std::size_t by_place = 0;
+            for (std::size_t place = 0; place < 3; ++place) {
+                for (const auto& at : elements.at(v, place)) REQUIRE(at.place == place);
+                by_place += elements.at(v, place).size();
+            }
+            REQUIRE(by_place == elements.at(v).size());
         }
     }
 }

@@ -26,30 +26,42 @@ template <>
 inline constexpr auto arctangent_series<float> = std::to_array<float>({-0.333333155F, 0.199984894F, -0.142438487F,
                                                                        0.105960013F, -0.0608345288F});
 
-}  // namespace detail
-
-/// `std::atan2(y, x)` [rad], to four epsilons; zero at the origin, NaN unless both are finite. It has the same bits on
-/// every machine, which the standard library does not promise: by sums, products, one division and comparisons.
+/// arctan(t) for |t| <= tan(pi / 8).
 template <Number N>
-[[nodiscard]] MEMBRANE_INLINE N arctangent(const N& y, const N& x) noexcept {
-    using std::abs;
-    using Scalar = Each<N>;
-    constexpr Scalar pi = std::numbers::pi_v<Scalar>, tangent_of_eighth = std::numbers::sqrt2_v<Scalar> - 1;
-    const N across = abs(y), along = abs(x), longer = larger(across, along), shorter = smaller(across, along);
-    // arctan(t) = pi/4 + arctan((t - 1) / (t + 1)).
-    const auto beyond = shorter > tangent_of_eighth * longer;
-    const N divisor = select<N>(beyond, shorter + longer, longer);
-    const N t = select<N>(beyond, shorter - longer, shorter) / select<N>(longer > 0, divisor, 1), square = t * t;
-    constexpr auto series = detail::arctangent_series<Scalar>;
+[[nodiscard]] MEMBRANE_INLINE N arctangent_of_small(const N& t) noexcept {
+    constexpr auto series = arctangent_series<Each<N>>;
+    const N square = t * t, fourth = square * square;
     // Two sums of every other term, which a processor evaluates at the same time.
     constexpr std::size_t last = series.size() - 1;
-    const N fourth = square * square;
     N sum = series[last], other = series[last - 1];
     for (std::size_t k = last; k >= 2; k -= 2) {
         sum = sum * fourth + series[k - 2];
         if (k >= 3) other = other * fourth + series[k - 3];
     }
-    const N small = t + t * (square * (sum + square * other));
+    return t + t * (square * (sum + square * other));
+}
+
+}  // namespace detail
+
+/// `std::atan2(y, x)` [rad], to four epsilons; zero at the origin, NaN unless both are finite. It has the same bits on
+/// every machine, which the standard library does not promise: by sums, products, one division and comparisons. Faster if
+/// all angles are below pi / 8.
+template <Number N>
+[[nodiscard]] MEMBRANE_INLINE N arctangent(const N& y, const N& x) noexcept {
+    using std::abs;
+    using Scalar = Each<N>;
+    constexpr Scalar pi = std::numbers::pi_v<Scalar>, tangent_of_eighth = std::numbers::sqrt2_v<Scalar> - 1;
+    const N across = abs(y), along = abs(x);
+    // The same as below. The last term is zero or NaN.
+    if (all(across <= tangent_of_eighth * x)) {
+        return detail::arctangent_of_small<N>(y / select<N>(x > 0, x, 1)) + 0 * x;
+    }
+    const N longer = larger(across, along), shorter = smaller(across, along);
+    // arctan(t) = pi/4 + arctan((t - 1) / (t + 1)).
+    const auto beyond = shorter > tangent_of_eighth * longer;
+    const N divisor = select<N>(beyond, shorter + longer, longer);
+    const N t = select<N>(beyond, shorter - longer, shorter) / select<N>(longer > 0, divisor, 1);
+    const N small = detail::arctangent_of_small<N>(t);
     const N in_eighth = select<N>(beyond, pi / 4 + small, small);
     const N in_quarter = select<N>(across > along, pi / 2 - in_eighth, in_eighth);
     const N in_half = select<N>(x < 0, pi - in_quarter, in_quarter);

@@ -194,9 +194,17 @@ template <class Part, Real Scalar>
     static_assert(width == 2 || width == 4 || width == 8);
     if constexpr (width == 2) {
         const Scalar *first = rows + begins[0], *second = rows + begins[1];
-        const Part a = load_part<Part>(first), b = load_part<Part>(second);
-        const Part c = load_part<Part>(first + 2), d = load_part<Part>(second + 2);
-        return {shuffle<0, 2>(a, b), shuffle<1, 3>(a, b), shuffle<0, 2>(c, d), shuffle<1, 3>(c, d)};
+        const auto column = [&](std::size_t k) MEMBRANE_INLINE_LAMBDA {
+            return Part{for_lane(first[k]), for_lane(second[k])};
+        };
+        return {column(0), column(1), column(2), column(3)};
+    } else if constexpr (sizeof(Part) == 16) {
+        const Part a = load_part<Part>(rows + begins[0]), b = load_part<Part>(rows + begins[1]),
+                   c = load_part<Part>(rows + begins[2]), d = load_part<Part>(rows + begins[3]);
+        const Part ab = shuffle<0, 4, 1, 5>(a, b), cd = shuffle<0, 4, 1, 5>(c, d);
+        const Part ab_z = shuffle<2, 6, 3, 7>(a, b), cd_z = shuffle<2, 6, 3, 7>(c, d);
+        return {shuffle<0, 1, 4, 5>(ab, cd), shuffle<2, 3, 6, 7>(ab, cd), shuffle<0, 1, 4, 5>(ab_z, cd_z),
+                shuffle<2, 3, 6, 7>(ab_z, cd_z)};
     } else if constexpr (width == 4) {
         // Reads half rows, so that no later shuffle crosses the halves of a register.
         using Half = typename Register<Scalar, 2 * sizeof(Scalar)>::Type;

@@ -129,10 +129,14 @@ class Lanes {
         ///@}
 
         /// Whether the mask is set in every lane.
-        [[nodiscard]] MEMBRANE_INLINE friend bool all(const Mask& mask) noexcept { return !any(!mask); }
+        [[nodiscard]] MEMBRANE_INLINE friend bool all(const Mask& mask) noexcept {
+            return Registers::bits(mask.parts_[0] & mask.parts_[last]) == (1U << width) - 1;
+        }
 
         /// Whether the mask is set in at least one lane.
-        [[nodiscard]] MEMBRANE_INLINE friend bool any(const Mask& mask) noexcept { return bits(mask) != 0; }
+        [[nodiscard]] MEMBRANE_INLINE friend bool any(const Mask& mask) noexcept {
+            return Registers::bits(mask.parts_[0] | mask.parts_[last]) != 0;
+        }
 
         /// Lane i in bit i.
         [[nodiscard]] MEMBRANE_INLINE friend std::uint32_t bits(const Mask& mask) noexcept {

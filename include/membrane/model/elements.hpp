@@ -252,8 +252,16 @@ class Elements {
         std::size_t place;  ///< of the vertex among the corners
     };
 
-    /// The elements of vertex `v`, by their `place`.
+    ///@{
+    /// The elements of vertex `v`, by their `place`; and those where it has one `place`.
     [[nodiscard]] std::span<const AtVertex> at(Index v) const noexcept { return at_vertex_[v]; }
+    [[nodiscard]] std::span<const AtVertex> at(Index v, std::size_t place) const noexcept {
+        const auto all = at_vertex_[v];
+        const auto first = std::find_if(all.begin(), all.end(), [&](const auto& at) { return at.place >= place; });
+        const auto end = std::find_if(first, all.end(), [&](const auto& at) { return at.place > place; });
+        return {first, end};
+    }
+    ///@}
 
     /// Calls `act(instance, x, place)` for each element of vertex `v`: `x` are the positions of its corners, number
     /// `place` is `v`.

@@ -76,14 +76,8 @@ class PackedElements {
     // Calls `act(elements, place, group)` for each kind and each place of a vertex in it; place and group are constants.
     template <class Network, class Act>
     static void for_each_group(const Network& network, const Act& act) noexcept;
-    template <class All>
-    [[nodiscard]] static std::size_t count_at(const All& elements, Index v, std::size_t place) noexcept {
-        const auto at_vertex = elements.at(v);
-        const auto is_there = [&](const auto& at) { return at.place == place; };
-        return static_cast<std::size_t>(std::count_if(at_vertex.begin(), at_vertex.end(), is_there));
-    }
     template <class E>
-    void fill_lane(Slot<E>& slot, std::size_t lane, const typename Elements<Scalar, E>::AtVertex& at) noexcept;
+    static void fill_lane(Slot<E>& slot, std::size_t lane, std::size_t place, const ElementInstance<E>& at) noexcept;
     template <class E>
     [[nodiscard]] Slot<E>& slot_at(std::size_t block) noexcept {
         return *std::launder(reinterpret_cast<Slot<E>*>(&blocks_[block]));
@@ -128,7 +122,7 @@ PackedElements<Scalar>::PackedElements(const Network& network, std::size_t capac
     for_each_group(network, [&]<class E>(const Elements<Scalar, E>& elements, auto place, std::size_t group) {
         std::size_t all = 0, longest = 0;
         for (Index v = 0; v < network.vertex_count(); ++v) {
-            const std::size_t count = count_at(elements, v, place);
+            const std::size_t count = elements.at(v, place).size();
             all += count;
             longest = (std::max)(longest, count);
         }
@@ -150,8 +144,12 @@ bool PackedElements<Scalar>::append(std::span<const Index> vertices, const Begin
     if (!begins_.try_push_back(block_count_)) return false;
     bool fits = true;
     for_each_group(network, [&]<class E>(const Elements<Scalar, E>& elements, auto place, std::size_t group) {
+        std::array<std::span<const typename Elements<Scalar, E>::AtVertex>, Wide::count> in_lane;
         std::size_t count = 0;
-        for (const Index v : vertices) count = (std::max)(count, count_at(elements, v, place));
+        for (std::size_t lane = 0; lane < vertices.size(); ++lane) {
+            in_lane[lane] = elements.at(vertices[lane], place);
+            count = (std::max)(count, in_lane[lane].size());
+        }
         const std::size_t first = block_count_;
         fits = fits && first + count * blocks<E> <= blocks_.size();
         if (!fits) return;
@@ -161,9 +159,8 @@ bool PackedElements<Scalar>::append(std::span<const Index> vertices, const Begin
         counts_[pack * group_count_ + group] = static_cast<Index>(count);
         for (std::size_t lane = 0; lane < vertices.size(); ++lane) {
             std::size_t block = first;
-            for (const auto& at : elements.at(vertices[lane])) {
-                if (at.place != place) continue;
-                fill_lane(slot_at<E>(block), lane, at);
+            for (const auto& at : in_lane[lane]) {
+                fill_lane(slot_at<E>(block), lane, place, at.instance);
                 block += blocks<E>;
             }
         }
@@ -174,11 +171,11 @@ bool PackedElements<Scalar>::append(std::span<const Index> vertices, const Begin
 
 template <Real Scalar>
 template <class E>
-void PackedElements<Scalar>::fill_lane(Slot<E>& slot, std::size_t lane,
-                                       const typename Elements<Scalar, E>::AtVertex& at) noexcept {
-    membrane::set_lane(slot.element, lane, at.instance.element);
-    for (std::size_t k = 0, other = 0; k < E::corner_count; ++k) {
-        if (k != at.place) slot.others[other++][lane] = numbers_in_point * at.instance.corners[k];
+MEMBRANE_INLINE void PackedElements<Scalar>::fill_lane(Slot<E>& slot, std::size_t lane, std::size_t place,
+                                                       const ElementInstance<E>& at) noexcept {
+    membrane::set_lane(slot.element, lane, at.element);
+    for (std::size_t k = 0; k < E::corner_count; ++k) {
+        if (k != place) slot.others[k - (k > place)][lane] = numbers_in_point * at.corners[k];
     }
 }
 
