@@ -60,9 +60,8 @@ void run(const std::filesystem::path& folder, const std::vector<std::string>& na
         tables.push_back(table);
     }
     for (std::FILE* file : {stdout, page}) {
-        std::fprintf(
-            file,
-            "\n| scene | largest difference | bound | largest with an assumption switched |\n|---|---|---|---|\n");
+        std::fprintf(file,
+                     "\n| scene | largest difference | bound | with an assumption switched |\n|---|---|---|---|\n");
         for (const Comparison& table : tables) table.print_summary(file);
     }
     std::fclose(page);

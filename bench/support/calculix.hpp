@@ -28,13 +28,14 @@
 ///     results.force("RIM", 1);                                                                   // after step 1 [N]
 namespace bench {
 
-/// An isotropic shell.
+/// An isotropic shell, but for shear through its thickness.
 struct ShellSection {
     double young_modulus, poisson_ratio, thickness;  ///< [Pa], 1, [m]
+    double shear = 1;  ///< stiffness in shear through the thickness, over that of an isotropic shell
 
     /// The same stiffness E t in the surface, and `part` of the thickness: `part` squared of the bending stiffness.
     [[nodiscard]] ShellSection thinned(double part) const {
-        return {young_modulus / part, poisson_ratio, part * thickness};
+        return {young_modulus / part, poisson_ratio, part * thickness, shear};
     }
 };
 
@@ -48,7 +49,7 @@ struct Prescribed {
 /// One load step, to be reached from the one before.
 struct CalculixStep {
     std::vector<Prescribed> held;
-    double pressure = 0;           ///< along the normal, +z on a flat mesh [Pa]
+    double pressure = 0;           ///< along the normal, +z on a flat mesh, half of it on each face [Pa]
     std::string loaded = "SHELL";  ///< quads under pressure, all by default
     double first_increment = 1;    ///< part of the step that is tried first
 };
@@ -96,6 +97,7 @@ class CalculixScene {
             const auto inside = [&](Index node) { return is_in(mesh_.nodes[static_cast<std::size_t>(node)]); };
             if (std::all_of(quad.begin(), quad.end(), inside)) model_ << q + 1 << ",\n";
         }
+        add_faces(name);
     }
 
     /// A spring along z on each node, `stiffness` times its area [N/m^3].
@@ -116,6 +118,14 @@ class CalculixScene {
     static constexpr double mm = 1e3, mpa = 1e-6;
 
     void add_section(const ShellSection& section);
+    /// Axes of each quad in its surface.
+    void add_orientation();
+    /// The two faces of these quads, to be loaded.
+    void add_faces(const std::string& quads) {
+        for (const char* const face : {"SPOS", "SNEG"}) {
+            model_ << "*SURFACE,NAME=" << quads << face << ",TYPE=ELEMENT\n" << quads << ',' << face << '\n';
+        }
+    }
     void write(std::ostream& out) const;
     void write(std::ostream& out, const CalculixStep& step) const;
     Index add_node(const Vector3& position);
@@ -164,10 +174,39 @@ inline CalculixScene::CalculixScene(ShellMesh mesh, const ShellSection& section)
         for (const Index node : quad) model_ << ',' << node + 1;
         model_ << '\n';
     }
-    model_ << "*MATERIAL,NAME=SHEET\n*ELASTIC\n"
-           << mpa * section.young_modulus << ',' << section.poisson_ratio
-           << "\n*SHELL SECTION,ELSET=SHELL,MATERIAL=SHEET\n"
+    add_section(section);
+    add_faces("SHELL");
+}
+
+inline void CalculixScene::add_section(const ShellSection& section) {
+    const double young = mpa * section.young_modulus, nu = section.poisson_ratio, shear = young / (2 * (1 + nu));
+    const bool is_isotropic = section.shear == 1;
+    model_ << "*MATERIAL,NAME=SHEET\n*ELASTIC";
+    if (is_isotropic) {
+        model_ << '\n' << young << ',' << nu << '\n';
+    } else {
+        model_ << ",TYPE=ENGINEERING CONSTANTS\n";
+        for (const double constant : {young, young, young, nu, nu, nu, shear}) model_ << constant << ',';
+        model_ << section.shear * shear << ",\n" << section.shear * shear << '\n';
+        add_orientation();
+    }
+    model_ << "*SHELL SECTION,ELSET=SHELL,MATERIAL=SHEET" << (is_isotropic ? "" : ",ORIENTATION=AXES") << '\n'
            << mm * section.thickness << '\n';
+}
+
+inline void CalculixScene::add_orientation() {
+    model_ << "*DISTRIBUTION,NAME=INPLANE\n,1,0,0,0,1,0\n";
+    for (std::size_t q = 0; q < mesh_.quads.size(); ++q) {
+        const auto corner = [&](std::size_t i) { return mesh_.nodes[static_cast<std::size_t>(mesh_.quads[q][i])]; };
+        const Vector3 first = corner(2) - corner(0), normal = membrane::cross<double>(first, corner(3) - corner(1));
+        const Vector3 second = membrane::cross<double>(normal, first);
+        model_ << q + 1;
+        for (const Vector3& axis : {Vector3(first / norm(first)), Vector3(second / norm(second))}) {
+            for (Eigen::Index k = 0; k < 3; ++k) model_ << ',' << axis[k];
+        }
+        model_ << '\n';
+    }
+    model_ << "*ORIENTATION,NAME=AXES,SYSTEM=RECTANGULAR\nINPLANE\n";
 }
 
 inline Index CalculixScene::add_node(const Vector3& position) {
@@ -189,9 +228,8 @@ inline void CalculixScene::name_displacements(const std::string& name,
 
 inline void CalculixScene::add_foundation(double stiffness, const std::vector<double>& areas) {
     for (std::size_t node = 0; node < areas.size(); ++node) {
-        const std::string name = "K" + std::to_string(node);
-        model_ << "*ELEMENT,TYPE=SPRING1,ELSET=" << name << '\n'
-               << ++element_count_ << ',' << node + 1 << "\n*SPRING,ELSET=" << name << "\n3\n"
+        model_ << "*ELEMENT,TYPE=SPRING1,ELSET=K" << node << '\n'
+               << ++element_count_ << ',' << node + 1 << "\n*SPRING,ELSET=K" << node << "\n3\n"
                << stiffness * areas[node] / mm << '\n';
     }
 }
@@ -244,7 +282,13 @@ inline void CalculixScene::write(std::ostream& out, const CalculixStep& step) co
             }
         }
     }
-    if (step.pressure != 0) out << "*DLOAD,OP=NEW\n" << step.loaded << ",P," << mpa * step.pressure << '\n';
+    // The area of one face would be that of the middle surface times (1 + t / 2R)^2 or (1 - t / 2R)^2.
+    if (step.pressure != 0) {
+        const double half = mpa * step.pressure / 2;
+        out << "*DSLOAD,OP=NEW\n"
+            << step.loaded << "SPOS,P," << -half << '\n'
+            << step.loaded << "SNEG,P," << half << '\n';
+    }
     for (const std::string& set : printed_) {
         out << "*NODE PRINT,NSET=" << set << ",FREQUENCY=1000\nU\n*NODE PRINT,NSET=" << set
             << ",FREQUENCY=1000,TOTALS=ONLY\nRF\n";

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -21,7 +23,9 @@ inline constexpr int shell_elements = 160;
 /// differences of the energy. Lengths are over the radius, energies over E t radius^2.
 class RevolvedShell {
   public:
-    RevolvedShell(const Eye& eye, int elements) : eye_(eye), last_(elements), rest_(2, elements + 2) {
+    /// The pressure is on the first `loaded` elements, all by default.
+    RevolvedShell(const Eye& eye, int elements, int loaded = std::numeric_limits<int>::max())
+        : eye_(eye), last_(elements), loaded_(std::min(loaded, elements)), rest_(2, elements + 2) {
         for (int i = 0; i <= last_ + 1; ++i) {
             const double angle = eye.rim_angle() * i / last_;
             rest_.col(i) << std::sin(angle), std::cos(angle);
@@ -33,6 +37,7 @@ class RevolvedShell {
     [[nodiscard]] Middle at(double pressure) {
         pressure_ = pressure * eye_.radius / (eye_.young_modulus * eye_.thickness);
         for (int turn = 0; turn < 50; ++turn) {
+            edge_height_ = x_(1, loaded_);
             const Eigen::VectorXd step = newton_step();
             x_.leftCols(last_).reshaped() -= step;
             if (step.cwiseAbs().maxCoeff() < 1e-8) {
@@ -63,7 +68,8 @@ class RevolvedShell {
         const double length = (b0 - a0).norm(), middle = (a0.x() + b0.x()) / 2;
         const auto green = [](double stretch) { return (stretch * stretch - 1) / 2; };
         const double energy = of_strains(green((b - a).norm() / length), green((a.x() + b.x()) / 2 / middle));
-        const double volume = (a.y() - b.y()) * (a.x() * a.x() + a.x() * b.x() + b.x() * b.x()) / 3;
+        double volume = i < loaded_ ? (a.y() - b.y()) * (a.x() * a.x() + a.x() * b.x() + b.x() * b.x()) / 3 : 0;
+        if (i + 1 == loaded_) volume += b.x() * b.x() * (b.y() - edge_height_);  // moved by the load with its edge
         return std::numbers::pi * (2 * middle * length * energy - pressure_ * volume);
     }
 
@@ -129,7 +135,8 @@ class RevolvedShell {
     }
 
     Eye eye_;
-    int last_;  // number of the node at the border
+    int last_, loaded_;  // numbers of the nodes at the border and at the edge of the load
+    double edge_height_ = 0;
     Nodes rest_, x_;
     double pressure_ = 0;
 };

@@ -62,6 +62,7 @@ set yrange [-10:20]
 plot 3 dt 2 lc '#999999' notitle, -3 dt 2 lc '#999999' notitle, \
      'truth_shell.tsv' using 1:(difference(3)) title 'cornea, DistMesh' lc rgb colour(2) pt 7, \
      '' using 1:(difference(4)) title 'cornea, rings' lc rgb colour(1) pt 7, \
+     '' using 1:(100 * (column(3) / column(8) - 1)) title 'cornea, no shear' lc rgb colour(4) pt 7, \
      'truth_plate.tsv' using 1:(difference(3)) title 'plate, hinged' lc rgb colour(3) pt 7
 
 set title '9. two balls'
@@ -69,7 +70,8 @@ set xlabel 'depth [radii]'
 set yrange [-10:10]
 plot 1 dt 2 lc '#999999' notitle, -1 dt 2 lc '#999999' notitle, \
      'truth_tools.tsv' using 1:(difference(3)) title 'each of two' lc rgb colour(1) pt 7, \
-     '' using 1:(difference(5)) title 'smaller radius' lc rgb colour(4) pt 7
+     '' using 1:(difference(5)) title 'smaller radius' lc rgb colour(4) pt 7, \
+     '' using 1:(difference(6)) title 'graded DistMesh' lc rgb colour(2) pt 7
 unset multiplot
 
 # What a ball's contact with flat triangles does to its force, against the depth in edges.

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,6 +28,30 @@ inline constexpr double start_gap = 0.01;  // between ball and sheet before the 
     const Zone outside{
         .radius = disc_radius, .rings = 3 * across / 2, .growth = std::pow(disc_radius / radius, 1.0 / across)};
     return {.across = across, .core = 0.25 * radius, .zones = {under, outside}};
+}
+
+/// The quarter of the disc, in quads that are fine under a ball at (x, 0).
+[[nodiscard]] inline ShellMesh disc_around(int across, double radius, double x) {
+    const Zone under{.radius = radius, .rings = 2 * across};
+    const Zone outside{
+        .radius = 2 * radius, .rings = 3 * across / 2, .growth = std::pow(disc_radius / radius, 1.0 / across)};
+    ShellMesh half = mirrored(quarter_disc({.across = across, .core = 0.25 * radius, .zones = {under, outside}}), 0);
+    const double right = std::numbers::pi / 2, corner = std::atan2(disc_radius, -x);  // seen from the ball
+    const auto on_border = [&](double angle) -> Vector3 {  // of the quarter, whose corner is at a right angle
+        if (angle == right) return {0, disc_radius, 0};
+        const double turned = angle * corner / right, rest = (std::numbers::pi - angle) * (2 - corner / right);
+        if (angle > right) return {0, x * std::tan(rest), 0};
+        const double beside = x * std::sin(turned);
+        const double distance = std::sqrt(disc_radius * disc_radius - beside * beside) - x * std::cos(turned);
+        return {x + distance * std::cos(turned), distance * std::sin(turned), 0};
+    };
+    for (Vector3& node : half.nodes) {
+        double part = std::max(0.0, node.norm() / radius - 1);  // 0 under the ball, 1 at the border
+        if (part > 1 - 1e-9) part = 1;
+        const Vector3 inside = Vector3(x, 0, 0) + node / (1 + part);
+        node = (1 - part) * inside + part * on_border(std::atan2(node.y(), node.x()));
+    }
+    return half;
 }
 
 /// What stands for the ball on flat triangles.
@@ -53,7 +79,8 @@ struct BallScene {
 inline Column BallScene::calculix(const Effort& effort, const std::string& name, double part) const {
     return compared(name, effort.across, [&](int across) {
         const ShellSection section = section_of(soft).thinned(part);
-        FlatShell shell(x == 0 ? ball_disc(3 * across / 2, radius) : even_disc(5 * across / 2), section,
+        const int fine = 3 * across / 2;
+        FlatShell shell(x == 0 ? quarter_disc(ball_disc(fine, radius)) : disc_around(fine, radius, x), section,
                         {{"BALL", 1, 3, 0}});
         // What touches is the shell's upper side, half its thickness off the middle.
         const Vector3 bottom(x, 0, section.thickness / 2 + start_gap * radius);
@@ -138,6 +165,7 @@ struct Placement {
     const Mesh graded = disc_for_loads(effort.rings, {{.radius = radius / 2}});
     const std::string name = "graded by DistMesh, " + vertices_of(graded);
     table.ours.push_back(single(name + ", corrected", [&] { return scene.forces(graded, Ball::corrected); }));
+    table.explained = table.ours.back().name;
     table.ours.push_back(single(name + ", radius as it is", [&] { return scene.forces(graded, Ball::as_it_is); }));
     return table;
 }
@@ -171,6 +199,7 @@ struct Placement {
                                                       {.centre = {-scene.x, 0, 0}, .radius = scene.radius / 2}});
     table.ours.push_back(single("graded by DistMesh, " + vertices_of(graded) + ", corrected",
                                 [&] { return scene.forces(graded, Ball::corrected); }));
+    table.explained = table.ours.back().name;
     return table;
 }
 

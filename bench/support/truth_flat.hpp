@@ -25,12 +25,12 @@ inline const membrane::Material soft{.young_modulus = 1e6, .poisson_ratio = 0.45
     return {material.young_modulus, material.poisson_ratio, material.thickness};
 }
 
-/// The other program's disc: quads of the unstretched disc; the first step stretches it in its plane. Sets: RIM, X0 and
+/// The other program's disc, by its stretched quarter; the first step stretches it in its plane. Sets: RIM, X0 and
 /// Y0 (the planes of symmetry), MIDDLE, PATCH. `still` is prescribed in this step only.
 class FlatShell {
   public:
-    FlatShell(QuarterDiscOptions options, const ShellSection& section, const std::vector<Prescribed>& still = {})
-        : scene(scaled(std::move(options)), section) {
+    FlatShell(ShellMesh quarter, const ShellSection& section, const std::vector<Prescribed>& still = {})
+        : scene(unstretched(std::move(quarter)), section) {
         const ShellMesh& mesh = scene.mesh();
         const double radius = disc_radius / disc_stretch, patch = patch_radius / disc_stretch, tiny = 1e-9 * radius;
         const auto rim = mesh.where([&](const Vector3& x) { return x.norm() > radius - tiny; });
@@ -83,10 +83,9 @@ class FlatShell {
     CalculixScene scene;
 
   private:
-    [[nodiscard]] static ShellMesh scaled(QuarterDiscOptions options) {
-        options.core /= disc_stretch;
-        for (Zone& zone : options.zones) zone.radius /= disc_stretch;
-        return quarter_disc(options);
+    [[nodiscard]] static ShellMesh unstretched(ShellMesh mesh) {
+        for (Vector3& node : mesh.nodes) node = node / disc_stretch;
+        return mesh;
     }
 
     std::vector<Index> held_;
@@ -180,7 +179,7 @@ class FlatShell {
 
 [[nodiscard]] inline Column calculix_pressure(const Effort& effort, const std::vector<double>& pressures) {
     return compared("CalculiX", effort.across, [&](int across) {
-        FlatShell shell(even_disc(across), section_of(soft).thinned(0.02));
+        FlatShell shell(quarter_disc(even_disc(across)), section_of(soft).thinned(0.02));
         for (const double pressure : pressures) shell.add_step({}, pressure);
         shell.scene.print("MIDDLE");
         const auto results = shell.scene.run(effort.folder, "pressure" + std::to_string(across));
@@ -192,7 +191,7 @@ class FlatShell {
                                            double foundation, const std::vector<double>& displacements) {
     const int fine = foundation > 0 ? 2 * effort.across : effort.across;  // springs at nodes converge slowly
     const auto solve = [&](int across) {
-        FlatShell shell(patch_disc(across), section_of(soft).thinned(part));
+        FlatShell shell(quarter_disc(patch_disc(across)), section_of(soft).thinned(part));
         if (foundation > 0) shell.scene.add_foundation(foundation, shell.stretched_areas());
         for (const double displacement : displacements) shell.add_patch_step(sign * 1e-3 * displacement);
         shell.scene.print("PATCH");
