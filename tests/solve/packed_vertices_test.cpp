@@ -7,6 +7,8 @@
 #include <numeric>
 #include <vector>
 
+#include <malloc.h>
+
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/model/bending.hpp>
 #include <membrane/model/foundation_layer.hpp>
@@ -52,10 +54,14 @@ static_assert(!UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, Expon
 template <Real S>
 struct Membrane {
     explicit Membrane(Random& random)
-        : mesh(test::with_holes(test::random_surface<S>(random), random).mesh()),
+        : mesh(test::with_holes(surface(random), random).mesh()),
           network(mesh, {}, springs(random)),
           foundation(mesh, volume(random)) {}
 
+    /// Now and then with many springs at one vertex.
+    static test::Surface<S> surface(Random& random) {
+        return random.chance(0.2) ? test::fan<S>(3 + random.index(20)) : test::random_surface<S>(random);
+    }
     NetworkOptions<S> springs(Random& random) const {
         std::vector<S> stiffness(Adjacency(mesh).edges().size());
         for (S& k : stiffness) k = random.chance(0.1) ? S(0) : random.number(S(1), S(10));
@@ -265,11 +271,28 @@ TEMPLATE_TEST_CASE("there are as many groups as the capacity allows, in packs", 
             }
             REQUIRE(pack == packed.count());
             REQUIRE(number == packed.size());
+            for (std::size_t p = 0; p < packed.count(); ++p) {
+                const std::size_t of_group = *std::upper_bound(ends.begin(), ends.end(), packed.first_of(p));
+                for (std::size_t end = p + 1; end <= packed.count(); ++end)
+                    REQUIRE(packed.end_of_group(p, end) == std::min(end, packed.pack_from(of_group)));
+            }
             REQUIRE(packed.pack_from(packed.size()) == packed.count());
             REQUIRE(packed.needed().size() == expected.items().size());
             for (const Index v : packed.needed()) REQUIRE(expected.contains(v));
         }
     }
+}
+
+TEST_CASE("memory for packs grows with the springs, however many meet at one vertex", "[packed]") {
+    const auto mesh = test::fan<double>(2000).mesh();
+    const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 1.0});
+    const auto in_use = [] {
+        const auto memory = mallinfo2();
+        return static_cast<double>(memory.uordblks + memory.hblkhd);
+    };
+    const double before = in_use();
+    const PackedVertices<double> packed(network);
+    CHECK(in_use() - before < 2000 * 2e4);  // bytes
 }
 
 TEMPLATE_TEST_CASE("the residual forces of packs are those of their vertices, to the bit", "[packed]", float, double) {

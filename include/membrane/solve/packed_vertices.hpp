@@ -511,8 +511,8 @@ auto PackedVertices<Scalar>::backtracked(std::size_t p, const PackState& at, Vec
         const Wide factor = select<Wide>(rises, Scalar(0.5), 1);
         displacement = factor * displacement;
     }
-    const Wide factor = select<Wide>(rises, 0, 1);
-    return factor * displacement;
+    for (Eigen::Index k = 0; k < 3; ++k) displacement[k] = select<Wide>(rises, 0, displacement[k]);  // if NaN, too
+    return displacement;
 }
 
 template <Real Scalar>
