@@ -153,6 +153,19 @@ TEST_CASE("a fixed vertex yields to tools by force over stiffness, a free one do
     CHECK(context.support_compliance(5) == 0.25);
 }
 
+TEST_CASE("forces and stiffnesses that are added, either alone too, last until the step ends", "[context]") {
+    SixPoints scene;
+    ConstraintContext<double> context(scene.x, scene.work, scene);
+    context.add_force(1, {1, 2, 3});
+    for (const Index v : {2, 2, 4}) context.add_stiffness(v, 0.5);
+    CHECK(as_vector(scene.work.forced.items()) == std::vector<Index>{1, 2, 4});
+    CHECK(scene.work.constraint_force(1) == Vector3<double>(1, 2, 3));
+    CHECK(scene.work.added_stiffness == std::vector<double>{0, 0, 1, 0, 0.5, 0, 0});
+    scene.work.begin_step();
+    CHECK(scene.work.constraint_force(1) == Vector3<double>(0, 0, 0));
+    CHECK(scene.work.added_stiffness == std::vector<double>(7, 0));
+}
+
 TEST_CASE("seeds keep their order, and each comes once", "[context]") {
     SixPoints scene;
     ConstraintContext<double> context(scene.x, scene.work, scene);

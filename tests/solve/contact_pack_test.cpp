@@ -36,7 +36,10 @@ void check_packs(const ContactPacks<S>& packs, const std::vector<ContactPoint<S>
         std::vector<Index> corners;
         for (std::size_t i = 0; i < ContactPack<S>::lanes; ++i) {
             REQUIRE(pack.listed[i] == (i < pack.size ? 1 : 0));
-            if (i >= pack.size) continue;
+            if (i >= pack.size) {
+                REQUIRE(pack.point[i] == no_index);
+                continue;
+            }
             const std::size_t number = static_cast<std::size_t>(pack.point[i]) - first;
             REQUIRE(number < points.size());
             const auto& point = points[number];

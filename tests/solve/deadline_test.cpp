@@ -140,6 +140,26 @@ TEST_CASE("a deadline is given in seconds, whatever the clock", "[deadline]") {
     CHECK(soon.left() < 0);
 }
 
+TEST_CASE("costs are measured in updates, whether one takes a nanosecond or a minute", "[deadline]") {
+    for (const double unit : {1e-9, 1e-3, 60.0}) {
+        CAPTURE(unit);
+        double time = 0;
+        const Deadline deadline([&] { return time; }, 1000 * unit);
+        StepCosts costs;
+        TimeBudget budget(deadline, costs);
+        budget.begin(5);
+        time += 20 * unit;
+        budget.updated(10);
+        time += 6 * unit;
+        budget.enforced();
+        time += 60 * unit;
+        budget.end();
+        CHECK(costs.update == Approx(2 * unit));
+        CHECK(costs.enforcement == Approx(3));
+        CHECK(costs.residual == Approx(6));
+    }
+}
+
 TEST_CASE("a step is over at its deadline, and has used the time", "[solver][deadline]") {
     Index unconverged = 0;
     const int runs = 20;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -44,6 +45,22 @@ std::vector<std::vector<Index>> random_packs(Index vertices, Random& random) {
     return packs;
 }
 
+/// Number of slots for these vertices: for each kind and place the most elements at one of them.
+template <Real S, class Network>
+std::size_t slots_for(const Network& network, const std::vector<Index>& vertices) {
+    std::size_t slots = 0;
+    network.for_each_kind([&]<class E>(const Elements<S, E>& elements) {
+        std::array<std::size_t, E::corner_count> most{};
+        for (const Index v : vertices) {
+            std::array<std::size_t, E::corner_count> count{};
+            for (const auto& at : elements.at(v)) ++count[at.place];
+            for (std::size_t k = 0; k < count.size(); ++k) most[k] = std::max(most[k], count[k]);
+        }
+        slots = std::accumulate(most.begin(), most.end(), slots);
+    });
+    return slots;
+}
+
 }  // namespace
 
 TEMPLATE_TEST_CASE("each lane of a pack sums the elements of its vertex, to the bit", "[packed][tissue]", float,
@@ -67,9 +84,13 @@ TEMPLATE_TEST_CASE("each lane of a pack sums the elements of its vertex, to the 
             for (std::size_t l = 0; l < packs[p].size(); ++l) own[l] = numbers_in_point * packs[p][l];
             REQUIRE(packed.append(packs[p], own, tissue));
             CornerForce<Wide> sum{{}, {}, {}};
-            packed.for_each(
-                p, gather(rows.data(), own.data()), rows.data(), tissue,
-                [&](const auto& element, const auto& at, std::size_t i) { sum += element.force_on(at, i); });
+            std::size_t slots = 0;
+            packed.for_each(p, gather(rows.data(), own.data()), rows.data(), tissue,
+                            [&](const auto& element, const auto& at, std::size_t i) {
+                                sum += element.force_on(at, i);
+                                ++slots;
+                            });
+            REQUIRE(slots == slots_for<S>(tissue, packs[p]));
             for (std::size_t l = 0; l < Wide::count; ++l) {
                 CornerForce<S> alone{{}, {}, {}};
                 if (l < packs[p].size()) {
@@ -87,6 +108,25 @@ TEMPLATE_TEST_CASE("each lane of a pack sums the elements of its vertex, to the 
             }
         }
         REQUIRE(packed.size() == packs.size());
+    }
+}
+
+TEST_CASE("there is room for a vertex with many elements, and for no more packs than fit", "[packed][tissue]") {
+    const auto mesh = test::fan<double>(200).mesh();
+    const auto tissue = Tissue(MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 1.0}),
+                               triangular_springs(mesh, Material{.young_modulus = 1e3, .thickness = 1e-3}));
+    const Index middle = 0;
+    PackedElements<double>::Begins own;
+    own.fill(0);
+    const std::size_t packs = 10'000;
+    PackedElements<double> packed(tissue, 1, packs);
+    while (packed.append({&middle, 1}, own, tissue)) REQUIRE(packed.size() < packs);
+    CHECK(packed.size() >= 64);
+    for (std::size_t p = 0; p < packed.size(); ++p) {
+        std::size_t slots = 0;
+        packed.for_each(p, {0, 0, 0}, std::vector<PaddedPoint<double>>(202).data(), tissue,
+                        [&](const auto&, const auto&, std::size_t) { ++slots; });
+        REQUIRE(slots == 200);
     }
 }
 

@@ -671,6 +671,31 @@ TEMPLATE_TEST_CASE("a rule that runs away is called unstable, and nothing has mo
           }) == StepStatus::unstable);
 }
 
+namespace {
+
+/// A load whose reaction is made up.
+struct Reacting {
+    Vector3<double> force;
+
+    bool valid() const noexcept { return true; }
+    void begin(ConstraintContext<double>& context) const noexcept { context.seed(3); }
+    bool enforce(ConstraintContext<double>&) const noexcept { return false; }
+    Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return force; }
+};
+
+}  // namespace
+
+TEST_CASE("a reaction that is no number refuses the step, and no reaction is reported", "[solver][bad]") {
+    const Sphere<double> sphere;
+    const Reacting sound{{1, 2, 3}}, broken{{0, std::numeric_limits<double>::quiet_NaN(), 0}};
+    CHECK(status_of_refused(sphere, QuasiStaticSolver(sphere.network), [&](auto& solver, Points<double>& x) {
+              const auto report = solver.step(x, 0.1, sphere.network, sphere.foundation, sound, broken);
+              REQUIRE(report.reactions.size() == 2);
+              for (const auto& reaction : report.reactions) CHECK(reaction == Vector3<double>(0, 0, 0));
+              return report;
+          }) == StepStatus::unstable);
+}
+
 TEST_CASE("waking what is no vertex wakes no vertex", "[solver][bad]") {
     const Sphere<double> sphere;
     QuasiStaticSolver solver(sphere.network);

@@ -124,6 +124,19 @@ TEST_CASE("previous points are found by their first corner, those of the last st
     }
 }
 
+TEST_CASE("a point at no vertex is kept, and no vertex finds it", "[state]") {
+    StepState<double> state(3, 4);
+    state.begin_step();
+    for (const Index corner : {no_index, 3, 1, 100}) REQUIRE(state.points.try_push_back(point_at_corner(0, 0, corner)));
+    state.end_step();
+    CHECK(state.previous_points.size() == 4);
+    CHECK(state.previous_at(1) == 2);
+    CHECK(state.next_previous(2) == no_index);
+    for (const Index v : {no_index, 0, 2, 3, 100}) CHECK(state.previous_at(v) == no_index);
+    state.reset_points();
+    CHECK(state.previous_at(1) == no_index);
+}
+
 TEST_CASE("what is kept turns with the body", "[state]") {
     StepState<double> state(4, 4);
     const Points<double> x = Points<double>::Random(3, 4);

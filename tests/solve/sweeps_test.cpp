@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/solve/sweeps.hpp>
 
+#include <array>
+#include <type_traits>
+
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/surface/shapes.hpp>
 
@@ -41,7 +44,64 @@ struct LatePull {
     Vector3<S> reaction(const ConstraintContext<S>&) const noexcept { return -force; }
 };
 
+/// A force on one vertex, and how often it was enforced.
+struct CountedLoad {
+    Index at;
+    Vector3<double> force;
+    int* enforcements;
+
+    bool valid() const noexcept { return true; }
+    void begin(ConstraintContext<double>& context) const noexcept {
+        context.seed(at);
+        context.add_force(at, force);
+    }
+    bool enforce(ConstraintContext<double>&) const noexcept {
+        ++*enforcements;
+        return true;
+    }
+    Vector3<double> reaction(const ConstraintContext<double>&) const noexcept { return -force; }
+};
+
 }  // namespace
+
+TEST_CASE("under a deadline the cost of an update is the time of all over their number", "[solver][deadline]") {
+    const auto mesh = icosphere<double>({.radius = 1, .subdivisions = 3});
+    const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 1.0});
+    const VirtualVolumeSprings<double> springs(mesh, {.stiffness = 0.1});
+    const auto check = [&](const auto& foundation, const SolverOptions<double>& options) {
+        const Points<double> x = mesh.positions();
+        int readings = 0, enforcements = 0;  // each reading of the clock takes a second
+        const CountedLoad load{7, 0.01 * point(x, 7), &enforcements};
+        const std::array<ConstraintRef<double>, 1> loads{ConstraintRef<double>(load)};
+        StepState<double> state(mesh.vertex_count(), 0);
+        ActiveVertices active(mesh.vertex_count());
+        PackedVertices<double> packed(network);
+        StepReport<double> report;
+        StepCosts costs;
+        const Deadline deadline([&] { return double(readings++); }, 1e9);
+        state.begin_step();
+        const ConstPointsRef<double> start = x, now = state.positions();
+        ConstraintContext<double> context(start, state, network);
+        const ConstraintList<double> acting(context, loads);
+        acting.begin();
+        active.begin_step(network, state.seeds.items(), options);
+        using Foundation = std::remove_cvref_t<decltype(foundation)>;
+        const StepInput<double, MassSpringNetwork<double, LinearSpring>, Foundation> scene{start,   now,        1e-3,
+                                                                                           network, foundation, state};
+        const AnyExecutor executor;
+        Sweeps<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Foundation> sweeps{
+            scene, {}, options, executor, active, packed, acting, report, TimeBudget(deadline, costs), 0};
+        sweeps.load_and_pack();
+        sweeps.run();
+        const int batches = readings - 1 - enforcements;
+        CHECK(batches > 10);
+        CHECK(costs.update * static_cast<double>(report.vertex_updates) == Approx(batches));
+    };
+    check(springs, {.layers = 6, .sweeps = 3, .order = UpdateOrder::colour_layers});
+    check(springs, {.layers = 6, .sweeps = 3, .order = UpdateOrder::colour_all});
+    check(Opaque<double>{springs}, {.layers = 6, .sweeps = 3});
+    check(Opaque<double>{springs}, {.layers = 6, .adaptive_layers = true, .sweeps = 3});
+}
 
 TEMPLATE_TEST_CASE("a force that comes beyond layer 0 while constraints are enforced moves what is in a pack",
                    "[solver]", float, double) {

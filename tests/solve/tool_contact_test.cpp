@@ -133,6 +133,10 @@ SolverOptions<double> exact_in_order_of(int seed) {
     return options;
 }
 
+struct NoPins {
+    bool pinned(Index) const { return false; }
+};
+
 /// A tool and where it goes.
 struct Stroke {
     Tool<double> tool;  // it does not touch yet
@@ -642,6 +646,60 @@ TEST_CASE("a small tool on a vertex feels what holds the vertex there", "[press]
         while (!held.converged) held = solver.step(x, 1e-3, loop.network(), loop.foundation(), pull(v, target));
         CHECK((held.reactions[0] - loop.reaction()).norm() < 1e-9);
         CHECK((x - loop.x()).cwiseAbs().maxCoeff() < 1e-9);
+    }
+}
+
+TEST_CASE("a contact that lacks points is refused, and nothing has moved", "[press][bad]") {
+    const auto& mesh = unit_sphere();
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
+    const VirtualVolumeSprings<double> foundation(mesh, {.stiffness = 0.1});
+    const Tool<double> tool{.position = {0, 0, 1.05}, .radius = 0.1};
+    ContactTracker<double> tracker(mesh);
+    auto contact = tracker.update(AabbTree<double>(mesh), mesh.positions(), tool);
+    REQUIRE(contact.touching());
+    for (const bool has_all_points : {false, true}) {
+        contact.has_all_points = has_all_points;
+        QuasiStaticSolver<double> solver(network);
+        Points<double> x = mesh.positions();
+        const auto report = solver.step(x, 1e-3, network, foundation, press(tool, contact));
+        CHECK(report.status == (has_all_points ? StepStatus::advanced : StepStatus::too_many_contact_points));
+        CHECK((x == mesh.positions()) == !has_all_points);
+    }
+}
+
+TEST_CASE("a triangle that comes into the tool during a step is a violation, with or without a point", "[press]") {
+    Points<double> x(3, 6);  // two triangles under a ball or a shaft, one near it and one far below
+    x << -1, 1, 0, -1, 1, 0, -1, -1, 1, -1, -1, 1, 0, 0, 0, -9, -9, -9;
+    const ConstPointsRef<double> start = x;
+    const std::vector<ContactTriangle> triangles{{0, {0, 1, 2}}, {1, {3, 4, 5}}};
+    for (const double length : {0.0, 3.0}) {
+        CAPTURE(length);
+        const Tool<double> tool{.position = {0, 0, 1.1}, .axis = {0, 0, length}, .radius = 1};
+        const auto near = contact_point(0, triangles[0].corners, triangle_at(x, triangles[0].corners), tool, 0, 1.0);
+        REQUIRE(near);
+        Contact<double> contact;
+        contact.phase = ContactPhase::ongoing;
+        contact.triangle = 0;
+        contact.corners = triangles[0].corners;
+        contact.barycentric = near->weights;
+        contact.normal = {0, 0, 1};
+        contact.axis_point = contact.previous_axis_point = tool.position;
+        contact.gap = near->gap;
+        contact.detection_distance = 1.2;
+        contact.radius = 1;
+        contact.points = {&*near, 1};
+        contact.triangles = contact.candidates = triangles;
+        StepState<double> state(6, 20);
+        state.begin_step();
+        const NoPins pins;
+        ConstraintContext<double> context(start, state, pins);
+        context.begin_points();
+        const auto pressing = press(tool, contact);
+        pressing.begin(context);
+        REQUIRE(context.points().size() == 1);
+        CHECK_FALSE(pressing.enforce(context));
+        for (const Index v : {3, 4, 5}) context.move(v, {0, 0, 9.5});
+        CHECK(pressing.enforce(context));
     }
 }
 

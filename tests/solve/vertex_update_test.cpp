@@ -82,8 +82,12 @@ TEST_CASE("the state of a vertex has all that pulls on it", "[update]") {
         REQUIRE(state_of<Numbers>(step.scene, v).stiffness_reduction.trace() == 0);
         REQUIRE(state_of<Blocks>(step.scene, v).stiffness_reduction.trace() ==
                 step.network.majoriser(v, step.x).stiffness_reduction.trace());
+        REQUIRE(state_of<Blocks>(step.scene, v).contact_stiffness == 0);
         step.state.seeds.insert(v);
-        REQUIRE(state_of<Blocks>(step.scene, v).constrained);
+        const auto in_contact = state_of<Blocks>(step.scene, v);
+        REQUIRE(in_contact.constrained);
+        REQUIRE(in_contact.contact_stiffness == 7);
+        REQUIRE(norm<double>(norm(step.force) * in_contact.contact_normal - step.force) < 1e-15);
 
         // What damping holds back is no rest.
         const Vector3<double> lasting =
@@ -144,7 +148,7 @@ TEST_CASE("what the majoriser of a tissue says descends does, by the energy", "[
             VertexState<double> state;
             static_cast<EnergyMajoriser<double>&>(state) = tissue.majoriser(v, x);
             const Vector3<double> displacement =
-                random.number(0.0, 1.5) * (BlockStep{.omega = 1}.compliance(state) * state.force);
+                random.number(0.0, 4.0) * (BlockStep{.omega = 1}.compliance(state) * state.force);
             const bool descends = surely_descends(state, displacement);
             ++(descends ? proved : unknown);
             const auto energy = tissue.energy_change(v, displacement, x);
