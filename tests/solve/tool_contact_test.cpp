@@ -133,10 +133,6 @@ SolverOptions<double> exact_in_order_of(int seed) {
     return options;
 }
 
-struct NoPins {
-    bool pinned(Index) const { return false; }
-};
-
 /// A tool and where it goes.
 struct Stroke {
     Tool<double> tool;  // it does not touch yet
@@ -667,39 +663,90 @@ TEST_CASE("a contact that lacks points is refused, and nothing has moved", "[pre
     }
 }
 
+namespace {
+
+/// Two triangles in the middle of a step: one at z = 0 below a tool of radius 1, one far below.
+struct TwoTriangles {
+    explicit TwoTriangles(const Tool<double>& tool) : pressing{press(tool, Contact<double>())} {
+        x << -1, 1, 0, -1, 1, 0, -1, -1, 1, -1, -1, 1, 0, 0, 0, -9, -9, -9;
+        auto& contact = pressing.contact;
+        contact.phase = ContactPhase::ongoing;
+        contact.corners = triangles[1].corners;
+        contact.barycentric = {0.25, 0.25, 0.5};
+        contact.normal = {0, 0, 1};
+        contact.axis_point = contact.previous_axis_point = tool.position;
+        contact.gap = tool.position.z() - 1;
+        contact.detection_distance = 1.2;
+        contact.radius = 1;
+        contact.triangles = contact.candidates = triangles;
+        state.begin_step();
+        context.begin_points();
+    }
+
+    bool pinned(Index) const { return false; }
+    void raise(std::size_t triangle, double by) {
+        for (const Index v : triangles[triangle].corners) context.move(v, {0, 0, by});
+    }
+
+    Points<double> x = Points<double>::Zero(3, 6);
+    ConstPointsRef<double> start = x;
+    std::array<ContactTriangle, 2> triangles{{{0, {0, 1, 2}}, {1, {3, 4, 5}}}};
+    StepState<double> state{6, 20};
+    ConstraintContext<double> context{start, state, *this};
+    ToolContact<double> pressing;
+};
+
+}  // namespace
+
 TEST_CASE("a triangle that comes into the tool during a step is a violation, with or without a point", "[press]") {
-    Points<double> x(3, 6);  // two triangles under a ball or a shaft, one near it and one far below
-    x << -1, 1, 0, -1, 1, 0, -1, -1, 1, -1, -1, 1, 0, 0, 0, -9, -9, -9;
-    const ConstPointsRef<double> start = x;
-    const std::vector<ContactTriangle> triangles{{0, {0, 1, 2}}, {1, {3, 4, 5}}};
     for (const double length : {0.0, 3.0}) {
         CAPTURE(length);
         const Tool<double> tool{.position = {0, 0, 1.1}, .axis = {0, 0, length}, .radius = 1};
-        const auto near = contact_point(0, triangles[0].corners, triangle_at(x, triangles[0].corners), tool, 0, 1.0);
+        TwoTriangles scene(tool);
+        const auto& corners = scene.triangles[0].corners;
+        const auto near = contact_point(0, corners, triangle_at(scene.x, corners), tool, 0, 1.0);
         REQUIRE(near);
-        Contact<double> contact;
-        contact.phase = ContactPhase::ongoing;
-        contact.triangle = 0;
-        contact.corners = triangles[0].corners;
-        contact.barycentric = near->weights;
-        contact.normal = {0, 0, 1};
-        contact.axis_point = contact.previous_axis_point = tool.position;
-        contact.gap = near->gap;
-        contact.detection_distance = 1.2;
-        contact.radius = 1;
-        contact.points = {&*near, 1};
-        contact.triangles = contact.candidates = triangles;
-        StepState<double> state(6, 20);
-        state.begin_step();
-        const NoPins pins;
-        ConstraintContext<double> context(start, state, pins);
-        context.begin_points();
-        const auto pressing = press(tool, contact);
-        pressing.begin(context);
-        REQUIRE(context.points().size() == 1);
-        CHECK_FALSE(pressing.enforce(context));
-        for (const Index v : {3, 4, 5}) context.move(v, {0, 0, 9.5});
-        CHECK(pressing.enforce(context));
+        scene.pressing.contact.points = {&*near, 1};
+        scene.pressing.begin(scene.context);
+        REQUIRE(scene.context.points().size() == 1);
+        CHECK_FALSE(scene.pressing.enforce(scene.context));
+        scene.raise(1, 9.5);
+        CHECK(scene.pressing.enforce(scene.context));
+    }
+}
+
+TEST_CASE("a triangle that has passed the tool's axis goes back to some clearance in front of it", "[press]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const double clearance = random.number(0.01, 1.15), by = clearance + random.number(0.01, 3.0);
+        TwoTriangles scene({.position = {0, 0, clearance}, .radius = 1});
+        scene.pressing.begin(scene.context);
+        scene.raise(0, by);
+        scene.pressing.enforce(scene.context);
+        const double left = clearance - scene.context.position(0).z();
+        REQUIRE(left >= 0.999 * std::min(0.25, 0.9 * clearance));  // a quarter of the radius, if it was as far before
+        REQUIRE(left < clearance);
+    }
+}
+
+TEST_CASE("a surface on the tool's axis is pushed away from where the tool comes", "[press]") {
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const Point shift = random.vector(-3.0, 3.0);
+        const Tool<double> tool{.position = shift, .radius = 1};
+        TwoTriangles scene(tool);
+        scene.x.colwise() += shift.eigen();
+        const bool moves = random.chance(0.8);
+        const Point from = moves ? random.unit_vector() : Point(0, 0, 1);
+        if (moves) scene.pressing.contact.previous_axis_point += 0.3 * from;
+        scene.pressing.contact.gap = -1;
+        const ContactPoint<double> on_axis{0, 0, scene.triangles[0].corners, {0.25, 0.25, 0.5}, {}, {}, {}, {}, {}, -1};
+        scene.pressing.contact.points = {&on_axis, 1};
+        scene.pressing.begin(scene.context);
+        REQUIRE(scene.context.points().size() == 1);
+        REQUIRE(norm<double>(scene.context.points()[0].normal - from) < 1e-14);
     }
 }
 
