@@ -111,7 +111,7 @@ TEMPLATE_TEST_CASE("each lane of a pack sums the elements of its vertex, to the 
     }
 }
 
-TEST_CASE("there is room for a vertex with many elements, and for no more packs than fit", "[packed][tissue]") {
+TEST_CASE("a vertex with many elements fits, and no pack beyond the capacity", "[packed][tissue]") {
     const auto mesh = test::fan<double>(200).mesh();
     const auto tissue = Tissue(MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 1.0}),
                                triangular_springs(mesh, Material{.young_modulus = 1e3, .thickness = 1e-3}));

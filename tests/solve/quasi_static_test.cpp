@@ -687,9 +687,9 @@ struct Reacting {
 
 TEST_CASE("a reaction that is no number refuses the step, and no reaction is reported", "[solver][bad]") {
     const Sphere<double> sphere;
-    const Reacting sound{{1, 2, 3}}, broken{{0, std::numeric_limits<double>::quiet_NaN(), 0}};
+    const Reacting finite{{1, 2, 3}}, broken{{0, std::numeric_limits<double>::quiet_NaN(), 0}};
     CHECK(status_of_refused(sphere, QuasiStaticSolver(sphere.network), [&](auto& solver, Points<double>& x) {
-              const auto report = solver.step(x, 0.1, sphere.network, sphere.foundation, sound, broken);
+              const auto report = solver.step(x, 0.1, sphere.network, sphere.foundation, finite, broken);
               REQUIRE(report.reactions.size() == 2);
               for (const auto& reaction : report.reactions) CHECK(reaction == Vector3<double>(0, 0, 0));
               return report;

@@ -742,8 +742,8 @@ TEST_CASE("a surface on the tool's axis is pushed away from where the tool comes
         const Point from = moves ? random.unit_vector() : Point(0, 0, 1);
         if (moves) scene.pressing.contact.previous_axis_point += 0.3 * from;
         scene.pressing.contact.gap = -1;
-        const ContactPoint<double> on_axis{0, 0, scene.triangles[0].corners, {0.25, 0.25, 0.5}, {}, {}, {}, {}, {}, -1};
-        scene.pressing.contact.points = {&on_axis, 1};
+        const ContactPoint<double> central{0, 0, scene.triangles[0].corners, {0.25, 0.25, 0.5}, {}, {}, {}, {}, {}, -1};
+        scene.pressing.contact.points = {&central, 1};
         scene.pressing.begin(scene.context);
         REQUIRE(scene.context.points().size() == 1);
         REQUIRE(norm<double>(scene.context.points()[0].normal - from) < 1e-14);

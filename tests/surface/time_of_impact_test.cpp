@@ -2,6 +2,7 @@
 #include <membrane/surface/time_of_impact.hpp>
 
 #include <cmath>
+#include <cstdint>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -60,6 +61,39 @@ TEST_CASE("just before it passes, the point is still on the side it was on") {
         REQUIRE((time >= 0 && time <= 1));
         if (time < 1) REQUIRE(side(time) * side(time + 1e-7) < 1e-12);  // it changes here
     }
+}
+
+TEST_CASE("no passing is missed, and the unit of length does not matter") {
+    int passings = 0;
+    for (int seed = 1; seed <= cases(20000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const Triangle<double> from{random.vector(), random.vector(), random.vector()};
+        const Triangle<double> to{random.vector(), random.vector(), random.vector()};
+        const Vector3<double> q = random.vector<double>(-0.3, 0.3);
+        const double time = membrane::time_of_impact<double>(from, to, q);
+        CAPTURE(seed, time);
+        for (const double unit : {0x1p-20, 0x1p20}) {
+            const auto scaled = [&](const Triangle<double>& a) {
+                return Triangle<double>{unit * a.a, unit * a.b, unit * a.c};
+            };
+            REQUIRE(membrane::time_of_impact<double>(scaled(from), scaled(to), unit * q) == time);
+        }
+        bool was_inside = false, was_behind = false;
+        for (int i = 0; i <= 50; ++i) {
+            const double t = i / 50.0;
+            const Triangle<double> now{(1 - t) * from.a + t * to.a, (1 - t) * from.b + t * to.b,
+                                       (1 - t) * from.c + t * to.c};
+            const bool inside = membrane::closest_point<double>(now, q).barycentric.minCoeff() > 0;
+            const bool behind = membrane::dot<double>(q - now.a, membrane::area_vector(now)) < 0;
+            if (inside && was_inside && behind != was_behind) {
+                ++passings;
+                REQUIRE(time <= t);
+                break;
+            }
+            was_inside = inside, was_behind = behind;
+        }
+    }
+    REQUIRE(passings > cases(20000) / 50);
 }
 
 TEST_CASE("a triangle that stays, or stays away, passes nothing") {

@@ -392,6 +392,20 @@ TEMPLATE_TEST_CASE("hits in general position are those of signed volumes", "[tri
     CHECK(hits > cases(5000));
 }
 
+TEMPLATE_TEST_CASE("a segment in the plane of a long triangle hits it", "[triangle]", float, double) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Vector3<S> a = random.vector<S>(), along = S(1e4) * random.unit_vector<S>();
+        Triangle<S> triangle{a, a + along, a + random.unit_vector<S>()};
+        if (random.chance(0.5)) std::swap(triangle.b, triangle.c);
+        const Vector3<S> inside = random.barycentric<S>(), away(random.number(S(1), S(3)), -1, 0);
+        const auto from = point_at<S>(triangle, inside + away), to = point_at<S>(triangle, inside - away);
+        REQUIRE(first_hit<S>(triangle, from, to));
+    }
+}
+
 TEMPLATE_TEST_CASE("no segment slips through a closed surface", "[triangle]", float, double) {
     using S = TestType;
     for (int seed = 1; seed <= cases(20'000); ++seed) {
