@@ -78,19 +78,24 @@ TEST_CASE("no passing is missed, and the unit of length does not matter") {
             };
             REQUIRE(membrane::time_of_impact<double>(scaled(from), scaled(to), unit * q) == time);
         }
-        bool was_inside = false, was_behind = false;
-        for (int i = 0; i <= 50; ++i) {
-            const double t = i / 50.0;
-            const Triangle<double> now{(1 - t) * from.a + t * to.a, (1 - t) * from.b + t * to.b,
-                                       (1 - t) * from.c + t * to.c};
-            const bool inside = membrane::closest_point<double>(now, q).barycentric.minCoeff() > 0;
-            const bool behind = membrane::dot<double>(q - now.a, membrane::area_vector(now)) < 0;
-            if (inside && was_inside && behind != was_behind) {
-                ++passings;
-                REQUIRE(time <= t);
-                break;
+        const auto at = [&](double s) {
+            return Triangle<double>{(1 - s) * from.a + s * to.a, (1 - s) * from.b + s * to.b,
+                                    (1 - s) * from.c + s * to.c};
+        };
+        const auto behind = [&](double s) {
+            return membrane::dot<double>(q - at(s).a, membrane::area_vector(at(s))) < 0;
+        };
+        for (int i = 0; i < 50; ++i) {
+            double first = i / 50.0, last = (i + 1) / 50.0;
+            if (behind(first) == behind(last)) continue;
+            for (int k = 0; k < 40; ++k) {
+                const double middle = (first + last) / 2;
+                (behind(middle) == behind(first) ? first : last) = middle;
             }
-            was_inside = inside, was_behind = behind;
+            if (membrane::closest_point<double>(at(first), q).barycentric.minCoeff() < 1e-3) continue;
+            ++passings;
+            REQUIRE(time <= last);
+            break;
         }
     }
     REQUIRE(passings > cases(20000) / 50);
