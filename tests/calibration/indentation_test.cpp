@@ -149,6 +149,24 @@ TEST_CASE("Depths may come in any order and repeat, and without touch there is n
     CHECK(indentation(constants, {}).empty());
 }
 
+TEST_CASE("A tool that goes on from a deep indentation is still in contact") {
+    int found = 0;
+    for (int seed = 1; seed <= 60; ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = sphere(2);
+        const Point from = 0.02 * random.unit_vector(), to = 0.004 * random.vector();
+        const Tool<double> tool{.position = from, .radius = random.number(5e-4, 3e-3)};
+        const Indentation indentation(mesh, tool, to - from, linear_on(mesh));
+        const double near = random.number(0.0, 3e-3), far = random.number(near, 5e-3);
+        const auto forces = indentation(std::vector{40.0, random.number(0.5, 8.0)}, std::vector{near, far});
+        if (!is_finite(forces[1])) continue;
+        CHECK(forces[1] > 0);
+        ++found;
+    }
+    CHECK(found > 50);
+}
+
 TEST_CASE("All stiffnesses times a factor make the force of an indentation times it, in float too") {
     const auto mesh = sphere(1);
     const Indentation indentation(mesh, tip(), down, linear_on(mesh));
