@@ -104,18 +104,22 @@ std::vector<Biaxial> all_states(const std::vector<SkinPath>& paths, std::size_t 
     return states;
 }
 
+std::vector<membrane::Fit> mouse_fits() {
+    std::vector<membrane::Fit> fits;
+    for (const SkinPath& path : mouse_skin()) fits.push_back(fitted(stiffening_skin, mouse_start, path.states));
+    return fits;
+}
+
 /// Skin of mice: from constants fitted to the three other animals, together and each.
-std::vector<Curve> mouse_curves() {
+std::vector<Curve> mouse_curves(const std::vector<membrane::Fit>& fits) {
     const std::vector<SkinPath> paths = mouse_skin();
-    std::vector<Values> fits;
-    for (const SkinPath& path : paths) fits.push_back(fitted(stiffening_skin, mouse_start, path.states).constants);
     std::vector<Curve> curves;
     for (std::size_t i = 0; i < paths.size(); ++i) {
         std::vector<Values> sets{fitted(stiffening_skin, mouse_start, all_states(paths, i)).constants};
         for (std::size_t other = 0; other < paths.size(); ++other) {
-            if (other != i) sets.push_back(fits[other]);
+            if (other != i) sets.push_back(fits[other].constants);
         }
-        add(curves, "mouse skin, ", paths[i], stiffening_skin, sets, fits[i]);
+        add(curves, "mouse skin, ", paths[i], stiffening_skin, sets, fits[i].constants);
     }
     return curves;
 }
@@ -178,15 +182,16 @@ void print_laws(std::FILE* file) {
     row("`fibres` of all directions and of one: k1, k2 of each", two_families, {10, 10, 0.2, 5});
 }
 
-void print_fits(const membrane::Fit& eye, std::FILE* file) {
+void print_fits(const membrane::Fit& eye, const std::vector<membrane::Fit>& mice, std::FILE* file) {
     std::fprintf(file,
                  "\n### Constants fitted\n\n| curves | E at rest [MPa] | stiffening |\n|---|---|---|\n"
                  "| human eye | %.2f (%.2f to %.2f) | %.0f (%.0f to %.0f) |\n",
                  eye.constants[0], eye.intervals[0].lower, eye.intervals[0].upper, eye.constants[1],
                  eye.intervals[1].lower, eye.intervals[1].upper);
-    for (const SkinPath& path : mouse_skin()) {
-        const membrane::Fit fit = fitted(stiffening_skin, mouse_start, path.states);
-        std::fprintf(file, "| mouse skin, %s | %.4f (%.4f to %.4f) | %.0f (%.0f to %.0f) |\n", path.name,
+    const std::vector<SkinPath> paths = mouse_skin();
+    for (std::size_t i = 0; i < paths.size(); ++i) {
+        const membrane::Fit& fit = mice[i];
+        std::fprintf(file, "| mouse skin, %s | %.4f (%.4f to %.4f) | %.0f (%.0f to %.0f) |\n", paths[i].name,
                      fit.constants[0], fit.intervals[0].lower, fit.intervals[0].upper, fit.constants[1],
                      fit.intervals[1].lower, fit.intervals[1].upper);
     }
@@ -208,14 +213,14 @@ void write(const std::filesystem::path& path, const std::vector<Curve>& curves) 
 void run(const std::filesystem::path& folder) {
     const membrane::Fit eye = fitted_globe({globe_radius(sclera_area), mean_thickness()});
     std::vector<Curve> curves = pig_curves();
-    const std::vector<Curve> mice = mouse_curves();
-    curves.insert(curves.end(), mice.begin(), mice.end());
+    const std::vector<membrane::Fit> mice = mouse_fits();
+    for (const Curve& curve : mouse_curves(mice)) curves.push_back(curve);
     for (const Curve& curve : eye_curves(eye)) curves.push_back(curve);
     std::FILE* page = std::fopen((folder / "tissue_curves.md").c_str(), "w");
     if (page == nullptr) throw std::runtime_error("cannot write " + (folder / "tissue_curves.md").string());
     print(curves, page);
     print_laws(page);
-    print_fits(eye, page);
+    print_fits(eye, mice, page);
     std::fclose(page);
     write(folder / "tissue_curves.tsv", curves);
 }

@@ -17,6 +17,22 @@ Triangle<double> moved(const Triangle<double>& triangle, const Vector3<double>& 
     return {triangle.a + displacement, triangle.b + displacement, triangle.c + displacement};
 }
 
+/// A triangle whose corners move anywhere, and a point near its path.
+struct RandomMotion {
+    explicit RandomMotion(test::Random& random)
+        : from{random.vector(), random.vector(), random.vector()},
+          to{random.vector(), random.vector(), random.vector()},
+          q(random.vector<double>(-0.3, 0.3)) {}
+
+    [[nodiscard]] Triangle<double> at(double t) const {
+        return {(1 - t) * from.a + t * to.a, (1 - t) * from.b + t * to.b, (1 - t) * from.c + t * to.c};
+    }
+    [[nodiscard]] double time_of_impact() const { return membrane::time_of_impact<double>(from, to, q); }
+
+    Triangle<double> from, to;
+    Vector3<double> q;
+};
+
 }  // namespace
 
 TEST_CASE("a triangle that moves as a whole passes where and when a line says") {
@@ -47,13 +63,11 @@ TEST_CASE("a triangle that moves as a whole passes where and when a line says") 
 TEST_CASE("just before it passes, the point is still on the side it was on") {
     for (int seed = 1; seed <= cases(20000); ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));
-        const Triangle<double> from{random.vector(), random.vector(), random.vector()};
-        const Triangle<double> to{random.vector(), random.vector(), random.vector()};
-        const Vector3<double> q = random.vector<double>(-0.3, 0.3);
-        const double time = membrane::time_of_impact<double>(from, to, q);
+        const RandomMotion motion(random);
+        const double time = motion.time_of_impact();
         const auto side = [&](double t) {
-            const Vector3<double> a = (1 - t) * from.a + t * to.a - q, b = (1 - t) * from.b + t * to.b - q,
-                                  c = (1 - t) * from.c + t * to.c - q;
+            const auto now = motion.at(t);
+            const Vector3<double> a = now.a - motion.q, b = now.b - motion.q, c = now.c - motion.q;
             return a.x() * (b.y() * c.z() - b.z() * c.y()) + a.y() * (b.z() * c.x() - b.x() * c.z()) +
                    a.z() * (b.x() * c.y() - b.y() * c.x());
         };
@@ -67,23 +81,18 @@ TEST_CASE("no passing is missed, and the unit of length does not matter") {
     int passings = 0;
     for (int seed = 1; seed <= cases(20000); ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));
-        const Triangle<double> from{random.vector(), random.vector(), random.vector()};
-        const Triangle<double> to{random.vector(), random.vector(), random.vector()};
-        const Vector3<double> q = random.vector<double>(-0.3, 0.3);
-        const double time = membrane::time_of_impact<double>(from, to, q);
+        const RandomMotion motion(random);
+        const double time = motion.time_of_impact();
         CAPTURE(seed, time);
         for (const double unit : {0x1p-20, 0x1p20}) {
             const auto scaled = [&](const Triangle<double>& a) {
                 return Triangle<double>{unit * a.a, unit * a.b, unit * a.c};
             };
-            REQUIRE(membrane::time_of_impact<double>(scaled(from), scaled(to), unit * q) == time);
+            REQUIRE(membrane::time_of_impact<double>(scaled(motion.from), scaled(motion.to), unit * motion.q) == time);
         }
-        const auto at = [&](double s) {
-            return Triangle<double>{(1 - s) * from.a + s * to.a, (1 - s) * from.b + s * to.b,
-                                    (1 - s) * from.c + s * to.c};
-        };
-        const auto behind = [&](double s) {
-            return membrane::dot<double>(q - at(s).a, membrane::area_vector(at(s))) < 0;
+        const auto behind = [&](double t) {
+            const auto now = motion.at(t);
+            return membrane::dot<double>(motion.q - now.a, membrane::area_vector(now)) < 0;
         };
         for (int i = 0; i < 50; ++i) {
             double first = i / 50.0, last = (i + 1) / 50.0;
@@ -92,7 +101,7 @@ TEST_CASE("no passing is missed, and the unit of length does not matter") {
                 const double middle = (first + last) / 2;
                 (behind(middle) == behind(first) ? first : last) = middle;
             }
-            if (membrane::closest_point<double>(at(first), q).barycentric.minCoeff() < 1e-3) continue;
+            if (membrane::closest_point<double>(motion.at(first), motion.q).barycentric.minCoeff() < 1e-3) continue;
             ++passings;
             REQUIRE(time <= last);
             break;
