@@ -76,6 +76,10 @@
 #include <membrane/model/spring_stiffness.hpp>
 // [/constants]
 
+// [adhesion]
+#include <membrane/model/cohesive_springs.hpp>
+// [/adhesion]
+
 // [equilibrium]
 #include <membrane/accuracy/equilibrium.hpp>
 // [/equilibrium]
@@ -601,6 +605,20 @@ TEST_CASE("pages: constants") {
     // [/constants]
     CHECK(layers > 0);
     CHECK(tool.radius < 2e-3);
+}
+
+TEST_CASE_METHOD(Touched, "pages: adhesion") {
+    membrane::Grasper<double> grasper(mesh);
+    tool.grasping = true;
+    const auto grasp = grasper.update(contact, x, tool);
+    REQUIRE(grasp.holding());
+    tool.position += Eigen::Vector3d(0, 0, 1e-4);
+    // [adhesion]
+    auto adhesion = membrane::CohesiveSprings(mesh, {.stiffness = 1e8, .strength = 2e3, .energy = 0.05});  // per area
+    const auto report = solver.step(x, dt, network, adhesion, membrane::pull(tool, grasp));
+    adhesion.update(x, report.moved);
+    // [/adhesion]
+    CHECK(adhesion.dissipated() > 0);
 }
 
 TEST_CASE_METHOD(Touched, "pages: equilibrium") {

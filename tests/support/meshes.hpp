@@ -101,6 +101,26 @@ Surface<Scalar> fan(membrane::Index triangles) {
     return surface;
 }
 
+/// A flat strip of equilateral triangles along x, `columns` edges long and `rows` triangles wide.
+template <membrane::Real Scalar>
+membrane::TriangleMesh<Scalar> triangle_strip(membrane::Index columns, membrane::Index rows, double edge) {
+    const double height = edge * std::sqrt(3.0) / 2;
+    Surface<Scalar> strip;
+    for (membrane::Index j = 0; j <= rows; ++j) {
+        for (membrane::Index i = 0; i <= columns; ++i)
+            strip.add({Scalar(edge * (i + (j % 2) / 2.0)), Scalar(height * j), Scalar(0)});
+    }
+    const auto at = [&](membrane::Index i, membrane::Index j) { return j * (columns + 1) + i; };
+    for (membrane::Index j = 0; j < rows; ++j) {
+        for (membrane::Index i = 0; i < columns; ++i) {
+            const membrane::Index a = at(i, j), b = at(i + 1, j), c = at(i, j + 1), d = at(i + 1, j + 1);
+            strip.add(a, b, j % 2 == 0 ? c : d);
+            strip.add(j % 2 == 0 ? b : a, d, c);
+        }
+    }
+    return strip.mesh();
+}
+
 /// An irregular flat sheet of the unit square, inner vertices moved by up to 0.3 of a square.
 inline membrane::TriangleMesh<double> irregular_sheet(membrane::Index squares, Random& random) {
     auto surface = surface_of(membrane::sheet({.width = 1, .height = 1, .columns = squares, .rows = squares}));

@@ -30,6 +30,30 @@ template <Real Number, Real Scalar>
 
 }  // namespace detail
 
+/// The rigid motion of the body at vertex `v`, between its rest pose and now.
+template <Real Scalar>
+struct FrameOnBody {
+    /// Of `body` where vertex `v` is anchored.
+    FrameOnBody(const MovingBody<Scalar>& body, Index v) noexcept
+        : at_rest(point(body.anchors_at_rest(), v)), now(point(body.anchors(), v)) {
+        turn.rotation = body.rotation_at(v);
+    }
+
+    ///@{
+    /// A point near the vertex in the rest pose of the body, and back [m].
+    [[nodiscard]] Vector3<Scalar> point_to_body(const Vector3<Scalar>& position) const noexcept {
+        return at_rest + turn.vector_to_body(position - now);
+    }
+    [[nodiscard]] Vector3<Scalar> point_to_world(const Vector3<Scalar>& position) const noexcept {
+        return now + turn.vector_to_world(position - at_rest);
+    }
+    ///@}
+
+    Vector3<Scalar> at_rest;  ///< the anchor in the rest pose [m]
+    Vector3<Scalar> now;      ///< the anchor [m]
+    RigidFrame<Scalar> turn;  ///< rotates without translation
+};
+
 /// Any `FoundationModel` on a body that has moved: at each vertex the model is translated with the anchor and rotated
 /// with the body. Arguments are transformed to the rest pose of the body, results back. A short-lived view of both, see
 /// `on`.
@@ -45,7 +69,7 @@ class MovingFoundation {
     /// As `FoundationModel` requires; [N] and [N/m] in the frame of `position`.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const Vector3<Scalar>& position, const Vector3<Scalar>& start,
                                                Scalar dt) const noexcept {
-        const LocalFrame frame(*body_, v);
+        const FrameOnBody<Scalar> frame(*body_, v);
         auto sum = volume_->force_on(v, frame.point_to_body(position), frame.point_to_body(start), dt);
         sum.force = frame.turn.vector_to_world(sum.force);
         return sum;
@@ -54,7 +78,7 @@ class MovingFoundation {
     /// The spring of vertex `v`, if the model has springs.
     [[nodiscard]] auto spring(Index v, const Vector3<Scalar>& start,
                               Scalar dt) const noexcept requires HasSprings<Volume, Scalar> {
-        const LocalFrame frame(*body_, v);
+        const FrameOnBody<Scalar> frame(*body_, v);
         return volume_->spring(v, frame.point_to_body(start), dt)
             .moved([&](const Vector3<Scalar>& place) { return frame.point_to_world(place); },
                    [&](const Vector3<Scalar>& vector) { return frame.turn.vector_to_world(vector); });
@@ -86,25 +110,9 @@ class MovingFoundation {
         requires(const Volume& volume) {
         volume.energy(v, position);
     }
-    { return volume_->energy(v, LocalFrame(*body_, v).point_to_body(position)); }
+    { return volume_->energy(v, FrameOnBody<Scalar>(*body_, v).point_to_body(position)); }
 
   private:
-    /// The rigid motion of the body at vertex `v`.
-    struct LocalFrame {
-        LocalFrame(const MovingBody<Scalar>& body, Index v) noexcept
-            : at_rest(point(body.anchors_at_rest(), v)), now(point(body.anchors(), v)) {
-            turn.rotation = body.rotation_at(v);
-        }
-        [[nodiscard]] Vector3<Scalar> point_to_body(const Vector3<Scalar>& position) const noexcept {
-            return at_rest + turn.vector_to_body(position - now);
-        }
-        [[nodiscard]] Vector3<Scalar> point_to_world(const Vector3<Scalar>& position) const noexcept {
-            return now + turn.vector_to_world(position - at_rest);
-        }
-        Vector3<Scalar> at_rest, now;
-        RigidFrame<Scalar> turn;
-    };
-
     const MovingBody<Scalar>* body_;
     const Volume* volume_;
 };

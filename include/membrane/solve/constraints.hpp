@@ -300,8 +300,8 @@ template <class Force>
                                                      const Vector3<typename Force::Scalar>& barycentric,
                                                      const Eigen::MatrixBase<Force>& force) noexcept {
     return {corners, barycentric, force};
-    ///@}
 }
+///@}
 
 namespace detail {
 
