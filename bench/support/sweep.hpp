@@ -54,9 +54,9 @@ struct PlainMass {
     template <Real Scalar, class Springs>
     static Eigen::Matrix<Scalar, 3, 1> move(const Springs& springs, const Eigen::Matrix<Scalar, 3, 1>& from_anchor) {
         Eigen::Matrix<Scalar, 3, 1> force = -Scalar(foundation) * from_anchor;
-        springs([&](const auto& edge, Scalar stiffness, Scalar rest_length) {
+        springs([&](const auto& edge, Scalar k, Scalar rest_length) {
             const Scalar length = edge.norm();
-            force += stiffness * (length - rest_length) / length * edge;
+            force += k * (length - rest_length) / length * edge;
         });
         return static_cast<Scalar>(tick * tick / 4e-4) * force;
     }
@@ -70,14 +70,14 @@ struct PlainNewton {
         Eigen::Matrix<Scalar, 3, 1> force = -Scalar(foundation) * from_anchor;
         Matrix3 dyads = Matrix3::Zero();
         Scalar sum = Scalar(foundation), trace = 0, size = std::numeric_limits<Scalar>::max();
-        springs([&](const auto& edge, Scalar stiffness, Scalar rest_length) {
+        springs([&](const auto& edge, Scalar k, Scalar rest_length) {
             const Scalar length = edge.norm();
             const Eigen::Matrix<Scalar, 3, 1> direction = edge / length;
-            force += stiffness * (length - rest_length) * direction;
-            const Scalar part = stiffness * std::min(rest_length / length, Scalar(1));
+            force += k * (length - rest_length) * direction;
+            const Scalar part = k * std::min(rest_length / length, Scalar(1));
             dyads.noalias() += (part * direction).lazyProduct(direction.transpose());
             trace += part;
-            sum += stiffness;
+            sum += k;
             size = std::min(size, length);
         });
         const Scalar ratio = force.norm() / (sum * size), slack = 1 - trace / sum - ratio;

@@ -150,7 +150,7 @@ MEMBRANE_INLINE CornerForce<N> Hinge<Scalar>::force_on(const Corners<N, 4>& x, s
     // Within 0.28 of the distances h the curvature at most doubles. Without an area nothing is known.
     const N bend = fold.curvature(i);
     constexpr auto infinity = std::numeric_limits<Each<N>>::infinity();
-    const N unknown = select<N>(!fold.valid & (k > 0), infinity, 0);
+    const N unknown = select<N>((!fold.valid) & (k > 0), infinity, 0);
     return {moment * descent, outer<N>(k, descent), {abs(moment) * bend, k / 2 * (bend * bend), 12 * bend + unknown}};
 }
 
