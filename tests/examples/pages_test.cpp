@@ -80,6 +80,10 @@
 #include <membrane/model/cohesive_springs.hpp>
 // [/adhesion]
 
+// [friction]
+#include <membrane/solve/tool_friction.hpp>
+// [/friction]
+
 // [equilibrium]
 #include <membrane/accuracy/equilibrium.hpp>
 // [/equilibrium]
@@ -619,6 +623,15 @@ TEST_CASE_METHOD(Touched, "pages: adhesion") {
     adhesion.update(x, report.moved);
     // [/adhesion]
     CHECK(adhesion.dissipated() > 0);
+}
+
+TEST_CASE_METHOD(Touched, "pages: friction") {
+    // [friction]
+    auto friction = membrane::ToolFriction<double>({.coefficient = 0.3});  // one for each tool
+    const auto report = solver.step(x, dt, network, foundation, friction.press(tool, contact));
+    // [/friction]
+    CHECK(report.total_reaction().norm() > 0);
+    CHECK_FALSE(friction.points().empty());
 }
 
 TEST_CASE_METHOD(Touched, "pages: equilibrium") {

@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include <membrane/core/check.hpp>
+#include <membrane/core/fixed_vector.hpp>
+#include <membrane/solve/tool_contact.hpp>
+
+/// Coulomb friction between a tool and the membrane: the tool drags the tissue along.
+///
+///     auto friction = membrane::ToolFriction<double>({.coefficient = 0.3});
+///     const auto contact = tracker.update(tree, x, tool);
+///     const auto report  = solver.step(x, dt, network, foundation, friction.press(tool, contact));
+namespace membrane {
+
+/// Options of `ToolFriction`.
+struct ToolFrictionOptions {
+    double coefficient;               ///< of Coulomb friction: largest ratio of tangential to normal force
+    Index max_contact_points = 4096;  ///< capacity, see `SolverOptions`; points beyond it have no friction
+
+    /// @throws InvalidInput if a number is out of its range
+    void check() const;
+};
+
+/// The place of the membrane that a contact point holds, and the friction force there.
+template <Real Scalar>
+struct StickingPoint {
+    Index triangle;                   ///< of the contact point
+    int feature;                      ///< of the tool, as of the contact point
+    std::array<Index, 3> corners;     ///< of the triangle
+    Vector3<Scalar> weights;          ///< barycentric, of the place on the membrane
+    Scalar along;                     ///< of the place on the tool: fraction of the axis
+    Vector3<Scalar> offset;           ///< from there to the place on the membrane [m]
+    Vector3<Scalar> force;            ///< of friction on the membrane [N]
+    Vector3<Scalar> sticking_force;   ///< that would keep the place, by the last pass [N]
+    Scalar pressure = 0;              ///< the normal force [N]
+    Vector3<Scalar> normal{0, 0, 1};  ///< of the contact point
+};
+
+template <Real Scalar>
+class ToolFriction;
+
+/// `ToolContact` with friction: made by `ToolFriction::press`.
+template <Real Scalar>
+struct FrictionalContact {
+    ToolContact<Scalar> normal;      ///< without friction
+    ToolFriction<Scalar>* friction;  ///< of this tool; must outlive the step
+
+    ///@{
+    /// As `Constraint` requires. The reaction is the sum of normal and friction forces.
+    [[nodiscard]] bool valid() const noexcept { return normal.valid(); }
+    [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return normal.driving_input(); }
+    void begin(ConstraintContext<Scalar>& context) const noexcept {
+        normal.begin(context);
+        friction->begin(context, normal.tool);
+    }
+    bool enforce(ConstraintContext<Scalar>& context) const noexcept {
+        if (!normal.contact.touching()) return false;
+        const bool slipped = friction->solve(context, normal.tool);
+        const bool pressed = normal.enforce(context);
+        friction->limit(context);
+        return slipped || pressed;
+    }
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept {
+        return normal.reaction(context) + friction->end(context, normal.tool);
+    }
+    ///@}
+};
+
+/// Friction of one tool, and what it keeps from tick to tick. Each contact point holds a place of the membrane: a force
+/// along the surface keeps it where it is on the tool, as long as that takes at most `coefficient` times the normal
+/// force of the point; else the place slips, against that force: the exact cone. The forces are found within the step,
+/// with all others, by projected Gauss-Seidel. Under a tool at rest the membrane does not creep: places are kept, and
+/// not displacements.
+///
+/// The tool does not rotate about itself. Fixed corners take no friction. `ContactFriction` adds friction to the
+/// hand's force alone; with this part the reaction has it. `equilibrium` and error bounds do not know it.
+///
+/// Online, but for the constructor. Cost: linear in the contact points, in each sweep.
+template <Real Scalar>
+class ToolFriction {
+  public:
+    /// Allocates. @throws InvalidInput if an option is out of its range
+    explicit ToolFriction(const ToolFrictionOptions& options)
+        : coefficient_((options.check(), static_cast<Scalar>(options.coefficient))),
+          points_(static_cast<std::size_t>(options.max_contact_points)),
+          kept_(points_) {}
+
+    /// The tool presses at its contact, as by `membrane::press`, with friction. In one step at most once; must outlive
+    /// the step.
+    [[nodiscard]] FrictionalContact<Scalar> press(const Tool<Scalar>& tool, const Contact<Scalar>& contact,
+                                                  const Grasp<Scalar>& grasp = {}) noexcept {
+        return {membrane::press(tool, contact, grasp), this};
+    }
+
+    /// The contact points of the last step, with their friction.
+    [[nodiscard]] std::span<const StickingPoint<Scalar>> points() const noexcept { return kept_.items(); }
+
+    /// Whether a point with a normal force slips in the last step.
+    [[nodiscard]] bool slips() const noexcept {
+        return std::any_of(points().begin(), points().end(),
+                           [this](const Point& point) { return point.pressure > 0 && is_at_limit(point); });
+    }
+
+    /// Forgets all places. Cost: O(1).
+    void reset() noexcept {
+        kept_.clear();
+        tool_ = {};
+        has_tool_ = false;
+    }
+
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.kept_, self.tool_, self.has_tool_);
+    }
+
+  private:
+    friend FrictionalContact<Scalar>;
+    using Context = ConstraintContext<Scalar>;
+    using Point = StickingPoint<Scalar>;
+
+    void begin(Context& context, const Tool<Scalar>& tool) noexcept;
+    bool solve(Context& context, const Tool<Scalar>& tool) noexcept;
+    void limit(Context& context) noexcept;
+    [[nodiscard]] Vector3<Scalar> end(const Context& context, const Tool<Scalar>& tool) noexcept;
+
+    void read_normal_forces(Context& context) noexcept;
+    [[nodiscard]] const Point* kept(const ContactPoint<Scalar>& point, std::size_t guess) const noexcept;
+    [[nodiscard]] Scalar change_force(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept;
+    [[nodiscard]] Vector3<Scalar> limited(const Vector3<Scalar>& force, const Point& point) const noexcept;
+    [[nodiscard]] bool is_at_limit(const Point& point) const noexcept {
+        constexpr Scalar rounding = Scalar(64) * std::numeric_limits<Scalar>::epsilon();
+        return norm(point.force) >= coefficient_ * point.pressure * (1 - rounding);
+    }
+    [[nodiscard]] static Vector3<Scalar> place(const Context& context, const Point& point) noexcept {
+        const auto& v = point.corners;
+        return point_at(Triangle<Scalar>{context.position(v[0]), context.position(v[1]), context.position(v[2])},
+                        point.weights);
+    }
+    [[nodiscard]] static Vector3<Scalar> on_tool(const Tool<Scalar>& tool, const Point& point) noexcept {
+        return tool.position + point.along * tool.axis;
+    }
+    // Lets the point hold the place that is in contact, at `position`, by `tool`.
+    static void hold(Point& point, const Vector3<Scalar>& weights, const Vector3<Scalar>& position,
+                     const Tool<Scalar>& tool) noexcept;
+
+    Scalar coefficient_;
+    FixedVector<Point> points_, kept_;  // of this step, in the order of the contact points; of the last one
+    Tool<Scalar> tool_;                 // in the last step
+    bool has_tool_ = false;
+};
+
+inline void ToolFrictionOptions::check() const {
+    constexpr std::string_view component = "ToolFriction";
+    detail::check_option(component, coefficient, "coefficient", "1");
+    if (max_contact_points < 1) {
+        refuse(component, "max_contact_points must be at least 1, got ", max_contact_points);
+    }
+}
+
+// Finds the places that the contact points of this step hold, and applies their forces of the last step.
+template <Real Scalar>
+void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noexcept {
+    points_.clear();
+    const auto contacts = std::as_const(context).points();
+    for (const auto& contact : contacts) {
+        Point point;
+        if (const auto* before = kept(contact, points_.size()); before != nullptr && is_finite(before->force)) {
+            point = *before;
+        } else {
+            point.triangle = contact.triangle;
+            point.feature = contact.feature;
+            point.corners = contact.corners;
+            point.force = Vector3<Scalar>::Zero();
+            const auto& v = contact.corners;
+            const Triangle<Scalar> start{context.start(v[0]), context.start(v[1]), context.start(v[2])};
+            hold(point, contact.weights, point_at(start, contact.weights), has_tool_ ? tool_ : tool);
+        }
+        point.pressure = norm(contact.force);
+        point.normal = contact.normal;
+        point.force = point.sticking_force = limited(point.force, point);
+        if (!points_.try_push_back(point)) break;
+        add_point_force(context, point.corners, point.weights, point.force);
+    }
+}
+
+template <Real Scalar>
+auto ToolFriction<Scalar>::kept(const ContactPoint<Scalar>& point, std::size_t guess) const noexcept -> const Point* {
+    const auto same = [&](const Point& other) {
+        return other.triangle == point.triangle && other.feature == point.feature && other.corners == point.corners;
+    };
+    const auto all = kept_.items();
+    if (guess < all.size() && same(all[guess])) return &all[guess];
+    const auto found = std::find_if(all.begin(), all.end(), same);
+    return found == all.end() ? nullptr : &*found;
+}
+
+template <Real Scalar>
+void ToolFriction<Scalar>::hold(Point& point, const Vector3<Scalar>& weights, const Vector3<Scalar>& position,
+                                const Tool<Scalar>& tool) noexcept {
+    const Scalar square = squared_norm<Scalar>(tool.axis);
+    const Scalar along = square > 0 ? dot<Scalar>(position - tool.position, tool.axis) / square : Scalar(0);
+    point.weights = weights;
+    point.along = std::clamp(along, Scalar(0), Scalar(1));
+    point.offset = position - on_tool(tool, point);
+}
+
+// Normal forces and normals by the last pass over the contact points.
+template <Real Scalar>
+void ToolFriction<Scalar>::read_normal_forces(Context& context) noexcept {
+    auto& state = context.state();
+    const auto first = static_cast<Index>(state.point_ranges[context.constraint()].begin);
+    for (const auto& pack : state.pack_ranges[context.constraint()].of(state.packs.items())) {
+        for (std::size_t i = 0; i < pack.size; ++i) {
+            const auto at = static_cast<std::size_t>(pack.point[i] - first);
+            if (at >= points_.size()) continue;
+            Point& point = points_.items()[at];
+            point.pressure = pack.load.force[i];
+            point.normal = {pack.load.normal[0][i], pack.load.normal[1][i], pack.load.normal[2][i]};
+        }
+    }
+}
+
+// Without the part along the normal, and within the cone.
+template <Real Scalar>
+Vector3<Scalar> ToolFriction<Scalar>::limited(const Vector3<Scalar>& force, const Point& point) const noexcept {
+    const Vector3<Scalar> tangential = force - dot(force, point.normal) * point.normal;
+    const Scalar size = norm(tangential), largest = coefficient_ * point.pressure;
+    return size > largest ? (largest / size) * tangential : tangential;
+}
+
+// Changes the force of a point by its slip over the compliance in that direction, and moves the corners by their
+// response. Returns the change [N], zero if the response is negligible.
+template <Real Scalar>
+Scalar ToolFriction<Scalar>::change_force(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept {
+    const Vector3<Scalar> now = place(context, point), off = now - on_tool(tool, point) - point.offset;
+    const Vector3<Scalar> slip = off - dot(off, point.normal) * point.normal;
+    const Vector3<Scalar> along = direction_or_zero(slip);
+    Scalar compliance = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
+        compliance += weight * weight * dot(along, context.response(point.corners[k], along));
+    }
+    point.sticking_force = compliance > 0 ? point.force - (1 / compliance) * slip : point.force;
+    const Vector3<Scalar> change = limited(point.sticking_force, point) - point.force;
+    const Scalar size = norm(change);
+    if (!(size > context.force_tolerance()) || !(size * compliance > detail::rounding_at(now))) return 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vector3<Scalar> part = point.weights[static_cast<Eigen::Index>(k)] * change;
+        context.move(point.corners[k], context.response(point.corners[k], part));
+        context.add_force(point.corners[k], part);
+    }
+    point.force += change;
+    return size;
+}
+
+// Some passes of projected Gauss-Seidel. Returns whether a force changed.
+template <Real Scalar>
+bool ToolFriction<Scalar>::solve(Context& context, const Tool<Scalar>& tool) noexcept {
+    constexpr int max_passes = 4;
+    read_normal_forces(context);
+    Scalar first = 0;
+    for (int pass = 0; pass < max_passes; ++pass) {
+        Scalar largest = 0;
+        for (auto& point : points_.items()) largest = (std::max)(largest, change_force(context, tool, point));
+        if (pass == 0) first = largest;
+        if (!(largest > first / 2)) break;
+    }
+    return first > 0;
+}
+
+// Limits the forces by the normal forces of now, which the contact has changed since the last pass.
+template <Real Scalar>
+void ToolFriction<Scalar>::limit(Context& context) noexcept {
+    read_normal_forces(context);
+    for (auto& point : points_.items()) {
+        const Vector3<Scalar> now = limited(point.sticking_force, point);
+        if (now == point.force) continue;
+        add_point_force<Scalar>(context, point.corners, point.weights, now - point.force);
+        point.force = now;
+    }
+}
+
+// Points that slip, or do not press, hold what is in contact now. Returns the sum of the forces on the tool.
+template <Real Scalar>
+Vector3<Scalar> ToolFriction<Scalar>::end(const Context& context, const Tool<Scalar>& tool) noexcept {
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    const auto contacts = context.points();
+    for (std::size_t i = 0; i < points_.size(); ++i) {
+        Point& point = points_.items()[i];
+        sum -= point.force;
+        if (!is_at_limit(point)) continue;
+        point.weights = contacts[i].weights;
+        hold(point, contacts[i].weights, place(context, point), tool);
+    }
+    std::swap(points_, kept_);
+    tool_ = tool;
+    has_tool_ = true;
+    return sum;
+}
+
+static_assert(Constraint<FrictionalContact<double>, double> && Constraint<FrictionalContact<float>, float>);
+
+}  // namespace membrane

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/solve/tool_friction.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <tuple>
+#include <type_traits>
+#include <vector>
+
+#include <membrane/core/snapshot.hpp>
+#include <membrane/membrane.hpp>
+#include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/moving_foundation.hpp>
+#include <membrane/model/spring_stiffness.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random.hpp"
+#include "support/refusal.hpp"
+
+using namespace membrane;
+using test::Random;
+
+namespace {
+
+struct Settings {
+    double friction = 0.3;
+    Index rings = 12, sweeps = 20;
+    Vector3<double> axis = Vector3<double>::Zero();  // of a shaft [m]
+};
+
+/// A ball, or a shaft, on a disc whose foundation resists along the surface, too.
+template <Real S>
+struct Drag {
+    static constexpr double radius = 2e-3, depth = 0.05e-3;  // of the ball; pressed in [m]
+
+    Settings settings;
+    TriangleMesh<S> mesh = disc<S>({.radius = 5e-3, .rings = settings.rings});
+    Material material{.young_modulus = 1e6, .poisson_ratio = 1.0 / 3, .thickness = 50e-6};
+    FoundationLayer layer{.young_modulus = 2e4, .poisson_ratio = 0.3, .thickness = 1e-3};
+    MassSpringNetwork<S, LinearSpring> network{
+        mesh, LinearSpring{}, {.stiffness = spring_stiffnesses(mesh, material), .pinned = border(mesh)}};
+    FoundationSprings<S> foundation{
+        mesh, {.normal = normal_stiffnesses(mesh, layer), .tangential = tangential_stiffnesses(mesh, layer)}};
+    QuasiStaticSolver<S> solver{network, {.layers = unlimited, .sweeps = settings.sweeps}};
+    AabbTree<S> tree{mesh};
+    ContactTracker<S> tracker{mesh};
+    ToolFriction<S> friction{{.coefficient = settings.friction}};
+    Points<S> x = mesh.positions();
+    Tool<S> tool{.axis = settings.axis.cast<S>(), .radius = S(radius)};
+    StepReport<S> report;
+
+    explicit Drag(const Settings& with) : settings(with) {}
+
+    /// The ball's lowest point goes to `at` along the disc, `deep` below it [m]. Returns its force on the hand [N].
+    Vector3<double> move_to(const Vector3<double>& at, double deep = depth) {
+        tool.position = Vector3<double>(at[0], at[1], radius - deep).cast<S>();
+        const auto contact = tracker.update(tree, x, tool);
+        report = solver.step(x, S(1e-3), network, foundation, friction.press(tool, contact));
+        REQUIRE(report.status == StepStatus::advanced);
+        tree.refit(x, report.moved);
+        return report.total_reaction().template cast<double>();
+    }
+    /// Pressed straight in, until it is in equilibrium.
+    void press_in() {
+        for (int i = 0; i <= 50; ++i) move_to({0, 0, 0}, depth * i / 50);
+        for (int i = 0; i < 50; ++i) move_to({0, 0, 0});
+    }
+    /// Every point's friction is along the surface, and within its cone.
+    void check_cones() const {
+        const double rounding = 100 * std::numeric_limits<S>::epsilon();
+        for (const auto& point : friction.points()) {
+            const double largest = settings.friction * static_cast<double>(point.pressure);
+            REQUIRE(static_cast<double>(norm(point.force)) <= (1 + rounding) * largest);
+            REQUIRE(std::abs(static_cast<double>(dot(point.force, point.normal))) <= rounding * largest);
+        }
+    }
+    /// Of all points, the sums of the magnitudes of friction and normal forces.
+    [[nodiscard]] double ratio_at_points() const {
+        double tangential = 0, normal = 0;
+        for (const auto& point : friction.points()) {
+            tangential += static_cast<double>(norm(point.force));
+            normal += static_cast<double>(point.pressure);
+        }
+        return tangential / normal;
+    }
+};
+
+double along_disc(const Vector3<double>& force) { return std::hypot(force[0], force[1]); }
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and is pulled against its motion",
+                   "[friction]", double, float) {
+    for (const double coefficient : {0.1, 0.3, 1.0}) {
+        CAPTURE(coefficient);
+        Drag<TestType> drag({.friction = coefficient, .rings = 20});
+        drag.press_in();
+        const Vector3<double> direction(0.8, 0.6, 0);
+        Vector3<double> sum = Vector3<double>::Zero();
+        double at_points = 0;
+        int count = 0;
+        for (int i = 1; i <= 1000; i += cases_are_slow ? 10 : 1) {
+            const auto force = drag.move_to(1e-6 * i * direction);
+            drag.check_cones();
+            if (i < 300) continue;
+            REQUIRE(drag.friction.slips());
+            sum += force;
+            at_points += drag.ratio_at_points();
+            ++count;
+        }
+        // The facets push the ball by some per cent to and fro.
+        CHECK(at_points / count == Approx(coefficient).epsilon(0.01));
+        CHECK(along_disc(sum) / sum[2] == Approx(coefficient).epsilon(0.02));
+        CHECK(-dot(sum, direction) / along_disc(sum) > std::cos(0.02));
+    }
+}
+
+TEMPLATE_TEST_CASE("below that it sticks: the membrane moves with the tool", "[friction]", double, float) {
+    Drag<TestType> drag({.friction = 0.6});
+    drag.press_in();
+    const auto offsets = [&] {
+        std::vector<Vector3<double>> all;
+        for (const auto& point : drag.friction.points()) {
+            const auto& v = point.corners;
+            const Triangle<TestType> triangle{membrane::point(drag.x, v[0]), membrane::point(drag.x, v[1]),
+                                              membrane::point(drag.x, v[2])};
+            const Vector3<TestType> offset = point_at(triangle, point.weights) - drag.tool.position;
+            all.push_back(offset.template cast<double>());
+        }
+        return all;
+    };
+    const auto before = offsets();
+    std::vector<bool> has_slipped(before.size(), false);  // as points at the rim do, where the normal force is small
+    const auto note_slips = [&] {
+        for (std::size_t k = 0; k < has_slipped.size(); ++k) {
+            const auto& point = drag.friction.points()[k];
+            has_slipped[k] = has_slipped[k] || static_cast<double>(norm(point.force)) >=
+                                                   0.999 * drag.settings.friction * static_cast<double>(point.pressure);
+        }
+    };
+    const double force_before = along_disc(drag.move_to({0, 0, 0}));
+    std::vector<double> forces;
+    for (int i = 1; i <= 10; ++i) {
+        Vector3<double> force = Vector3<double>::Zero();
+        for (int wait = 0; wait < 30; ++wait) {
+            force = drag.move_to({0.2e-6 * i, 0, 0});
+            REQUIRE(drag.friction.points().size() == before.size());
+            note_slips();
+        }
+        forces.push_back(-force[0]);
+        drag.check_cones();
+        const auto now = offsets();
+        for (std::size_t k = 0; k < now.size(); ++k) {
+            const Vector3<double> off = now[k] - before[k],
+                                  normal = drag.friction.points()[k].normal.template cast<double>();
+            if (!has_slipped[k]) REQUIRE(norm<double>(off - dot(off, normal) * normal) < 0.01e-6);
+        }
+    }
+    CHECK(std::count(has_slipped.begin(), has_slipped.end(), false) >= 3);
+    // More and more of the rim slips: the force increases by less and less, towards that of all points slipping.
+    const double whole = 0.6 * drag.move_to({2e-6, 0, 0})[2];
+    for (std::size_t i = 1; i < forces.size(); ++i) {
+        CHECK(forces[i] > forces[i - 1]);
+        const auto n = static_cast<double>(i);
+        CHECK(forces[i] / (n + 1) < 1.02 * forces[i - 1] / n);
+    }
+    CHECK(forces.back() > 0.2 * whole);
+    CHECK(forces.back() < whole);
+    for (int wait = 0; wait < 100; ++wait) drag.move_to({0, 0, 0});
+    CHECK(along_disc(drag.move_to({0, 0, 0})) < force_before + 0.2 * forces.back());
+}
+
+TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[friction]", double, float) {
+    Drag<TestType> drag({.friction = 0.3, .sweeps = 5});
+    drag.press_in();
+    for (int i = 1; i <= 30; ++i) drag.move_to({1e-6 * i, 0, 0});
+    const Vector3<double> held(3e-5, 0, 0);
+    for (int i = 0; i < 300; ++i) drag.move_to(held);
+    const auto before = drag.x;
+    const auto force = drag.move_to(held);
+    CHECK(along_disc(force) > 0.1 * force[2]);
+    for (int i = 0; i < (cases_are_slow ? 300 : 10'000); ++i) drag.move_to(held);
+    // What the vertex updates leave out at the force tolerance.
+    CHECK((drag.x - before).cwiseAbs().maxCoeff() < (std::is_same_v<TestType, float> ? 1e-9 : 1e-10));
+    CHECK(norm<double>(drag.move_to(held) - force) < 1e-3 * along_disc(force));
+}
+
+TEST_CASE("the forces of a frictional contact balance those of the membrane", "[friction]") {
+    for (int seed = 1; seed <= cases(20); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Drag<double> drag({.friction = random.number(0.0, 1.0), .rings = 8, .sweeps = 400});
+        Vector3<double> at = Vector3<double>::Zero();
+        Vector3<double> reaction = Vector3<double>::Zero();
+        const double deep = random.number(0.01e-3, 0.2e-3);
+        for (int i = 0; i < 20; ++i) {
+            at += Vector3<double>(random.number(-1e-5, 1e-5), random.number(-1e-5, 1e-5), 0);
+            reaction = drag.move_to(at, deep);
+            drag.check_cones();
+        }
+        for (int i = 0; i < 20; ++i) reaction = drag.move_to(at, deep);
+        // The springs' forces on all vertices sum to zero.
+        Vector3<double> sum = Vector3<double>::Zero();
+        for (Index v = 0; v < drag.mesh.vertex_count(); ++v) {
+            const Vector3<double> here = point(drag.x, v);
+            if (drag.network.pinned(v)) {
+                sum -= drag.network.force_on(v, drag.x).force;
+            } else {
+                sum += drag.foundation.force_on(v, here, here, 1.0).force;
+            }
+        }
+        CHECK(norm<double>(sum - reaction) < 1e-4 * norm(reaction));
+    }
+}
+
+TEST_CASE("without a coefficient the contact is that without friction, to the bit", "[friction]") {
+    Drag<double> drag({.friction = 0}), plain({.friction = 0});
+    Random random(1);
+    for (int i = 0; i < cases(300); ++i) {
+        const Vector3<double> at(1e-6 * i, 3e-6 * std::sin(0.1 * i), 0);
+        const double deep = random.number(-0.01e-3, 0.1e-3);
+        const auto force = drag.move_to(at, deep);
+        plain.tool.position = drag.tool.position;
+        const auto contact = plain.tracker.update(plain.tree, plain.x, plain.tool);
+        const auto report =
+            plain.solver.step(plain.x, 1e-3, plain.network, plain.foundation, press(plain.tool, contact));
+        plain.tree.refit(plain.x, report.moved);
+        REQUIRE(drag.x == plain.x);
+        REQUIRE(force == report.total_reaction());
+    }
+}
+
+TEST_CASE("a shaft drags the membrane, too", "[friction]") {
+    Drag<double> drag({.friction = 0.3, .axis = {0, 3e-3, 0}});
+    drag.press_in();
+    Vector3<double> sum = Vector3<double>::Zero();
+    for (int i = 1; i <= 600; i += cases_are_slow ? 10 : 1) {
+        const auto force = drag.move_to({1e-6 * i, 0, 0});
+        drag.check_cones();
+        if (i > 300) sum += force;
+    }
+    CHECK(-sum[0] / sum[2] == Approx(0.3).epsilon(0.05));
+    CHECK(std::abs(sum[1]) < 0.02 * sum[2]);
+}
+
+TEST_CASE("on a body that moves with the tool a frictional contact is at rest", "[friction]") {
+    Drag<double> drag({.friction = 0.5});
+    drag.press_in();
+    for (int i = 1; i <= 10; ++i) drag.move_to({1e-6 * i, 0, 0});
+    for (int i = 0; i < 100; ++i) drag.move_to({1e-5, 0, 0});
+    const auto here = drag.move_to({1e-5, 0, 0});
+    MovingBody body(drag.mesh);
+    const Vector3<double> at_rest = drag.tool.position;
+    for (int i = 1; i <= 100; ++i) {
+        const RigidFrame<double> pose{.origin = {1e-5 * i, -0.5e-5 * i, 2e-5 * i}};
+        REQUIRE(body.move_to(pose, drag.x));
+        drag.tree.refit(drag.x);
+        drag.tool.position = pose.point_to_world(at_rest);
+        const auto contact = drag.tracker.update(drag.tree, drag.x, drag.tool, body);
+        drag.report = drag.solver.step(drag.x, 1e-3, drag.network, on(body, drag.foundation),
+                                       drag.friction.press(drag.tool, contact));
+        REQUIRE(drag.report.status == StepStatus::advanced);
+        drag.tree.refit(drag.x, drag.report.moved);
+        REQUIRE(norm<double>(drag.report.total_reaction() - here) < 1e-3 * norm(here));
+    }
+}
+
+TEST_CASE("friction is restored from a snapshot, and runs on to the same bits", "[friction]") {
+    Drag<double> drag({.friction = 0.4});
+    drag.press_in();
+    const auto stroke = [&](int from) {
+        std::vector<Vector3<double>> forces;
+        for (int i = from; i < from + 50; ++i) forces.push_back(drag.move_to({1e-6 * i, 2e-6 * std::cos(0.3 * i), 0}));
+        return forces;
+    };
+    std::ignore = stroke(0);
+    std::vector<std::byte> buffer(snapshot_capacity(drag.solver, drag.tracker, drag.friction, drag.x));
+    const auto size = save_snapshot(buffer, drag.solver, drag.tracker, drag.friction, drag.x);
+    const auto first = stroke(50);
+    const auto x = drag.x;
+    REQUIRE(restore_snapshot({buffer.data(), size}, drag.solver, drag.tracker, drag.friction, drag.x));
+    drag.tree.refit(drag.x);
+    CHECK(stroke(50) == first);
+    CHECK(drag.x == x);
+    drag.friction.reset();
+    CHECK(drag.friction.points().empty());
+    CHECK_FALSE(drag.friction.slips());
+}
+
+TEST_CASE("nonsense from a device is refused, and friction goes on", "[friction]") {
+    Drag<double> drag({.friction = 0.4}), undisturbed({.friction = 0.4});
+    Random random(1);
+    for (int i = 0; i < cases(300); ++i) {
+        const Vector3<double> at(1e-6 * i, 0, 0);
+        if (random.chance(0.1)) {
+            auto tool = drag.tool;
+            tool.position[0] = random.chance(0.5) ? std::numeric_limits<double>::quiet_NaN() : 1e300;
+            const auto contact = drag.tracker.update(drag.tree, drag.x, drag.tool);
+            const auto report =
+                drag.solver.step(drag.x, 1e-3, drag.network, drag.foundation, drag.friction.press(tool, contact));
+            if (report.status == StepStatus::advanced) drag.tree.refit(drag.x, report.moved);
+            REQUIRE(drag.x.allFinite());
+            continue;
+        }
+        drag.move_to(at);
+        drag.check_cones();
+    }
+    for (int i = 0; i < 400; ++i) drag.move_to({3e-4, 0, 0});
+    CHECK(drag.x.allFinite());
+    CHECK(along_disc(drag.move_to({3e-4, 0, 0})) < 0.5 * drag.move_to({3e-4, 0, 0})[2]);
+}
+
+TEST_CASE("friction refuses options out of range", "[friction]") {
+    const auto refused = [](const ToolFrictionOptions& options) {
+        return test::refusal([&] { ToolFriction<double> friction(options); });
+    };
+    CHECK(refused({.coefficient = -1}) == "ToolFriction: coefficient must be finite and not negative [1], got -1");
+    CHECK(refused({.coefficient = 0.1, .max_contact_points = 0}) ==
+          "ToolFriction: max_contact_points must be at least 1, got 0");
+}
