@@ -3,9 +3,12 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
+#include <string_view>
 
 #include <membrane/contact/contact.hpp>
 #include <membrane/contact/tool.hpp>
+#include <membrane/core/check.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
@@ -22,12 +25,13 @@ class MovingBody;  // of surface/moving_body.hpp, which the update on a moving b
 /// A point of the membrane that moves with the tool.
 template <Real Scalar>
 struct Grasp {
-    Index triangle = no_index;                                   ///< `no_index`: no point is held
-    std::array<Index, 3> corners{no_index, no_index, no_index};  ///< its vertices
-    Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the held point
-    Vector3<Scalar> offset = Vector3<Scalar>::Zero();            ///< from the tool to the held point [m]
-    Vector3<Scalar> origin = Vector3<Scalar>::Zero();            ///< of the held point, on the rest surface [m]
-    Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();     ///< of a moving body at the held point [m/s]
+    Index triangle = no_index;                                       ///< `no_index`: no point is held
+    std::array<Index, 3> corners{no_index, no_index, no_index};      ///< its vertices
+    Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();           ///< of the held point
+    Vector3<Scalar> offset = Vector3<Scalar>::Zero();                ///< from the tool to the held point [m]
+    Vector3<Scalar> origin = Vector3<Scalar>::Zero();                ///< of the held point, on the rest surface [m]
+    Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();         ///< of a moving body at the held point [m/s]
+    Scalar holding_force = std::numeric_limits<Scalar>::infinity();  ///< at which the held point slips [N]
 
     /// Whether a point is held.
     [[nodiscard]] bool holding() const noexcept { return triangle != no_index; }
@@ -41,6 +45,11 @@ struct Grasp {
 /// How forceps grasp.
 struct GraspOptions {
     bool snap_to_vertex = false;  ///< hold the corner of largest weight, not the contact point
+    double holding_force = std::numeric_limits<double>::infinity();  ///< at which the tissue slips out of the jaws [N]
+    double jaw_length = std::numeric_limits<double>::infinity();     ///< tissue that has slipped so far is free [m]
+
+    /// @throws InvalidInput if a number is not positive
+    void check() const;
 };
 
 /// Holds the contact point from when the tool closes in contact until it opens.
@@ -48,8 +57,9 @@ template <Real Scalar>
 class Grasper {
   public:
     /// Keeps a copy of the positions of `mesh`, the rest surface. Cost: O(V).
+    /// @throws InvalidInput if an option is out of its range
     explicit Grasper(const TriangleMesh<Scalar>& mesh, GraspOptions options = {})
-        : origins_(mesh.positions()), options_(options) {}
+        : origins_(mesh.positions()), options_((options.check(), options)) {}
 
     /// The present grasp. Forceps that closed before the contact hold no point; those that are closed at the first
     /// update count as closing then.
@@ -60,17 +70,23 @@ class Grasper {
     [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                        const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept;
 
+    /// After a step: the tissue slips through the jaws if `reaction`, its force on them, is the `holding_force`, and is
+    /// free once it has slipped by the `jaw_length`, until they open and close again. Returns whether it slipped.
+    /// Jaws of any force: not needed. Online.
+    bool slip(const ConstPointsRef<Scalar>& x, const Tool<Scalar>& tool, const Vector3<Scalar>& reaction) noexcept;
+
     /// Drops the held point and the closed state. Later grasps equal those of a new grasper, bit for bit.
     void reset() noexcept {
         grasp_ = {};
         pose_ = {};
         closed_ = false;
+        slipped_ = 0;
     }
 
     /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.grasp_, self.pose_, self.closed_);
+        visit(self.grasp_, self.pose_, self.closed_, self.slipped_);
     }
 
   private:
@@ -79,7 +95,14 @@ class Grasper {
     Grasp<Scalar> grasp_;
     RigidFrame<Scalar> pose_;  // of the body at the last update
     bool closed_ = false;
+    Scalar slipped_ = 0;  // since the jaws closed [m]
 };
+
+inline void GraspOptions::check() const {
+    constexpr std::string_view component = "Grasper";
+    if (!(holding_force > 0)) refuse(component, "holding_force must be positive [N], got ", holding_force);
+    if (!(jaw_length > 0)) refuse(component, "jaw_length must be positive [m], got ", jaw_length);
+}
 
 template <Real Scalar>
 Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
@@ -89,6 +112,8 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
     if (!tool.grasping) grasp_ = {};
     if (!closes || !contact.touching() || !is_valid(tool)) return grasp_;
 
+    slipped_ = 0;
+    grasp_.holding_force = static_cast<Scalar>(options_.holding_force);
     grasp_.triangle = contact.triangle;
     grasp_.corners = contact.corners;
     grasp_.barycentric = contact.barycentric;
@@ -99,6 +124,19 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
     grasp_.offset = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
     grasp_.origin = point_at(triangle_at(origins_, grasp_.corners), grasp_.barycentric);
     return grasp_;
+}
+
+template <Real Scalar>
+bool Grasper<Scalar>::slip(const ConstPointsRef<Scalar>& x, const Tool<Scalar>& tool,
+                           const Vector3<Scalar>& reaction) noexcept {
+    constexpr Scalar rounding = Scalar(64) * std::numeric_limits<Scalar>::epsilon();
+    if (!grasp_.holding() || !(norm(reaction) >= (1 - rounding) * grasp_.holding_force) || !is_valid(tool))
+        return false;
+    const Vector3<Scalar> now = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
+    slipped_ += norm<Scalar>(now - grasp_.offset);
+    grasp_.offset = now;
+    if (slipped_ >= static_cast<Scalar>(options_.jaw_length)) grasp_ = {};
+    return true;
 }
 
 template <Real Scalar>

@@ -190,13 +190,14 @@ class ConstraintList {
     std::span<const ConstraintRef<Scalar>> constraints_;
 };
 
-/// Attaches a point of a triangle to `target`; the corners are otherwise free.
+/// Attaches a point of a triangle to `target`, by at most `max_force`; the corners are otherwise free.
 template <Real Scalar>
 struct PointAttachment {
     Index triangle = no_index;                                   ///< `no_index`: no attachment
     std::array<Index, 3> corners{no_index, no_index, no_index};  ///< vertices of the triangle
     Vector3<Scalar> barycentric = Vector3<Scalar>::Zero();       ///< of the point
     Vector3<Scalar> target = Vector3<Scalar>::Zero();            ///< [m]
+    Scalar max_force = std::numeric_limits<Scalar>::infinity();  ///< [N]
 
     ///@{
     /// As `Constraint` requires.
@@ -273,10 +274,10 @@ struct PointLoad {
     ///@}
 };
 
-/// The point that forceps hold follows the tool.
+/// The point that forceps hold follows the tool, by at most the force with which they hold it.
 template <Real Scalar>
 [[nodiscard]] PointAttachment<Scalar> pull(const Tool<Scalar>& tool, const Grasp<Scalar>& grasp) noexcept {
-    return {grasp.triangle, grasp.corners, grasp.barycentric, tool.position + grasp.offset};
+    return {grasp.triangle, grasp.corners, grasp.barycentric, tool.position + grasp.offset, grasp.holding_force};
 }
 
 /// Vertex `v` is attached to `target` [m].
@@ -315,7 +316,7 @@ template <Real Scalar>
 
 template <Real Scalar>
 bool PointAttachment<Scalar>::valid() const noexcept {
-    return triangle == no_index || (detail::is_barycentric(barycentric) && is_finite(target));
+    return triangle == no_index || (detail::is_barycentric(barycentric) && is_finite(target) && max_force >= 0);
 }
 
 template <Real Scalar>
@@ -326,6 +327,7 @@ void PointAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const no
     if (const auto* before = context.cached_point(triangle, 0, corners[0])) point.force = before->force;
     add_point_force(context, corners, barycentric, point.force);
     context.add_point(point);
+    if (norm(point.force) >= max_force) return;  // it slips: the target is not where the point will be
     const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
     move_point<Scalar>(context, corners, barycentric, target - now);
 }
@@ -336,9 +338,14 @@ bool PointAttachment<Scalar>::enforce(ConstraintContext<Scalar>& context) const 
     for (auto& point : context.points()) {
         const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
         if (!(norm<Scalar>(target - now) > negligible_distance(context, point))) continue;
-        const Vector3<Scalar> more = force_for<Scalar>(context, point, target - now);
+        Vector3<Scalar> more = force_for<Scalar>(context, point, target - now);
+        const Scalar size = norm<Scalar>(point.force + more);
+        if (size > max_force) {
+            more = (max_force / size) * (point.force + more) - point.force;
+            if (!(norm(more) > context.force_tolerance())) continue;
+        }
         if (more.isZero(0)) continue;
-        change_force(context, point, more);
+        change_force<Scalar>(context, point, more);
         changed = true;
     }
     return changed;

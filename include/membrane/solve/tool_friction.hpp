@@ -135,7 +135,7 @@ class ToolFriction {
 
     void read_normal_forces(Context& context) noexcept;
     [[nodiscard]] const Point* kept(const ContactPoint<Scalar>& point, std::size_t guess) const noexcept;
-    [[nodiscard]] Scalar change_force(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept;
+    [[nodiscard]] Scalar stick(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept;
     [[nodiscard]] Vector3<Scalar> limited(const Vector3<Scalar>& force, const Point& point) const noexcept;
     [[nodiscard]] bool is_at_limit(const Point& point) const noexcept {
         constexpr Scalar rounding = Scalar(64) * std::numeric_limits<Scalar>::epsilon();
@@ -241,25 +241,16 @@ Vector3<Scalar> ToolFriction<Scalar>::limited(const Vector3<Scalar>& force, cons
 // Changes the force of a point by its slip over the compliance in that direction, and moves the corners by their
 // response. Returns the change [N], zero if the response is negligible.
 template <Real Scalar>
-Scalar ToolFriction<Scalar>::change_force(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept {
+Scalar ToolFriction<Scalar>::stick(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept {
     const Vector3<Scalar> now = place(context, point), off = now - on_tool(tool, point) - point.offset;
     const Vector3<Scalar> slip = off - dot(off, point.normal) * point.normal;
     const Vector3<Scalar> along = direction_or_zero(slip);
-    Scalar compliance = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-        const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
-        compliance += weight * weight * dot(along, context.response(point.corners[k], along));
-    }
+    const Scalar compliance = dot(along, response_of<Scalar>(context, point, along));
     point.sticking_force = compliance > 0 ? point.force - (1 / compliance) * slip : point.force;
     const Vector3<Scalar> change = limited(point.sticking_force, point) - point.force;
     const Scalar size = norm(change);
     if (!(size > context.force_tolerance()) || !(size * compliance > detail::rounding_at(now))) return 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-        const Vector3<Scalar> part = point.weights[static_cast<Eigen::Index>(k)] * change;
-        context.move(point.corners[k], context.response(point.corners[k], part));
-        context.add_force(point.corners[k], part);
-    }
-    point.force += change;
+    membrane::change_force<Scalar>(context, point, change);
     return size;
 }
 
@@ -271,7 +262,7 @@ bool ToolFriction<Scalar>::solve(Context& context, const Tool<Scalar>& tool) noe
     Scalar first = 0;
     for (int pass = 0; pass < max_passes; ++pass) {
         Scalar largest = 0;
-        for (auto& point : points_.items()) largest = (std::max)(largest, change_force(context, tool, point));
+        for (auto& point : points_.items()) largest = (std::max)(largest, stick(context, tool, point));
         if (pass == 0) first = largest;
         if (!(largest > first / 2)) break;
     }
