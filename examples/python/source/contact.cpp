@@ -140,7 +140,9 @@ void bind_tracking(py::module_& module) {
         "reset", [](Tracker& self) { self.tracker.reset(); }, doc("ContactTracker::reset"));
 
     using membrane::GraspOptions;
-    const Keywords grasp_options("GraspOptions", std::pair("snap_to_vertex", &GraspOptions::snap_to_vertex));
+    const Keywords grasp_options("GraspOptions", std::pair("snap_to_vertex", &GraspOptions::snap_to_vertex),
+                                 std::pair("holding_force", &GraspOptions::holding_force),
+                                 std::pair("jaw_length", &GraspOptions::jaw_length));
     auto grasper = py::class_<Forceps>(module, "Grasper", doc("Grasper"));
     grasp_options.def_init(grasper, grasp_options.taking<const Mesh&>([](const Mesh& mesh, const GraspOptions& o) {
         return Forceps{membrane::Grasper(mesh, o), mesh.vertex_count()};
@@ -154,6 +156,13 @@ void bind_tracking(py::module_& module) {
             return self.grasp = self.grasper.update(contact, x.map(), tool);
         },
         py::arg("contact"), py::arg("x"), py::arg("tool"), doc("Grasper::update"));
+    grasper.def(
+        "slip",
+        [](Forceps& self, Positions x, const Tool& tool, const Vector& reaction) {
+            check_count("Grasper", "x", x.count, self.vertex_count);
+            return self.grasper.slip(x.map(), tool, reaction);
+        },
+        py::arg("x"), py::arg("tool"), py::arg("reaction"), doc("Grasper::slip"));
     grasper.def(
         "reset", [](Forceps& self) { self.grasper.reset(); }, doc("Grasper::reset"));
 }

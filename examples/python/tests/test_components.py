@@ -374,6 +374,29 @@ def another_thread_runs(call, repetitions):
         thread.join()
 
 
+def test_tissue_slips_out_of_forceps():
+    mesh = membrane.icosphere(radius=10e-3, subdivisions=3)
+    network = membrane.MassSpringNetwork(mesh, stiffness=40.0)
+    foundation = membrane.VirtualVolumeSprings(mesh, stiffness=8.0)
+    solver = membrane.QuasiStaticSolver(network, layers=6, sweeps=20)
+    tree, tracker = membrane.AabbTree(mesh), membrane.ContactTracker(mesh)
+    grasper = membrane.Grasper(mesh, holding_force=0.02, jaw_length=1e-3)
+    x = mesh.positions.copy()
+    slipped, held = 0, []
+    for i in range(400):
+        height = 11.9e-3 + max(i - 1, 0) * 2e-5
+        tool = membrane.Tool(position=(0, 0, height), radius=2e-3, grasping=i > 0)
+        contact = tracker.update(tree, x, tool)
+        grasp = grasper.update(contact, x, tool)
+        report = solver.step(x, 1e-3, network, foundation, membrane.pull(tool, grasp))
+        slipped += grasper.slip(x, tool, report.reactions[0])
+        tree.refit(x, report.moved)
+        held.append(numpy.linalg.norm(report.reactions[0]))
+    assert slipped > 10
+    assert max(held) == pytest.approx(0.02)
+    assert not grasper.update(contact, x, tool).holding
+
+
 @pytest.mark.parametrize("name", CALLS)
 def test_the_lock_is_released(name):
     assert another_thread_runs(CALLS[name], 10_000)
