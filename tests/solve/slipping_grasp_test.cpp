@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -111,6 +112,18 @@ TEST_CASE("tissue that has slipped by the jaws' length is free until they open a
     pull.tool.grasping = true;
     pull.move_to(pull.height(0));
     CHECK(pull.grasp.holding());
+}
+
+TEST_CASE("an attachment that holds less from now on pulls with no more than that", "[grasper][friction]") {
+    HeldDisc<double> disc({});
+    for (int i = 0; i < 300; ++i) disc.move_to(disc.height(1e-6 * std::min(i, 100)));
+    const double before = norm(disc.move_to(disc.height(1e-4)));
+    auto held = pull(disc.tool, disc.grasp);
+    for (const double part : {0.7, 0.2, 0.0}) {
+        held.max_force = part * before;
+        const auto report = disc.solver.step(disc.x, 1e-3, disc.network, disc.foundation, held);
+        CHECK(norm(report.reactions[0]) <= (1 + 1e-12) * held.max_force);
+    }
 }
 
 TEST_CASE("on a body that turns with the forceps nothing slips further", "[grasper][friction]") {

@@ -321,6 +321,7 @@ TEST_CASE("friction refuses options out of range", "[friction]") {
         return test::refusal([&] { ToolFriction<double> friction(options); });
     };
     CHECK(refused({.coefficient = -1}) == "ToolFriction: coefficient must be finite and not negative [1], got -1");
+    CHECK(refused({.coefficient = 11}) == "ToolFriction: coefficient must be at most 10, got 11");
     CHECK(refused({.coefficient = 0.1, .max_contact_points = 0}) ==
           "ToolFriction: max_contact_points must be at least 1, got 0");
 }

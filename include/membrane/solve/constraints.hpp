@@ -325,9 +325,11 @@ void PointAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const no
     const Vector3<Scalar> none = Vector3<Scalar>::Zero();
     ContactPoint<Scalar> point{triangle, 0, corners, barycentric, none, none};
     if (const auto* before = context.cached_point(triangle, 0, corners[0])) point.force = before->force;
+    const Scalar size = norm(point.force);
+    if (size > max_force) point.force *= max_force / size;
     add_point_force(context, corners, barycentric, point.force);
     context.add_point(point);
-    if (norm(point.force) >= max_force) return;  // it slips: the target is not where the point will be
+    if (size >= max_force) return;  // it slips: the target is not where the point will be
     const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
     move_point<Scalar>(context, corners, barycentric, target - now);
 }

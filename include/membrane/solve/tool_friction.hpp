@@ -23,7 +23,7 @@ namespace membrane {
 
 /// Options of `ToolFriction`.
 struct ToolFrictionOptions {
-    double coefficient;               ///< of Coulomb friction: largest ratio of tangential to normal force
+    double coefficient;               ///< of Coulomb friction: largest ratio of tangential to normal force, at most 10
     Index max_contact_points = 4096;  ///< capacity, see `SolverOptions`; points beyond it have no friction
 
     /// @throws InvalidInput if a number is out of its range
@@ -79,9 +79,10 @@ struct FrictionalContact {
 /// along the surface keeps it where it is on the tool, as long as that takes at most `coefficient` times the normal
 /// force of the point; else the place slips, against that force: the exact cone. The forces are found within the step,
 /// with all others, by projected Gauss-Seidel. Under a tool at rest the membrane does not creep: places are kept, and
-/// not displacements.
+/// not displacements. With a coefficient near 1 or above it may: normal and friction forces of neighbouring points may
+/// alternate, so that a step does not converge. A contact point that moves on to another triangle takes hold anew.
 ///
-/// The tool does not rotate about itself. Fixed corners take no friction. `ContactFriction` adds friction to the
+/// The tool does not rotate: a shaft that turns drags as if it were shifted. Fixed corners take no friction. `ContactFriction` adds friction to the
 /// hand's force alone; with this part the reaction has it. `equilibrium` and error bounds do not know it.
 ///
 /// Online, but for the constructor. Cost: linear in the contact points, in each sweep.
@@ -134,7 +135,7 @@ class ToolFriction {
     [[nodiscard]] Vector3<Scalar> end(const Context& context, const Tool<Scalar>& tool) noexcept;
 
     void read_normal_forces(Context& context) noexcept;
-    [[nodiscard]] const Point* kept(const ContactPoint<Scalar>& point, std::size_t guess) const noexcept;
+    [[nodiscard]] const Point* kept(const ContactPoint<Scalar>& point, std::size_t& next) const noexcept;
     [[nodiscard]] Scalar stick(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept;
     [[nodiscard]] Vector3<Scalar> limited(const Vector3<Scalar>& force, const Point& point) const noexcept;
     [[nodiscard]] bool is_at_limit(const Point& point) const noexcept {
@@ -162,6 +163,7 @@ class ToolFriction {
 inline void ToolFrictionOptions::check() const {
     constexpr std::string_view component = "ToolFriction";
     detail::check_option(component, coefficient, "coefficient", "1");
+    if (coefficient > 10) refuse(component, "coefficient must be at most 10, got ", coefficient);
     if (max_contact_points < 1) {
         refuse(component, "max_contact_points must be at least 1, got ", max_contact_points);
     }
@@ -172,9 +174,10 @@ template <Real Scalar>
 void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noexcept {
     points_.clear();
     const auto contacts = std::as_const(context).points();
+    std::size_t next = 0;  // of the points that are kept, in nearly the same order
     for (const auto& contact : contacts) {
         Point point;
-        if (const auto* before = kept(contact, points_.size()); before != nullptr && is_finite(before->force)) {
+        if (const auto* before = kept(contact, next); before != nullptr) {
             point = *before;
         } else {
             point.triangle = contact.triangle;
@@ -193,15 +196,21 @@ void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noe
     }
 }
 
+// The point of the last step with this triangle and feature, or null; searches from `next` on.
 template <Real Scalar>
-auto ToolFriction<Scalar>::kept(const ContactPoint<Scalar>& point, std::size_t guess) const noexcept -> const Point* {
+auto ToolFriction<Scalar>::kept(const ContactPoint<Scalar>& point, std::size_t& next) const noexcept -> const Point* {
+    const auto all = kept_.items();
     const auto same = [&](const Point& other) {
         return other.triangle == point.triangle && other.feature == point.feature && other.corners == point.corners;
     };
-    const auto all = kept_.items();
-    if (guess < all.size() && same(all[guess])) return &all[guess];
-    const auto found = std::find_if(all.begin(), all.end(), same);
-    return found == all.end() ? nullptr : &*found;
+    const auto from = all.begin() + static_cast<std::ptrdiff_t>(next);
+    auto found = std::find_if(from, all.end(), same);
+    if (found == all.end()) {
+        found = std::find_if(all.begin(), from, same);
+        if (found == from) return nullptr;
+    }
+    next = static_cast<std::size_t>(found - all.begin()) + 1;
+    return is_finite(found->force) && is_finite(found->offset) ? &*found : nullptr;
 }
 
 template <Real Scalar>
