@@ -8,13 +8,12 @@
 
 #include <membrane/core/snapshot.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
+#include "support/soft_disc.hpp"
 
 using namespace membrane;
 
@@ -22,15 +21,10 @@ namespace {
 
 /// Forceps on the middle of a disc.
 template <Real S>
-struct HeldDisc {
+struct HeldDisc : test::SoftDisc<S> {
+    using test::SoftDisc<S>::mesh, test::SoftDisc<S>::network, test::SoftDisc<S>::foundation;
+
     GraspOptions options;
-    TriangleMesh<S> mesh = disc<S>({.radius = 5e-3, .rings = 8});
-    Material material{.young_modulus = 1e6, .poisson_ratio = 1.0 / 3, .thickness = 50e-6};
-    FoundationLayer layer{.young_modulus = 2e4, .poisson_ratio = 0.3, .thickness = 1e-3};
-    MassSpringNetwork<S, LinearSpring> network{
-        mesh, LinearSpring{}, {.stiffness = spring_stiffnesses(mesh, material), .pinned = border(mesh)}};
-    FoundationSprings<S> foundation{
-        mesh, {.normal = normal_stiffnesses(mesh, layer), .tangential = tangential_stiffnesses(mesh, layer)}};
     QuasiStaticSolver<S> solver{network, {.layers = unlimited, .sweeps = 20}};
     AabbTree<S> tree{mesh};
     ContactTracker<S> tracker{mesh};
@@ -40,7 +34,7 @@ struct HeldDisc {
     Grasp<S> grasp;
     bool slips = false;
 
-    explicit HeldDisc(const GraspOptions& with) : options(with) {
+    explicit HeldDisc(const GraspOptions& with) : test::SoftDisc<S>(8), options(with) {
         move_to({0.1e-3, 0, 0.4e-3});
         tool.grasping = true;
     }

@@ -13,14 +13,13 @@
 
 #include <membrane/core/snapshot.hpp>
 #include <membrane/membrane.hpp>
-#include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
-#include <membrane/model/spring_stiffness.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
+#include "support/soft_disc.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -35,17 +34,12 @@ struct Settings {
 
 /// A ball, or a shaft, on a disc whose foundation resists along the surface, too.
 template <Real S>
-struct Drag {
+struct Drag : test::SoftDisc<S> {
+    using test::SoftDisc<S>::mesh, test::SoftDisc<S>::network, test::SoftDisc<S>::foundation;
+
     static constexpr double radius = 2e-3, depth = 0.05e-3;  // of the ball; pressed in [m]
 
     Settings settings;
-    TriangleMesh<S> mesh = disc<S>({.radius = 5e-3, .rings = settings.rings});
-    Material material{.young_modulus = 1e6, .poisson_ratio = 1.0 / 3, .thickness = 50e-6};
-    FoundationLayer layer{.young_modulus = 2e4, .poisson_ratio = 0.3, .thickness = 1e-3};
-    MassSpringNetwork<S, LinearSpring> network{
-        mesh, LinearSpring{}, {.stiffness = spring_stiffnesses(mesh, material), .pinned = border(mesh)}};
-    FoundationSprings<S> foundation{
-        mesh, {.normal = normal_stiffnesses(mesh, layer), .tangential = tangential_stiffnesses(mesh, layer)}};
     QuasiStaticSolver<S> solver{network, {.layers = unlimited, .sweeps = settings.sweeps}};
     AabbTree<S> tree{mesh};
     ContactTracker<S> tracker{mesh};
@@ -54,7 +48,7 @@ struct Drag {
     Tool<S> tool{.axis = settings.axis.cast<S>(), .radius = S(radius)};
     StepReport<S> report;
 
-    explicit Drag(const Settings& with) : settings(with) {}
+    explicit Drag(const Settings& with) : test::SoftDisc<S>(with.rings), settings(with) {}
 
     /// The ball's lowest point goes to `at` along the disc, `deep` below it [m]. Returns its force on the hand [N].
     Vector3<double> move_to(const Vector3<double>& at, double deep = depth) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -55,7 +56,7 @@ struct CohesiveSpring {
     /// tangential energy are equal: beyond s the stress decreases with the separation.
     [[nodiscard]] VertexForce<Scalar> force_on(const Vector3<Scalar>& position) const noexcept {
         const Displacement at(*this, position);
-        const Scalar along = stiffness_along(at), across = intact(separation(at)) * tangential_stiffness;
+        const auto [along, across] = stiffnesses(at);
         return {-(across * at.sliding + (along * at.height) * normal), larger(along, across)};
     }
     [[nodiscard]] VertexForce<Scalar> elastic_force(const Vector3<Scalar>& position) const noexcept {
@@ -74,8 +75,8 @@ struct CohesiveSpring {
     /// Energy stored, which is given back if the displacement is taken back [J].
     [[nodiscard]] Scalar energy(const Vector3<Scalar>& position) const noexcept {
         const Displacement at(*this, position);
-        const Scalar across = intact(separation(at)) * tangential_stiffness;
-        return (stiffness_along(at) * (at.height * at.height) + across * squared_norm(at.sliding)) / 2;
+        const auto [along, across] = stiffnesses(at);
+        return (along * (at.height * at.height) + across * squared_norm(at.sliding)) / 2;
     }
 
     /// The separation at `position`; it fails at 1.
@@ -120,8 +121,10 @@ struct CohesiveSpring {
         const Scalar opening = per_opening * larger<Scalar>(at.height, 0);
         return root_of<Scalar>(opening * opening + (per_sliding * per_sliding) * squared_norm(at.sliding));
     }
-    [[nodiscard]] Scalar stiffness_along(const Displacement& at) const noexcept {
-        return select<Scalar>(at.height < 0, normal_stiffness, intact(separation(at)) * normal_stiffness);
+    // Along the normal, and along the surface. Pressed down, the spring keeps the former.
+    [[nodiscard]] std::array<Scalar, 2> stiffnesses(const Displacement& at) const noexcept {
+        const Scalar left = intact(separation(at));
+        return {select<Scalar>(at.height < 0, normal_stiffness, left * normal_stiffness), left * tangential_stiffness};
     }
 };
 

@@ -143,16 +143,13 @@ class ToolFriction {
         return norm(point.force) >= coefficient_ * point.pressure * (1 - rounding);
     }
     [[nodiscard]] static Vector3<Scalar> place(const Context& context, const Point& point) noexcept {
-        const auto& v = point.corners;
-        return point_at(Triangle<Scalar>{context.position(v[0]), context.position(v[1]), context.position(v[2])},
-                        point.weights);
+        return point_at(triangle_of(context, point.corners), point.weights);
     }
     [[nodiscard]] static Vector3<Scalar> on_tool(const Tool<Scalar>& tool, const Point& point) noexcept {
         return tool.position + point.along * tool.axis;
     }
-    // Lets the point hold the place that is in contact, at `position`, by `tool`.
-    static void hold(Point& point, const Vector3<Scalar>& weights, const Vector3<Scalar>& position,
-                     const Tool<Scalar>& tool) noexcept;
+    // Lets the point hold its place, at `position`, by `tool`.
+    static void hold(Point& point, const Vector3<Scalar>& position, const Tool<Scalar>& tool) noexcept;
 
     Scalar coefficient_;
     FixedVector<Point> points_, kept_;  // of this step, in the order of the contact points; of the last one
@@ -183,10 +180,11 @@ void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noe
             point.triangle = contact.triangle;
             point.feature = contact.feature;
             point.corners = contact.corners;
+            point.weights = contact.weights;
             point.force = Vector3<Scalar>::Zero();
             const auto& v = contact.corners;
             const Triangle<Scalar> start{context.start(v[0]), context.start(v[1]), context.start(v[2])};
-            hold(point, contact.weights, point_at(start, contact.weights), has_tool_ ? tool_ : tool);
+            hold(point, point_at(start, point.weights), has_tool_ ? tool_ : tool);
         }
         point.pressure = norm(contact.force);
         point.normal = contact.normal;
@@ -214,11 +212,9 @@ auto ToolFriction<Scalar>::kept(const ContactPoint<Scalar>& point, std::size_t& 
 }
 
 template <Real Scalar>
-void ToolFriction<Scalar>::hold(Point& point, const Vector3<Scalar>& weights, const Vector3<Scalar>& position,
-                                const Tool<Scalar>& tool) noexcept {
+void ToolFriction<Scalar>::hold(Point& point, const Vector3<Scalar>& position, const Tool<Scalar>& tool) noexcept {
     const Scalar square = squared_norm<Scalar>(tool.axis);
     const Scalar along = square > 0 ? dot<Scalar>(position - tool.position, tool.axis) / square : Scalar(0);
-    point.weights = weights;
     point.along = std::clamp(along, Scalar(0), Scalar(1));
     point.offset = position - on_tool(tool, point);
 }
@@ -300,7 +296,7 @@ Vector3<Scalar> ToolFriction<Scalar>::end(const Context& context, const Tool<Sca
         sum -= point.force;
         if (!is_at_limit(point)) continue;
         point.weights = contacts[i].weights;
-        hold(point, contacts[i].weights, place(context, point), tool);
+        hold(point, place(context, point), tool);
     }
     std::swap(points_, kept_);
     tool_ = tool;
