@@ -42,6 +42,7 @@ struct Hinge {
         {{0, 1}, {0, 2}, {1, 2}, {0, 3}, {1, 3}}};  ///< see `Element`
     static constexpr std::array<std::array<std::size_t, 4>, 4> orders{
         {{0, 1, 2, 3}, {1, 0, 3, 2}, {0, 1, 2, 3}, {1, 0, 3, 2}}};  ///< see `Element`
+    static constexpr std::array<std::array<std::size_t, 3>, 2> triangles{{{0, 1, 2}, {1, 0, 3}}};  ///< see `Element`
 
     Scalar stiffness;        ///< [N m]
     Scalar rest_sine = 0;    ///< sine of the angle at rest

@@ -189,10 +189,16 @@ class CohesiveSprings {
     /// Undoes all damage. Cost: O(V).
     void reset() noexcept;
 
-    /// For `save_snapshot`.
+    ///@{
+    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it. Online.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept { anchors_.col(moved.vertex) = moved.rest; }
+    ///@}
+
+    /// Visits damage, and what a tear changes, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.reached_, self.dissipated_);
+        visit(self.anchors_, self.normals_, self.constants_, self.reached_, self.dissipated_);
     }
 
   private:
@@ -284,6 +290,16 @@ void CohesiveSprings<Scalar>::reset() noexcept {
         reached_[v] = softening > 0 ? softening / (1 + softening) : Scalar(1);
     }
     dissipated_ = 0;
+}
+
+template <Real Scalar>
+void CohesiveSprings<Scalar>::split(const VertexSplit& split) noexcept {
+    const auto from = static_cast<std::size_t>(split.vertex), to = static_cast<std::size_t>(split.copy);
+    for (auto* points : {&anchors_, &normals_}) points->col(split.copy) = points->col(split.vertex);
+    constants_[to] = constants_[from];
+    divide(constants_[from].normal_stiffness, constants_[to].normal_stiffness, split.area_share);
+    divide(constants_[from].tangential_stiffness, constants_[to].tangential_stiffness, split.area_share);
+    reached_[to] = reached_[from];
 }
 
 }  // namespace membrane

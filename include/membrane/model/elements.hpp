@@ -5,6 +5,7 @@
 #include <array>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <utility>
@@ -16,6 +17,7 @@
 #include <membrane/model/elastic_network.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Elements of any number of vertices: triangles that resist stretch, hinges, pressure, loads.
 ///
@@ -59,6 +61,10 @@ using Corners = std::array<Vector3<Scalar>, count>;
 ///
 /// Optional, where not all corners are joined by edges of the mesh:
 /// - `E::edges`: the pairs of corners that are. A `PropagationQueue` counts its layers along edges.
+///
+/// Optional, so that a membrane may tear:
+/// - `E::triangles`: the triples of corners that are triangles of the mesh, if there is more than one.
+/// - `reshaped(before, after)`: the element of the same material whose triangle has other corners at rest.
 ///
 /// Optional, for speed, and satisfied by the elements of this library:
 /// - `CornerForce::remainder`: with it most updates need no evaluation of the energy.
@@ -114,6 +120,23 @@ template <class E>
         return all;
     }
 }
+
+/// The triples of corners that are triangles of the mesh.
+template <class E>
+[[nodiscard]] constexpr auto triangles_of() noexcept {
+    if constexpr (requires { E::triangles; }) {
+        return E::triangles;
+    } else {
+        static_assert(E::corner_count == 3, "an element that is no triangle must name its triangles, to tear");
+        return std::array<std::array<std::size_t, 3>, 1>{{{0, 1, 2}}};
+    }
+}
+
+/// A triangle of a material, whose constants depend on its shape at rest.
+template <class E, class Scalar>
+concept CanReshape = E::corner_count == 3 && requires(const E& element, const Corners<Scalar, 3>& corners) {
+    { element.reshaped(corners, corners) } noexcept -> std::same_as<E>;
+};
 
 /// The order of corners in which an element is evaluated at corner `i`.
 template <class E>
@@ -221,7 +244,14 @@ concept ElementInLanes = StructOfNumbers<E> &&
     { element.energy_change(x, i, x[i]) } -> std::same_as<EnergyChange<Lanes<Scalar>>>;
 };
 
-/// Elements of one kind, each with its vertices. Immutable; holds no positions.
+/// Energy of a triangle [J], and its forces on its corners [N].
+template <Real Scalar>
+struct TriangleResponse {
+    Scalar energy = 0;
+    std::array<Vector3<Scalar>, 3> force{Vector3<Scalar>::Zero(), Vector3<Scalar>::Zero(), Vector3<Scalar>::Zero()};
+};
+
+/// Elements of one kind, each with its vertices. Constant until the membrane tears; holds no positions.
 template <Real Scalar_, CheckedElement Each>
 class Elements {
   public:
@@ -248,8 +278,9 @@ class Elements {
 
     /// An element as it is evaluated at one of its vertices.
     struct AtVertex {
-        Instance instance;  ///< in the order of corners for this vertex
-        std::size_t place;  ///< of the vertex among the corners
+        Instance instance;    ///< in the order of corners for this vertex
+        std::uint32_t place;  ///< of the vertex among the corners
+        Index number;         ///< of the element in `all`
     };
 
     ///@{
@@ -267,7 +298,7 @@ class Elements {
     /// `place` is `v`.
     template <class Act>
     void for_each(Index v, const ConstPointsRef<Scalar>& x, Act act) const noexcept {
-        for (const auto& [instance, place] : at_vertex_[v]) act(instance, instance.where(x), place);
+        for (const auto& at : at_vertex_[v]) act(at.instance, at.instance.where(x), std::size_t{at.place});
     }
 
     /// Positions of the corners of an element.
@@ -276,11 +307,31 @@ class Elements {
         return instance.where(x);
     }
 
+    /// Adds the energy [J] of the element of a triangle, and its forces on the corners [N], at positions `x`.
+    void add_response(const std::array<Index, 3>& corners, const ConstPointsRef<Scalar>& x,
+                      TriangleResponse<Scalar>& sum) const noexcept;
+
+    /// A vertex becomes two. An element keeps to its triangles; one of two triangles that part acts no more. Online. Cost:
+    /// that of listing the elements around the vertex.
+    void split(const VertexSplit& split) noexcept;
+
+    /// Triangles change their shape at rest: their elements are `reshaped`, if they can be. Online.
+    void reshape(const MovedVertex<Scalar>& moved) noexcept;
+
     /// See `MassSpringNetwork::force_tolerance`.
     [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
+    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.all_, self.at_vertex_);
+    }
+
   private:
     [[nodiscard]] Scalar force_tolerance_of(const Instance& instance, const Points<Scalar>& x) const noexcept;
+    template <class Act>
+    void for_each_copy(Index number, Act act) noexcept;
+    [[nodiscard]] Index number_of(const std::array<Index, 3>& corners) const noexcept;
 
     std::vector<Instance> all_;
     CompressedRows<AtVertex> at_vertex_;
@@ -304,14 +355,112 @@ Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<I
     }
     at_vertex_ = CompressedRows<AtVertex>(mesh.vertex_count(), [this](auto put) {
         for (std::size_t place = 0; place < corner_count; ++place) {
-            for (const auto& instance : all_) {
+            for (std::size_t n = 0; n < all_.size(); ++n) {
                 for (std::size_t i = 0; i < corner_count; ++i) {
                     if (detail::place_of<Each>(i) != place) continue;
-                    put(instance.corners[i], AtVertex{detail::in_order_of(instance, i), place});
+                    put(all_[n].corners[i], AtVertex{detail::in_order_of(all_[n], i), static_cast<std::uint32_t>(place),
+                                                     static_cast<Index>(n)});
                 }
             }
         }
     });
+}
+
+// Calls `act(instance)` for the element, and as it is at each of its vertices.
+template <Real Scalar, CheckedElement Each>
+template <class Act>
+void Elements<Scalar, Each>::for_each_copy(Index number, Act act) noexcept {
+    Instance& instance = all_[static_cast<std::size_t>(number)];
+    for (const Index v : instance.corners) {
+        for (AtVertex& at : at_vertex_[v]) {
+            if (at.number == number) act(at.instance);
+        }
+    }
+    act(instance);
+}
+
+template <Real Scalar, CheckedElement Each>
+void Elements<Scalar, Each>::split(const VertexSplit& split) noexcept {
+    // How many of the element's triangles at the vertex get the copy, and how many there are.
+    const auto count = [&](const Instance& instance) {
+        std::array<int, 2> found{};
+        for (const auto& triple : detail::triangles_of<Each>()) {
+            std::array<Index, 3> others{};
+            int at = 0;
+            for (const std::size_t i : triple) {
+                if (instance.corners[i] != split.vertex) others[static_cast<std::size_t>(at++)] = instance.corners[i];
+            }
+            if (at == 3) continue;
+            found[0] += split.takes(others[0], others[1]) ? 1 : 0;
+            ++found[1];
+        }
+        return found;
+    };
+    for (const AtVertex& at : at_vertex_[split.vertex]) {
+        const auto [taken, all] = count(at.instance);
+        if (taken == 0) continue;
+        for_each_copy(at.number, [&, parts = taken != all](Instance& instance) {
+            if (parts) {
+                instance.element = Each{};
+            } else {
+                std::replace(instance.corners.begin(), instance.corners.end(), split.vertex, split.copy);
+            }
+        });
+    }
+    at_vertex_.split(split.vertex, split.copy, [&](const AtVertex& at) {
+        const auto& corners = at.instance.corners;
+        return std::find(corners.begin(), corners.end(), split.copy) != corners.end();
+    });
+}
+
+template <Real Scalar, CheckedElement Each>
+void Elements<Scalar, Each>::reshape([[maybe_unused]] const MovedVertex<Scalar>& moved) noexcept {
+    if constexpr (detail::CanReshape<Each, Scalar>) {
+        for (const auto& triangle : moved.triangles) {
+            const auto number = number_of(triangle.corners);
+            if (number == no_index) continue;
+            for_each_copy(number, [&](Instance& instance) {
+                Corners<Scalar, 3> before, after;
+                for (std::size_t i = 0; i < 3; ++i) {
+                    const auto k = static_cast<std::size_t>(
+                        std::find(triangle.corners.begin(), triangle.corners.end(), instance.corners[i]) -
+                        triangle.corners.begin());
+                    before[i] = triangle.before[k];
+                    after[i] = triangle.after[k];
+                }
+                instance.element = instance.element.reshaped(before, after);
+            });
+        }
+    }
+}
+
+template <Real Scalar, CheckedElement Each>
+void Elements<Scalar, Each>::add_response([[maybe_unused]] const std::array<Index, 3>& corners,
+                                          [[maybe_unused]] const ConstPointsRef<Scalar>& x,
+                                          [[maybe_unused]] TriangleResponse<Scalar>& sum) const noexcept {
+    if constexpr (detail::CanReshape<Each, Scalar>) {
+        const Index number = number_of(corners);
+        if (number == no_index) return;
+        const Instance& instance = all_[static_cast<std::size_t>(number)];
+        const auto at = instance.where(x);
+        sum.energy += instance.element.energy(at);
+        for (std::size_t i = 0; i < 3; ++i) {
+            const auto k = static_cast<std::size_t>(std::find(corners.begin(), corners.end(), instance.corners[i]) -
+                                                    corners.begin());
+            sum.force[k] += instance.element.force_on(at, i).force;
+        }
+    }
+}
+
+// The element of a triangle, or `no_index`.
+template <Real Scalar, CheckedElement Each>
+Index Elements<Scalar, Each>::number_of(const std::array<Index, 3>& corners) const noexcept {
+    for (const AtVertex& at : at_vertex_[corners[0]]) {
+        const auto& own = at.instance.corners;
+        const auto has = [&](Index v) { return std::find(own.begin(), own.end(), v) != own.end(); };
+        if (has(corners[1]) && has(corners[2])) return at.number;
+    }
+    return no_index;
 }
 
 template <Real Scalar, CheckedElement Each>

@@ -128,6 +128,18 @@ class FoundationSprings {
         return dot<Scalar>(displacement, spring(v, position, 1).times(displacement)) / 2;
     }
 
+    ///@{
+    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it. Online.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept { anchors_.col(moved.vertex) = moved.rest; }
+    ///@}
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.anchors_, self.normals_, self.constants_);
+    }
+
   private:
     struct Constants {
         Scalar normal, tangential, time;
@@ -154,6 +166,16 @@ FoundationSprings<Scalar>::FoundationSprings(const TriangleMesh<Scalar>& mesh, c
     const auto time = each(options.recovery_time.given() ? options.recovery_time : Scalar(0), "recovery_time", "s");
     constants_.reserve(normal.size());
     for (std::size_t v = 0; v < normal.size(); ++v) constants_.push_back({normal[v], tangential[v], time[v]});
+}
+
+template <Real Scalar>
+void FoundationSprings<Scalar>::split(const VertexSplit& split) noexcept {
+    for (auto* points : {&anchors_, &normals_}) points->col(split.copy) = points->col(split.vertex);
+    Constants& of_vertex = constants_[static_cast<std::size_t>(split.vertex)];
+    Constants& of_copy = constants_[static_cast<std::size_t>(split.copy)];
+    of_copy = of_vertex;
+    divide(of_vertex.normal, of_copy.normal, split.area_share);
+    divide(of_vertex.tangential, of_copy.tangential, split.area_share);
 }
 
 }  // namespace membrane

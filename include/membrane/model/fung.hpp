@@ -77,6 +77,11 @@ struct FungTriangle {
     [[nodiscard]] FungTriangle in_order(std::size_t i) const noexcept {
         return {rest.in_order(i), stiffness, stiffening, limit};
     }
+    [[nodiscard]] FungTriangle reshaped(const Corners<Scalar, 3>& before,
+                                        const Corners<Scalar, 3>& after) const noexcept {
+        const auto shape = rest.reshaped(before, after);
+        return {shape, stiffness * (shape.area() / rest.area()), stiffening, limit};
+    }
     ///@}
 
     /// Mean of the two principal tensions, force per current width [N/m].

@@ -94,6 +94,10 @@ struct IncompressibleTriangle {
     /// The rest shape with its corners in the order `orders[i]`. Offline.
     [[nodiscard]] IncompressibleTriangle in_order(std::size_t i) const noexcept;
 
+    /// The rest shape with the corners `after` in place of `before`, of which this one is a scaled copy. Online.
+    [[nodiscard]] IncompressibleTriangle reshaped(const Corners<Scalar, 3>& before,
+                                                  const Corners<Scalar, 3>& after) const noexcept;
+
     /// Exact second derivative of I1 by corners `i` and `j` [1/m^2].
     [[nodiscard]] Eigen::Matrix3d invariant_hessian(const Corners<double, 3>& x, std::size_t i,
                                                     std::size_t j) const noexcept;
@@ -114,6 +118,19 @@ struct IncompressibleTriangle {
     const Vector3<double> first = x[1] - x[0], second = x[2] - x[0];
     const double length = norm(first), height = norm(cross(first, second)) / length;
     return {1 / length, -dot(first, second) / (length * (length * height)), 1 / height};
+}
+
+template <Number Scalar>
+IncompressibleTriangle<Scalar> IncompressibleTriangle<Scalar>::reshaped(const Corners<Scalar, 3>& before,
+                                                                        const Corners<Scalar, 3>& after) const noexcept {
+    const auto shape = [](const Corners<Scalar, 3>& x) {
+        return incompressible_triangle({x[0].template cast<double>(), x[1].template cast<double>(),
+                                        x[2].template cast<double>()});
+    };
+    const auto from = shape(before), to = shape(after);
+    const double scale = static_cast<double>(along) / from.along;
+    return {static_cast<Scalar>(scale * to.along), static_cast<Scalar>(scale * to.skew),
+            static_cast<Scalar>(scale * to.across)};
 }
 
 namespace detail {

@@ -337,11 +337,15 @@ class MassSpringNetwork {
     /// stiffness times 64 roundings of a coordinate if that is larger.
     [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
-  private:
+  protected:  // for networks that tear
     [[nodiscard]] ElementInstance<SpringElement<Scalar, Law>> instance(const Spring<Scalar>& spring) const noexcept {
         return {{spring.first, spring.second}, {&law_, spring.stiffness, spring.rest_length}};
     }
     void build_springs(const Adjacency& adjacency, const Points<Scalar>& x, const NetworkOptions<Scalar>& options);
+    template <class Self, class Visit>
+    static void visit_tear(Self& self, const Visit& visit) noexcept {
+        visit(self.springs_, self.ends_, self.mass_, self.viscosity_, self.pinned_);
+    }
 
     [[no_unique_address]] Law law_;
     std::vector<Spring<Scalar>> springs_;

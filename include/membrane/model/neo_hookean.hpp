@@ -51,6 +51,11 @@ struct NeoHookeanTriangle {
         return static_cast<double>(stiffness) * rest.invariant_hessian(x, i, j);
     }
     [[nodiscard]] NeoHookeanTriangle in_order(std::size_t i) const noexcept { return {rest.in_order(i), stiffness}; }
+    [[nodiscard]] NeoHookeanTriangle reshaped(const Corners<Scalar, 3>& before,
+                                              const Corners<Scalar, 3>& after) const noexcept {
+        const auto shape = rest.reshaped(before, after);
+        return {shape, stiffness * (shape.area() / rest.area())};
+    }
     ///@}
 
     /// Mean of the two principal tensions, force per current width [N/m].

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <span>
 #include <string_view>
 #include <tuple>
@@ -78,6 +80,28 @@ class Tissue {
     ///@}
 
     ///@{
+    /// Of `TearableSprings`: a vertex becomes two; a vertex moves at rest. Online. Cost: that of listing springs and
+    /// elements around the vertex and its neighbours.
+    void split(const VertexSplit& split) noexcept requires FollowsSplit<Springs>;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept requires FollowsSplit<Springs>;
+    ///@}
+
+    /// Of `TearableSprings`: the energy [J] of triangle `f` with these corners, and its forces on them [N]: of springs, and
+    /// of elements of a material that are triangles.
+    [[nodiscard]] TriangleResponse<Scalar> triangle_response(Index f, const std::array<Index, 3>& corners,
+                                                             const ConstPointsRef<Scalar>& x) const noexcept
+        requires FollowsSplit<Springs>;
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        if constexpr (FollowsSplit<Springs>) {
+            visit(self.springs_, self.neighbours_, self.joined_);
+            std::apply([&](auto&... kinds) { visit(kinds...); }, self.kinds_);
+        }
+    }
+
+    ///@{
     /// Sums over springs and elements at vertex `v`. Elements contribute their Hessian at `x` to the majoriser; its
     /// `size` is that of the springs.
     [[nodiscard]] VertexForce<Scalar> force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept;
@@ -97,6 +121,8 @@ class Tissue {
         });
     }
     void join();
+    [[nodiscard]] std::size_t room(Index v) const noexcept;
+    void list_again(Index v) noexcept;
 
     Springs springs_;
     std::tuple<Kinds...> kinds_;
@@ -114,7 +140,16 @@ Tissue<Springs, Kinds...>::Tissue(const Springs& springs, const Kinds&... kinds)
         }
         force_tolerance_ = (std::max)(force_tolerance_, elements.force_tolerance());
     });
-    join();
+    if constexpr (FollowsSplit<Springs>) {
+        neighbours_ = joined_ = CompressedRows<Neighbour>(vertex_count(), [&](auto put) {
+            for (Index v = 0; v < vertex_count(); ++v) {
+                for (std::size_t i = room(v); i > 0; --i) put(v, Neighbour{});
+            }
+        });
+        for (Index v = 0; v < vertex_count(); ++v) list_again(v);
+    } else {
+        join();
+    }
 }
 
 template <class Springs, class... Kinds>
@@ -147,6 +182,70 @@ void Tissue<Springs, Kinds...>::join() {
     };
     neighbours_ = rows(coupled);
     joined_ = rows(joined);
+}
+
+// For the neighbours of `v`, however its triangles part.
+template <class Springs, class... Kinds>
+std::size_t Tissue<Springs, Kinds...>::room(Index v) const noexcept {
+    std::size_t sum = springs_.room(v);
+    for_each_kind([&]<class E>(const Elements<Scalar, E>& elements) {
+        sum += elements.at(v).size() * (E::corner_count - 1);
+    });
+    return sum;
+}
+
+// Lists the neighbours of `v` by its springs and elements.
+template <class Springs, class... Kinds>
+void Tissue<Springs, Kinds...>::list_again(Index v) noexcept {
+    const auto add = [v](CompressedRows<Neighbour>& rows, Index other) {
+        const auto row = std::as_const(rows)[v];
+        const auto is_other = [other](const Neighbour& neighbour) { return neighbour.other == other; };
+        if (other != v && std::none_of(row.begin(), row.end(), is_other)) rows.append(v, {other});
+    };
+    neighbours_.truncate(v, 0);
+    joined_.truncate(v, 0);
+    for (const auto& end : springs_.springs_of(v)) {
+        add(joined_, end.other);
+        add(neighbours_, end.other);
+    }
+    for_each_kind([&]<class E>(const Elements<Scalar, E>& elements) {
+        for (const auto& at : elements.at(v)) {
+            const auto& corners = elements.all()[static_cast<std::size_t>(at.number)].corners;
+            for (const Index other : corners) add(neighbours_, other);
+            for (const auto& [i, j] : detail::edges_of<E>()) {
+                if (corners[i] == v) add(joined_, corners[j]);
+                if (corners[j] == v) add(joined_, corners[i]);
+            }
+        }
+    });
+}
+
+template <class Springs, class... Kinds>
+void Tissue<Springs, Kinds...>::split(const VertexSplit& split) noexcept requires FollowsSplit<Springs> {
+    springs_.split(split);
+    std::apply([&](auto&... kinds) { (kinds.split(split), ...); }, kinds_);
+    for (const Neighbour& neighbour : std::as_const(neighbours_)[split.vertex]) list_again(neighbour.other);
+    for (auto* rows : {&neighbours_, &joined_}) {
+        rows->truncate(split.vertex, 0);
+        rows->split(split.vertex, split.copy, [](const Neighbour&) { return true; }, room(split.vertex));
+    }
+    list_again(split.vertex);
+    list_again(split.copy);
+}
+
+template <class Springs, class... Kinds>
+void Tissue<Springs, Kinds...>::reshape(const MovedVertex<Scalar>& moved) noexcept requires FollowsSplit<Springs> {
+    springs_.reshape(moved);
+    std::apply([&](auto&... kinds) { (kinds.reshape(moved), ...); }, kinds_);
+}
+
+template <class Springs, class... Kinds>
+auto Tissue<Springs, Kinds...>::triangle_response(Index f, const std::array<Index, 3>& corners,
+                                                  const ConstPointsRef<Scalar>& x) const noexcept
+    -> TriangleResponse<Scalar> requires FollowsSplit<Springs> {
+    TriangleResponse<Scalar> sum = springs_.triangle_response(f, corners, x);
+    for_each_kind([&](const auto& elements) { elements.add_response(corners, x, sum); });
+    return sum;
 }
 
 template <class Springs, class... Kinds>

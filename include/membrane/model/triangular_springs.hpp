@@ -42,6 +42,8 @@ struct TriangularSpring {
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 3>& x, std::size_t i,
                                                 std::size_t j) const noexcept;
     [[nodiscard]] TriangularSpring in_order(std::size_t i) const noexcept;
+    [[nodiscard]] TriangularSpring reshaped(const Corners<Scalar, 3>& before,
+                                            const Corners<Scalar, 3>& after) const noexcept;
     ///@}
 
     /// Mean of the two principal tensions, force per current width [N/m].
@@ -89,11 +91,9 @@ template <Number Scalar>
     return i + j == 1 ? k.xy : i + j == 2 ? k.xz : k.yz;
 }
 
-/// K of a triangle with these corners. With n_i the gradient of barycentric coordinate i, the strain is -1/4 of the sum
+/// K of a triangle with these corners, for the Lame constants of the sheet [N/m]. With n_i the gradient of barycentric coordinate i, the strain is -1/4 of the sum
 /// of d_k (n_i n_j^T + n_j n_i^T), k opposite of the edge from i to j.
-[[nodiscard]] inline Symmetric3<double> stiffness_of(const Corners<double, 3>& x, const Material& material) {
-    const double nu = material.poisson_ratio, sheet = material.young_modulus * material.thickness;
-    const double lame = sheet * nu / (1 - nu * nu), shear = sheet / (2 * (1 + nu));
+[[nodiscard]] inline Symmetric3<double> stiffness_of(const Corners<double, 3>& x, double lame, double shear) noexcept {
     const std::array<Vector3<double>, 3> edges{x[2] - x[1], x[0] - x[2], x[1] - x[0]};
     const double area = norm<double>(cross(edges[0], edges[1])) / 2;
     const auto gradients = [&](std::size_t i, std::size_t j) { return dot(edges[i], edges[j]) / (4 * area * area); };
@@ -105,6 +105,12 @@ template <Number Scalar>
         return area / 16 * (lame * traces + 2 * shear * products);
     };
     return {of(0, 0), of(1, 1), of(2, 2), of(0, 1), of(0, 2), of(1, 2)};
+}
+
+/// K of a triangle with these corners.
+[[nodiscard]] inline Symmetric3<double> stiffness_of(const Corners<double, 3>& x, const Material& material) noexcept {
+    const double nu = material.poisson_ratio, sheet = material.young_modulus * material.thickness;
+    return stiffness_of(x, sheet * nu / (1 - nu * nu), sheet / (2 * (1 + nu)));
 }
 
 }  // namespace detail
@@ -138,6 +144,32 @@ TriangularSpring<Scalar> TriangularSpring<Scalar>::in_order(std::size_t i) const
     const auto of = [this](std::size_t k, std::size_t l) { return detail::entry(stiffness, k, l); };
     const auto at = [this](std::size_t k) { return rest[static_cast<Eigen::Index>(k)]; };
     return {{of(a, a), of(b, b), of(c, c), of(a, b), of(a, c), of(b, c)}, {at(a), at(b), at(c)}};
+}
+
+// The Lame constants are those that come nearest to K, by least squares.
+template <Number Scalar>
+TriangularSpring<Scalar> TriangularSpring<Scalar>::reshaped(const Corners<Scalar, 3>& before,
+                                                            const Corners<Scalar, 3>& after) const noexcept {
+    const auto in_double = [](const Corners<Scalar, 3>& x) {
+        return Corners<double, 3>{x[0].template cast<double>(), x[1].template cast<double>(),
+                                  x[2].template cast<double>()};
+    };
+    const auto numbers = [](const auto& k) { return std::array<double, 6>{k.xx, k.yy, k.zz, k.xy, k.xz, k.yz}; };
+    const auto from = in_double(before), to = in_double(after);
+    const auto traces = numbers(detail::stiffness_of(from, 1, 0)), products = numbers(detail::stiffness_of(from, 0, 1));
+    const auto own = numbers(stiffness);
+    double tt = 0, tp = 0, pp = 0, tk = 0, pk = 0;
+    for (std::size_t i = 0; i < 6; ++i) {
+        tt += traces[i] * traces[i], tp += traces[i] * products[i], pp += products[i] * products[i];
+        tk += traces[i] * own[i], pk += products[i] * own[i];
+    }
+    const double determinant = tt * pp - tp * tp;
+    const double lame = (tk * pp - pk * tp) / determinant, shear = (pk * tt - tk * tp) / determinant;
+    const auto k = detail::stiffness_of(to, lame, shear);
+    const auto cast = [](double number) { return static_cast<Scalar>(number); };
+    const Vector3<Scalar> squares = detail::squares_of_edges<Scalar>(after), old = detail::squares_of_edges<Scalar>(before);
+    return {{cast(k.xx), cast(k.yy), cast(k.zz), cast(k.xy), cast(k.xz), cast(k.yz)},
+            {rest[0] * (squares[0] / old[0]), rest[1] * (squares[1] / old[1]), rest[2] * (squares[2] / old[2])}};
 }
 
 template <Number Scalar>

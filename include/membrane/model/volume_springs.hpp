@@ -14,6 +14,7 @@
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/model/elastic_network.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// The foundation: it supports the membrane on the body under it.
 ///
@@ -197,6 +198,18 @@ class VirtualVolumeSprings {
         return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.energy(position);
     }
 
+    ///@{
+    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it. Online.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept { anchors_.col(moved.vertex) = moved.rest; }
+    ///@}
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.anchors_, self.stiffness_, self.damping_);
+    }
+
   private:
     Points<Scalar> anchors_;
     std::vector<Scalar> stiffness_, damping_;
@@ -211,6 +224,15 @@ VirtualVolumeSprings<Scalar>::VirtualVolumeSprings(const TriangleMesh<Scalar>& m
     stiffness_ = options.stiffness.expand(mesh.vertex_count(), component, "stiffness", "vertex", "N/m");
     if (options.damping.given()) {
         damping_ = options.damping.expand(mesh.vertex_count(), component, "damping", "vertex", "N s/m");
+    }
+}
+
+template <Real Scalar>
+void VirtualVolumeSprings<Scalar>::split(const VertexSplit& split) noexcept {
+    anchors_.col(split.copy) = anchors_.col(split.vertex);
+    for (auto* constants : {&stiffness_, &damping_}) {
+        if (!constants->empty()) divide((*constants)[static_cast<std::size_t>(split.vertex)],
+                   (*constants)[static_cast<std::size_t>(split.copy)], split.area_share);
     }
 }
 

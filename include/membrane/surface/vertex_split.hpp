@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <span>
+
+#include <membrane/core/vector3.hpp>
+
+/// Changes of a surface that tears, which all parts that know its triangles follow.
+///
+///     for (const auto& event : tear.update(x, tissue, foundation)) {
+///         tissue.split(event.split);
+///         tree.split(event.split);
+///     }
+namespace membrane {
+
+/// A vertex that becomes two: some of its triangles get another vertex in its place. Numbers and order of all triangles
+/// stay. Valid until the surface changes again.
+struct VertexSplit {
+    Index vertex = no_index;                             ///< keeps the other triangles
+    Index copy = no_index;                               ///< until now a vertex without triangles
+    std::span<const Index> triangles = {};               ///< whose corner `vertex` becomes `copy`
+    std::span<const std::array<Index, 3>> corners = {};  ///< theirs until now, in the same order
+    double area_share = 0;                               ///< of the area around `vertex` that goes with `copy`, 0 to 1
+
+    /// Whether triangle `f` gets the copy.
+    [[nodiscard]] bool takes(Index f) const noexcept {
+        return std::find(triangles.begin(), triangles.end(), f) != triangles.end();
+    }
+
+    /// Whether a triangle of `vertex` and these two other corners, in any order, gets the copy.
+    [[nodiscard]] bool takes(Index first, Index second) const noexcept {
+        return std::any_of(corners.begin(), corners.end(), [&](const auto& all) {
+            const auto has = [&](Index v) { return std::find(all.begin(), all.end(), v) != all.end(); };
+            return has(first) && has(second);
+        });
+    }
+};
+
+/// Divides a constant of the vertex that is in proportion to the area around it.
+template <Real Scalar>
+void divide(Scalar& of_vertex, Scalar& of_copy, double area_share) noexcept {
+    of_copy = static_cast<Scalar>(area_share) * of_vertex;
+    of_vertex -= of_copy;
+}
+
+/// A triangle whose shape at rest changes.
+template <Real Scalar>
+struct ReshapedTriangle {
+    Index triangle;                                ///< its number
+    std::array<Index, 3> corners;                  ///< its vertices
+    std::array<Vector3<Scalar>, 3> before, after;  ///< their rest positions [m]
+};
+
+/// A vertex that gets another place on the rest surface, so that an edge lies where the tear runs. Valid until the
+/// surface changes again.
+template <Real Scalar>
+struct MovedVertex {
+    Index vertex = no_index;                                    ///< `no_index`: none
+    Vector3<Scalar> rest = Vector3<Scalar>::Zero();             ///< its rest position from now on [m]
+    std::span<const ReshapedTriangle<Scalar>> triangles = {};   ///< all triangles around it
+};
+
+/// A part that follows a `VertexSplit`.
+template <class Part>
+concept FollowsSplit = requires(Part& part, const VertexSplit& split) {
+    { part.split(split) }
+    noexcept;
+};
+
+/// A part that depends on the shape at rest.
+template <class Part, class Scalar>
+concept FollowsMovedVertex = requires(Part& part, const MovedVertex<Scalar>& moved) {
+    { part.reshape(moved) }
+    noexcept;
+};
+
+}  // namespace membrane
