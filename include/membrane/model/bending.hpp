@@ -41,7 +41,7 @@ struct Hinge {
     static constexpr std::array<std::array<std::size_t, 2>, 5> edges{
         {{0, 1}, {0, 2}, {1, 2}, {0, 3}, {1, 3}}};  ///< see `Element`
     static constexpr std::array<std::array<std::size_t, 4>, 4> orders{
-        {{0, 1, 2, 3}, {1, 0, 3, 2}, {0, 1, 2, 3}, {1, 0, 3, 2}}};  ///< see `Element`
+        {{0, 1, 2, 3}, {1, 0, 3, 2}, {0, 1, 2, 3}, {1, 0, 3, 2}}};                                 ///< see `Element`
     static constexpr std::array<std::array<std::size_t, 3>, 2> triangles{{{0, 1, 2}, {1, 0, 3}}};  ///< see `Element`
 
     Scalar stiffness;        ///< [N m]

@@ -135,7 +135,8 @@ template <class E>
 /// A triangle of a material, whose constants depend on its shape at rest.
 template <class E, class Scalar>
 concept CanReshape = E::corner_count == 3 && requires(const E& element, const Corners<Scalar, 3>& corners) {
-    { element.reshaped(corners, corners) } noexcept -> std::same_as<E>;
+    { element.reshaped(corners, corners) }
+    noexcept->std::same_as<E>;
 };
 
 /// The order of corners in which an element is evaluated at corner `i`.

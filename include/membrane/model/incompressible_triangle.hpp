@@ -121,11 +121,11 @@ struct IncompressibleTriangle {
 }
 
 template <Number Scalar>
-IncompressibleTriangle<Scalar> IncompressibleTriangle<Scalar>::reshaped(const Corners<Scalar, 3>& before,
-                                                                        const Corners<Scalar, 3>& after) const noexcept {
+IncompressibleTriangle<Scalar> IncompressibleTriangle<Scalar>::reshaped(
+    const Corners<Scalar, 3>& before, const Corners<Scalar, 3>& after) const noexcept {
     const auto shape = [](const Corners<Scalar, 3>& x) {
-        return incompressible_triangle({x[0].template cast<double>(), x[1].template cast<double>(),
-                                        x[2].template cast<double>()});
+        return incompressible_triangle(
+            {x[0].template cast<double>(), x[1].template cast<double>(), x[2].template cast<double>()});
     };
     const auto from = shape(before), to = shape(after);
     const double scale = static_cast<double>(along) / from.along;

@@ -137,16 +137,16 @@ TearableSprings<Scalar, Law>::TearableSprings(const TriangleMesh<Scalar>& mesh, 
 // Rows with room for the springs of all triangles apart, and a list with room for springs that part.
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 void TearableSprings<Scalar, Law>::build_rows() {
-    const CompressedRows<SpringEnd<Scalar>> before = std::move(this->ends_);
-    this->ends_ = CompressedRows<SpringEnd<Scalar>>(this->vertex_count(), [&](auto put) {
-        for (Index v = 0; v < static_cast<Index>(room_.size()); ++v) {
+    CompressedRows<SpringEnd<Scalar>> rows(this->vertex_count(), [&](auto put) {
+        for (Index v = 0; v < this->vertex_count(); ++v) {
             for (Index i = 0; i < room_[at(v)]; ++i) put(v, SpringEnd<Scalar>{});
         }
     });
     for (Index v = 0; v < this->vertex_count(); ++v) {
-        this->ends_.truncate(v, 0);
-        for (const auto& end : before[v]) this->ends_.append(v, end);
+        rows.truncate(v, 0);
+        for (const auto& end : this->ends_[v]) rows.append(v, end);
     }
+    this->ends_ = std::move(rows);
     // A vertex that doubles parts two springs at most.
     count_ = this->springs_.size();
     const auto reserve = static_cast<std::size_t>(std::count(room_.begin(), room_.end(), 0));

@@ -89,8 +89,8 @@ class Tissue {
     /// Of `TearableSprings`: the energy [J] of triangle `f` with these corners, and its forces on them [N]: of springs, and
     /// of elements of a material that are triangles.
     [[nodiscard]] TriangleResponse<Scalar> triangle_response(Index f, const std::array<Index, 3>& corners,
-                                                             const ConstPointsRef<Scalar>& x) const noexcept
-        requires FollowsSplit<Springs>;
+                                                             const ConstPointsRef<Scalar>& x) const noexcept requires
+        FollowsSplit<Springs>;
 
     /// Visits what a tear changes, see `core/snapshot.hpp`.
     template <class Self, class Visit>
@@ -188,9 +188,8 @@ void Tissue<Springs, Kinds...>::join() {
 template <class Springs, class... Kinds>
 std::size_t Tissue<Springs, Kinds...>::room(Index v) const noexcept {
     std::size_t sum = springs_.room(v);
-    for_each_kind([&]<class E>(const Elements<Scalar, E>& elements) {
-        sum += elements.at(v).size() * (E::corner_count - 1);
-    });
+    for_each_kind(
+        [&]<class E>(const Elements<Scalar, E>& elements) { sum += elements.at(v).size() * (E::corner_count - 1); });
     return sum;
 }
 
@@ -227,7 +226,8 @@ void Tissue<Springs, Kinds...>::split(const VertexSplit& split) noexcept require
     for (const Neighbour& neighbour : std::as_const(neighbours_)[split.vertex]) list_again(neighbour.other);
     for (auto* rows : {&neighbours_, &joined_}) {
         rows->truncate(split.vertex, 0);
-        rows->split(split.vertex, split.copy, [](const Neighbour&) { return true; }, room(split.vertex));
+        rows->split(
+            split.vertex, split.copy, [](const Neighbour&) { return true; }, room(split.vertex));
     }
     list_again(split.vertex);
     list_again(split.copy);
@@ -242,11 +242,12 @@ void Tissue<Springs, Kinds...>::reshape(const MovedVertex<Scalar>& moved) noexce
 template <class Springs, class... Kinds>
 auto Tissue<Springs, Kinds...>::triangle_response(Index f, const std::array<Index, 3>& corners,
                                                   const ConstPointsRef<Scalar>& x) const noexcept
-    -> TriangleResponse<Scalar> requires FollowsSplit<Springs> {
-    TriangleResponse<Scalar> sum = springs_.triangle_response(f, corners, x);
-    for_each_kind([&](const auto& elements) { elements.add_response(corners, x, sum); });
-    return sum;
-}
+    -> TriangleResponse<Scalar>
+    requires FollowsSplit<Springs> {
+        TriangleResponse<Scalar> sum = springs_.triangle_response(f, corners, x);
+        for_each_kind([&](const auto& elements) { elements.add_response(corners, x, sum); });
+        return sum;
+    }
 
 template <class Springs, class... Kinds>
 auto Tissue<Springs, Kinds...>::force_on(Index v, const ConstPointsRef<Scalar>& x) const noexcept

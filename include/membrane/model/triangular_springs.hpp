@@ -167,7 +167,8 @@ TriangularSpring<Scalar> TriangularSpring<Scalar>::reshaped(const Corners<Scalar
     const double lame = (tk * pp - pk * tp) / determinant, shear = (pk * tt - tk * tp) / determinant;
     const auto k = detail::stiffness_of(to, lame, shear);
     const auto cast = [](double number) { return static_cast<Scalar>(number); };
-    const Vector3<Scalar> squares = detail::squares_of_edges<Scalar>(after), old = detail::squares_of_edges<Scalar>(before);
+    const Vector3<Scalar> squares = detail::squares_of_edges<Scalar>(after),
+                          old = detail::squares_of_edges<Scalar>(before);
     return {{cast(k.xx), cast(k.yy), cast(k.zz), cast(k.xy), cast(k.xz), cast(k.yz)},
             {rest[0] * (squares[0] / old[0]), rest[1] * (squares[1] / old[1]), rest[2] * (squares[2] / old[2])}};
 }

@@ -231,7 +231,8 @@ template <Real Scalar>
 void VirtualVolumeSprings<Scalar>::split(const VertexSplit& split) noexcept {
     anchors_.col(split.copy) = anchors_.col(split.vertex);
     for (auto* constants : {&stiffness_, &damping_}) {
-        if (!constants->empty()) divide((*constants)[static_cast<std::size_t>(split.vertex)],
+        if (!constants->empty())
+            divide((*constants)[static_cast<std::size_t>(split.vertex)],
                    (*constants)[static_cast<std::size_t>(split.copy)], split.area_share);
     }
 }

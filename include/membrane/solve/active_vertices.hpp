@@ -78,6 +78,9 @@ class ActiveVertices {
     template <class Network, class IsBalanced>
     [[nodiscard]] bool end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept;
 
+    /// Other vertices are neighbours, or other forces join them: the next step builds the queue anew.
+    void network_changed() noexcept { has_changed_ = true; }
+
     /// Makes all asleep, and the queue empty. The next step builds it anew.
     void clear() noexcept;
 
@@ -86,7 +89,7 @@ class ActiveVertices {
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.clear();
         visit(self.queue_, self.seeds_, self.awake_, self.dropped_, self.activated_, self.layers_, self.layers_before_,
-              self.order_, self.as_needed_, self.has_frontier_, self.queue_fits_, self.is_open_);
+              self.order_, self.as_needed_, self.has_frontier_, self.queue_fits_, self.is_open_, self.has_changed_);
         if constexpr (Visit::restores) self.has_new_queue_ = true;  // what was packed is of another queue
     }
 
@@ -125,7 +128,8 @@ class ActiveVertices {
     bool has_new_queue_ = false;
     bool queue_fits_ = true, truncated_ = false;
     bool queue_balanced_ = true;
-    bool is_open_ = false;  // between `begin_step` and `end_step`
+    bool is_open_ = false;      // between `begin_step` and `end_step`
+    bool has_changed_ = false;  // the network, since the queue was built
 };
 
 inline ActiveVertices::ActiveVertices(Index vertex_count)
@@ -152,7 +156,8 @@ void ActiveVertices::begin_step(const Network& network, std::span<const Index> s
     for (const Index v : seeds) next_seeds_.insert(v);
     dropped_.clear();
     const auto before = seeds_.items(), now = next_seeds_.items();
-    const bool is_new = as_needed_ || !std::equal(now.begin(), now.end(), before.begin(), before.end());
+    const bool is_new = std::exchange(has_changed_, false) || as_needed_ ||
+                        !std::equal(now.begin(), now.end(), before.begin(), before.end());
     if (is_new) {
         // Vertices that a constraint released, too: the forces on them have changed.
         drop(as_needed_ ? layer_0() : queue_.vertices());
@@ -282,7 +287,7 @@ void ActiveVertices::undo_step(const Network& network) noexcept {
 inline void ActiveVertices::clear() noexcept {
     queue_.clear();
     has_new_queue_ = queue_fits_ = true;
-    is_open_ = false;
+    is_open_ = has_changed_ = false;
     for (IndexSet* set : {&seeds_, &awake_, &dropped_, &active_, &activated_}) set->clear();
 }
 

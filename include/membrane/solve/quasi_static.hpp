@@ -25,6 +25,7 @@
 #include <membrane/solve/step_state.hpp>
 #include <membrane/solve/sweeps.hpp>
 #include <membrane/solve/vertex_update.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// The quasi-static solver: equilibrium positions of the membrane and its reactions.
 ///
@@ -95,6 +96,13 @@ class QuasiStaticSolver {
     /// an index that is no vertex. Not needed for the motion of a `MovingBody`.
     void wake(std::span<const Index> vertices) noexcept;
     void wake_all() noexcept;  ///< `wake` for every vertex. Cost: O(V).
+
+    ///@{
+    /// The membrane has torn, and the network has followed: the copy goes on as the vertex; a vertex has moved at rest.
+    /// Both wake, and the vertices around them. Online. Cost: that of the contact points of the last step.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept;
+    ///@}
 
     /// Resets the solver to a new one, to the bit: a membrane out of equilibrium does not move until woken. Cost: O(V).
     void reset() noexcept;
@@ -351,6 +359,23 @@ void QuasiStaticSolver<Scalar, Rule>::wake(std::span<const Index> vertices) noex
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::wake_all() noexcept {
     for (Index v = 0; v < state_.vertex_count(); ++v) wake({&v, 1});
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+void QuasiStaticSolver<Scalar, Rule>::split(const VertexSplit& split) noexcept {
+    state_.split(split);
+    active_.network_changed();
+    for (const auto& corners : split.corners) wake(corners);
+    wake({&split.copy, 1});
+    if (options_.predict) last_displacements_.col(split.copy) = last_displacements_.col(split.vertex);
+    const auto moved = moved_.items();
+    if (std::find(moved.begin(), moved.end(), split.vertex) != moved.end()) moved_.try_push_back(split.copy);
+}
+
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+void QuasiStaticSolver<Scalar, Rule>::reshape(const MovedVertex<Scalar>& moved) noexcept {
+    active_.network_changed();
+    for (const auto& triangle : moved.triangles) wake(triangle.corners);
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>

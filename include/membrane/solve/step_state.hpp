@@ -14,6 +14,7 @@
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/solve/contact_pack.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 namespace membrane {
 
@@ -63,6 +64,9 @@ struct StepState {
     void reset_points() noexcept;  ///< Drops the contact points of the last step.
     void reset() noexcept;         ///< As new.
     void rotate(const Eigen::Matrix<Scalar, 3, 3>& rotation) noexcept;  ///< Rotates the kept vectors with the body.
+
+    /// A vertex becomes two: the copy gets its rows, and contact points on triangles that get the copy follow.
+    void split(const VertexSplit& split) noexcept;
 
     /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
     template <class Self, class Visit>
@@ -289,6 +293,20 @@ void StepState<Scalar>::reset() noexcept {
     reset_points();
     for (Rows* rows : {&position, &response, &support, &residual})
         std::fill(rows->begin(), rows->end(), PaddedPoint<Scalar>{});
+}
+
+template <Real Scalar>
+void StepState<Scalar>::split(const VertexSplit& split) noexcept {
+    for (Rows* rows : {&position, &support, &residual}) row(*rows, split.copy) = row(*rows, split.vertex);
+    for (const Index i : {0, 1}) row(response, 2 * split.copy + i) = row(response, 2 * split.vertex + i);
+    if (loaded.contains(split.vertex)) loaded.insert(split.copy);
+    for (auto& point : previous_points.items()) {
+        const Index first = point.corners[0];
+        if (first >= 0 && first < vertex_count()) first_previous[static_cast<std::size_t>(first)] = no_index;
+        if (split.takes(point.triangle))
+            std::replace(point.corners.begin(), point.corners.end(), split.vertex, split.copy);
+    }
+    index_previous_points();
 }
 
 template <Real Scalar>

@@ -91,7 +91,8 @@ inline void TriangleAdjacency::split(const VertexSplit& split) noexcept {
         for (std::size_t k = 0; k < 3; ++k) {
             const Index f = split.triangles[n], first = split.corners[n][k], second = split.corners[n][(k + 1) % 3];
             Index& across = neighbours_[static_cast<std::size_t>(f)][k];
-            if ((first != split.vertex && second != split.vertex) || across == no_index || split.takes(across)) continue;
+            if ((first != split.vertex && second != split.vertex) || across == no_index || split.takes(across))
+                continue;
             auto& back = neighbours_[static_cast<std::size_t>(across)];
             std::replace(back.begin(), back.end(), f, no_index);
             across = no_index;

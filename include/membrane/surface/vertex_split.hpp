@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <concepts>
+#include <cstddef>
 #include <span>
 
 #include <membrane/core/vector3.hpp>
@@ -28,6 +29,11 @@ struct VertexSplit {
     /// Whether triangle `f` gets the copy.
     [[nodiscard]] bool takes(Index f) const noexcept {
         return std::find(triangles.begin(), triangles.end(), f) != triangles.end();
+    }
+
+    /// The corners of triangle `f` until now. @pre takes(f)
+    [[nodiscard]] const std::array<Index, 3>& corners_of(Index f) const noexcept {
+        return corners[static_cast<std::size_t>(std::find(triangles.begin(), triangles.end(), f) - triangles.begin())];
     }
 
     /// Whether a triangle of `vertex` and these two other corners, in any order, gets the copy.
@@ -58,9 +64,9 @@ struct ReshapedTriangle {
 /// surface changes again.
 template <Real Scalar>
 struct MovedVertex {
-    Index vertex = no_index;                                    ///< `no_index`: none
-    Vector3<Scalar> rest = Vector3<Scalar>::Zero();             ///< its rest position from now on [m]
-    std::span<const ReshapedTriangle<Scalar>> triangles = {};   ///< all triangles around it
+    Index vertex = no_index;                                   ///< `no_index`: none
+    Vector3<Scalar> rest = Vector3<Scalar>::Zero();            ///< its rest position from now on [m]
+    std::span<const ReshapedTriangle<Scalar>> triangles = {};  ///< all triangles around it
 };
 
 /// A part that follows a `VertexSplit`.

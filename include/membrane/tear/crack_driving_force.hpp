@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include <membrane/model/tissue.hpp>
+#include <membrane/surface/triangle_adjacency.hpp>
+
+/// The energy that a membrane releases as a tear advances.
+namespace membrane {
+
+/// Gradients of the barycentric coordinates of a triangle at rest [1/m], and its area [m^2].
+template <Real Scalar>
+struct RestTriangle {
+    std::array<Vector3<Scalar>, 3> gradient;  ///< of the coordinate of each corner
+    Vector3<Scalar> normal;                   ///< unit vector
+    Scalar area;                              ///< [m^2]
+
+    /// From the corners [m].
+    explicit RestTriangle(const std::array<Vector3<Scalar>, 3>& x) noexcept {
+        const Vector3<Scalar> twice = cross<Scalar>(x[1] - x[0], x[2] - x[0]);
+        const Scalar size = norm(twice);
+        area = size / 2;
+        normal = (1 / size) * twice;
+        for (std::size_t k = 0; k < 3; ++k) {
+            gradient[k] = (1 / size) * cross<Scalar>(normal, x[(k + 2) % 3] - x[(k + 1) % 3]);
+        }
+    }
+};
+
+/// The configurational force of a triangle on a corner: minus the derivative of its energy by the corner's rest position,
+/// with all present positions kept [N]. For a homogeneous material of energy density W, deformation gradient F and first
+/// Piola-Kirchhoff stress P it is -(W I - F^T P) times the gradient of the corner's barycentric coordinate, integrated
+/// [Miehe07]: with the corner's force f, and F^T f, this needs energy and forces alone.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> configurational_force(const RestTriangle<Scalar>& rest,
+                                                    const std::array<Vector3<Scalar>, 3>& x,
+                                                    const TriangleResponse<Scalar>& response, std::size_t i) noexcept {
+    Vector3<Scalar> pulled_back = Vector3<Scalar>::Zero();
+    for (std::size_t k = 1; k < 3; ++k) {
+        pulled_back += dot<Scalar>(x[k] - x[0], response.force[i]) * rest.gradient[k];
+    }
+    return -(response.energy * rest.gradient[i] + pulled_back);
+}
+
+/// The largest principal tension of a triangle, per width at rest [N/m]: T^T T, T its first Piola-Kirchhoff stress.
+template <Real Scalar>
+[[nodiscard]] Symmetric3<Scalar> squared_tension(const RestTriangle<Scalar>& rest,
+                                                 const std::array<Vector3<Scalar>, 3>& at_rest,
+                                                 const TriangleResponse<Scalar>& response) noexcept {
+    // T = -sum of f_k (X_k - X_0)^T / area
+    const Vector3<Scalar> a = (1 / rest.area) * response.force[1], b = (1 / rest.area) * response.force[2];
+    const Vector3<Scalar> p = at_rest[1] - at_rest[0], q = at_rest[2] - at_rest[0];
+    Symmetric3<Scalar> sum = outer<Scalar>(dot(a, a), p);
+    sum += outer<Scalar>(dot(b, b), q);
+    const Scalar both = dot(a, b);
+    sum += outer<Scalar>(both / 2, p + q);
+    sum += outer<Scalar>(-both / 2, p - q);
+    return sum;
+}
+
+}  // namespace membrane

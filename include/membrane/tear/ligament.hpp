@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+
+#include <membrane/solve/constraints.hpp>
+
+/// The force across an edge that is opening.
+namespace membrane {
+
+/// What still joins the two vertices into which a tear has parted one: a force against their separation that decreases
+/// linearly from `strength` to zero at `failure_opening`; the area below is what the edge takes to open. A tear so
+/// advances without a jump, and takes that energy however coarse mesh and ticks are. If the separation decreases, the
+/// force decreases in proportion.
+template <Real Scalar>
+struct Ligament {
+    ///@{
+    /// The vertices that it joins.
+    Index vertex = no_index, copy = no_index;
+    ///@}
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< on `vertex` when it begins; the opposite acts on `copy` [N]
+    Scalar strength = 0;                              ///< when it begins [N]
+    Scalar failure_opening = 0;                       ///< separation at which it fails [m]
+    Scalar reached = 0;                               ///< largest separation in earlier ticks [m]
+    Scalar dissipated = 0;                            ///< energy that the membrane has given up to it [J]
+
+    /// Whether it holds no more.
+    [[nodiscard]] bool failed() const noexcept { return reached >= failure_opening; }
+
+    /// The largest force at any separation from now on [N].
+    [[nodiscard]] Scalar largest_tension() const noexcept {
+        return failed() ? Scalar(0) : strength * (1 - reached / failure_opening);
+    }
+
+    /// The force at a separation [N].
+    [[nodiscard]] Scalar tension(Scalar opening) const noexcept {
+        if (opening >= failure_opening) return 0;
+        if (opening >= reached) return strength * (1 - opening / failure_opening);
+        return largest_tension() * (opening / reached);
+    }
+
+    /// Energy that it would give back [J].
+    [[nodiscard]] Scalar stored(Scalar opening) const noexcept { return tension(opening) * opening / 2; }
+
+    /// After a tick, at a separation of `opening`. The membrane's force across the edge has decreased from that before to
+    /// that now, and the mean of both is what it has parted the edge with: also in a tick in which the edge fails, where
+    /// the membrane gives up more than the ligament takes.
+    void open(Scalar opening) noexcept {
+        if (!(opening > reached)) return;
+        const Scalar before = largest_tension(), stored_before = before * reached / 2;
+        const Scalar grown = opening - reached;
+        reached = opening;
+        const Scalar now = largest_tension();
+        dissipated += (before + now) * grown / 2 - (now * reached / 2 - stored_before);
+    }
+};
+
+/// The forces of all ligaments, as a constraint of a step: made by `Tearing::ligaments`.
+template <Real Scalar>
+struct LigamentForces {
+    std::span<const Ligament<Scalar>> ligaments;  ///< must outlive the step
+
+    ///@{
+    /// As `Constraint` requires. The reaction is zero.
+    [[nodiscard]] bool valid() const noexcept { return true; }
+    void begin(ConstraintContext<Scalar>& context) const noexcept;
+    bool enforce(ConstraintContext<Scalar>& context) const noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
+    ///@}
+};
+
+// A ligament is a point whose weights are 1 and -1: its position is the separation, its force that on the vertex.
+template <Real Scalar>
+void LigamentForces<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
+    for (const auto& ligament : ligaments) {
+        const std::array<Index, 3> corners{ligament.vertex, ligament.copy, ligament.vertex};
+        if (!seed_corners(context, corners)) return;
+        ContactPoint<Scalar> point{no_index, static_cast<int>(ligament.copy), corners, {1, -1, 0}};
+        const auto* before = context.cached_point(no_index, point.feature, ligament.vertex);
+        point.force = before != nullptr ? before->force : ligament.force;
+        add_point_force<Scalar>(context, corners, point.weights, point.force);
+        context.add_point(point);
+    }
+}
+
+// With the response S of the separation u, and c = u / tension, the force f on the vertex solves c f = -(u + S (f - f_0)).
+template <Real Scalar>
+bool LigamentForces<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
+    bool changed = false;
+    const auto points = context.points();
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        auto& point = points[i];
+        const auto& ligament = ligaments[i];
+        const Vector3<Scalar> x = response_of<Scalar>(context, point, Vector3<Scalar>::UnitX());
+        const Vector3<Scalar> y = response_of<Scalar>(context, point, Vector3<Scalar>::UnitY());
+        const Vector3<Scalar> z = response_of<Scalar>(context, point, Vector3<Scalar>::UnitZ());
+        if (!(x[0] > 0)) continue;
+        const Vector3<Scalar> apart = context.position(ligament.vertex) - context.position(ligament.copy);
+        const Scalar opening = norm(apart), tension = ligament.tension(opening);
+        const Scalar stiffness = 1 / x[0];  // scaled, for the range of a float
+        const Symmetric3<Scalar> response = stiffness * Symmetric3<Scalar>{x[0], y[1], z[2], x[1], x[2], y[2]};
+        Symmetric3<Scalar> sum = response;
+        if (tension > 0) sum += diagonal3(stiffness * (opening / tension));
+        Vector3<Scalar> force = Vector3<Scalar>::Zero();
+        if (opening < ligament.failure_opening) force = inverse(sum) * (response * point.force - stiffness * apart);
+        const Scalar size = norm(force);
+        const Scalar largest = ligament.largest_tension();
+        if (size > largest) force *= largest / size;
+        const Vector3<Scalar> more = force - point.force;
+        if (!(norm(more) > context.force_tolerance())) continue;
+        change_force<Scalar>(context, point, more);
+        changed = true;
+    }
+    return changed;
+}
+
+template <Real Scalar>
+Vector3<Scalar> LigamentForces<Scalar>::reaction(const ConstraintContext<Scalar>& context) const noexcept {
+    for (const auto& point : context.points()) {
+        if (!is_finite(point.force)) return point.force;  // the step is refused
+    }
+    return Vector3<Scalar>::Zero();
+}
+
+static_assert(Constraint<LigamentForces<double>, double> && Constraint<LigamentForces<float>, float>);
+
+}  // namespace membrane

@@ -1,0 +1,437 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <membrane/core/index_set.hpp>
+#include <membrane/model/tearable_springs.hpp>
+#include <membrane/model/volume_springs.hpp>
+#include <membrane/tear/crack_driving_force.hpp>
+#include <membrane/tear/ligament.hpp>
+#include <membrane/tear/tear_criterion.hpp>
+#include <membrane/tear/torn_surface.hpp>
+
+/// Tears in the membrane: cuts, and their advance under load.
+///
+///     auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 1.4e3, .thickness = 12e-6});
+///     for (const auto& event : tear.cut_along(path, x)) follow(event, tissue, foundation, solver, tree, tracker);
+///     ...
+///     const auto report = solver.step(x, dt, tissue, foundation, pull(tool, grasp), tear.ligaments());
+///     for (const auto& event : tear.update(x, dt, tissue, foundation)) follow(event, tissue, foundation, solver, tree);
+///     tree.refit(x, report.moved);
+namespace membrane {
+
+/// How a tear runs.
+struct TearOptions {
+    Index max_tips = 16;        ///< capacity
+    double patch_radius = 3.5;  ///< around a tip, where the driving force is found [edges], at least 2
+    double min_angle = 0.35;    ///< of a triangle that a moved vertex may leave [rad]
+    bool move_vertices = true;  ///< onto the tear's direction; if not, it runs along the edges that there are
+
+    /// @throws InvalidInput if a number is out of its range
+    void check() const;
+};
+
+/// An end of a tear within the membrane.
+template <Real Scalar>
+struct TearTip {
+    Index vertex = no_index;                            ///< where it is
+    Vector3<Scalar> heading = Vector3<Scalar>::Zero();  ///< direction of its last advance at rest
+    Index opening = no_index;                           ///< the copy of the vertex behind it, while that edge opens
+    Vector3<Scalar> driving_force = Vector3<Scalar>::Zero();  ///< by the last update [N]
+};
+
+/// Follows an event with all parts: those that have `reshape` or `split`.
+template <Real Scalar, class... Parts>
+void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
+    const auto tell = [&](auto& part) {
+        using Part = std::remove_reference_t<decltype(part)>;
+        static_assert(FollowsSplit<Part> || FollowsMovedVertex<Part, Scalar>, "this part does not follow a tear");
+        if constexpr (FollowsMovedVertex<Part, Scalar>) {
+            if (event.moved.vertex != no_index) part.reshape(event.moved);
+        }
+        if constexpr (FollowsSplit<Part>) {
+            if (event.split.vertex != no_index) part.split(event.split);
+        }
+    };
+    (tell(parts), ...);
+}
+
+/// Tears of one membrane, along the edges of its triangles.
+///
+/// A cut starts them; each of its ends within the membrane is a tip. In each tick the configurational force at a tip
+/// [Miehe07] says what energy an advance would release, and in which direction most. If the `Criterion` says so, the next
+/// vertex in that direction moves onto it, at rest and now, and the edge to it opens: the tip's vertex becomes two, from a
+/// reserve (`with_reserve`). A `Ligament` takes up the energy of the edge as it opens. The tip goes on when that has
+/// failed. Triangles keep their numbers; other parts `follow` the events.
+///
+/// A flap may pass through the membrane: there is no contact of the membrane with itself. A membrane that slips over its
+/// foundation and elements that are no triangles do not count in the driving force.
+///
+/// Online but for the constructor; cost of a tick: that of the forces of some 60 triangles at each tip.
+template <Real Scalar, TearCriterion<Scalar> Criterion = EnergyRelease>
+class Tearing {
+  public:
+    using Events = std::span<const TearEvent<Scalar>>;  ///< in order; valid until the next call
+
+    /// Vertices of `mesh` without triangles are the reserve. @throws InvalidInput for options out of their range
+    explicit Tearing(const TriangleMesh<Scalar>& mesh, const Criterion& criterion, const TearOptions& options = {});
+
+    /// Cuts along the edges between these vertices, each joined to the next by an edge with two triangles; those between
+    /// the ends are not on a border. Nothing is cut, and there is no event, if `path` is not so, or if the reserve is too
+    /// small. Ends that are not on a border become tips, up to the capacity.
+    [[nodiscard]] Events cut_along(std::span<const Index> path, PointsRef<Scalar> x) noexcept;
+
+    /// The path of two edges through `v`, as nearly as possible along `direction` at rest: where a sharp tool perforates
+    /// the membrane. All are `no_index` if there is none.
+    [[nodiscard]] std::array<Index, 3> slit_at(Index v, const Vector3<Scalar>& direction) const noexcept;
+
+    /// The forces across opening edges: a constraint of the step.
+    [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items()}; }
+
+    /// After a step of `dt` [s]: edges open, tips advance.
+    template <class Network, class Volume>
+    [[nodiscard]] Events update(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume) noexcept;
+
+    /// The tips within the membrane.
+    [[nodiscard]] std::span<const TearTip<Scalar>> tips() const noexcept { return tips_.items(); }
+
+    /// Triangles and rest positions by now.
+    [[nodiscard]] const TornSurface<Scalar>& surface() const noexcept { return surface_; }
+
+    /// Whether a tear did not advance in the last call because the reserve was used up.
+    [[nodiscard]] bool reserve_used_up() const noexcept { return used_up_; }
+
+    ///@{
+    /// Length torn so far, without cuts [m]; the energy that has taken, and what opening edges would give back [J].
+    [[nodiscard]] double torn_length() const noexcept { return torn_length_; }
+    [[nodiscard]] double dissipated() const noexcept;
+    [[nodiscard]] double stored(const ConstPointsRef<Scalar>& x) const noexcept;
+    ///@}
+
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.surface_, self.tips_, self.ligaments_, self.failed_, self.torn_length_, self.used_up_,
+              self.is_outer_border_);
+    }
+
+  private:
+    [[nodiscard]] bool is_path(std::span<const Index> path) const noexcept;
+    void add_tip(Index v, Index behind) noexcept;
+    void set_outer_border(Index copy, Index v) noexcept {
+        is_outer_border_[static_cast<std::size_t>(copy)] = is_outer_border_[static_cast<std::size_t>(v)];
+    }
+    void open_ligaments(const ConstPointsRef<Scalar>& x) noexcept;
+    [[nodiscard]] bool is_opening(Index copy) const noexcept {
+        const auto all = ligaments_.items();
+        return std::any_of(all.begin(), all.end(), [copy](const auto& ligament) { return ligament.copy == copy; });
+    }
+    void list_patch(Index v, Scalar radius) noexcept;
+    template <class Network, class Volume>
+    [[nodiscard]] TipState<Scalar> state_at(const TearTip<Scalar>& tip, const ConstPointsRef<Scalar>& x, Scalar dt,
+                                            const Network& network, const Volume& volume) noexcept;
+    template <class Network>
+    [[nodiscard]] bool advance(TearTip<Scalar>& tip, const Vector3<Scalar>& direction, PointsRef<Scalar>& x,
+                               const Network& network) noexcept;
+    template <class Network>
+    void add_ligament(Index v, Index copy, double energy, const ConstPointsRef<Scalar>& x,
+                      const Network& network) noexcept;
+
+    Criterion criterion_;
+    TearOptions options_;
+    TornSurface<Scalar> surface_;
+    FixedVector<TearTip<Scalar>> tips_;
+    FixedVector<Ligament<Scalar>> ligaments_;
+    double failed_ = 0, torn_length_ = 0;
+    bool used_up_ = false;
+    std::vector<unsigned char> is_outer_border_;  // vertices on the border of the membrane before it tore
+    IndexSet patch_vertices_, patch_;             // around a tip; triangles
+};
+
+template <Real Scalar, class Criterion>
+Tearing(const TriangleMesh<Scalar>&, const Criterion&) -> Tearing<Scalar, Criterion>;
+template <Real Scalar, class Criterion>
+Tearing(const TriangleMesh<Scalar>&, const Criterion&, const TearOptions&) -> Tearing<Scalar, Criterion>;
+
+inline void TearOptions::check() const {
+    constexpr std::string_view component = "Tearing";
+    if (max_tips < 1) refuse(component, "max_tips must be at least 1, got ", max_tips);
+    if (!(patch_radius >= 2 && patch_radius <= 100)) {
+        refuse(component, "patch_radius must be 2 to 100 [edges], got ", patch_radius);
+    }
+    if (!(min_angle >= 0 && min_angle < 1)) refuse(component, "min_angle must be 0 to 1 [rad], got ", min_angle);
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+Tearing<Scalar, Criterion>::Tearing(const TriangleMesh<Scalar>& mesh, const Criterion& criterion,
+                                    const TearOptions& options)
+    : criterion_(criterion),
+      options_((options.check(), options)),
+      surface_(mesh),
+      tips_(static_cast<std::size_t>(options.max_tips)),
+      ligaments_(2 * tips_.capacity()),
+      is_outer_border_(static_cast<std::size_t>(mesh.vertex_count())),
+      patch_vertices_(mesh.vertex_count()),
+      patch_(mesh.triangle_count()) {
+    if constexpr (requires { criterion.check(); }) criterion.check();
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        is_outer_border_[static_cast<std::size_t>(v)] = surface_.adjacency().on_border(v) ? 1 : 0;
+    }
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+bool Tearing<Scalar, Criterion>::is_path(std::span<const Index> path) const noexcept {
+    const auto vertices = static_cast<Index>(surface_.rest_positions().cols());
+    if (path.size() < 2) return false;
+    for (std::size_t i = 0; i < path.size(); ++i) {
+        if (path[i] < 0 || path[i] >= vertices) return false;
+        if (std::find(path.begin(), path.begin() + static_cast<std::ptrdiff_t>(i), path[i]) !=
+            path.begin() + static_cast<std::ptrdiff_t>(i)) {
+            return false;
+        }
+        const bool is_end = i == 0 || i + 1 == path.size();
+        if (!is_end && surface_.adjacency().on_border(path[i])) return false;
+        if (i > 0 && !surface_.has_inner_edge(path[i - 1], path[i])) return false;
+    }
+    return path.size() > 2 || surface_.adjacency().on_border(path[0]) || surface_.adjacency().on_border(path[1]);
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+auto Tearing<Scalar, Criterion>::cut_along(std::span<const Index> path, PointsRef<Scalar> x) noexcept -> Events {
+    surface_.begin();
+    used_up_ = false;
+    if (!is_path(path)) return {};
+    const std::size_t last = path.size() - 1;
+    const bool from_border = surface_.adjacency().on_border(path[0]),
+               to_border = surface_.adjacency().on_border(path[last]);
+    const std::size_t needed = last - 1 + (from_border ? 1 : 0) + (to_border ? 1 : 0);
+    used_up_ = needed > static_cast<std::size_t>(surface_.reserve());
+    if (used_up_) return {};
+    const auto split = [&](std::size_t i, Index out, Index back) {
+        const Index copy = surface_.split(x, path[i], out, back);
+        if (copy != no_index) set_outer_border(copy, path[i]);
+    };
+    if (from_border) split(0, path[1], no_index);
+    for (std::size_t i = 1; i < last; ++i) split(i, path[i + 1], path[i - 1]);
+    if (to_border) split(last, path[last - 1], no_index);
+    if (!from_border) add_tip(path[0], path[1]);
+    if (!to_border) add_tip(path[last], path[last - 1]);
+    return surface_.events();
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+void Tearing<Scalar, Criterion>::add_tip(Index v, Index behind) noexcept {
+    const auto& rest = surface_.rest_positions();
+    tips_.try_push_back({v, direction_or_zero<Scalar>(point(rest, v) - point(rest, behind))});
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+std::array<Index, 3> Tearing<Scalar, Criterion>::slit_at(Index v, const Vector3<Scalar>& direction) const noexcept {
+    const std::array<Index, 3> none{no_index, no_index, no_index};
+    if (v < 0 || v >= surface_.rest_positions().cols() || surface_.adjacency().on_border(v)) return none;
+    const Index ahead = surface_.nearest_in_direction(v, direction);
+    const Index behind = surface_.nearest_in_direction(v, -direction);
+    return ahead == no_index || behind == no_index ? none : std::array<Index, 3>{behind, v, ahead};
+}
+
+// Makes the separations permanent, and drops what has failed.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x) noexcept {
+    const auto all = ligaments_.items();
+    std::size_t left = 0;
+    for (auto& ligament : all) {
+        ligament.open(norm<Scalar>(point(x, ligament.vertex) - point(x, ligament.copy)));
+        if (ligament.failed()) {
+            failed_ += static_cast<double>(ligament.dissipated);
+        } else {
+            all[left++] = ligament;
+        }
+    }
+    ligaments_.truncate(left);
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+double Tearing<Scalar, Criterion>::dissipated() const noexcept {
+    double sum = failed_;
+    for (const auto& ligament : ligaments_.items()) sum += static_cast<double>(ligament.dissipated);
+    return sum;
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+double Tearing<Scalar, Criterion>::stored(const ConstPointsRef<Scalar>& x) const noexcept {
+    double sum = 0;
+    for (const auto& ligament : ligaments_.items()) {
+        sum += static_cast<double>(ligament.stored(norm<Scalar>(point(x, ligament.vertex) - point(x, ligament.copy))));
+    }
+    return sum;
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Network, class Volume>
+auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Network& network,
+                                        const Volume& volume) noexcept -> Events {
+    surface_.begin();
+    used_up_ = false;
+    open_ligaments(x);
+    const auto all = tips_.items();
+    std::size_t left = 0;
+    for (auto& tip : all) {
+        bool goes_on = true;
+        if (!is_opening(tip.opening)) {
+            const auto state = state_at(tip, x, dt, network, volume);
+            tip.driving_force = state.driving_force;
+            const Vector3<Scalar> direction = criterion_.direction(state);
+            if (is_finite(direction) && criterion_.opens(state)) goes_on = advance(tip, direction, x, network);
+        }
+        if (goes_on) all[left++] = tip;
+    }
+    tips_.truncate(left);
+    return surface_.events();
+}
+
+// The triangles with a corner within `radius` of vertex `v` at rest [m], over triangles that share a corner.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+void Tearing<Scalar, Criterion>::list_patch(Index v, Scalar radius) noexcept {
+    patch_.clear();
+    patch_vertices_.clear();
+    patch_vertices_.insert(v);
+    const auto& rest = surface_.rest_positions();
+    for (std::size_t i = 0; i < patch_vertices_.items().size(); ++i) {
+        const Index at = patch_vertices_.items()[i];
+        if (!(squared_norm<Scalar>(point(rest, at) - point(rest, v)) < radius * radius)) continue;
+        for (const Index f : surface_.adjacency().triangles_of(at)) {
+            if (!patch_.insert(f)) continue;
+            for (const Index corner : surface_.corners(f)) patch_vertices_.insert(corner);
+        }
+    }
+}
+
+// The driving force is the configurational force of the patch: of all its vertices, those nearer to the tip in full, those
+// farther away less. That of a vertex on the membrane's own border does not count: the tear does not move it.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Network, class Volume>
+TipState<Scalar> Tearing<Scalar, Criterion>::state_at(const TearTip<Scalar>& tip, const ConstPointsRef<Scalar>& x,
+                                                      Scalar dt, const Network& network,
+                                                      const Volume& volume) noexcept {
+    const auto& rest = surface_.rest_positions();
+    const Scalar radius = static_cast<Scalar>(options_.patch_radius) * surface_.mean_edge(tip.vertex);
+    const auto weight = [&](Index v) {
+        const Scalar distance = norm<Scalar>(point(rest, v) - point(rest, tip.vertex));
+        if (is_outer_border_[static_cast<std::size_t>(v)] != 0) return Scalar(0);
+        return std::clamp(2 - 2 * distance / radius, Scalar(0), Scalar(1));
+    };
+    TipState<Scalar> state{Vector3<Scalar>::Zero(), 0, Vector3<Scalar>::Zero(), tip.heading};
+    Symmetric3<Scalar> squares;
+    Scalar area = 0;
+    list_patch(tip.vertex, radius);
+    for (const Index f : patch_.items()) {
+        const auto corners = surface_.corners(f);
+        const std::array<Scalar, 3> weights{weight(corners[0]), weight(corners[1]), weight(corners[2])};
+        const bool at_tip = std::find(corners.begin(), corners.end(), tip.vertex) != corners.end();
+        // The three forces of a triangle add up to zero.
+        if (weights[0] == weights[1] && weights[1] == weights[2] && !at_tip) continue;
+        const auto at_rest = surface_.corners_at(rest, f), now = surface_.corners_at(x, f);
+        const RestTriangle<Scalar> shape(at_rest);
+        const auto response = network.triangle_response(f, corners, x);
+        for (std::size_t k = 0; k < 3; ++k) {
+            state.driving_force += weights[k] * configurational_force(shape, now, response, k);
+        }
+        if (!at_tip) continue;
+        area += shape.area;
+        squares += shape.area * squared_tension(shape, at_rest, response);
+    }
+    if constexpr (!std::same_as<Volume, NoFoundation>) {
+        for (const Index v : patch_vertices_.items()) {
+            const Scalar part = weight(v);
+            const Vector3<Scalar> at = point(x, v);
+            if (part > 0) state.driving_force -= part * volume.force_on(v, at, at, dt).force;
+        }
+    }
+    const Vector3<Scalar> normal = surface_.rest_normal(tip.vertex);
+    state.driving_force -= dot(state.driving_force, normal) * normal;
+    if (area > 0) {
+        const Vector3<Scalar> ahead = direction_or_zero<Scalar>(tip.heading - dot(tip.heading, normal) * normal);
+        const Vector3<Scalar> aside = cross(normal, ahead);
+        const Scalar along = dot<Scalar>(ahead, squares * ahead), across = dot<Scalar>(aside, squares * aside);
+        const Scalar twice = 2 * dot<Scalar>(ahead, squares * aside), angle = std::atan2(twice, along - across) / 2;
+        state.tension_direction = std::cos(angle) * ahead + std::sin(angle) * aside;
+        state.tension = std::sqrt((along + across + std::hypot(twice, along - across)) / (2 * area));
+    }
+    return state;
+}
+
+// Opens the edge from the tip that is nearest to the direction. Returns whether the tip is still within the membrane.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Network>
+bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Scalar>& direction, PointsRef<Scalar>& x,
+                                         const Network& network) noexcept {
+    const auto& rest = surface_.rest_positions();
+    const Index v = tip.vertex, next = surface_.nearest_in_direction(v, direction);
+    if (next == no_index) return true;
+    const bool reaches_border = surface_.adjacency().on_border(next);
+    used_up_ = surface_.reserve() < (reaches_border ? 2 : 1);
+    if (used_up_) return true;
+    if (options_.move_vertices && !reaches_border && !network.pinned(next)) {
+        const Vector3<Scalar> ahead = direction_or_zero(direction), from = point(rest, v);
+        const Vector3<Scalar> place = from + dot<Scalar>(point(rest, next) - from, ahead) * ahead;
+        surface_.move_vertex(x, next, place, static_cast<Scalar>(options_.min_angle));
+    }
+    const Vector3<Scalar> edge = point(rest, next) - point(rest, v);
+    const Index copy = surface_.split(x, v, next);
+    if (copy == no_index) return false;
+    set_outer_border(copy, v);
+    const Scalar length = norm(edge);
+    torn_length_ += static_cast<double>(length);
+    add_ligament(v, copy, static_cast<double>(length) * criterion_.resistance(), x, network);
+    if (reaches_border) {
+        const Index other = surface_.split(x, next, v);
+        if (other != no_index) set_outer_border(other, next);
+        return false;
+    }
+    tip.vertex = next;
+    tip.heading = direction_or_zero(edge);
+    tip.opening = copy;
+    return true;
+}
+
+// It begins with the force that the membrane has transmitted through the vertex.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Network>
+void Tearing<Scalar, Criterion>::add_ligament(Index v, Index copy, double energy, const ConstPointsRef<Scalar>& x,
+                                              const Network& network) noexcept {
+    if (!(energy > 0)) return;
+    const auto pull_on = [&](Index end, const VertexSplit& split) {
+        Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+        for (const Index f : surface_.adjacency().triangles_of(end)) {
+            const auto corners = split.takes(f) ? split.corners_of(f) : surface_.corners(f);
+            const auto response = network.triangle_response(f, corners, x);
+            for (std::size_t k = 0; k < 3; ++k) {
+                if (corners[k] == split.vertex) sum += response.force[k];
+            }
+        }
+        return sum;
+    };
+    const VertexSplit& split = surface_.events().back().split;
+    const auto share = static_cast<Scalar>(split.area_share);
+    const Vector3<Scalar> force = (1 - share) * pull_on(copy, split) - share * pull_on(v, split);
+    const Scalar strength = norm(force);
+    if (!(strength > 0) || !is_finite(force)) {
+        failed_ += energy;
+        return;
+    }
+    constexpr Scalar yields =
+        Scalar(0.98);  // so that it opens at once, though the membrane's force is not quite linear
+    const auto opening = static_cast<Scalar>(2 * energy) / strength;
+    if (!ligaments_.try_push_back({v, copy, yields * force, yields * strength, opening, 0, 0})) failed_ += energy;
+}
+
+}  // namespace membrane
