@@ -11,10 +11,10 @@
 /// The force across an edge that is opening.
 namespace membrane {
 
-/// What still joins the two vertices into which a tear has parted one: a force against their separation that decreases
-/// linearly from `strength` to zero at `failure_opening`; the area below is what the edge takes to open. A tear so
-/// advances without a jump, and takes that energy however coarse mesh and ticks are. If the separation decreases, the
-/// force decreases in proportion.
+/// What still joins the two vertices into which a tear has parted one: a force against their separation that is `strength`
+/// up to the separation `plateau` and decreases linearly to zero at `failure_opening`; the area below is what the edge
+/// takes to open. A tear so advances without a jump, and takes that energy however coarse mesh and ticks are. If the
+/// separation decreases, the force decreases in proportion.
 template <Real Scalar>
 struct Ligament {
     ///@{
@@ -23,24 +23,21 @@ struct Ligament {
     ///@}
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< on `vertex` when it begins; the opposite acts on `copy` [N]
     Scalar strength = 0;                              ///< when it begins [N]
+    Scalar plateau = 0;                               ///< separation up to which it keeps its strength [m]
     Scalar failure_opening = 0;                       ///< separation at which it fails [m]
     Scalar reached = 0;                               ///< largest separation in earlier ticks [m]
     Scalar dissipated = 0;                            ///< energy that the membrane has given up to it [J]
 
-    /// Whether it holds no more.
-    [[nodiscard]] bool failed() const noexcept { return reached >= failure_opening; }
-
-    /// The largest force at any separation from now on [N].
-    [[nodiscard]] Scalar largest_tension() const noexcept {
-        return failed() ? Scalar(0) : strength * (1 - reached / failure_opening);
-    }
+    /// Whether it holds hardly more, a tenth of its strength: the tip goes on.
+    [[nodiscard]] bool failed() const noexcept { return !(first_tension(reached) > strength / 10); }
 
     /// The force at a separation [N].
     [[nodiscard]] Scalar tension(Scalar opening) const noexcept {
-        if (opening >= failure_opening) return 0;
-        if (opening >= reached) return strength * (1 - opening / failure_opening);
-        return largest_tension() * (opening / reached);
+        return opening < reached ? first_tension(reached) * (opening / reached) : first_tension(opening);
     }
+
+    /// The largest force at any separation from now on [N].
+    [[nodiscard]] Scalar largest_tension() const noexcept { return first_tension(reached); }
 
     /// Energy that it would give back [J].
     [[nodiscard]] Scalar stored(Scalar opening) const noexcept { return tension(opening) * opening / 2; }
@@ -55,6 +52,13 @@ struct Ligament {
         reached = opening;
         const Scalar now = largest_tension();
         dissipated += (before + now) * grown / 2 - (now * reached / 2 - stored_before);
+    }
+
+  private:
+    // At a separation that increases.
+    [[nodiscard]] Scalar first_tension(Scalar opening) const noexcept {
+        if (opening >= failure_opening) return 0;
+        return opening <= plateau ? strength : strength * (failure_opening - opening) / (failure_opening - plateau);
     }
 };
 

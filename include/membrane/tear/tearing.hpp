@@ -43,9 +43,10 @@ struct TearOptions {
 /// An end of a tear within the membrane.
 template <Real Scalar>
 struct TearTip {
-    Index vertex = no_index;                            ///< where it is
-    Vector3<Scalar> heading = Vector3<Scalar>::Zero();  ///< direction of its last advance at rest
-    Index opening = no_index;                           ///< the copy of the vertex behind it, while that edge opens
+    Index vertex = no_index;                                  ///< where it is
+    std::array<Index, 2> behind{no_index, no_index};          ///< the vertex behind it and its copy
+    Vector3<Scalar> heading = Vector3<Scalar>::Zero();        ///< direction of its last advance at rest
+    Scalar advanced = 0;                                      ///< by its last advance [m]
     Vector3<Scalar> driving_force = Vector3<Scalar>::Zero();  ///< by the last update [N]
 };
 
@@ -126,7 +127,7 @@ class Tearing {
 
   private:
     [[nodiscard]] bool is_path(std::span<const Index> path) const noexcept;
-    void add_tip(Index v, Index behind) noexcept;
+    void add_tip(Index v, Index behind, Index copy) noexcept;
     void set_outer_border(Index copy, Index v) noexcept {
         is_outer_border_[static_cast<std::size_t>(copy)] = is_outer_border_[static_cast<std::size_t>(v)];
     }
@@ -143,7 +144,7 @@ class Tearing {
     [[nodiscard]] bool advance(TearTip<Scalar>& tip, const Vector3<Scalar>& direction, PointsRef<Scalar>& x,
                                const Network& network) noexcept;
     template <class Network>
-    void add_ligament(Index v, Index copy, double energy, const ConstPointsRef<Scalar>& x,
+    void add_ligament(const TearTip<Scalar>& tip, Index copy, Scalar length, const ConstPointsRef<Scalar>& x,
                       const Network& network) noexcept;
 
     Criterion criterion_;
@@ -219,19 +220,25 @@ auto Tearing<Scalar, Criterion>::cut_along(std::span<const Index> path, PointsRe
     const auto split = [&](std::size_t i, Index out, Index back) {
         const Index copy = surface_.split(x, path[i], out, back);
         if (copy != no_index) set_outer_border(copy, path[i]);
+        return copy;
     };
-    if (from_border) split(0, path[1], no_index);
-    for (std::size_t i = 1; i < last; ++i) split(i, path[i + 1], path[i - 1]);
-    if (to_border) split(last, path[last - 1], no_index);
-    if (!from_border) add_tip(path[0], path[1]);
-    if (!to_border) add_tip(path[last], path[last - 1]);
+    Index first = no_index, copy = no_index;
+    if (from_border) first = copy = split(0, path[1], no_index);
+    for (std::size_t i = 1; i < last; ++i) {
+        copy = split(i, path[i + 1], path[i - 1]);
+        if (first == no_index) first = copy;
+    }
+    if (!from_border) add_tip(path[0], path[1], to_border && last == 1 ? split(1, path[0], no_index) : first);
+    if (to_border && (from_border || last > 1)) split(last, path[last - 1], no_index);
+    if (!to_border) add_tip(path[last], path[last - 1], copy);
     return surface_.events();
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
-void Tearing<Scalar, Criterion>::add_tip(Index v, Index behind) noexcept {
+void Tearing<Scalar, Criterion>::add_tip(Index v, Index behind, Index copy) noexcept {
     const auto& rest = surface_.rest_positions();
-    tips_.try_push_back({v, direction_or_zero<Scalar>(point(rest, v) - point(rest, behind))});
+    const Vector3<Scalar> edge = point(rest, v) - point(rest, behind);
+    tips_.try_push_back({v, {behind, copy}, direction_or_zero(edge), norm(edge)});
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
@@ -286,7 +293,7 @@ auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Ne
     std::size_t left = 0;
     for (auto& tip : all) {
         bool goes_on = true;
-        if (!is_opening(tip.opening)) {
+        if (!is_opening(tip.behind[1])) {
             const auto state = state_at(tip, x, dt, network, volume);
             tip.driving_force = state.driving_force;
             const Vector3<Scalar> direction = criterion_.direction(state);
@@ -391,7 +398,7 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     set_outer_border(copy, v);
     const Scalar length = norm(edge);
     torn_length_ += static_cast<double>(length);
-    add_ligament(v, copy, static_cast<double>(length) * criterion_.resistance(), x, network);
+    add_ligament(tip, copy, length, x, network);
     if (reaches_border) {
         const Index other = surface_.split(x, next, v);
         if (other != no_index) set_outer_border(other, next);
@@ -399,15 +406,20 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     }
     tip.vertex = next;
     tip.heading = direction_or_zero(edge);
-    tip.opening = copy;
+    tip.behind = {v, copy};
+    tip.advanced = length;
     return true;
 }
 
-// It begins with the force that the membrane has transmitted through the vertex.
+// It begins with the force that the membrane has transmitted through the vertex, and ends with the opening that the edge
+// behind has now, as in a virtual crack closure [Rybicki77]. A force that decreases linearly has half their product as its
+// energy. Where the sides part without stretch, as the legs of a torn strip, more: it first keeps its strength.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network>
-void Tearing<Scalar, Criterion>::add_ligament(Index v, Index copy, double energy, const ConstPointsRef<Scalar>& x,
-                                              const Network& network) noexcept {
+void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index copy, Scalar length,
+                                              const ConstPointsRef<Scalar>& x, const Network& network) noexcept {
+    const Index v = tip.vertex;
+    const auto energy = static_cast<Scalar>(criterion_.resistance()) * length;
     if (!(energy > 0)) return;
     const auto pull_on = [&](Index end, const VertexSplit& split) {
         Vector3<Scalar> sum = Vector3<Scalar>::Zero();
@@ -425,13 +437,21 @@ void Tearing<Scalar, Criterion>::add_ligament(Index v, Index copy, double energy
     const Vector3<Scalar> force = (1 - share) * pull_on(copy, split) - share * pull_on(v, split);
     const Scalar strength = norm(force);
     if (!(strength > 0) || !is_finite(force)) {
-        failed_ += energy;
+        failed_ += static_cast<double>(energy);
         return;
     }
     constexpr Scalar yields =
         Scalar(0.98);  // so that it opens at once, though the membrane's force is not quite linear
-    const auto opening = static_cast<Scalar>(2 * energy) / strength;
-    if (!ligaments_.try_push_back({v, copy, yields * force, yields * strength, opening, 0, 0})) failed_ += energy;
+    Ligament<Scalar> ligament{v, copy, yields * force, yields * strength};
+    ligament.failure_opening = 2 * energy / strength;
+    const auto [left, right] = tip.behind;
+    const Scalar opens = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
+    if (ligament.failure_opening > opens && opens > 0) {
+        ligament.plateau = (std::min)(ligament.failure_opening - opens, opens);
+        ligament.failure_opening = opens;
+        ligament.strength = (std::max)(ligament.strength, yields * energy / opens);
+    }
+    if (!ligaments_.try_push_back(ligament)) failed_ += static_cast<double>(energy);
 }
 
 }  // namespace membrane
