@@ -25,6 +25,7 @@
 #include "support/child_process.hpp"
 #include "support/meshes.hpp"
 #include "support/refusal.hpp"
+#include "support/tears.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -139,7 +140,7 @@ void compare(const std::vector<Index>& found, const std::vector<Index>& expected
 template <class S>
 constexpr bool online = [](AabbTree<S>* tree, const AabbTree<S>* const_tree, const ConstPointsRef<S>* x,
                            const Vector3<S>* p, std::span<const Index>* moved, void (*visit)(Index)) {
-    return std::min({noexcept(tree->refit(*x)), noexcept(tree->refit(*x, *moved)),
+    return std::min({FollowsSplit<AabbTree<S>>, noexcept(tree->refit(*x)), noexcept(tree->refit(*x, *moved)),
                      noexcept(const_tree->closest_point(*x, *p)), noexcept(const_tree->first_hit(*x, *p, *p)),
                      noexcept(const_tree->overlap_sphere(*x, *p, S(1), visit)),
                      noexcept(const_tree->overlap_box(*x, *p, *p, visit)),
@@ -367,6 +368,54 @@ TEMPLATE_TEST_CASE("a refit of what moved gives the bits of a refit of all", "[t
         }
         fresh.refit(scene.x);
         CHECK(same_boxes(scene.tree, fresh));
+    }
+}
+
+TEMPLATE_TEST_CASE("after random tears a tree equals one that is built anew", "[tree][tear]", float, double) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        test::TearingSurface<S> surface(test::random_surface<S>(random), 4 + random.index(60));
+        const Index threshold = thresholds[static_cast<std::size_t>(random.index(thresholds.size()))];
+        Scene<S> torn(surface.mesh(), threshold);
+        const auto follow = [&](const VertexSplit& split) {
+            torn.tree.split(split);
+            torn.x.col(split.copy) = torn.x.col(split.vertex);
+        };
+        while (surface.tear(random, follow)) {
+            Scene<S> fresh(surface.mesh(), threshold);
+            torn.moved.clear();
+            for (Index v = 0; v < surface.used(); ++v) {
+                if (!random.chance(0.2)) continue;
+                torn.moved.push_back(v);
+                torn.x.col(v) += torn.size * random.vector<S>(S(-0.1), S(0.1));
+            }
+            fresh.x = torn.x;
+            fresh.tree.refit(fresh.x);
+            torn.tree.refit(torn.x, torn.moved);
+            REQUIRE(same_boxes(torn.tree, fresh.tree));
+            torn.tree.refit(torn.x);
+            REQUIRE(same_boxes(torn.tree, fresh.tree));
+            for (int i = 0; i < 10; ++i) {
+                const auto p = fresh.query(random), q = fresh.query_beside(random);
+                const auto found = torn.tree.closest_point(torn.x, q), expected = fresh.tree.closest_point(fresh.x, q);
+                REQUIRE(found.triangle == expected.triangle);
+                REQUIRE(same_bits(found.point, expected.point));
+                Long least = std::numeric_limits<Long>::infinity();
+                for (Index f = 0; f < fresh.mesh.triangle_count(); ++f) {
+                    least = std::min(least, test::squared_distance<Long>(fresh.exact_triangle(f), exact(q)));
+                }
+                REQUIRE(std::abs(std::sqrt(static_cast<Long>(found.squared_distance)) - std::sqrt(least)) <=
+                        fresh.rounding(found.triangle, q));
+                const auto hit = torn.tree.first_hit(torn.x, p, q), expected_hit = fresh.tree.first_hit(fresh.x, p, q);
+                REQUIRE(hit.triangle == expected_hit.triangle);
+                REQUIRE(hit.fraction == expected_hit.fraction);
+                const S radius = torn.size * random.number<S>(0, S(0.3));
+                REQUIRE(visited([&](auto visit) { torn.tree.overlap_capsule(torn.x, p, q, radius, visit); }) ==
+                        visited([&](auto visit) { fresh.tree.overlap_capsule(fresh.x, p, q, radius, visit); }));
+            }
+        }
     }
 }
 

@@ -12,6 +12,7 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/tears.hpp"
 
 using membrane::Index;
 using membrane::LocalSurface;
@@ -101,4 +102,34 @@ TEST_CASE("nearest to a tool: a point for a sphere, along the axis for a capsule
     }
     CHECK(std::abs(nearest_sphere - 0.3) < 1e-12);
     CHECK(std::abs(nearest_capsule - 0.1) < 1e-12);
+}
+
+TEST_CASE("after random tears a surface equals one that is built anew", "[tear]") {
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        test::TearingSurface<double> torn(test::random_surface<double>(random), 4 + random.index(60));
+        LocalSurface<double> surface(torn.mesh());
+        const double edge = surface.mean_edge();
+        while (torn.tear(random, [&](const membrane::VertexSplit& split) { surface.split(split); })) {
+            const auto mesh = torn.mesh();
+            const LocalSurface<double> fresh(mesh);
+            REQUIRE(surface.closed() == fresh.closed());
+            REQUIRE(surface.mean_edge() == edge);
+            for (Index f = 0; f < mesh.triangle_count(); ++f) {
+                REQUIRE(surface.corners(f) == fresh.corners(f));
+                std::vector<Index> found, expected;
+                surface.across_sides(f, [&](Index g) { found.push_back(g); });
+                fresh.across_sides(f, [&](Index g) { expected.push_back(g); });
+                surface.around_corners(f, [&](Index g) { found.push_back(g); });
+                fresh.around_corners(f, [&](Index g) { expected.push_back(g); });
+                REQUIRE(found == expected);
+                Vector3<double> weights = random.barycentric();
+                if (random.chance(0.6)) weights[random.index(3)] = 0;
+                if (random.chance(0.3)) weights = Vector3<double>::Unit(random.index(3));
+                REQUIRE(surface.on_border(f, weights) == fresh.on_border(f, weights));
+                REQUIRE(surface.outward(mesh.positions(), f, weights) == fresh.outward(mesh.positions(), f, weights));
+            }
+        }
+    }
 }

@@ -18,6 +18,7 @@
 #include "support/cgal_mesh.hpp"
 #include "support/child_process.hpp"
 #include "support/meshes.hpp"
+#include "support/tears.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -346,6 +347,58 @@ TEMPLATE_TEST_CASE("pseudo-normals of face, edge and corner", "[normals]", doubl
     }
     x.setConstant(std::numeric_limits<S>::quiet_NaN());
     CHECK(at(0, 1, 0, 0) == Vector3<S>(0, 0, 0));
+}
+
+TEMPLATE_TEST_CASE("after random tears the normals are those of a mesh that is built anew, bit for bit",
+                   "[normals][tear]", double, float) {
+    using S = TestType;
+    const S tolerance = 100 * std::numeric_limits<S>::epsilon();
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        auto whole = random.chance(0.1) ? test::fan<S>(3 + random.index(40)) : test::random_surface<S>(random);
+        whole.x.colwise() -= whole.x.rowwise().mean().eval();
+        test::TearingSurface<S> surface(whole, 4 + random.index(60));
+        VertexNormals<S> normals(surface.mesh());
+        TriangleAdjacency adjacency(surface.mesh());
+        Points<S> x = surface.mesh().positions();
+        const auto follow = [&](const VertexSplit& split) {
+            adjacency.split(split);
+            normals.split(split);
+            x.col(split.copy) = x.col(split.vertex);
+            REQUIRE(same_bits(point(normals.values(), split.copy), point(normals.values(), split.vertex)));
+            normals.update(x, std::array{split.vertex, split.copy});
+            // Here a vertex may have two fans of triangles, which no mesh is accepted with.
+            const auto expected = expected_normals<S>(x, surface.triangles());
+            REQUIRE(largest_error<S>(normals.values().leftCols(surface.used()), expected.leftCols(surface.used())) <
+                    tolerance);
+        };
+        while (surface.tear(random, follow)) {
+            const auto mesh = surface.mesh();
+            VertexNormals<S> fresh(mesh);
+            std::vector<Index> moved;
+            for (Index v = 0; v < surface.used(); ++v) {
+                if (!random.chance(0.3)) continue;
+                moved.push_back(v);
+                x.col(v) += S(0.02) * x.cwiseAbs().maxCoeff() * random.vector<S>();
+            }
+            fresh.update(x);
+            normals.update(x, moved);
+            REQUIRE(same_bits(normals.values(), fresh.values()));
+            normals.update(x);
+            REQUIRE(same_bits(normals.values(), fresh.values()));
+
+            const Adjacency expected(mesh);
+            for (int i = 0; i < 20; ++i) {
+                const Index f = random.index(mesh.triangle_count());
+                Vector3<S> weights = random.barycentric<S>();
+                if (random.chance(0.6)) weights[random.index(3)] = 0;
+                if (random.chance(0.3)) weights = Vector3<S>::Unit(random.index(3));
+                REQUIRE(same_bits(pseudo_normal(x, mesh.triangles(), adjacency, f, weights),
+                                  pseudo_normal(x, mesh.triangles(), expected, f, weights)));
+            }
+        }
+    }
 }
 
 TEST_CASE("the pseudo-normal at the nearest point distinguishes inside from outside as CGAL does", "[normals][cgal]") {

@@ -9,6 +9,7 @@
 #include <membrane/surface/aabb.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Finds the triangles near a point, a segment, a sphere, a box or a capsule, on a deforming surface.
 ///
@@ -63,6 +64,12 @@ class AabbTree {
     /// @pre `x` has as many points as the mesh, and `moved` holds indices of these (asserted)
     void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept { boxes_.refit(x, moved); }
 
+    /// A vertex becomes two, at one position until the next refit. Boxes keep their triangles: a flap that moves far away
+    /// makes those that have triangles on either side of a tear larger. The memory is there if the mesh of the tree has
+    /// vertices without triangles: that of a leaf for all corners of its triangles. Online. Cost: the leaves around the
+    /// vertex.
+    void split(const VertexSplit& split) noexcept { boxes_.split(split); }
+
     // All queries take the positions of the last refit. They do not allocate. They report the number of boxes visited:
     // O(log F) for a small query near the surface, all boxes at worst.
 
@@ -96,6 +103,12 @@ class AabbTree {
     /// The box around all triangles below a node of `tree_shape`; node 0: around the surface.
     /// @pre 0 <= `node` < `statistics().nodes` (asserted)
     [[nodiscard]] Aabb<Scalar> box(Index node) const noexcept { return boxes_.box(node); }
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles. Then refit the tree.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.boxes_);
+    }
 
   private:
     WideBvh<Scalar> boxes_;

@@ -81,12 +81,20 @@ class ContactTracker {
     /// Number of full tree queries (for all triangles near the tool) during contact, since construction.
     [[nodiscard]] Index full_query_count() const noexcept { return full_query_count_; }
 
+    ///@{
+    /// A vertex becomes two; a vertex moves at rest. A contact goes on. Online. Cost: the triangles around the vertex.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept { origins_.col(moved.vertex) = moved.rest; }
+    ///@}
+
     /// Drops contact, tool and side. Later contacts equal those of a new tracker, bit for bit.
     void reset() noexcept;
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`; of a mesh with a reserve, the triangles as well.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.surface_);
+        if (self.surface_.has_reserve()) visit(self.origins_);
         visit(self.near_, self.nearest_, self.nearest_square_, self.last_, self.last_tool_, self.pose_, self.side_,
               self.slid_off_, self.origin_triangles_, self.ticks_, self.full_query_count_, self.rebound_ticks_);
     }
@@ -194,6 +202,13 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
         refuse("ContactTracker", "full_query_interval must be at least 1, got ", options.full_query_interval);
     if (options.max_contact_points < 1)
         refuse("ContactTracker", "max_contact_points must be at least 1, got ", options.max_contact_points);
+}
+
+template <Real Scalar>
+void ContactTracker<Scalar>::split(const VertexSplit& split) noexcept {
+    surface_.split(split);
+    origins_.col(split.copy) = origins_.col(split.vertex);
+    if (split.takes(last_.triangle)) split.replace_in(last_.corners);
 }
 
 template <Real Scalar>

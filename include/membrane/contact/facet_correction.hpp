@@ -16,6 +16,7 @@
 #include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// A ball on a mesh whose triangles are not smaller than its contact.
 ///
@@ -63,6 +64,17 @@ class FacetCorrection {
     /// Online. Cost: linear in `contact.triangles`.
     [[nodiscard]] Vector3<Scalar> operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
                                              const Vector3<Scalar>& reaction) const noexcept;
+
+    /// A vertex becomes two, each with the edges at rest that it had. Online.
+    void split(const VertexSplit& split) noexcept {
+        edge_[static_cast<std::size_t>(split.copy)] = edge_[static_cast<std::size_t>(split.vertex)];
+    }
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.edge_);
+    }
 
     /// Radius of the contact of a ball of `radius` [m] under this force [N], at most that radius [m].
     [[nodiscard]] double contact_radius(double radius, double force) const noexcept;

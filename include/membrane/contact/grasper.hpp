@@ -11,6 +11,7 @@
 #include <membrane/core/check.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Forceps: the held point, from closing to opening.
 ///
@@ -59,7 +60,7 @@ class Grasper {
     /// Keeps a copy of the positions of `mesh`, the rest surface. Cost: O(V).
     /// @throws InvalidInput if an option is out of its range
     explicit Grasper(const TriangleMesh<Scalar>& mesh, GraspOptions options = {})
-        : origins_(mesh.positions()), options_((options.check(), options)) {}
+        : origins_(mesh.positions()), options_((options.check(), options)), has_reserve_(reserve_of(mesh) > 0) {}
 
     /// The present grasp. Forceps that closed before the contact hold no point; those that are closed at the first
     /// update count as closing then.
@@ -75,6 +76,15 @@ class Grasper {
     /// Jaws of any force: not needed. Online.
     bool slip(const ConstPointsRef<Scalar>& x, const Tool<Scalar>& tool, const Vector3<Scalar>& reaction) noexcept;
 
+    ///@{
+    /// A vertex becomes two; a vertex moves at rest. The held point stays the same point of the tissue. Online.
+    void split(const VertexSplit& split) noexcept {
+        origins_.col(split.copy) = origins_.col(split.vertex);
+        if (split.takes(grasp_.triangle)) split.replace_in(grasp_.corners);
+    }
+    void reshape(const MovedVertex<Scalar>& moved) noexcept;
+    ///@}
+
     /// Drops the held point and the closed state. Later grasps equal those of a new grasper, bit for bit.
     void reset() noexcept {
         grasp_ = {};
@@ -83,9 +93,10 @@ class Grasper {
         slipped_ = 0;
     }
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`; of a mesh with a reserve, the rest surface as well.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
+        if (self.has_reserve_) visit(self.origins_);
         visit(self.grasp_, self.pose_, self.closed_, self.slipped_);
     }
 
@@ -96,6 +107,7 @@ class Grasper {
     RigidFrame<Scalar> pose_;  // of the body at the last update
     bool closed_ = false;
     Scalar slipped_ = 0;  // since the jaws closed [m]
+    bool has_reserve_;
 };
 
 inline void GraspOptions::check() const {
@@ -137,6 +149,25 @@ bool Grasper<Scalar>::slip(const ConstPointsRef<Scalar>& x, const Tool<Scalar>& 
     grasp_.offset = now;
     if (slipped_ >= static_cast<Scalar>(options_.jaw_length)) grasp_ = {};
     return true;
+}
+
+template <Real Scalar>
+void Grasper<Scalar>::reshape(const MovedVertex<Scalar>& moved) noexcept {
+    origins_.col(moved.vertex) = moved.rest;
+    const auto at = [](const std::array<Vector3<Scalar>, 3>& x) { return Triangle<Scalar>{x[0], x[1], x[2]}; };
+    const auto held = std::find_if(moved.triangles.begin(), moved.triangles.end(),
+                                   [&](const auto& one) { return one.triangle == grasp_.triangle; });
+    if (!grasp_.holding() || held == moved.triangles.end()) return;
+    const Vector3<Scalar> rest = point_at(at(held->before), grasp_.barycentric);
+    Scalar least = std::numeric_limits<Scalar>::infinity();
+    for (const auto& one : moved.triangles) {
+        const auto nearest = closest_point(at(one.after), rest);
+        if (!(nearest.squared_distance < least)) continue;
+        least = nearest.squared_distance;
+        grasp_.triangle = one.triangle;
+        grasp_.corners = one.corners;
+        grasp_.barycentric = nearest.barycentric;
+    }
 }
 
 template <Real Scalar>

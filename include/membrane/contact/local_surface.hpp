@@ -9,9 +9,11 @@
 
 #include <membrane/contact/tool.hpp>
 #include <membrane/core/lanes.hpp>
-#include <membrane/surface/adjacency.hpp>
+#include <membrane/surface/half_edges.hpp>
 #include <membrane/surface/normals.hpp>
+#include <membrane/surface/triangle_adjacency.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Local queries on a surface around a triangle: neighbours, outward direction, nearest point.
 ///
@@ -26,14 +28,15 @@ template <Real Scalar>
 class LocalSurface {
   public:
     /// Cost: O(V + F log F).
-    explicit LocalSurface(const TriangleMesh<Scalar>& mesh);
+    explicit LocalSurface(const TriangleMesh<Scalar>& mesh) : LocalSurface(mesh, half_edges(mesh.triangles())) {}
 
     /// Number of triangles F.
     [[nodiscard]] Index triangle_count() const noexcept { return static_cast<Index>(triangles_.cols()); }
 
     /// Whether the surface has no border.
     [[nodiscard]] bool closed() const noexcept { return adjacency_.closed(); }
-    [[nodiscard]] Scalar mean_edge() const noexcept { return mean_edge_; }  ///< [m]
+    /// Of the mesh, before it tears [m].
+    [[nodiscard]] Scalar mean_edge() const noexcept { return mean_edge_; }
 
     /// Vertices of triangle `f`.
     [[nodiscard]] std::array<Index, 3> corners(Index f) const noexcept {
@@ -91,23 +94,43 @@ class LocalSurface {
     [[nodiscard]] TrianglePoint<Lanes<Scalar>> closest_points(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                               const Vector3<Scalar>& q) const noexcept;
 
+    /// A vertex becomes two. Cost: the triangles around it.
+    void split(const VertexSplit& split) noexcept;
+
+    /// Whether a vertex of the mesh had no triangles, see `surface/vertex_split.hpp`.
+    [[nodiscard]] bool has_reserve() const noexcept { return has_reserve_; }
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        if (self.has_reserve_) visit(self.triangles_, self.adjacency_);
+    }
+
   private:
+    LocalSurface(const TriangleMesh<Scalar>& mesh, std::span<const HalfEdge> sides);
     [[nodiscard]] Triangle<Lanes<Scalar>> gather(const ConstPointsRef<Scalar>& x, const Wide& some) const noexcept;
 
     Triangles triangles_;
-    Adjacency adjacency_;
-    std::vector<unsigned char> border_;  // whether vertex v is on the border
+    TriangleAdjacency adjacency_;
     Scalar mean_edge_ = 0;
+    bool has_reserve_;
 };
 
 template <Real Scalar>
-LocalSurface<Scalar>::LocalSurface(const TriangleMesh<Scalar>& mesh)
-    : triangles_(mesh.triangles()), adjacency_(mesh), border_(static_cast<std::size_t>(mesh.vertex_count()), 0) {
-    for (const Index v : adjacency_.border_vertices()) border_[static_cast<std::size_t>(v)] = 1;
-    for (const auto& [first, second] : adjacency_.edges()) {
-        mean_edge_ += norm<Scalar>(point(mesh.positions(), second) - point(mesh.positions(), first));
-    }
-    mean_edge_ /= static_cast<Scalar>(adjacency_.edges().size());
+LocalSurface<Scalar>::LocalSurface(const TriangleMesh<Scalar>& mesh, std::span<const HalfEdge> sides)
+    : triangles_(mesh.triangles()), adjacency_(mesh, sides), has_reserve_(reserve_of(mesh) > 0) {
+    Index edges = 0;
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
+        mean_edge_ += norm<Scalar>(point(mesh.positions(), edge[0].second) - point(mesh.positions(), edge[0].first));
+        ++edges;
+    });
+    mean_edge_ /= static_cast<Scalar>(edges);
+}
+
+template <Real Scalar>
+void LocalSurface<Scalar>::split(const VertexSplit& split) noexcept {
+    for (const Index f : split.triangles) split.replace_in(triangles_.col(f));
+    adjacency_.split(split);
 }
 
 template <Real Scalar>
@@ -138,7 +161,7 @@ bool LocalSurface<Scalar>::on_border(Index f, const Vector3<Scalar>& barycentric
     const auto vertices = corners(f);
     for (std::size_t k = 0; k < 3; ++k) {
         const auto weight = [&](std::size_t i) { return barycentric[static_cast<Eigen::Index>(i % 3)]; };
-        if (weight(k) == 1) return border_[static_cast<std::size_t>(vertices[k])] != 0;
+        if (weight(k) == 1) return adjacency_.on_border(vertices[k]);
         if (weight(k) > 0 && weight(k + 1) > 0 && weight(k + 2) == 0) {
             return adjacency_.triangle_neighbours(f)[k] == no_index;
         }

@@ -18,6 +18,7 @@
 #include <membrane/surface/aabb.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// A bounding volume hierarchy over the triangles of a deforming surface, with several boxes tested at once.
 ///
@@ -48,6 +49,9 @@ class WideBvh {
     void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
     ///@}
 
+    /// A vertex becomes two: see `AabbTree`.
+    void split(const VertexSplit& split) noexcept;
+
     /// Calls `examine(Index f, triangle)` for each triangle with a key below `limit`, of boxes with a key below
     /// `limit`. Visits sibling boxes by ascending key; `examine` may lower the limit. `key(box)` is one number a box;
     /// `key(triangle)` is optional: by default a triangle has the key of its box. Returns the number of boxes visited.
@@ -63,6 +67,12 @@ class WideBvh {
 
     /// The box around the triangles below a node of `tree_shape`. @pre 0 <= `node` < `statistics().nodes` (asserted)
     [[nodiscard]] Aabb<Scalar> box(Index node) const noexcept;
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        if (self.has_reserve_) visit(self.items_, self.vertices_of_, self.leaves_of_);
+    }
 
   private:
     static constexpr std::size_t width = Lanes<Scalar>::count;
@@ -91,6 +101,12 @@ class WideBvh {
         const auto [first, count] = leaves_[static_cast<std::size_t>(leaf)];
         return std::span(items_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
     }
+    [[nodiscard]] std::span<Item> items_of(Index leaf) noexcept {
+        const auto [first, count] = leaves_[static_cast<std::size_t>(leaf)];
+        return std::span(items_).subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(count));
+    }
+    void reserve_vertices();
+    void add_vertex(Index leaf, Index v) noexcept;
     [[nodiscard]] Aabb<Scalar> box_in(Index slot) const noexcept;
     void fit_leaf(const ConstPointsRef<Scalar>& x, Index leaf) noexcept;
     void fit_node(Index n) noexcept;
@@ -118,6 +134,7 @@ class WideBvh {
     IndexSet stale_leaves_;                   // to be refitted
     std::vector<std::uint64_t> stale_nodes_;  // 64 nodes a word
     TreeStatistics statistics_;
+    bool has_reserve_;
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
@@ -137,7 +154,9 @@ template <class Key, Number N>
 
 template <Real Scalar>
 WideBvh<Scalar>::WideBvh(const TriangleMesh<Scalar>& mesh, const TreeOptions& options)
-    : shape_(tree_shape(mesh, options.balance_threshold)), statistics_(membrane::statistics(shape_)) {
+    : shape_(tree_shape(mesh, options.balance_threshold)),
+      statistics_(membrane::statistics(shape_)),
+      has_reserve_(reserve_of(mesh) > 0) {
     detail::define_made<WideBvh>();
     items_.reserve(shape_.triangles.size());
     for (const Index f : shape_.triangles) {
@@ -147,6 +166,7 @@ WideBvh<Scalar>::WideBvh(const TriangleMesh<Scalar>& mesh, const TreeOptions& op
     items_.insert(items_.end(), width - 1, items_.back());  // several are read at once, from any item on
     fold();
     collect_vertices_and_leaves(mesh.vertex_count());
+    if (has_reserve_) reserve_vertices();
     stale_leaves_ = IndexSet(statistics_.leaves);
     stale_nodes_.assign(nodes_.size() / bits_in_word + 1, 0);
     refit(mesh.positions());
@@ -209,6 +229,59 @@ void WideBvh<Scalar>::collect_vertices_and_leaves(Index vertex_count) {
             for (; count[some] != 0 && count[some] < filled; ++count[some]) put(v, latest[some]);
         }
     });
+}
+
+// Makes room in each leaf for the vertices of its triangles if all were apart.
+template <Real Scalar>
+void WideBvh<Scalar>::reserve_vertices() {
+    const auto padded = [](std::size_t count) { return (count + filled - 1) / filled * filled; };
+    const CompressedRows<Index> present = std::move(vertices_of_);
+    vertices_of_ = CompressedRows<Index>(statistics_.leaves, [&](auto put) {
+        for (Index leaf = 0; leaf < statistics_.leaves; ++leaf) {
+            const auto vertices = present[leaf];
+            for (const Index v : vertices) put(leaf, v);
+            for (std::size_t n = vertices.size(); n < padded(3 * items_of(leaf).size()); ++n) put(leaf, vertices[0]);
+        }
+    });
+    for (Index leaf = 0; leaf < statistics_.leaves; ++leaf) vertices_of_.truncate(leaf, present[leaf].size());
+}
+
+// The leaves of the vertex stay those of both.
+template <Real Scalar>
+void WideBvh<Scalar>::split(const VertexSplit& split) noexcept {
+    for (const Index leaf : std::as_const(leaves_of_)[split.vertex]) {
+        bool goes = false, stays = false;
+        for (Item& item : items_of(leaf)) {
+            const auto& corners = item.corners;
+            if (split.takes(item.triangle)) {
+                split.replace_in(item.corners);
+                goes = true;
+            } else if (std::find(corners.begin(), corners.end(), split.vertex) != corners.end()) {
+                stays = true;
+            }
+        }
+        if (goes && stays) {
+            add_vertex(leaf, split.copy);
+        } else if (goes) {
+            split.replace_in(vertices_of_[leaf]);
+        }
+    }
+    leaves_of_.share(split.vertex, split.copy);
+}
+
+// Adds `v` to the vertices of a leaf, in the place of one that is repeated, if any is.
+template <Real Scalar>
+void WideBvh<Scalar>::add_vertex(Index leaf, Index v) noexcept {
+    const auto vertices = vertices_of_[leaf];
+    if (std::find(vertices.begin(), vertices.end(), v) != vertices.end()) return;
+    const auto spare = std::find_if(vertices.end() - (filled - 1), vertices.end(), [&](const Index& w) {
+        return &*std::find(vertices.begin(), vertices.end(), w) != &w;
+    });
+    if (spare != vertices.end()) {
+        *spare = v;
+        return;
+    }
+    for (Index n = 0; n < filled; ++n) vertices_of_.append(leaf, v);
 }
 
 template <Real Scalar>

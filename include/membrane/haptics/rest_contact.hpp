@@ -56,6 +56,29 @@ class RestContact {
         return found;
     }
 
+    ///@{
+    /// A vertex becomes two; a vertex moves at rest. A closed surface is open once it tears. Online. Cost: the triangles and
+    /// the tree's leaves around the vertex.
+    void split(const VertexSplit& split) noexcept {
+        at_rest_.col(split.copy) = at_rest_.col(split.vertex);
+        surface_.split(split);
+        tree_.split(split);
+    }
+    void reshape(const MovedVertex<Scalar>& moved) noexcept {
+        at_rest_.col(moved.vertex) = moved.rest;
+        tree_.refit(at_rest_, {&moved.vertex, 1});
+    }
+    ///@}
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the surface.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.surface_, self.tree_);
+        if (!self.surface_.has_reserve()) return;
+        visit(self.at_rest_);
+        if constexpr (Visit::restores) self.tree_.refit(self.at_rest_);
+    }
+
   private:
     [[nodiscard]] Contact<Scalar> contact_with(const ConstPointsRef<Scalar>& anchors, const AabbTree<Scalar>& tree,
                                                const Contact<Scalar>& contact, const Tool<Scalar>& tool) const noexcept;

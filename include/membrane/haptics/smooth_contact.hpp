@@ -6,10 +6,11 @@
 #include <limits>
 
 #include <membrane/contact/contact.hpp>
-#include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/normals.hpp>
 #include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_adjacency.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// A contact normal that is continuous as the tool slides over edges and vertices.
 ///
@@ -51,6 +52,19 @@ class SmoothContact {
         return over(contact, body.anchors(), body.normals());
     }
 
+    ///@{
+    /// A vertex becomes two; a vertex moves at rest. Normals stay those of the surface before it tore, so that the force is
+    /// continuous over a tear that is closed. Online. Cost: the triangles around the vertex.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept { at_rest_.col(moved.vertex) = moved.rest; }
+    ///@}
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        visit(self.triangles_, self.adjacency_, self.at_rest_, self.normals_);
+    }
+
   private:
     [[nodiscard]] Contact<Scalar> over(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
                                        const ConstPointsRef<Scalar>& normals) const noexcept;
@@ -61,7 +75,7 @@ class SmoothContact {
     static constexpr int max_triangles = 64;  // visited from the contact to the proxy
 
     Triangles triangles_;
-    Adjacency adjacency_;
+    TriangleAdjacency adjacency_;
     Points<Scalar> at_rest_, normals_;
 };
 
@@ -94,6 +108,13 @@ template <Real Scalar>
 }
 
 }  // namespace detail
+
+template <Real Scalar>
+void SmoothContact<Scalar>::split(const VertexSplit& split) noexcept {
+    for (const Index f : split.triangles) split.replace_in(triangles_.col(f));
+    adjacency_.split(split);
+    for (auto* points : {&at_rest_, &normals_}) points->col(split.copy) = points->col(split.vertex);
+}
 
 template <Real Scalar>
 Contact<Scalar> SmoothContact<Scalar>::over(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,

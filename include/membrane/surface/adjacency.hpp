@@ -9,6 +9,7 @@
 
 #include <membrane/core/compressed_rows.hpp>
 #include <membrane/surface/half_edges.hpp>
+#include <membrane/surface/triangle_adjacency.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
 /// Neighbours of vertices and triangles on a surface.
@@ -23,7 +24,7 @@ class Adjacency {
   public:
     /// O(F log F).
     template <Real Scalar>
-    explicit Adjacency(const TriangleMesh<Scalar>& mesh);
+    explicit Adjacency(const TriangleMesh<Scalar>& mesh) : Adjacency(mesh, half_edges(mesh.triangles())) {}
 
     /// Vertices that an edge joins to `v`, ascending.
     /// @pre `v` is a vertex (asserted).
@@ -31,11 +32,13 @@ class Adjacency {
 
     /// Triangles that have `v` as a corner, ascending.
     /// @pre `v` is a vertex (asserted).
-    [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return triangles_of_[v]; }
+    [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return around_.triangles_of(v); }
 
     /// The triangle across each side of `f`, side k running from corner k to the next; `no_index` at a border.
     /// @pre `f` is a triangle (asserted).
-    [[nodiscard]] const std::array<Index, 3>& triangle_neighbours(Index f) const noexcept;
+    [[nodiscard]] const std::array<Index, 3>& triangle_neighbours(Index f) const noexcept {
+        return around_.triangle_neighbours(f);
+    }
 
     /// The two vertices of each edge, the lower first; ascending.
     [[nodiscard]] std::span<const std::array<Index, 2>> edges() const noexcept { return edges_; }
@@ -46,14 +49,17 @@ class Adjacency {
     /// Whether every edge has two triangles.
     [[nodiscard]] bool closed() const noexcept { return border_vertices_.empty(); }
 
-  private:
-    inline void collect_edges(const Triangles& triangles);
+    /// The part without edges, for `pseudo_normal`.
+    operator const TriangleAdjacency&() const noexcept { return around_; }
 
+  private:
+    template <Real Scalar>
+    Adjacency(const TriangleMesh<Scalar>& mesh, std::span<const HalfEdge> sides);
+
+    TriangleAdjacency around_;
     std::vector<std::array<Index, 2>> edges_;
-    std::vector<std::array<Index, 3>> triangle_neighbours_;
     std::vector<Index> border_vertices_;
     CompressedRows<Index> neighbours_;
-    CompressedRows<Index> triangles_of_;
 };
 
 /// The vertices on the border of `mesh`, ascending, for example to pin a rim. O(F log F).
@@ -64,42 +70,17 @@ template <Real Scalar>
 }
 
 template <Real Scalar>
-Adjacency::Adjacency(const TriangleMesh<Scalar>& mesh) {
-    collect_edges(mesh.triangles());
+Adjacency::Adjacency(const TriangleMesh<Scalar>& mesh, std::span<const HalfEdge> sides) : around_(mesh, sides) {
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) { edges_.push_back({edge[0].first, edge[0].second}); });
     neighbours_ = CompressedRows<Index>(mesh.vertex_count(), [&](auto put) {
         for (const auto& [first, second] : edges_) {  // ascending, so each row is ascending
             put(first, second);
             put(second, first);
         }
     });
-    triangles_of_ = CompressedRows<Index>(mesh.vertex_count(), [&](auto put) {
-        for (Index f = 0; f < mesh.triangle_count(); ++f) {
-            for (const Index v : mesh.triangles().col(f)) put(v, f);
-        }
-    });
-}
-
-inline const std::array<Index, 3>& Adjacency::triangle_neighbours(Index f) const noexcept {
-    MEMBRANE_ASSERT(f >= 0 && static_cast<std::size_t>(f) < triangle_neighbours_.size());
-    return triangle_neighbours_[static_cast<std::size_t>(f)];
-}
-
-inline void Adjacency::collect_edges(const Triangles& triangles) {
-    triangle_neighbours_.assign(static_cast<std::size_t>(triangles.cols()), {no_index, no_index, no_index});
-    const auto across = [this](const HalfEdge& side) -> Index& {
-        return triangle_neighbours_[static_cast<std::size_t>(side.triangle)][static_cast<std::size_t>(side.side)];
-    };
-    for_each_edge(half_edges(triangles), [&](std::span<const HalfEdge> sides) {
-        edges_.push_back({sides[0].first, sides[0].second});
-        if (sides.size() == 2) {
-            across(sides[0]) = sides[1].triangle;
-            across(sides[1]) = sides[0].triangle;
-        } else {
-            border_vertices_.insert(border_vertices_.end(), {sides[0].first, sides[0].second});
-        }
-    });
-    std::sort(border_vertices_.begin(), border_vertices_.end());
-    border_vertices_.erase(std::unique(border_vertices_.begin(), border_vertices_.end()), border_vertices_.end());
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        if (around_.on_border(v)) border_vertices_.push_back(v);
+    }
 }
 
 }  // namespace membrane

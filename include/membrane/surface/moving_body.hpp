@@ -9,10 +9,12 @@
 #include <utility>
 
 #include <membrane/core/arctangent.hpp>
+#include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/surface/normals.hpp>
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// The moving body under the membrane: one source of its motion for all parts.
 ///
@@ -39,6 +41,9 @@ namespace membrane {
 /// world: with `to_body_frame(tool, frame)` the membrane stays in the frame of the body, at no cost. Loads with a fixed
 /// direction in the world (`DeadLoad`) do not rotate with a body, and force policies that store a position in the world
 /// (`ContactFriction`) do not move with it; with `to_body_frame` they do.
+///
+/// A membrane that tears does not tear the body: a vertex and its copy have one anchor and one normal. The last vertices
+/// of the mesh, if they have no triangles, do not count in the pose.
 template <Real Scalar>
 class MovingBody {
   public:
@@ -53,7 +58,7 @@ class MovingBody {
     [[nodiscard]] bool move_to(const RigidFrame<Scalar>& pose, PointsRef<Scalar> x) noexcept;
 
     /// Moves a body of any motion: its anchors are now at `anchors` (3 x V [m]), after a motion of `dt` [s]. The pose
-    /// is the least-squares fit, by quaternions [Horn87]. Cost: O(F).
+    /// is the least-squares fit, by quaternions [Horn87]. The anchor given for a copy of a vertex is not used. Cost: O(F).
     /// @pre as many anchors as vertices (asserted)
     [[nodiscard]] bool move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept;
 
@@ -81,9 +86,17 @@ class MovingBody {
     /// The anchors of the undeformed body: the positions of the mesh.
     [[nodiscard]] const Points<Scalar>& anchors_at_rest() const noexcept { return at_rest_; }
 
+    ///@{
+    /// A vertex becomes two; a vertex moves at rest, and its anchor with it: do not move one if `move_to` gets anchors.
+    /// Online.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept;
+    ///@}
+
     /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
+        if (self.copies_.capacity() > 0) visit(self.copies_, self.at_rest_, self.normals_at_rest_);
         visit(self.anchors_, self.normals_, self.previous_, self.pose_, self.rate_, self.deformed_, self.deformations_);
     }
 
@@ -92,8 +105,17 @@ class MovingBody {
     [[nodiscard]] RigidFrame<Scalar> fit(const ConstPointsRef<Scalar>& anchors) const noexcept;
     [[nodiscard]] bool is_carried(const RigidFrame<Scalar>& motion, const Points<Scalar>& from) const noexcept;
 
+    struct Copy {
+        Index vertex, copy;
+    };
+    static constexpr void copy_columns(const Copy& of, auto&... points) noexcept {
+        ((points.col(of.copy) = points.col(of.vertex)), ...);
+    }
+
     Points<Scalar> at_rest_;
     VertexNormals<Scalar> surface_;
+    FixedVector<Copy> copies_;  // vertices that a tear has doubled, in order
+    Index fitted_;              // the pose is fitted to the anchors of these first vertices
     Points<Scalar> normals_at_rest_, anchors_, normals_;
     Points<Scalar> previous_;        // anchors before the last motion
     Points<Scalar> next_, carried_;  // during a motion: new anchors, new positions of the membrane
@@ -176,6 +198,8 @@ template <Real Scalar>
 MovingBody<Scalar>::MovingBody(const TriangleMesh<Scalar>& mesh)
     : at_rest_(mesh.positions()),
       surface_(mesh),
+      copies_(static_cast<std::size_t>(reserve_of(mesh))),
+      fitted_(mesh.triangles().maxCoeff() + 1),
       normals_at_rest_(surface_.values()),
       anchors_(at_rest_),
       normals_(normals_at_rest_),
@@ -209,13 +233,29 @@ bool MovingBody<Scalar>::move_to(const ConstPointsRef<Scalar>& anchors, Scalar d
     pose.velocity = (pose.origin - pose_.origin) / dt;
     if (!is_finite(pose.rotation) || !is_finite(pose.velocity) || !is_finite(pose.angular_velocity)) return false;
     next_ = anchors;
+    for (const Copy& of : copies_.items()) copy_columns(of, next_);
     if (!carry(pose, x)) return false;
     rate_ = 1 / dt;
     if (!is_carried(motion, previous_)) ++deformations_;
     deformed_ = !is_carried(pose_, at_rest_);
     surface_.update(anchors_);
     normals_ = surface_.values();
+    for (const Copy& of : copies_.items()) copy_columns(of, normals_);
     return true;
+}
+
+template <Real Scalar>
+void MovingBody<Scalar>::split(const VertexSplit& split) noexcept {
+    const Copy of{split.vertex, split.copy};
+    copies_.try_push_back(of);
+    copy_columns(of, at_rest_, normals_at_rest_, anchors_, normals_, previous_);
+}
+
+template <Real Scalar>
+void MovingBody<Scalar>::reshape(const MovedVertex<Scalar>& moved) noexcept {
+    const Vector3<Scalar> displacement = pose_.vector_to_world(moved.rest - point(at_rest_, moved.vertex));
+    at_rest_.col(moved.vertex) = moved.rest;
+    for (auto* anchors : {&anchors_, &previous_}) anchors->col(moved.vertex) += displacement.eigen();
 }
 
 // Moves the membrane to the anchors in `next_`, which belong to `pose`.
@@ -242,16 +282,16 @@ RigidFrame<Scalar> MovingBody<Scalar>::fit(const ConstPointsRef<Scalar>& anchors
         return (std::max)(largest, (std::numeric_limits<double>::min)());
     };
     const double scale = size_of(at_rest_), scale_now = size_of(anchors);
-    const auto count = static_cast<double>((std::max)(anchors.cols(), Eigen::Index{1}));
+    const auto count = static_cast<double>(fitted_);
     Vector3<double> centre = Vector3<double>::Zero(), centre_now = centre;
-    for (Index v = 0; v < anchors.cols(); ++v) {
+    for (Index v = 0; v < fitted_; ++v) {
         centre += point(at_rest_, v).template cast<double>() / scale;
         centre_now += point(anchors, v).template cast<double>() / scale_now;
     }
     centre /= count;
     centre_now /= count;
     Eigen::Matrix3d m = Eigen::Matrix3d::Zero();
-    for (Index v = 0; v < anchors.cols(); ++v) {
+    for (Index v = 0; v < fitted_; ++v) {
         const Vector3<double> p = point(at_rest_, v).template cast<double>() / scale - centre;
         const Vector3<double> q = point(anchors, v).template cast<double>() / scale_now - centre_now;
         for (Eigen::Index k = 0; k < 3; ++k) m.col(k) += q[k] * p;
@@ -271,7 +311,7 @@ RigidFrame<Scalar> MovingBody<Scalar>::fit(const ConstPointsRef<Scalar>& anchors
 template <Real Scalar>
 bool MovingBody<Scalar>::is_carried(const RigidFrame<Scalar>& motion, const Points<Scalar>& from) const noexcept {
     Scalar off = 0, size = 0;
-    for (Index v = 0; v < anchors_.cols(); ++v) {
+    for (Index v = 0; v < fitted_; ++v) {
         const Vector3<Scalar> now = point(anchors_, v);
         off = (std::max)(off, norm<Scalar>(motion.point_to_world(point(from, v)) - now));
         size = (std::max)({size, norm(now), norm(point(from, v))});

@@ -15,6 +15,8 @@
 #include <membrane/core/lane_points.hpp>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/triangle.hpp>
+#include <membrane/surface/triangle_adjacency.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Normals of a moving surface.
 ///
@@ -57,7 +59,19 @@ class VertexNormals {
     /// 3 x V, unit length.
     [[nodiscard]] const Points<Scalar>& values() const noexcept { return values_; }
 
+    /// A vertex becomes two, with one normal until both are updated. The normal at rest of both stays. Online. Cost: the
+    /// triangles around the vertex and its neighbours.
+    void split(const VertexSplit& split) noexcept;
+
+    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles around each vertex.
+    /// Then update the normals.
+    template <class Self, class Visit>
+    static void visit_state(Self& self, const Visit& visit) noexcept {
+        if (self.has_reserve_) visit(self.one_rings_, self.overflow_, self.at_rest_);
+    }
+
   private:
+    using Fan = std::span<const std::array<Index, 2>>;
     static constexpr auto lanes = static_cast<Index>(Lanes<Scalar>::count);
     static constexpr Index batch_size = 256;  // vertices of a batch: intermediate results stay in the cache
 
@@ -66,6 +80,13 @@ class VertexNormals {
     template <class VertexAt>
     void normalise(const ConstPointsRef<Scalar>& x, const VertexAt& vertex, Index first, Index end) noexcept;
     void check(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept;
+    // Of vertices beyond the first six, if all `triangles` of a vertex are apart.
+    [[nodiscard]] static std::size_t overflow_room(std::size_t triangles) noexcept {
+        const std::size_t all = 3 * triangles + triangles % 2, first = detail::OneRing{}.vertices.size();
+        return all > first ? all - first : 0;
+    }
+    [[nodiscard]] std::span<std::array<Index, 2>> fan_of(Index v) noexcept;
+    void set_ring(Index v, Fan fan) noexcept;
 
     std::vector<detail::OneRing> one_rings_;
     std::vector<Index> overflow_;  // vertices of one-rings beyond the first six
@@ -73,6 +94,8 @@ class VertexNormals {
     Points<Scalar> at_rest_;
     IndexSet updated_;                        // by the last call
     std::vector<PaddedPoint<Scalar>> areas_;  // of a batch: twice the areas as z, x, y; then the normals
+    bool has_reserve_;
+    std::vector<std::array<Index, 2>> fan_;  // the other corners of the triangles around a vertex
 };
 
 /// The angle-weighted normal of the face, edge or corner at `barycentric`. If this is the surface point nearest to a
@@ -82,7 +105,7 @@ class VertexNormals {
 /// @pre `f` is a triangle (asserted).
 template <class Positions>
 [[nodiscard]] Vector3<typename Positions::Scalar> pseudo_normal(
-    const Positions& x, const Triangles& triangles, const Adjacency& adjacency, Index f,
+    const Positions& x, const Triangles& triangles, const TriangleAdjacency& adjacency, Index f,
     const Vector3<typename Positions::Scalar>& barycentric) noexcept;
 
 namespace detail {
@@ -160,7 +183,14 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
       values_(3, mesh.vertex_count()),
       at_rest_(Vector3<Scalar>::UnitZ().eigen().replicate(1, mesh.vertex_count())),
       updated_(mesh.vertex_count()),
-      areas_(static_cast<std::size_t>(batch_size)) {
+      areas_(static_cast<std::size_t>(batch_size)),
+      has_reserve_(reserve_of(mesh) > 0) {
+    std::vector<std::size_t> room(one_rings_.size(), 0);
+    if (has_reserve_) {
+        for (const Index v : mesh.triangles().reshaped()) ++room[static_cast<std::size_t>(v)];
+        fan_.resize(*std::max_element(room.begin(), room.end()));
+        std::transform(room.begin(), room.end(), room.begin(), overflow_room);
+    }
     const CompressedRows<Index> whole = detail::one_rings_of(mesh);
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         detail::OneRing& ring = one_rings_[static_cast<std::size_t>(v)];
@@ -171,6 +201,8 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
         ring.overflow_size = static_cast<Index>(points.size() - here);
         for (std::size_t k = 0; k < here; ++k) ring.vertices[k] = points[k];
         for (const Index w : points.subspan(here)) overflow_.push_back(w);
+        const std::size_t end = static_cast<std::size_t>(ring.overflow) + room[static_cast<std::size_t>(v)];
+        overflow_.resize((std::max)(overflow_.size(), end), v);
     }
     update(mesh.positions());
     at_rest_ = values_;
@@ -203,6 +235,76 @@ std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar
     const auto updated = updated_.items();
     face(x, updated_.count(), [&](Index n) { return updated[static_cast<std::size_t>(n)]; });
     return updated;
+}
+
+template <Real Scalar>
+void VertexNormals<Scalar>::split(const VertexSplit& split) noexcept {
+    const auto fan = fan_of(split.vertex);
+    const auto stays = [&](const auto& triangle) { return !split.takes(triangle[0], triangle[1]); };
+    // Those that stay first; both in order: a fan is short.
+    std::size_t left = 0;
+    for (std::size_t i = 0; i < fan.size(); ++i) {
+        if (!stays(fan[i])) continue;
+        std::rotate(fan.begin() + static_cast<std::ptrdiff_t>(left), fan.begin() + static_cast<std::ptrdiff_t>(i),
+                    fan.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+        ++left;
+    }
+    one_rings_[static_cast<std::size_t>(split.copy)].overflow =
+        one_rings_[static_cast<std::size_t>(split.vertex)].overflow + static_cast<Index>(overflow_room(left));
+    set_ring(split.vertex, fan.first(left));
+    set_ring(split.copy, fan.subspan(left));
+    for (const auto& corners : split.corners) {
+        for (const Index w : corners) {
+            if (w == split.vertex) continue;
+            const auto around = fan_of(w);
+            for (auto& [first, second] : around) {
+                if (first == split.vertex && split.takes(w, second)) first = split.copy;
+                if (second == split.vertex && split.takes(w, first)) second = split.copy;
+            }
+            set_ring(w, around);
+        }
+    }
+    for (auto* normals : {&values_, &at_rest_}) normals->col(split.copy) = normals->col(split.vertex);
+}
+
+// The triangles around `v`, counter-clockwise: in each its other two corners.
+template <Real Scalar>
+std::span<std::array<Index, 2>> VertexNormals<Scalar>::fan_of(Index v) noexcept {
+    const detail::OneRing& ring = one_rings_[static_cast<std::size_t>(v)];
+    const std::size_t here = ring.vertices.size(), size = here + static_cast<std::size_t>(ring.overflow_size);
+    const auto at = [&](std::size_t k) {
+        return k < here ? ring.vertices[k] : overflow_[static_cast<std::size_t>(ring.overflow) + (k - here)];
+    };
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < size; ++k) {
+        const Index first = at(k), second = at((k + 1) % size);
+        if (first != second && first != v && second != v) fan_[count++] = {first, second};
+    }
+    return std::span(fan_).first(count);
+}
+
+// Stores the one-ring of the triangles `fan` around `v`: with `v` wherever two in a row share no side.
+template <Real Scalar>
+void VertexNormals<Scalar>::set_ring(Index v, Fan fan) noexcept {
+    detail::OneRing& ring = one_rings_[static_cast<std::size_t>(v)];
+    const std::size_t n = fan.size(), here = ring.vertices.size();
+    const auto parts = [&](std::size_t i) { return fan[(i + n - 1) % n][1] != fan[i % n][0]; };  // from the last one
+    std::size_t start = 0, count = 0;
+    while (start < n && !parts(start)) ++start;
+    const bool closed = n > 0 && start == n;
+    const Index first = closed ? fan[0][0] : v;
+    const auto put = [&](Index w) {
+        (count < here ? ring.vertices[count] : overflow_[static_cast<std::size_t>(ring.overflow) + (count - here)]) = w;
+        ++count;
+    };
+    for (std::size_t i = start; i < start + n; ++i) {
+        if (parts(i)) put(v);
+        if (parts(i) || closed) put(fan[i % n][0]);
+        if (!closed) put(fan[i % n][1]);
+    }
+    if (count % 2 == 1) put(first);
+    ring.overflow_size = count > here ? static_cast<Index>(count - here) : 0;
+    while (count < here) put(first);
 }
 
 /// Computes the normals of `vertex(n)` for n from 0 to `count` - 1.
@@ -267,7 +369,7 @@ MEMBRANE_NOINLINE void VertexNormals<Scalar>::check(const Vector3<Scalar>& posit
 
 template <class Positions>
 Vector3<typename Positions::Scalar> pseudo_normal(const Positions& x, const Triangles& triangles,
-                                                  const Adjacency& adjacency, Index f,
+                                                  const TriangleAdjacency& adjacency, Index f,
                                                   const Vector3<typename Positions::Scalar>& barycentric) noexcept {
     using Scalar = typename Positions::Scalar;
     MEMBRANE_ASSERT(f >= 0 && f < triangles.cols());

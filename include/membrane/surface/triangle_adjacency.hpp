@@ -24,7 +24,12 @@ class TriangleAdjacency {
   public:
     /// O(F log F).
     template <Real Scalar>
-    explicit TriangleAdjacency(const TriangleMesh<Scalar>& mesh);
+    explicit TriangleAdjacency(const TriangleMesh<Scalar>& mesh)
+        : TriangleAdjacency(mesh, half_edges(mesh.triangles())) {}
+
+    /// With `sides`, the `half_edges` of the mesh. O(F).
+    template <Real Scalar>
+    TriangleAdjacency(const TriangleMesh<Scalar>& mesh, std::span<const HalfEdge> sides);
 
     /// Triangles that have `v` as a corner, ascending. @pre `v` is a vertex (asserted).
     [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return triangles_of_[v]; }
@@ -62,7 +67,7 @@ class TriangleAdjacency {
 };
 
 template <Real Scalar>
-TriangleAdjacency::TriangleAdjacency(const TriangleMesh<Scalar>& mesh)
+TriangleAdjacency::TriangleAdjacency(const TriangleMesh<Scalar>& mesh, std::span<const HalfEdge> sides)
     : triangles_of_(mesh.vertex_count(),
                     [&](auto put) {
                         for (Index f = 0; f < mesh.triangle_count(); ++f) {
@@ -74,14 +79,14 @@ TriangleAdjacency::TriangleAdjacency(const TriangleMesh<Scalar>& mesh)
     const auto across = [this](const HalfEdge& side) -> Index& {
         return neighbours_[static_cast<std::size_t>(side.triangle)][static_cast<std::size_t>(side.side)];
     };
-    for_each_edge(half_edges(mesh.triangles()), [&](std::span<const HalfEdge> sides) {
-        if (sides.size() == 2) {
-            across(sides[0]) = sides[1].triangle;
-            across(sides[1]) = sides[0].triangle;
+    for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
+        if (edge.size() == 2) {
+            across(edge[0]) = edge[1].triangle;
+            across(edge[1]) = edge[0].triangle;
             return;
         }
         closed_ = false;
-        for (const Index v : {sides[0].first, sides[0].second}) on_border_[static_cast<std::size_t>(v)] = 1;
+        for (const Index v : {edge[0].first, edge[0].second}) on_border_[static_cast<std::size_t>(v)] = 1;
     });
 }
 

@@ -6,8 +6,10 @@
 #include <concepts>
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include <membrane/core/vector3.hpp>
+#include <membrane/surface/triangle_mesh.hpp>
 
 /// Changes of a surface that tears, which all parts that know its triangles follow.
 ///
@@ -43,7 +45,21 @@ struct VertexSplit {
             return has(first) && has(second);
         });
     }
+
+    /// Puts the copy in the place of the vertex in `list`, the corners of a triangle that gets it.
+    template <class List>
+    void replace_in(List&& list) const noexcept {
+        std::replace(list.begin(), list.end(), vertex, copy);
+    }
 };
+
+/// The number of vertices of `mesh` without triangles. If it is 0, parts have no memory to follow a split. O(V + F).
+template <Real Scalar>
+[[nodiscard]] Index reserve_of(const TriangleMesh<Scalar>& mesh) {
+    std::vector<bool> referenced(static_cast<std::size_t>(mesh.vertex_count()), false);
+    for (const Index v : mesh.triangles().reshaped()) referenced[static_cast<std::size_t>(v)] = true;
+    return static_cast<Index>(std::count(referenced.begin(), referenced.end(), false));
+}
 
 /// Divides a constant of the vertex that is in proportion to the area around it.
 template <Real Scalar>
