@@ -84,6 +84,16 @@ struct Drag : test::SoftDisc<S> {
     }
 };
 
+/// Pushes back with a force that is no number.
+struct BrokenConstraint {
+    [[nodiscard]] bool valid() const noexcept { return true; }
+    void begin(ConstraintContext<double>&) const noexcept {}
+    bool enforce(ConstraintContext<double>&) const noexcept { return false; }
+    [[nodiscard]] Vector3<double> reaction(const ConstraintContext<double>&) const noexcept {
+        return {std::numeric_limits<double>::quiet_NaN(), 0, 0};
+    }
+};
+
 double along_disc(const Vector3<double>& force) { return std::hypot(force[0], force[1]); }
 
 }  // namespace
@@ -308,6 +318,33 @@ TEST_CASE("nonsense from a device is refused, and friction goes on", "[friction]
     for (int i = 0; i < 400; ++i) drag.move_to({3e-4, 0, 0});
     CHECK(drag.x.allFinite());
     CHECK(along_disc(drag.move_to({3e-4, 0, 0})) < 0.5 * drag.move_to({3e-4, 0, 0})[2]);
+}
+
+TEST_CASE("a step that is refused leaves friction as it was, to the bit", "[friction]") {
+    Drag<double> drag({.friction = 0.4});
+    drag.press_in();
+    for (int i = 1; i <= 30; ++i) drag.move_to({1e-6 * i, 0, 0});
+    const auto saved = [&] {
+        std::vector<std::byte> buffer(snapshot_capacity(drag.friction, drag.x));
+        buffer.resize(save_snapshot(buffer, drag.friction, drag.x));
+        return buffer;
+    };
+    const auto before = saved();
+    auto tool = drag.tool;
+    const auto step = [&](const auto&... others) {
+        const auto contact = drag.tracker.update(drag.tree, drag.x, tool);
+        return drag.solver
+            .step(drag.x, 1e-3, drag.network, drag.foundation, drag.friction.press(tool, contact), others...)
+            .status;
+    };
+    tool.position[0] += 1e-5;
+    REQUIRE(step(BrokenConstraint()) == StepStatus::unstable);  // found after all forces of friction
+    CHECK(saved() == before);
+    const Index no_vertex = drag.mesh.vertex_count();
+    REQUIRE(step(pin({&no_vertex, 1})) == StepStatus::invalid_input);
+    CHECK(saved() == before);
+    REQUIRE(step() == StepStatus::advanced);
+    CHECK(saved() != before);
 }
 
 TEST_CASE("friction refuses options out of range", "[friction]") {

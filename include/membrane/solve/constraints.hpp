@@ -25,7 +25,8 @@ namespace membrane {
 /// each update of layer 0. If there is time, it is also called at the end of the step, unless nothing has changed since a
 /// call that found no violation. `reaction` is the force of the membrane on the constraint [N]. Optional members:
 /// `driving_input(): DrivingInput<Scalar>`, from which the next steps are extrapolated; `prescribe(context)`, which
-/// prescribes vertices and is called before any `begin`.
+/// prescribes vertices and is called before any `begin`; `end(context)`, called after all reactions of a step that
+/// advanced, and not of one that is refused: for what a constraint keeps from step to step.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> &&
     requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
@@ -85,7 +86,7 @@ class ConstraintRef {
     explicit ConstraintRef(const C& constraint) noexcept : constraint_(&constraint), calls_(&calls_of<C>) {}
 
     ///@{
-    /// As `Constraint` requires. Where the constraint has no `driving_input` or no `prescribe`, returns none, does
+    /// As `Constraint` requires. Where the constraint has no `driving_input`, `prescribe` or `end`, returns none, does
     /// nothing.
     [[nodiscard]] bool valid() const noexcept { return calls_->valid(constraint_); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return calls_->driving_input(constraint_); }
@@ -97,6 +98,7 @@ class ConstraintRef {
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& done) const noexcept {
         return calls_->reaction(constraint_, done);
     }
+    void end(const ConstraintContext<Scalar>& done) const noexcept { calls_->end(constraint_, done); }
     ///@}
 
   private:
@@ -107,6 +109,7 @@ class ConstraintRef {
         void (*begin)(const void*, ConstraintContext<Scalar>&) noexcept;
         bool (*enforce)(const void*, ConstraintContext<Scalar>&) noexcept;
         Vector3<Scalar> (*reaction)(const void*, const ConstraintContext<Scalar>&) noexcept;
+        void (*end)(const void*, const ConstraintContext<Scalar>&) noexcept;
     };
     template <class C>
     [[nodiscard]] static const C& as(const void* constraint) noexcept {
@@ -130,6 +133,10 @@ class ConstraintRef {
         .reaction = [](const void* c, const ConstraintContext<Scalar>& done) noexcept -> Vector3<Scalar> {
             return as<C>(c).reaction(done);
         },
+        .end =
+            [](const void* c, const ConstraintContext<Scalar>& done) noexcept {
+                if constexpr (requires { as<C>(c).end(done); }) as<C>(c).end(done);
+            },
     };
 
     const void* constraint_;
@@ -176,6 +183,10 @@ class ConstraintList {
             finite &= is_finite(reactions[i]);
         });
         return finite;
+    }
+    /// Ends a step that has advanced.
+    void end() const noexcept {
+        for_each([this](const auto& constraint, std::size_t) { constraint.end(context_); });
     }
 
   private:

@@ -255,6 +255,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     }
     if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
     if (report_.status != StepStatus::advanced) return refuse_step(report_.status);
+    acting.end();
     resume_ = sweeps.resume;
     write_back(x, network, sweeps.constraints_changed);
     sweeps.budget.end();

@@ -70,8 +70,9 @@ struct FrictionalContact {
         return slipped || pressed;
     }
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept {
-        return normal.reaction(context) + friction->end(context, normal.tool);
+        return normal.reaction(context) + friction->reaction();
     }
+    void end(const ConstraintContext<Scalar>& context) const noexcept { friction->end(context, normal.tool); }
     ///@}
 };
 
@@ -84,6 +85,8 @@ struct FrictionalContact {
 ///
 /// The tool does not rotate: a shaft that turns drags as if it were shifted. Fixed corners take no friction. `ContactFriction` adds friction to the
 /// hand's force alone; with this part the reaction has it. `equilibrium` and error bounds do not know it.
+///
+/// A step that is refused leaves it unchanged, to the bit.
 ///
 /// Online, but for the constructor. Cost: linear in the contact points, in each sweep.
 template <Real Scalar>
@@ -132,7 +135,8 @@ class ToolFriction {
     void begin(Context& context, const Tool<Scalar>& tool) noexcept;
     bool solve(Context& context, const Tool<Scalar>& tool) noexcept;
     void limit(Context& context) noexcept;
-    [[nodiscard]] Vector3<Scalar> end(const Context& context, const Tool<Scalar>& tool) noexcept;
+    [[nodiscard]] Vector3<Scalar> reaction() const noexcept;
+    void end(const Context& context, const Tool<Scalar>& tool) noexcept;
 
     void read_normal_forces(Context& context) noexcept;
     [[nodiscard]] const Point* kept(const ContactPoint<Scalar>& point, std::size_t& next) const noexcept;
@@ -286,14 +290,20 @@ void ToolFriction<Scalar>::limit(Context& context) noexcept {
     }
 }
 
-// Points that slip, or do not press, hold what is in contact now. Returns the sum of the forces on the tool.
+// The sum of the forces on the tool.
 template <Real Scalar>
-Vector3<Scalar> ToolFriction<Scalar>::end(const Context& context, const Tool<Scalar>& tool) noexcept {
+Vector3<Scalar> ToolFriction<Scalar>::reaction() const noexcept {
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    for (const auto& point : points_.items()) sum -= point.force;
+    return sum;
+}
+
+// Keeps the points of a step that has advanced. Those that slip, or do not press, hold what is in contact now.
+template <Real Scalar>
+void ToolFriction<Scalar>::end(const Context& context, const Tool<Scalar>& tool) noexcept {
     const auto contacts = context.points();
     for (std::size_t i = 0; i < points_.size(); ++i) {
         Point& point = points_.items()[i];
-        sum -= point.force;
         if (!is_at_limit(point)) continue;
         point.weights = contacts[i].weights;
         hold(point, place(context, point), tool);
@@ -301,7 +311,6 @@ Vector3<Scalar> ToolFriction<Scalar>::end(const Context& context, const Tool<Sca
     std::swap(points_, kept_);
     tool_ = tool;
     has_tool_ = true;
-    return sum;
 }
 
 static_assert(Constraint<FrictionalContact<double>, double> && Constraint<FrictionalContact<float>, float>);
