@@ -23,6 +23,7 @@
 #include "support/catch.hpp"
 #include "support/cgal_mesh.hpp"
 #include "support/child_process.hpp"
+#include "support/exact_crossing.hpp"
 #include "support/meshes.hpp"
 #include "support/refusal.hpp"
 #include "support/tears.hpp"
@@ -262,35 +263,23 @@ TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tr
         const auto hit = scene.tree.first_hit(scene.x, from, to);
         const auto all = test::all_that<Long>(scene.x, scene.mesh.triangles(),
                                               [&](const auto& t) { return test::meet(t, exact(from), exact(to)); });
-        // Roundings move a hit by more the smaller the angle between segment and triangle.
-        const auto slack_at = [&](Index f) {
-            const Vector3<S> normal = area_vector(scene.triangle(f)), segment = to - from;
-            const S slope = std::abs(dot(segment, normal)) / (norm(segment) * norm(normal));
-            return 256 * std::numeric_limits<S>::epsilon() * scene.scale(from) / slope;
-        };
-        // What the segment misses by no more than that, it hits.
-        const bool is_close =
-            hit.triangle != no_index && std::find(all.begin(), all.end(), hit.triangle) == all.end() &&
-            test::squared_distance_by_search(scene.exact_triangle(hit.triangle), exact(from), exact(to)) <=
-                std::pow(static_cast<Long>(slack_at(hit.triangle)), 2);
-        if (is_close) return;
-        if ((hit.triangle == no_index) != all.empty()) FAIL_CHECK(all.size() << " are hit");
-        if (hit.triangle == no_index || all.empty()) {
-            CHECK((hit.fraction == 1 || hit.triangle != no_index));
+        if (hit.triangle == no_index) {
+            CHECK(hit.fraction == 1);
+            if (!all.empty()) FAIL_CHECK(all.size() << " are hit");
             return;
         }
         ++hits;
-        Long first = 1;
-        for (const Index f : all) {
-            const auto t = test::brute_triangle<Long>(scene.triangle(f));
-            const Long above = test::volume(t.a, t.b, t.c, exact(from));
-            first = std::min(first, above / (above - test::volume(t.a, t.b, t.c, exact(to))));
-        }
         const auto triangle = scene.triangle(hit.triangle);
-        const Vector3<S> segment = to - from;
-        const S slack = slack_at(hit.triangle);
-        if (!(std::abs(hit.fraction - first) * norm(segment) <= slack)) FAIL_CHECK(hit.fraction << ", not " << first);
-        CHECK(norm<S>(point_at(triangle, hit.barycentric) - (from + hit.fraction * segment)) <= slack);
+        if (!test::ExactCrossing(triangle, from, to).may_hit_at(hit.fraction)) FAIL_CHECK(hit.triangle << " is missed");
+        for (const Index f : all) {
+            if (test::ExactCrossing(scene.triangle(f), from, to).is_before(hit.fraction)) FAIL_CHECK(f << " is before");
+        }
+        // The weights are those of the nearest point of the triangle.
+        const auto at = from + hit.fraction * (to - from);
+        const Long distance =
+            std::sqrt(test::squared_distance_by_search(scene.exact_triangle(hit.triangle), exact(at)));
+        const Long there = (exact(point_at(triangle, hit.barycentric)) - exact(at)).norm();
+        if (!(there - distance <= scene.rounding(hit.triangle, at))) FAIL_CHECK(there << ", not " << distance);
     });
     CHECK(hits > cases(5000));
 }

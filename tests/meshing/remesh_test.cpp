@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -40,6 +41,16 @@ void require_even(const TriangleMesh<double>& mesh, double wanted) {
     REQUIRE(quality.even_edges > 0.95);
     REQUIRE(std::abs(quality.mean_edge / wanted - 1) < 0.2);
 }
+
+/// A surface that faces up everywhere, whose points lie where they are.
+struct FacingUp {
+    static constexpr bool has_border = false;
+    std::optional<OnSurface> project(const Point& p) const { return OnSurface{p, {0, 0, 1}}; }
+    std::optional<OnSurface> project_to_border(const Point& p) const { return project(p); }
+};
+
+/// Cosine of the angle between a triangle and the horizontal.
+double facing_up(const Triangle<double>& triangle) { return area_vector(triangle).z() / norm(area_vector(triangle)); }
 
 /// The largest sum of two angles across an edge [degrees].
 double largest_sum_of_angles(const TriangleMesh<double>& mesh) {
@@ -97,6 +108,27 @@ TEST_CASE("a vertex too near to others moves away from them, the first one too",
         const auto mesh = remesh(TriangleMesh<double>(x, even.triangles()), surface, 0.6, 1);
         REQUIRE(mesh.vertex_count() == even.vertex_count());
         CHECK((mesh.positions() - even.positions()).col(v).norm() < 0.9 * (x - even.positions()).col(v).norm());
+    }
+}
+
+TEST_CASE("an edge is flipped if the worse of its triangles then faces the surface better, though not well",
+          "[remesh]") {
+    // Seen from above a quadrilateral, its diagonal from corner 0 to 1; corner 2 is near to that, and high above it.
+    for (const double height : {0.3, 0.35, 0.4}) {
+        CAPTURE(height);
+        const Points<double> x{{0, 1, 0.5, 0.5}, {0, 0, 0.05, -0.1}, {0, 0, height, 0}};
+        const TriangleMesh<double> mesh(x, Triangles{{0, 1}, {1, 0}, {2, 3}});
+        const auto flipped = remesh(mesh, FacingUp{}, 1, 0);
+        const auto facing = [&](const TriangleMesh<double>& of, Index f) {
+            return facing_up(triangle_at(x, of.triangles().col(f)));
+        };
+        REQUIRE(flipped.positions() == x);
+        REQUIRE(facing(mesh, 0) < 0.2);
+        REQUIRE(facing(mesh, 1) == 1);
+        for (Index f = 0; f < 2; ++f) {
+            CHECK(facing(flipped, f) > 0.25);
+            CHECK(facing(flipped, f) < 0.5);
+        }
     }
 }
 

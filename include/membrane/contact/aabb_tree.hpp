@@ -77,8 +77,8 @@ class AabbTree {
     [[nodiscard]] SurfacePoint<Scalar> closest_point(const ConstPointsRef<Scalar>& x,
                                                      const Vector3<Scalar>& q) const noexcept;
 
-    /// The first intersection of the segment with the surface, from either side. If it meets several triangles at the
-    /// same point, returns the one of lowest index.
+    /// The first intersection of the segment with the surface, from either side, as exact as `first_hit` of a triangle. If
+    /// it meets several triangles at the same point, returns the one of lowest index.
     [[nodiscard]] SurfaceHit<Scalar> first_hit(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& from,
                                                const Vector3<Scalar>& to) const noexcept;
 
