@@ -82,12 +82,12 @@ TEST_CASE("a row that is divided keeps the order of its items, and other rows", 
     }
 }
 
-TEST_CASE("a row that is divided may keep room for more items", "[core]") {
+TEST_CASE("a row that is divided may keep capacity for more items", "[core]") {
     CompressedRows<int> rows(3, [](auto put) {
         for (int i = 0; i < 8; ++i) put(0, i);
         put(1, 100);
     });
-    rows.truncate(0, 5);  // 0 to 4, and room for 3
+    rows.truncate(0, 5);  // 0 to 4, and capacity for 3
     rows.split(
         0, 2, [](int item) { return item == 1 || item == 3; }, 5);
     const auto row = [&](Index r) { return std::vector<int>(rows[r].begin(), rows[r].end()); };

@@ -84,6 +84,11 @@
 #include <membrane/solve/tool_friction.hpp>
 // [/friction]
 
+// [tear]
+#include <membrane/model/tissue.hpp>
+#include <membrane/tear/tearing.hpp>
+// [/tear]
+
 // [equilibrium]
 #include <membrane/accuracy/equilibrium.hpp>
 // [/equilibrium]
@@ -632,6 +637,31 @@ TEST_CASE_METHOD(Touched, "pages: friction") {
     // [/friction]
     CHECK(report.total_reaction().norm() > 0);
     CHECK_FALSE(friction.points().empty());
+}
+
+TEST_CASE("pages: tear") {
+    const auto sheet = membrane::disc<double>({.radius = 0.005, .rings = 8});
+    const std::vector<membrane::Index> path{1, 0, 4}, rim = membrane::border(sheet);
+    const double dt = 1e-3;
+    // [tear]
+    const auto mesh = membrane::with_reserve(sheet, 200);  // vertices to double others
+    const auto network =
+        membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 20.0, .pinned = rim});
+    auto tissue = membrane::Tissue(membrane::TearableSprings(mesh, network));
+    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 12});
+    auto tree = membrane::AabbTree(mesh);
+    auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 1.4e3, .thickness = 12e-6});
+    auto x = mesh.positions();
+
+    for (const auto& event : tear.cut_along(path, x)) follow(event, tissue, solver, tree);       // a cut to start from
+    const auto report = solver.step(x, dt, tissue, membrane::NoFoundation(), tear.ligaments());  // in each tick
+    for (const auto& event : tear.update(x, dt, tissue, membrane::NoFoundation())) {
+        follow(event, tissue, solver, tree);
+    }
+    tree.refit(x, report.moved);
+    // [/tear]
+    CHECK(report.status == membrane::StepStatus::advanced);
+    CHECK(tear.tips().size() == 2);
 }
 
 TEST_CASE_METHOD(Touched, "pages: equilibrium") {

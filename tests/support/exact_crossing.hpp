@@ -87,9 +87,9 @@ class ExactCrossing {
         for (std::size_t k = 0; k < 3; ++k) {
             const Vector<Long> offset = start_ - corners_[k];
             const Vector<Long> inward = cross<Long>(normal_, corners_[(k + 1) % 3] - corners_[k]);
-            const Long reach = largest(offset) + fraction * length_;
+            const Long extent = largest(offset) + fraction * length_;
             const Long slack =
-                allowed * slack_of(largest(normal_)) + (132 + rounding) * epsilon_ * size_ * size_ * size_ * reach;
+                allowed * slack_of(largest(normal_)) + (132 + rounding) * epsilon_ * size_ * size_ * size_ * extent;
             if (inward.dot(offset + fraction * segment_) < -slack) return false;
         }
         return true;

@@ -49,9 +49,9 @@ class CompressedRows {
 
     ///@{
     /// Online, for rows that change. Row `from` is divided: the items for which `goes(item)` become row `to`, which must be
-    /// empty; both keep their order. Row `from` keeps the memory of its first `room` items, which may be more than it has.
+    /// empty; both keep their order. Row `from` keeps the memory of its first `capacity` items, which may be more than it has.
     template <class Goes>
-    void split(Index from, Index to, Goes goes, std::size_t room = 0) noexcept;
+    void split(Index from, Index to, Goes goes, std::size_t capacity = 0) noexcept;
     /// Row `to` shows the items of row `from`.
     void share(Index from, Index to) noexcept { extent(to) = extent(from); }
     /// Removes the last items of a row but for `count`; their memory stays the row's.
@@ -99,7 +99,7 @@ CompressedRows<Item>::CompressedRows(Index row_count, ForEachItem for_each_item)
 
 template <class Item>
 template <class Goes>
-void CompressedRows<Item>::split(Index from, Index to, Goes goes, std::size_t room) noexcept {
+void CompressedRows<Item>::split(Index from, Index to, Goes goes, std::size_t capacity) noexcept {
     const auto all = (*this)[from];
     std::size_t stays = 0;
     for (std::size_t i = 0; i < all.size(); ++i) {  // rows are short
@@ -108,9 +108,9 @@ void CompressedRows<Item>::split(Index from, Index to, Goes goes, std::size_t ro
                     all.begin() + static_cast<std::ptrdiff_t>(i) + 1);
         ++stays;
     }
-    MEMBRANE_ASSERT(room == 0 || room >= stays);
+    MEMBRANE_ASSERT(capacity == 0 || capacity >= stays);
     Row& first = extent(from);
-    const auto begin = static_cast<std::uint32_t>(first.begin + (std::max)(room, stays));
+    const auto begin = static_cast<std::uint32_t>(first.begin + (std::max)(capacity, stays));
     const std::size_t count = all.size() - stays;
     std::move_backward(all.begin() + static_cast<std::ptrdiff_t>(stays), all.end(),
                        items_.begin() + static_cast<std::ptrdiff_t>(begin + count));

@@ -248,7 +248,8 @@ concept ElementInLanes = StructOfNumbers<E> &&
 /// Energy of a triangle [J], and its forces on its corners [N].
 template <Real Scalar>
 struct TriangleResponse {
-    Scalar energy = 0;
+    Scalar energy = 0;  ///< [J]
+    /// On the corners [N].
     std::array<Vector3<Scalar>, 3> force{Vector3<Scalar>::Zero(), Vector3<Scalar>::Zero(), Vector3<Scalar>::Zero()};
 };
 

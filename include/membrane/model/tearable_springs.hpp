@@ -52,7 +52,7 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
                                                              const ConstPointsRef<Scalar>& x) const noexcept;
 
     /// The most springs that vertex `v` may have if all its triangles part.
-    [[nodiscard]] std::size_t room(Index v) const noexcept { return static_cast<std::size_t>(room_[at(v)]); }
+    [[nodiscard]] std::size_t capacity(Index v) const noexcept { return static_cast<std::size_t>(capacity_[at(v)]); }
 
     ///@{
     /// A vertex becomes two; a vertex moves at rest: its springs have their rest lengths in proportion to the edges, and
@@ -65,7 +65,7 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         Base::visit_tear(self, visit);
-        visit(self.sides_, self.shares_, self.room_, self.count_);
+        visit(self.sides_, self.shares_, self.capacity_, self.count_);
     }
 
   private:
@@ -83,7 +83,7 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
 
     std::vector<std::array<Index, 3>> sides_;  // springs of a triangle, side k from corner k to the next, or no_index
     std::vector<Shares> shares_;               // of each spring; the first always has a triangle
-    std::vector<Index> room_;                  // for springs of each vertex
+    std::vector<Index> capacity_;              // for springs of each vertex
     std::size_t count_ = 0;                    // springs in use
 };
 
@@ -101,7 +101,7 @@ TearableSprings<Scalar, Law>::TearableSprings(const TriangleMesh<Scalar>& mesh, 
     : Base(network),
       sides_(at(mesh.triangle_count()), {no_index, no_index, no_index}),
       shares_(this->springs_.size()),
-      room_(at(mesh.vertex_count()), 0) {
+      capacity_(at(mesh.vertex_count()), 0) {
     constexpr std::string_view component = "TearableSprings";
     if (network.vertex_count() != mesh.vertex_count()) {
         refuse(component, "network must be of the mesh of ", mesh.vertex_count(), " vertices, got one of ",
@@ -129,17 +129,17 @@ TearableSprings<Scalar, Law>::TearableSprings(const TriangleMesh<Scalar>& mesh, 
     });
     if (s != this->springs_.size()) refuse(component, "network must be of the mesh, spring ", s, " is no edge of it");
     for (const auto& corners : mesh.triangles().colwise()) {
-        for (const Index v : corners) room_[at(v)] += 2;
+        for (const Index v : corners) capacity_[at(v)] += 2;
     }
     build_rows();
 }
 
-// Rows with room for the springs of all triangles apart, and a list with room for springs that part.
+// Rows with capacity for the springs of all triangles apart, and a list with capacity for springs that part.
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 void TearableSprings<Scalar, Law>::build_rows() {
     CompressedRows<SpringEnd<Scalar>> rows(this->vertex_count(), [&](auto put) {
         for (Index v = 0; v < this->vertex_count(); ++v) {
-            for (Index i = 0; i < room_[at(v)]; ++i) put(v, SpringEnd<Scalar>{});
+            for (Index i = 0; i < capacity_[at(v)]; ++i) put(v, SpringEnd<Scalar>{});
         }
     });
     for (Index v = 0; v < this->vertex_count(); ++v) {
@@ -149,7 +149,7 @@ void TearableSprings<Scalar, Law>::build_rows() {
     this->ends_ = std::move(rows);
     // A vertex that doubles parts two springs at most.
     count_ = this->springs_.size();
-    const auto reserve = static_cast<std::size_t>(std::count(room_.begin(), room_.end(), 0));
+    const auto reserve = static_cast<std::size_t>(std::count(capacity_.begin(), capacity_.end(), 0));
     this->springs_.resize(count_ + 2 * reserve, {0, 0, 0, 1});
     shares_.resize(this->springs_.size());
 }
@@ -228,10 +228,10 @@ void TearableSprings<Scalar, Law>::split(const VertexSplit& split) noexcept {
             if (side != no_index && (corners[k] == v || corners[(k + 1) % 3] == v)) part(split, f, side);
         }
     }
-    room_[at(copy)] = 2 * static_cast<Index>(split.triangles.size());
-    room_[at(v)] -= room_[at(copy)];
+    capacity_[at(copy)] = 2 * static_cast<Index>(split.triangles.size());
+    capacity_[at(v)] -= capacity_[at(copy)];
     this->ends_.split(
-        v, copy, [&](const SpringEnd<Scalar>& end) { return end_at(end.other, v) == nullptr; }, at(room_[at(v)]));
+        v, copy, [&](const SpringEnd<Scalar>& end) { return end_at(end.other, v) == nullptr; }, at(capacity_[at(v)]));
     for (std::size_t n = 0; n < split.triangles.size(); ++n) {
         for (const Index side : sides_[at(split.triangles[n])]) {
             if (side == no_index) continue;

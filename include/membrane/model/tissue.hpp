@@ -121,7 +121,7 @@ class Tissue {
         });
     }
     void join();
-    [[nodiscard]] std::size_t room(Index v) const noexcept;
+    [[nodiscard]] std::size_t capacity(Index v) const noexcept;
     void list_again(Index v) noexcept;
 
     Springs springs_;
@@ -143,7 +143,7 @@ Tissue<Springs, Kinds...>::Tissue(const Springs& springs, const Kinds&... kinds)
     if constexpr (FollowsSplit<Springs>) {
         neighbours_ = joined_ = CompressedRows<Neighbour>(vertex_count(), [&](auto put) {
             for (Index v = 0; v < vertex_count(); ++v) {
-                for (std::size_t i = room(v); i > 0; --i) put(v, Neighbour{});
+                for (std::size_t i = capacity(v); i > 0; --i) put(v, Neighbour{});
             }
         });
         for (Index v = 0; v < vertex_count(); ++v) list_again(v);
@@ -186,8 +186,8 @@ void Tissue<Springs, Kinds...>::join() {
 
 // For the neighbours of `v`, however its triangles part.
 template <class Springs, class... Kinds>
-std::size_t Tissue<Springs, Kinds...>::room(Index v) const noexcept {
-    std::size_t sum = springs_.room(v);
+std::size_t Tissue<Springs, Kinds...>::capacity(Index v) const noexcept {
+    std::size_t sum = springs_.capacity(v);
     for_each_kind(
         [&]<class E>(const Elements<Scalar, E>& elements) { sum += elements.at(v).size() * (E::corner_count - 1); });
     return sum;
@@ -227,7 +227,7 @@ void Tissue<Springs, Kinds...>::split(const VertexSplit& split) noexcept require
     for (auto* rows : {&neighbours_, &joined_}) {
         rows->truncate(split.vertex, 0);
         rows->split(
-            split.vertex, split.copy, [](const Neighbour&) { return true; }, room(split.vertex));
+            split.vertex, split.copy, [](const Neighbour&) { return true; }, capacity(split.vertex));
     }
     list_again(split.vertex);
     list_again(split.copy);

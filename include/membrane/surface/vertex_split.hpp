@@ -71,9 +71,10 @@ void divide(Scalar& of_vertex, Scalar& of_copy, double area_share) noexcept {
 /// A triangle whose shape at rest changes.
 template <Real Scalar>
 struct ReshapedTriangle {
-    Index triangle;                                ///< its number
-    std::array<Index, 3> corners;                  ///< its vertices
-    std::array<Vector3<Scalar>, 3> before, after;  ///< their rest positions [m]
+    Index triangle;                         ///< its number
+    std::array<Index, 3> corners;           ///< its vertices
+    std::array<Vector3<Scalar>, 3> before;  ///< their rest positions until now [m]
+    std::array<Vector3<Scalar>, 3> after;   ///< their rest positions from now on [m]
 };
 
 /// A vertex that gets another place on the rest surface, so that an edge lies where the tear runs. Valid until the

@@ -13,7 +13,7 @@ namespace membrane {
 
 /// What still joins the two vertices into which a tear has parted one: a force against their separation that is `strength`
 /// up to the separation `plateau` and decreases linearly to zero at `failure_opening`; the area below is what the edge
-/// takes to open. A tear so advances without a jump, and takes that energy however coarse mesh and ticks are. If the
+/// takes to open: a cohesive law that is rigid at first [Camacho96]. A tear so advances without a jump, and takes that energy however coarse mesh and ticks are. If the
 /// separation decreases, the force decreases in proportion.
 template <Real Scalar>
 struct Ligament {

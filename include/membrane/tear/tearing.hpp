@@ -53,7 +53,7 @@ struct TearTip {
 /// Follows an event with all parts: those that have `reshape` or `split`.
 template <Real Scalar, class... Parts>
 void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
-    const auto tell = [&](auto& part) {
+    const auto apply = [&](auto& part) {
         using Part = std::remove_reference_t<decltype(part)>;
         static_assert(FollowsSplit<Part> || FollowsMovedVertex<Part, Scalar>, "this part does not follow a tear");
         if constexpr (FollowsMovedVertex<Part, Scalar>) {
@@ -63,7 +63,7 @@ void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
             if (event.split.vertex != no_index) part.split(event.split);
         }
     };
-    (tell(parts), ...);
+    (apply(parts), ...);
 }
 
 /// Tears of one membrane, along the edges of its triangles.
@@ -421,7 +421,7 @@ void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index 
     const Index v = tip.vertex;
     const auto energy = static_cast<Scalar>(criterion_.resistance()) * length;
     if (!(energy > 0)) return;
-    const auto pull_on = [&](Index end, const VertexSplit& split) {
+    const auto forces_on = [&](Index end, const VertexSplit& split) {
         Vector3<Scalar> sum = Vector3<Scalar>::Zero();
         for (const Index f : surface_.adjacency().triangles_of(end)) {
             const auto corners = split.takes(f) ? split.corners_of(f) : surface_.corners(f);
@@ -434,7 +434,7 @@ void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index 
     };
     const VertexSplit& split = surface_.events().back().split;
     const auto share = static_cast<Scalar>(split.area_share);
-    const Vector3<Scalar> force = (1 - share) * pull_on(copy, split) - share * pull_on(v, split);
+    const Vector3<Scalar> force = (1 - share) * forces_on(copy, split) - share * forces_on(v, split);
     const Scalar strength = norm(force);
     if (!(strength > 0) || !is_finite(force)) {
         failed_ += static_cast<double>(energy);

@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MIT
+#include <membrane/model/tearable_springs.hpp>
+
+#include <algorithm>
+#include <set>
+#include <vector>
+
+#include <membrane/model/bending.hpp>
+#include <membrane/model/cohesive_springs.hpp>
+#include <membrane/model/foundation_layer.hpp>
+#include <membrane/model/fung.hpp>
+#include <membrane/model/neo_hookean.hpp>
+#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
+#include <membrane/model/volume_springs.hpp>
+#include <membrane/solve/quasi_static.hpp>
+#include <membrane/surface/shapes.hpp>
+
+#include "support/cases.hpp"
+#include "support/catch.hpp"
+#include "support/random_tear.hpp"
+#include "support/refusal.hpp"
+
+using namespace membrane;
+
+namespace {
+
+constexpr Material material{.young_modulus = 2e3, .poisson_ratio = 0.4, .thickness = 1e-3};
+
+// A vertex of the reserve has some mass, which a split replaces.
+auto springs_of(const TriangleMesh<double>& mesh) {
+    auto mass = vertex_masses(mesh, material);
+    for (double& of_vertex : mass) of_vertex = of_vertex > 0 ? of_vertex : 1.0;
+    return MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = spring_stiffnesses(mesh, material), .mass = mass});
+}
+
+auto tissue_of(const TriangleMesh<double>& mesh, const auto& springs, double rigidity) {
+    return Tissue(springs, triangular_springs(mesh, material, 1.1), neo_hookean(mesh, material, 1.05),
+                  fung(mesh, material, {.stiffening = 2}, 1.02), bending_springs(mesh, rigidity));
+}
+
+Points<double> shaken(const TriangleMesh<double>& mesh, test::Random& random) {
+    Points<double> x = mesh.positions();
+    for (double& number : x.reshaped()) number = 1.2 * number + random.number(-0.02, 0.02);
+    return x;
+}
+
+// Moves an inner vertex that is not beside a cut, as a tear does; returns whether it has moved.
+bool move_at_random(test::Random& random, TornSurface<double>& surface, PointsRef<double>& x) {
+    const Index v = random.index(60);
+    if (surface.adjacency().on_border(v)) return false;
+    const Vector3<double> from = point(surface.rest_positions(), v);
+    const Vector3<double> by(random.number(-0.05, 0.05), random.number(-0.05, 0.05), 0);
+    return surface.move_vertex(x, v, from + by, 0.3);
+}
+
+template <class Found, class Expected>
+void check_equal(const Found& found, const Expected& expected, const Points<double>& x) {
+    for (Index v = 0; v < found.vertex_count(); ++v) {
+        CAPTURE(v);
+        const auto force = found.force_on(v, x), right = expected.force_on(v, x);
+        const double size = norm(right.force) + right.stiffness * 1e-3;
+        REQUIRE(norm<double>(force.force - right.force) <= 1e-9 * size);
+        REQUIRE(force.stiffness == Approx(right.stiffness).epsilon(1e-9));
+        std::set<Index> joined, all;
+        for (const auto& end : found.neighbours(v)) joined.insert(end.other);
+        for (const auto& end : expected.neighbours(v)) all.insert(end.other);
+        REQUIRE(std::includes(joined.begin(), joined.end(), all.begin(), all.end()));
+        REQUIRE(joined.size() == found.neighbours(v).size());
+    }
+}
+
+}  // namespace
+
+// The oracle is built anew of the torn triangles at their present rest positions.
+TEST_CASE("after random cuts and moved vertices springs and elements are those of the torn mesh", "[tear]") {
+    int events = 0, moves = 0;
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = with_reserve(disc<double>({.radius = 1, .rings = 6}), 25);
+        Tearing tear(mesh, EnergyRelease{1, 1});
+        const bool bends = seed % 2 == 0;  // hinges keep their constants where a vertex moves
+        const double rigidity = bends ? 1e-3 : 0;
+        TearableSprings springs(mesh, springs_of(mesh));
+        auto tissue = tissue_of(mesh, springs, rigidity);
+        Points<double> all = mesh.positions();
+        TornSurface<double> moved_surface(mesh);
+        for (int n = 0; n < 8; ++n) {
+            for (const auto& event : test::cut_at_random(random, tear, all)) {
+                follow(event, springs, tissue);
+                ++events;
+            }
+            const TriangleMesh<double> torn(tear.surface().rest_positions(), tear.surface().triangles());
+            const auto x = shaken(torn, random);
+            check_equal(springs, springs_of(torn), x);
+            check_equal(tissue, tissue_of(torn, springs_of(torn), rigidity), x);
+            double energy = 0, parts = 0;
+            tissue.for_each_element([&](const auto& instance) {
+                if (instance.corners.size() < 4) energy += instance.element.energy(instance.where(x));
+            });
+            for (Index f = 0; f < torn.triangle_count(); ++f) {
+                parts += tissue.triangle_response(f, tear.surface().corners(f), x).energy;
+            }
+            REQUIRE(parts == Approx(energy));
+        }
+        double mass = 0, expected = 0;
+        for (Index v = 0; v < mesh.vertex_count(); ++v) {
+            if (!tear.surface().adjacency().triangles_of(v).empty()) mass += springs.mass(v);
+        }
+        for (const double of_vertex : vertex_masses(mesh, material)) expected += of_vertex;
+        CHECK(mass == Approx(expected));
+
+        // Vertices that move, on the mesh before any cut.
+        if (bends) continue;
+        TearableSprings shifted(mesh, springs_of(mesh));
+        auto reshaped = tissue_of(mesh, shifted, 0);
+        PointsRef<double> ref = all;
+        for (int n = 0; n < 10; ++n) {
+            moved_surface.begin();
+            if (!move_at_random(random, moved_surface, ref)) continue;
+            ++moves;
+            follow(moved_surface.events()[0], shifted, reshaped);
+            const TriangleMesh<double> torn(moved_surface.rest_positions(), mesh.triangles());
+            const auto x = shaken(torn, random);
+            check_equal(shifted, springs_of(torn), x);
+            check_equal(reshaped, tissue_of(torn, springs_of(torn), 0), x);
+        }
+    }
+    CHECK(events > cases(40));
+    CHECK(moves > cases(40));
+}
+
+TEST_CASE("before a tear the springs have the bits of the network", "[tear]") {
+    const auto mesh = with_reserve(icosphere<float>({.radius = 1, .subdivisions = 2}), 5);
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = spring_stiffnesses(mesh, material)});
+    const TearableSprings springs(mesh, network);
+    const Points<float> x = 1.1F * mesh.positions();
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        REQUIRE(springs.force_on(v, x).force == network.force_on(v, x).force);
+    }
+    CHECK(springs.springs().size() == network.springs().size());
+    CHECK(test::refusal([&] { TearableSprings(icosphere<float>({.subdivisions = 1}), network); }) ==
+          "TearableSprings: network must be of the mesh of 42 vertices, got one of 167");
+}
+
+TEST_CASE("foundations divide a vertex by area", "[tear]") {
+    const auto mesh = with_reserve(disc<double>({.radius = 1, .rings = 4}), 2);
+    VirtualVolumeSprings<double> volume(mesh, {.stiffness = 3.0, .damping = 2.0});
+    FoundationSprings<double> layer(mesh, {.normal = 4.0, .tangential = 2.0});
+    CohesiveSprings<double> cohesive(mesh, {.stiffness = 1e3, .strength = 10.0, .energy = 1.0});
+    const Vector3<double> u(0.001, 0.002, 0.003), at = point(mesh.positions(), 0) + u;
+    const auto force = cohesive.force_on(0, at, at, 1).force;
+    const VertexSplit split{0, mesh.vertex_count() - 2, {}, {}, 0.25};
+    MovedVertex<double> moved{.vertex = 1, .rest = {0.1, 0, 0}};
+    volume.split(split), layer.split(split), cohesive.split(split);
+    CHECK(volume.stiffness(split.copy) == 0.75);
+    CHECK(volume.stiffness(0) == 2.25);
+    CHECK(volume.damping(split.copy) == 0.5);
+    CHECK(layer.normal_stiffness(split.copy) == 1);
+    CHECK(layer.tangential_stiffness(0) == 1.5);
+    const auto parts = cohesive.force_on(0, at, at, 1).force + cohesive.force_on(split.copy, at, at, 1).force;
+    CHECK(norm<double>(parts - force) < 1e-12 * norm(force));
+    volume.reshape(moved), layer.reshape(moved), cohesive.reshape(moved);
+    for (const auto* anchors : {&volume.anchors(), &layer.anchors(), &cohesive.anchors()}) {
+        CHECK(anchors->col(1) == Eigen::Vector3d(0.1, 0, 0));
+        CHECK(anchors->col(split.copy) == mesh.positions().col(0));
+    }
+}
+
+TEMPLATE_TEST_CASE("a solver that follows a cut finds the equilibrium that a new solver keeps", "[tear]", double,
+                   float) {
+    const auto mesh = with_reserve(disc<TestType>({.radius = 1, .rings = 8}), 10);
+    const auto pinned = border(mesh);
+    const auto make = [&](const TriangleMesh<TestType>& of) {
+        return MassSpringNetwork(of, LinearSpring{}, {.stiffness = TestType(10), .pinned = pinned});
+    };
+    TearableSprings springs(mesh, make(mesh));
+    VirtualVolumeSprings<TestType> volume(mesh, {.stiffness = TestType(0)});
+    Tearing tear(mesh, EnergyRelease{1, 1});
+    QuasiStaticSolver<TestType> solver(springs, {.layers = unlimited, .sweeps = 20});
+    Points<TestType> x = TestType(1.3) * mesh.positions();
+    for (const Index v : border(mesh)) x.col(v) = TestType(1.3) * mesh.positions().col(v);
+    const auto relaxed = [&](auto& by, const auto& network, Points<TestType>& at) {
+        by.wake_all();
+        StepReport<TestType> report;
+        for (int n = 0; n < 400 && !report.converged; ++n) report = by.step(at, TestType(1e-3), network, volume);
+        return report;
+    };
+    static_cast<void>(relaxed(solver, springs, x));
+    const std::vector<Index> path{1, 0, 4};
+    const auto events = tear.cut_along(path, x);
+    REQUIRE(events.size() == 1);
+    for (const auto& event : events) follow(event, springs, volume, solver);
+    CHECK(relaxed(solver, springs, x).converged);
+    Points<TestType> fresh = x;
+    QuasiStaticSolver<TestType> other(springs, {.layers = unlimited, .sweeps = 20});
+    CHECK(relaxed(other, springs, fresh).converged);
+    CHECK((fresh - x).template cast<double>().colwise().norm().maxCoeff() <
+          (std::is_same_v<TestType, double> ? 1e-6 : 1e-3));
+    // The two sides of the cut part, and each is in balance by its own springs.
+    CHECK(norm<TestType>(point(x, 0) - point(x, tear.tips()[0].behind[1])) > TestType(0.01));
+}

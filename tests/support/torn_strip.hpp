@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <cmath>
+#include <map>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <CGAL/Delaunay_triangulation_2.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+
+#include <membrane/model/tearable_springs.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
+#include <membrane/solve/quasi_static.hpp>
+#include <membrane/tear/tearing.hpp>
+
+#include "support/meshes.hpp"
+
+/// A strip between two clamps, with a notch, that is torn.
+///
+///     test::TornStrip<double> strip({.turn = 0.3});
+///     while (strip.torn_edges() < 12) strip.tick();
+///     CHECK(strip.balance() == Approx(1).epsilon(0.01));
+namespace test {
+
+/// A rectangle on a grid of equilateral triangles with edges of 1 mm that is turned by `turn` [rad]; its border is
+/// straight. Triangulated by CGAL.
+template <membrane::Real Scalar>
+Surface<Scalar> turned_grid(int columns, int rows, double turn) {
+    using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+    using Delaunay = CGAL::Delaunay_triangulation_2<Kernel>;
+    constexpr double edge = 1e-3;
+    const double length = columns * edge, height = rows * edge, cosine = std::cos(turn), sine = std::sin(turn);
+    Delaunay delaunay;
+    for (int i = 0; i <= columns; ++i) {
+        for (const double y : {0.0, height}) delaunay.insert({i * edge, y});
+    }
+    for (int i = 0; i <= rows; ++i) {
+        for (const double x : {0.0, length}) delaunay.insert({x, i * edge});
+    }
+    const int extent = columns + rows;
+    for (int i = -extent; i <= extent; ++i) {
+        for (int j = -extent; j <= extent; ++j) {
+            const double a = (i + j / 2.0 + 0.3) * edge, b = (j * std::sqrt(0.75) + 0.4) * edge;
+            const double x = length / 2 + cosine * a - sine * b, y = height / 2 + sine * a + cosine * b;
+            const double gap = 0.6 * edge;
+            if (x > gap && x < length - gap && y > gap && y < height - gap) delaunay.insert({x, y});
+        }
+    }
+    Surface<Scalar> surface;
+    std::map<Delaunay::Vertex_handle, membrane::Index> number;
+    for (auto v = delaunay.finite_vertices_begin(); v != delaunay.finite_vertices_end(); ++v) {
+        const auto x = static_cast<Scalar>(v->point().x()), y = static_cast<Scalar>(v->point().y());
+        number[v] = surface.add(membrane::Vector3<Scalar>(x, y, 0));
+    }
+    for (auto f = delaunay.finite_faces_begin(); f != delaunay.finite_faces_end(); ++f) {
+        const auto at = [&](int i) { return number[f->vertex(i)]; };
+        const membrane::Index f0 = surface.add(at(0), at(1), at(2));
+        const auto x = membrane::triangle_at(surface.x, surface.triangles.col(f0));
+        if (!(norm(membrane::area_vector(x)) > 1e-3 * edge * edge)) surface.remove_triangle(f0);
+    }
+    return surface;
+}
+
+struct TornStripOptions {
+    int columns = 40, rows = 20;      ///< edges of 1 mm
+    int notch = 12;                   ///< edges
+    double turn = 0;                  ///< of the grid [rad]
+    double toughness = 1000;          ///< [J/m^2]
+    bool springs = false;             ///< a network of springs in place of a continuous sheet
+    membrane::TearOptions tear = {};  ///< how it tears
+};
+
+/// Pure shear: the clamps at y = 0 and y = height move apart, the strip is as long as wide, and its tear releases the
+/// energy density times the height, whatever its length.
+template <membrane::Real Scalar>
+class TornStrip {
+  public:
+    using Vector = membrane::Vector3<Scalar>;
+    using Index = membrane::Index;
+    using Springs = membrane::TearableSprings<Scalar, membrane::LinearSpring>;
+    using Sheet = membrane::Tissue<Springs, membrane::Elements<Scalar, membrane::TriangularSpring<Scalar>>>;
+
+    static constexpr double edge = 1e-3;
+    static constexpr double thickness = 1e-5;
+
+    explicit TornStrip(const TornStripOptions& options)
+        : options_(options),
+          surface(turned_grid<Scalar>(options.columns, options.rows, options.turn)),
+          mesh(membrane::with_reserve(surface.mesh(), 100)),
+          sheet(springs_of(), membrane::triangular_springs(mesh, material_of())),
+          tear(mesh, membrane::EnergyRelease{options.toughness, thickness}, options.tear),
+          solver(sheet, {.layers = membrane::unlimited, .sweeps = 6, .predict = false}),
+          x(mesh.positions()) {
+        for (Index v = 0; v < surface.vertex_count(); ++v) {
+            if (surface.x(1, v) == static_cast<Scalar>(height())) top.push_back(v);
+        }
+    }
+
+    double height() const { return options_.rows * edge; }
+    /// [N/m^2] The material of the sheet; Poisson ratio 0.3.
+    static membrane::Material material() {
+        return {.young_modulus = 1e6, .poisson_ratio = 0.3, .thickness = thickness};
+    }
+    /// Energy per area at this stretch, where the sheet cannot become narrower [J/m^2].
+    double energy_density(double stretch) const {
+        const double nu = material().poisson_ratio, strain = (stretch * stretch - 1) / 2;
+        return material().young_modulus * thickness / (1 - nu * nu) * strain * strain / 2;
+    }
+    /// The stretch at which the energy released is the toughness.
+    double critical_stretch() const {
+        const double nu = material().poisson_ratio;
+        const double strain = std::sqrt(2 * options_.toughness * (1 - nu * nu) / (material().young_modulus * height()));
+        return std::sqrt(1 + 2 * strain);
+    }
+
+    /// Cuts the notch from the middle of the left side.
+    void cut() {
+        Index first = 0;
+        for (Index v = 0; v < surface.vertex_count(); ++v) {
+            const auto off = [&](Index w) { return std::abs(surface.x(1, w) - height() / 2); };
+            if (surface.x(0, v) == 0 && (surface.x(0, first) != 0 || off(v) < off(first))) first = v;
+        }
+        std::vector<Index> path{first};
+        while (static_cast<int>(path.size()) <= options_.notch) {
+            const double off = (height() / 2 - static_cast<double>(surface.x(1, path.back()))) / (2 * edge);
+            path.push_back(tear.surface().nearest_in_direction(path.back(), Vector(1, static_cast<Scalar>(off), 0)));
+        }
+        follow(tear.cut_along(path, x));
+        start = membrane::point(tear.surface().rest_positions(), path.back());
+    }
+
+    /// Stretches the strip evenly, and finds its equilibrium.
+    void stretch(double to) {
+        stretched = to;
+        x.row(1) = static_cast<Scalar>(to) * tear.surface().rest_positions().row(1);
+        relax(3000);
+        force_ = force();
+        work = energy();
+    }
+
+    /// The clamps move apart by `by` of the height; up to 20 steps, and what tears then.
+    void tick(double by) {
+        const double apart = by * height();
+        stretched += by;
+        for (const Index v : top) x(1, v) += static_cast<Scalar>(apart);
+        relax(20);
+        work += (std::exchange(force_, force()) + force()) / 2 * apart;
+        follow(tear.update(x, Scalar(1e-3), sheet, membrane::NoFoundation()));
+    }
+
+    /// Whether the forces balance, but for a small part of what tears the strip.
+    bool at_rest() const {
+        constexpr double part = std::is_same_v<Scalar, double> ? 3e-4 : 3e-3;
+        return report.residual < static_cast<Scalar>(part * options_.toughness * thickness);
+    }
+
+    /// The clamps' force [N].
+    double force() const { return -static_cast<double>(report.reactions[1][1]); }
+    double energy() const {
+        double sum = 0;
+        sheet.for_each_element(
+            [&](const auto& instance) { sum += static_cast<double>(instance.element.energy(instance.where(x))); });
+        return sum;
+    }
+    /// Energy stored and dissipated, over the work of the clamps.
+    double balance() const { return (energy() + tear.stored(x) + tear.dissipated()) / work; }
+    double torn_edges() const { return tear.torn_length() / edge; }
+    /// Distance of the tip from the line of the notch [edges].
+    double off_line() const {
+        return std::abs(static_cast<double>(tear.surface().rest_positions()(1, tear.tips()[0].vertex) - start[1])) /
+               edge;
+    }
+
+  private:
+    membrane::Material material_of() const {
+        auto sheet_material = material();
+        if (options_.springs) sheet_material.young_modulus *= 1e-9;  // as good as none
+        return sheet_material;
+    }
+    Springs springs_of() const {
+        std::vector<Index> clamped;
+        for (Index v = 0; v < surface.vertex_count(); ++v) {
+            if (surface.x(1, v) == 0 || surface.x(1, v) == static_cast<Scalar>(height())) clamped.push_back(v);
+        }
+        membrane::NetworkOptions<Scalar> options{.stiffness = Scalar(0), .pinned = clamped};
+        if (options_.springs) options.stiffness = membrane::spring_stiffnesses(mesh, material());
+        return Springs(mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, options));
+    }
+    void relax(int steps) {
+        for (int i = 0; i < steps; ++i) {
+            solver.wake_all();
+            report =
+                solver.step(x, Scalar(1e-3), sheet, membrane::NoFoundation(), tear.ligaments(), membrane::pin(top));
+            if (at_rest()) return;
+        }
+    }
+    void follow(std::span<const membrane::TearEvent<Scalar>> events) {
+        for (const auto& event : events) membrane::follow(event, sheet, solver);
+    }
+
+    TornStripOptions options_;
+    double force_ = 0;
+
+  public:
+    Surface<Scalar> surface;
+    membrane::TriangleMesh<Scalar> mesh;
+    Sheet sheet;
+    membrane::Tearing<Scalar> tear;
+    membrane::QuasiStaticSolver<Scalar> solver;
+    membrane::Points<Scalar> x;
+    std::vector<Index> top;
+    membrane::StepReport<Scalar> report;
+    Vector start = Vector::Zero();  ///< of the tear
+    double stretched = 1, work = 0;
+};
+
+}  // namespace test
