@@ -81,7 +81,7 @@ class VertexNormals {
     void normalise(const ConstPointsRef<Scalar>& x, const VertexAt& vertex, Index first, Index end) noexcept;
     void check(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept;
     // Of vertices beyond the first six, if all `triangles` of a vertex are apart.
-    [[nodiscard]] static std::size_t overflow_room(std::size_t triangles) noexcept {
+    [[nodiscard]] static std::size_t overflow_capacity(std::size_t triangles) noexcept {
         const std::size_t all = 3 * triangles + triangles % 2, first = detail::OneRing{}.vertices.size();
         return all > first ? all - first : 0;
     }
@@ -185,11 +185,11 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
       updated_(mesh.vertex_count()),
       areas_(static_cast<std::size_t>(batch_size)),
       has_reserve_(reserve_of(mesh) > 0) {
-    std::vector<std::size_t> room(one_rings_.size(), 0);
+    std::vector<std::size_t> capacity(one_rings_.size(), 0);
     if (has_reserve_) {
-        for (const Index v : mesh.triangles().reshaped()) ++room[static_cast<std::size_t>(v)];
-        fan_.resize(*std::max_element(room.begin(), room.end()));
-        std::transform(room.begin(), room.end(), room.begin(), overflow_room);
+        for (const Index v : mesh.triangles().reshaped()) ++capacity[static_cast<std::size_t>(v)];
+        fan_.resize(*std::max_element(capacity.begin(), capacity.end()));
+        std::transform(capacity.begin(), capacity.end(), capacity.begin(), overflow_capacity);
     }
     const CompressedRows<Index> whole = detail::one_rings_of(mesh);
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
@@ -201,7 +201,7 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
         ring.overflow_size = static_cast<Index>(points.size() - here);
         for (std::size_t k = 0; k < here; ++k) ring.vertices[k] = points[k];
         for (const Index w : points.subspan(here)) overflow_.push_back(w);
-        const std::size_t end = static_cast<std::size_t>(ring.overflow) + room[static_cast<std::size_t>(v)];
+        const std::size_t end = static_cast<std::size_t>(ring.overflow) + capacity[static_cast<std::size_t>(v)];
         overflow_.resize((std::max)(overflow_.size(), end), v);
     }
     update(mesh.positions());
@@ -250,7 +250,7 @@ void VertexNormals<Scalar>::split(const VertexSplit& split) noexcept {
         ++left;
     }
     one_rings_[static_cast<std::size_t>(split.copy)].overflow =
-        one_rings_[static_cast<std::size_t>(split.vertex)].overflow + static_cast<Index>(overflow_room(left));
+        one_rings_[static_cast<std::size_t>(split.vertex)].overflow + static_cast<Index>(overflow_capacity(left));
     set_ring(split.vertex, fan.first(left));
     set_ring(split.copy, fan.subspan(left));
     for (const auto& corners : split.corners) {
