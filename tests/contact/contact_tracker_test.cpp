@@ -18,6 +18,7 @@
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
+#include "support/tears.hpp"
 
 using membrane::AabbTree;
 using membrane::Contact;
@@ -760,6 +761,156 @@ TEST_CASE("after a reset a tracker is as new") {
             REQUIRE((a.depth == b.depth && a.tunnelled == b.tunnelled));
             REQUIRE(a.candidates.size() == b.candidates.size());
             REQUIRE(used.full_query_count() - before == fresh.full_query_count());
+        }
+    }
+}
+
+namespace {
+
+/// All edges are of one length at rest, so that a tear does not change their mean.
+test::Surface<double> regular_surface(test::Random& random) {
+    if (random.chance(0.3)) return test::surface_of(membrane::icosphere<double>({.radius = 1, .subdivisions = 0}));
+    return test::surface_of(test::triangle_strip<double>(8, 8, 1));
+}
+
+/// A tool at the surface, or beside it.
+Tool<double> tool_near(const test::TearingSurface<double>& surface, const Points<double>& x, test::Random& random) {
+    const auto triangle =
+        membrane::triangle_at(x, surface.triangles().col(random.index(static_cast<Index>(surface.triangles().cols()))));
+    Tool<double> tool{.position = point_at(triangle, random.barycentric()) + 0.4 * random.vector(), .radius = 0.3};
+    if (random.chance(0.3)) tool.axis = random.vector();
+    return tool;
+}
+
+void check_same(const Contact<double>& found, const Contact<double>& expected) {
+    constexpr double rounding = 1e-12;
+    REQUIRE(found.phase == expected.phase);
+    REQUIRE(found.triangle == expected.triangle);
+    REQUIRE(found.corners == expected.corners);
+    REQUIRE(found.side == expected.side);
+    REQUIRE(found.closed == expected.closed);
+    REQUIRE(found.tunnelled == expected.tunnelled);
+    REQUIRE(membrane::norm<double>(found.point - expected.point) < rounding);
+    REQUIRE(membrane::norm<double>(found.normal - expected.normal) < rounding);
+    REQUIRE(std::abs(found.gap - expected.gap) < rounding);
+    REQUIRE(found.triangles.size() == expected.triangles.size());
+    REQUIRE(found.candidates.size() == expected.candidates.size());
+    for (std::size_t i = 0; i < found.candidates.size(); ++i) {
+        REQUIRE(found.candidates[i].triangle == expected.candidates[i].triangle);
+        REQUIRE(found.candidates[i].corners == expected.candidates[i].corners);
+    }
+    REQUIRE(found.points.size() == expected.points.size());
+    for (std::size_t i = 0; i < found.points.size(); ++i) {
+        REQUIRE(found.points[i].corners == expected.points[i].corners);
+        REQUIRE(std::abs(found.points[i].gap - expected.points[i].gap) < rounding);
+    }
+}
+
+}  // namespace
+
+// But for the depth: the surface at rest of the new one is torn, and a walk over it ends at a tear.
+TEST_CASE("after random tears the contacts are those of a tracker that is built anew", "[tear]") {
+    int contacts = 0;
+    for (int seed = 1; seed <= cases(150); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        test::TearingSurface<double> surface(regular_surface(random), 4 + random.index(60));
+        AabbTree<double> tree(surface.mesh());
+        ContactTracker<double> tracker(surface.mesh());
+        Points<double> x = surface.mesh().positions();
+        const auto follow = [&](const membrane::VertexSplit& split) {
+            tree.split(split);
+            tracker.split(split);
+            x.col(split.copy) = x.col(split.vertex);
+        };
+        while (surface.tear(random, follow)) {
+            const auto mesh = surface.mesh();
+            ContactTracker<double> fresh(mesh);
+            fresh.split({.vertex = 0, .copy = mesh.vertex_count() - 1});  // torn, but for no triangle
+            for (Index v = 0; v < surface.used(); ++v) x.col(v) += 0.03 * random.vector();
+            tree.refit(x);
+            AabbTree<double> fresh_tree(mesh);
+            fresh_tree.refit(x);
+            tracker.reset();
+            auto tool = tool_near(surface, x, random);
+            for (int tick = 0; tick < 8; ++tick) {
+                const auto contact = tracker.update(tree, x, tool), expected = fresh.update(fresh_tree, x, tool);
+                if (std::abs(contact.depth - expected.depth) > 1e-12) break;
+                check_same(contact, expected);
+                contacts += contact.touching() ? 1 : 0;
+                tool.position += 0.2 * random.vector();
+            }
+        }
+    }
+    CHECK(contacts > 10 * cases(150));
+}
+
+TEST_CASE("a contact goes on while the surface tears under it", "[tear]") {
+    int contacts = 0;
+    for (int seed = 1; seed <= cases(150); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        test::TearingSurface<double> surface(
+            test::surface_of(membrane::icosphere<double>({.radius = 1, .subdivisions = 2})), 60);
+        AabbTree<double> tree(surface.mesh()), whole_tree = tree;
+        ContactTracker<double> tracker(surface.mesh()), whole(surface.mesh());
+        Points<double> x = surface.mesh().positions();
+        const auto follow = [&](const membrane::VertexSplit& split) {
+            tree.split(split);
+            tracker.split(split);
+            x.col(split.copy) = x.col(split.vertex);
+        };
+        Vector towards = random.unit_vector();
+        for (bool more = true; more;) {
+            towards = membrane::direction<double>(towards + 0.05 * random.vector(), towards);
+            const Tool<double> tool{.position = random.number(1.02, 1.1) * towards, .radius = 0.15};
+            const auto contact = tracker.update(tree, x, tool), expected = whole.update(whole_tree, x, tool);
+            REQUIRE(contact.phase == expected.phase);
+            REQUIRE(std::abs(contact.gap - expected.gap) < 1e-12);
+            REQUIRE(std::abs(contact.depth - expected.depth) < 1e-12);
+            REQUIRE(membrane::norm<double>(contact.point - expected.point) < 1e-12);
+            contacts += contact.touching() ? 1 : 0;
+            for (const auto& listed : contact.candidates) {
+                const auto corners = surface.triangles().col(listed.triangle);
+                REQUIRE(listed.corners == std::array<Index, 3>{corners[0], corners[1], corners[2]});
+            }
+            more = surface.tear(random, follow);
+        }
+    }
+    CHECK(contacts > 10 * cases(150));
+}
+
+TEST_CASE("a tool that slides over tears touches both sides at once", "[tear]") {
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        test::TearingSurface<double> surface(test::surface_of(test::triangle_strip<double>(12, 12, 1)), 100);
+        AabbTree<double> tree(surface.mesh());
+        ContactTracker<double> tracker(surface.mesh(), {.full_query_interval = 1'000'000});
+        const auto follow = [&](const membrane::VertexSplit& split) {
+            tree.split(split);
+            tracker.split(split);
+        };
+        while (surface.tear(random, follow)) continue;
+        const auto mesh = surface.mesh();
+        const auto& x = mesh.positions();
+        Vector towards(1, 0, 0);
+        Tool<double> tool{.position = {4, 5, 0.6}, .radius = 0.7};
+        for (int tick = 0; tick < 200; ++tick) {
+            CAPTURE(tick);
+            const auto contact = tracker.update(tree, x, tool);
+            REQUIRE(contact.touching());
+            for (Index f = 0; f < mesh.triangle_count(); ++f) {
+                const auto nearest = closest_point(membrane::triangle_at(x, mesh.triangles().col(f)), tool.position);
+                if (nearest.squared_distance > tool.radius * tool.radius) continue;
+                const auto is_f = [f](const auto& listed) { return listed.triangle == f; };
+                REQUIRE(std::any_of(contact.triangles.begin(), contact.triangles.end(), is_f));
+            }
+            towards += 0.1 * Vector(random.number(-1.0, 1.0), random.number(-1.0, 1.0), 0);
+            towards /= membrane::norm(towards);
+            if (std::abs(tool.position[0] - 6) > 4) towards[0] = std::copysign(towards[0], 6 - tool.position[0]);
+            if (std::abs(tool.position[1] - 5) > 4) towards[1] = std::copysign(towards[1], 5 - tool.position[1]);
+            tool.position += 0.05 * towards;
         }
     }
 }

@@ -13,6 +13,7 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/tears.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -180,5 +181,61 @@ TEST_CASE("on a body that moves they turn with it, and the displacement is relat
         grasper.reset();  // as a new one, to the bit
         Grasper<double> fresh(mesh);
         REQUIRE(same(grasper.update(contact, x, tool, body), fresh.update(contact, x, tool, body)));
+    }
+}
+
+TEST_CASE("a held point stays in its triangle while the surface tears", "[grasp][tear]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        test::TearingSurface<double> surface(test::random_surface<double>(random), 40);
+        const auto whole = surface.mesh();
+        Grasper<double> grasper(whole);
+        const Index f = random.index(whole.triangle_count());
+        const auto contact = contact_at<double>(whole, f, random.barycentric());
+        const Tool<double> tool{.position = random.vector(), .grasping = true};
+        const auto before = grasper.update(contact, whole.positions(), tool);
+        while (surface.tear(random, [&](const VertexSplit& split) { grasper.split(split); })) {
+            const auto mesh = surface.mesh();
+            const auto grasp = grasper.update(contact, mesh.positions(), tool);
+            const auto corners = mesh.triangles().col(f);
+            REQUIRE(grasp.triangle == f);
+            REQUIRE(grasp.corners == std::array<Index, 3>{corners[0], corners[1], corners[2]});
+            REQUIRE(grasp.barycentric == before.barycentric);
+            Grasper<double> anew = grasper, fresh(mesh);
+            anew.reset();
+            const auto again = contact_at<double>(mesh, f, before.barycentric);
+            REQUIRE(same(anew.update(again, mesh.positions(), tool), fresh.update(again, mesh.positions(), tool)));
+        }
+    }
+}
+
+TEST_CASE("a held point stays the same point of the tissue if a vertex moves at rest", "[grasp][tear]") {
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = disc<double>({.radius = 1, .rings = 1});  // six triangles around vertex 0
+        Points<double> x = mesh.positions();
+        Grasper<double> grasper(mesh);
+        const auto contact = contact_at<double>(mesh, random.index(6), random.barycentric());
+        const Tool<double> tool{.grasping = true};
+        const auto before = grasper.update(contact, x, tool);
+        const Vector3<double> held = point_at(triangle_at(x, before.corners), before.barycentric);
+        const Vector3<double> to(random.number(-0.3, 0.3), random.number(-0.3, 0.3), 0);
+        std::vector<ReshapedTriangle<double>> triangles;
+        for (Index f = 0; f < 6; ++f) {
+            const auto corners = mesh.triangles().col(f);
+            ReshapedTriangle<double> one{f, {corners[0], corners[1], corners[2]}, {}, {}};
+            for (std::size_t k = 0; k < 3; ++k) {
+                one.before[k] = point(x, one.corners[k]);
+                one.after[k] = one.corners[k] == 0 ? to : one.before[k];
+            }
+            triangles.push_back(one);
+        }
+        grasper.reshape({0, to, triangles});
+        x.col(0) = to;
+        const auto grasp = grasper.update(contact, x, tool);
+        REQUIRE(norm<double>(point_at(triangle_at(x, grasp.corners), grasp.barycentric) - held) < 1e-14);
+        REQUIRE(grasp.offset == before.offset);
     }
 }

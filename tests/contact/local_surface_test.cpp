@@ -128,6 +128,7 @@ TEST_CASE("after random tears a surface equals one that is built anew", "[tear]"
                 if (random.chance(0.6)) weights[random.index(3)] = 0;
                 if (random.chance(0.3)) weights = Vector3<double>::Unit(random.index(3));
                 REQUIRE(surface.on_border(f, weights) == fresh.on_border(f, weights));
+                REQUIRE(surface.has_border_vertex(f) == fresh.has_border_vertex(f));
                 REQUIRE(surface.outward(mesh.positions(), f, weights) == fresh.outward(mesh.positions(), f, weights));
             }
         }

@@ -18,6 +18,7 @@
 #include "support/catch.hpp"
 #include "support/haptic_loop.hpp"
 #include "support/random.hpp"
+#include "support/tears.hpp"
 #include "support/whole_loop.hpp"
 
 using namespace membrane;
@@ -304,4 +305,47 @@ TEST_CASE("a snapshot takes plain data, matrices in place, and types with parts"
     CHECK(number == 0.5);
     CHECK(memory == std::vector<float>(12, 2.0F));
     CHECK(std::vector<Index>(set.items().begin(), set.items().end()) == std::vector<Index>{7, 2, 9});
+}
+
+TEST_CASE("a snapshot from before a tear brings back the surface", "[snapshot][tear]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        test::TearingSurface<double> surface(test::random_surface<double>(random), 60);
+        const auto whole = surface.mesh();
+        AabbTree<double> tree(whole);
+        ContactTracker<double> tracker(whole);
+        Grasper<double> grasper(whole);
+        VertexNormals<double> normals(whole);
+        MovingBody<double> body(whole);
+        Points<double> x = whole.positions();
+        const auto follow = [&](const VertexSplit& split) {
+            x.col(split.copy) = x.col(split.vertex);
+            membrane::VertexSplit of = split;
+            tree.split(of), tracker.split(of), grasper.split(of), normals.split(of), body.split(of);
+        };
+        const auto parts = std::tie(tree, tracker, grasper, normals, body, x);
+        (void)surface.tear(random, follow);
+        const auto snapshot = saved(parts);
+        const auto mesh = surface.mesh();
+        const Points<double> then = x;
+        while (surface.tear(random, follow)) continue;
+        REQUIRE(restored(snapshot, parts));
+        REQUIRE(x == then);
+        x = test::jittered(x, 0.02 * x.cwiseAbs().maxCoeff(), random);
+        AabbTree<double> fresh_tree(mesh);
+        VertexNormals<double> fresh_normals(mesh);
+        tree.refit(x), fresh_tree.refit(x);
+        normals.update(x), fresh_normals.update(x);
+        REQUIRE(normals.values() == fresh_normals.values());
+        for (Index n = 0; n < tree.statistics().nodes; ++n) REQUIRE(tree.box(n).low == fresh_tree.box(n).low);
+        for (int i = 0; i < 20; ++i) {
+            const auto triangle = triangle_at(x, mesh.triangles().col(random.index(mesh.triangle_count())));
+            const Tool<double> tool{.position = point_at(triangle, random.barycentric())};
+            const auto contact = tracker.update(tree, x, tool);
+            if (contact.triangle == no_index) continue;
+            const auto corners = mesh.triangles().col(contact.triangle);
+            REQUIRE(contact.corners == std::array<Index, 3>{corners[0], corners[1], corners[2]});
+        }
+    }
 }

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/surface/moving_body.hpp>
 
+#include <array>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include <Eigen/Geometry>
 #include <membrane/surface/shapes.hpp>
@@ -12,6 +14,7 @@
 #include "support/catch.hpp"
 #include "support/child_process.hpp"
 #include "support/random.hpp"
+#include "support/tears.hpp"
 
 using namespace membrane;
 using test::Random;
@@ -227,6 +230,45 @@ TEMPLATE_TEST_CASE("a number that is not finite is refused, and nothing has move
     Points<S> off = (Limits::max)() / 2 * Points<S>::Ones(3, x.cols());
     CHECK_FALSE(body.move_to(far, off));
     check_unmoved();
+}
+
+TEST_CASE("a tear does not part the body: a copy has the anchor and the normal of its vertex", "[body][tear]") {
+    for (int seed = 1; seed <= cases(60); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        test::TearingSurface<double> surface(test::surface_of(some_mesh<double>(seed)), 30);
+        MovingBody<double> body(surface.mesh()), whole = body;
+        Points<double> x = surface.mesh().positions(), y = x;
+        const Index vertices = surface.used();
+        std::vector<std::array<Index, 2>> copies;
+        const auto follow = [&](const VertexSplit& split) {
+            body.split(split);
+            x.col(split.copy) = x.col(split.vertex);
+            copies.push_back({split.vertex, split.copy});
+        };
+        while (surface.tear(random, follow)) {
+            if (random.chance(0.5)) {
+                const auto pose = random_pose<double>(random);
+                REQUIRE(body.move_to(pose, x));
+                REQUIRE(whole.move_to(pose, y));
+            } else {
+                const Points<double> anchors = test::jittered(whole.anchors(), 1e-3, random);
+                REQUIRE(body.move_to(anchors, 1e-3, x));
+                REQUIRE(whole.move_to(anchors, 1e-3, y));
+            }
+            REQUIRE(body.pose().rotation == whole.pose().rotation);
+            REQUIRE(body.deformations() == whole.deformations());
+            REQUIRE(body.anchors().leftCols(vertices) == whole.anchors().leftCols(vertices));
+            REQUIRE(body.normals().leftCols(vertices) == whole.normals().leftCols(vertices));
+            REQUIRE(x.leftCols(vertices) == y.leftCols(vertices));
+            for (const auto& [vertex, copy] : copies) {
+                REQUIRE(body.anchors().col(copy) == body.anchors().col(vertex));
+                REQUIRE(body.normals().col(copy) == body.normals().col(vertex));
+                REQUIRE(body.rotation_at(copy) == body.rotation_at(vertex));
+                REQUIRE(x.col(copy) == x.col(vertex));
+            }
+        }
+    }
 }
 
 #ifndef NDEBUG

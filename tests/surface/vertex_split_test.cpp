@@ -10,7 +10,7 @@
 
 using namespace membrane;
 
-TEST_CASE("a split says which triangles get the copy, by number or by their other corners", "[mesh][tear]") {
+TEST_CASE("triangles that get the copy are found by number or by their other corners", "[mesh][tear]") {
     const std::array<Index, 2> goes{3, 7};
     const std::array<std::array<Index, 3>, 2> corners{{{0, 1, 2}, {2, 5, 0}}};
     const VertexSplit split{0, 9, goes, corners, 0.25};

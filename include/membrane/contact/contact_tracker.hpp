@@ -44,7 +44,7 @@ struct TrackerOptions {
 /// Beyond the paper: the search floods every triangle within the detection distance. Each tick also casts the
 /// displacement of the tool's position (and of the other end of a capsule) against the tree. If it hits, the contact is
 /// at the intersection, however long the displacement. A second fold of the surface that approaches a tool in contact
-/// is found within `full_query_interval` ticks.
+/// is found within `full_query_interval` ticks; beyond a tear, at once.
 ///
 /// A contact begins if the gap is not positive. It ends if the gap is positive and either the tool has left the rest
 /// surface or the gap exceeds depth plus travel of the tool: a membrane that springs back stays in contact.
@@ -56,7 +56,7 @@ struct TrackerOptions {
 /// capsule that has slid off a border may lie on both sides. Until it is clear, only the passage of its ends is
 /// detected.
 ///
-/// The rest surface is the mesh, or the anchors of a moving body. Depth is measured against it. If the tool is outside
+/// The rest surface is the mesh, or the anchors of a moving body, even where the membrane is torn. Depth is measured against it. If the tool is outside
 /// the rest surface and the membrane lies farther out, there is no contact: a contact must not pull.
 template <Real Scalar>
 class ContactTracker {
@@ -94,7 +94,7 @@ class ContactTracker {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.surface_);
-        if (self.surface_.has_reserve()) visit(self.origins_);
+        if (self.surface_.has_reserve()) visit(self.origins_, self.torn_);
         visit(self.near_, self.nearest_, self.nearest_square_, self.last_, self.last_tool_, self.pose_, self.side_,
               self.slid_off_, self.origin_triangles_, self.ticks_, self.full_query_count_, self.rebound_ticks_);
     }
@@ -138,6 +138,10 @@ class ContactTracker {
     [[nodiscard]] bool has_passed(const Scene& scene, Index near, Scalar side, const Vector3<Scalar>& q) const noexcept;
     void gather_from_tree(const Scene& scene) noexcept;
     void flood(const Scene& scene) noexcept;
+    [[nodiscard]] bool reaches_border() const noexcept {
+        const auto near = near_.items();
+        return std::any_of(near.begin(), near.end(), [&](Index f) { return surface_.has_border_vertex(f); });
+    }
     void examine(const Scene& scene, std::span<const Index> some) noexcept;
     void collect_candidates(int rings) noexcept;
     void complete(const Scene& scene, Contact<Scalar>& contact) noexcept;
@@ -156,9 +160,13 @@ class ContactTracker {
     static constexpr int candidate_rings = 2, candidate_rings_after_tunnelling = 6, ticks_after_tunnelling = 16;
     static constexpr Scalar negligible_part = Scalar(1e-6);  // fraction of the tool's displacement in a tick
 
+    // The surface at rest: a tear does not part it.
+    [[nodiscard]] const LocalSurface<Scalar>& at_rest() const noexcept { return whole_ ? *whole_ : surface_; }
+
     Points<Scalar> origins_;
     LocalSurface<Scalar> surface_;
-    Scalar margin_;  // [m]
+    std::optional<LocalSurface<Scalar>> whole_;  // before any tear, if the mesh has a reserve
+    Scalar margin_;                              // [m]
     Index full_query_interval_;
 
     // Triangles within detection distance, those around the active one, and those on the path of a tunnelling tool;
@@ -175,6 +183,7 @@ class ContactTracker {
     std::optional<Tool<Scalar>> last_tool_;
     RigidFrame<Scalar> pose_;  // of the body at the last update
     Scalar side_ = 0;          // of the tool, 1 or -1; 0: not yet known
+    bool torn_ = false;        // whether a vertex has become two
     bool slid_off_ = false;    // whether a shaft has slid off a displaced border: its parts may be on different sides
     // The triangles of the rest surface nearest to the tool's two ends and its axis point.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
@@ -186,6 +195,7 @@ template <Real Scalar>
 ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options)
     : origins_(mesh.positions()),
       surface_(mesh),
+      whole_(surface_.has_reserve() ? std::optional(surface_) : std::nullopt),
       margin_(static_cast<Scalar>(options.margin) * surface_.mean_edge()),
       full_query_interval_(options.full_query_interval),
       near_(mesh.triangle_count()),
@@ -206,6 +216,7 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
 
 template <Real Scalar>
 void ContactTracker<Scalar>::split(const VertexSplit& split) noexcept {
+    torn_ = true;
     surface_.split(split);
     origins_.col(split.copy) = origins_.col(split.vertex);
     if (split.takes(last_.triangle)) split.replace_in(last_.corners);
@@ -310,6 +321,11 @@ bool ContactTracker<Scalar>::follow(const Scene& scene, Contact<Scalar>& contact
         gather_from_tree(scene);
     }
     flood(scene);
+    if (torn_ && reaches_border()) {  // beyond a tear there may be triangles as near
+        ++full_query_count_;
+        gather_from_tree(scene);
+        flood(scene);
+    }
     if (near_.empty()) return false;
 
     contact.side = expected_side();
@@ -410,7 +426,7 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
 template <Real Scalar>
 bool ContactTracker<Scalar>::was_behind(const Scene& scene, Index f, Scalar side,
                                         const Vector3<Scalar>& q) const noexcept {
-    return side * surface_.height(scene.anchors, surface_.walk_to_closest(scene.anchors, f, q), q) < 0;
+    return side * at_rest().height(scene.anchors, at_rest().walk_to_closest(scene.anchors, f, q), q) < 0;
 }
 
 // If a point of a shaft is behind the surface, makes the contact that of this point. Tests the middle of the part of
@@ -471,9 +487,9 @@ template <Real Scalar>
 bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar side,
                                         const Vector3<Scalar>& q) const noexcept {
     if (surface_.closed()) return winding_number(surface_, scene.tree, scene.x, q) != 0;
-    const Index f = surface_.walk_to_closest(scene.anchors, near, q);
-    const auto nearest = closest_point(surface_.triangle(scene.anchors, f), q);
-    const Vector3<Scalar> outward = side * surface_.outward(scene.anchors, f, nearest.barycentric);
+    const Index f = at_rest().walk_to_closest(scene.anchors, near, q);
+    const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), q);
+    const Vector3<Scalar> outward = side * at_rest().outward(scene.anchors, f, nearest.barycentric);
     const auto hit = scene.tree.first_hit(scene.x, q, q + 2 * max_axis_distance(scene.tree.box(0), q) * outward);
     if (hit.triangle == no_index) return false;
     return side * dot<Scalar>(area_vector(surface_.triangle(scene.x, hit.triangle)), outward) > 0;
@@ -619,8 +635,8 @@ void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& 
     contact.depth = 0;
     for (std::size_t i = 0; i < count; ++i) {
         Index& f = origin_triangles_[i];
-        f = surface_.walk_to_closest(scene.anchors, f == no_index ? contact.triangle : f, probes[i]);
-        Scalar height = contact.side * surface_.height(scene.anchors, f, probes[i]);
+        f = at_rest().walk_to_closest(scene.anchors, f == no_index ? contact.triangle : f, probes[i]);
+        Scalar height = contact.side * at_rest().height(scene.anchors, f, probes[i]);
         if (below_border) height = std::abs(height);
         contact.depth = (std::max)(contact.depth, scene.radius - height);
     }
@@ -677,7 +693,7 @@ bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>
         return false;
     }
     const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
-    const auto nearest = closest_point(surface_.triangle(scene.anchors, f), contact.axis_point);
+    const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), contact.axis_point);
     return dot<Scalar>(contact.normal, contact.axis_point - nearest.point) < 0;
 }
 

@@ -68,6 +68,12 @@ class LocalSurface {
     /// Whether the point `barycentric` of triangle `f` is on the border of the surface.
     [[nodiscard]] bool on_border(Index f, const Vector3<Scalar>& barycentric) const noexcept;
 
+    /// Whether a corner of triangle `f` is on the border.
+    [[nodiscard]] bool has_border_vertex(Index f) const noexcept {
+        const auto vertices = corners(f);
+        return std::any_of(vertices.begin(), vertices.end(), [&](Index v) { return adjacency_.on_border(v); });
+    }
+
     /// Walks from `f` over triangles that share a corner, ever nearer to `q`, to a local minimum of the distance.
     [[nodiscard]] Index walk_to_closest(const ConstPointsRef<Scalar>& x, Index f,
                                         const Vector3<Scalar>& q) const noexcept;

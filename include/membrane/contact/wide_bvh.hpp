@@ -231,7 +231,7 @@ void WideBvh<Scalar>::collect_vertices_and_leaves(Index vertex_count) {
     });
 }
 
-// Makes capacity in each leaf for the vertices of its triangles if all were apart.
+// Gives each leaf the capacity for the vertices of its triangles if all were apart.
 template <Real Scalar>
 void WideBvh<Scalar>::reserve_vertices() {
     const auto padded = [](std::size_t count) { return (count + filled - 1) / filled * filled; };

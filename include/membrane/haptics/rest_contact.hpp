@@ -57,25 +57,19 @@ class RestContact {
     }
 
     ///@{
-    /// A vertex becomes two; a vertex moves at rest. A closed surface is open once it tears. Online. Cost: the triangles and
-    /// the tree's leaves around the vertex.
-    void split(const VertexSplit& split) noexcept {
-        at_rest_.col(split.copy) = at_rest_.col(split.vertex);
-        surface_.split(split);
-        tree_.split(split);
-    }
+    /// A vertex becomes two; a vertex moves at rest. The surface at rest does not part, but where it is torn a tool may be
+    /// behind it: from then on it counts as open. Online.
+    void split(const VertexSplit& /*split*/) noexcept { torn_ = true; }
     void reshape(const MovedVertex<Scalar>& moved) noexcept {
         at_rest_.col(moved.vertex) = moved.rest;
         tree_.refit(at_rest_, {&moved.vertex, 1});
     }
     ///@}
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the surface.
+    /// Visits what a tear changes, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.surface_, self.tree_);
-        if (!self.surface_.has_reserve()) return;
-        visit(self.at_rest_);
+        visit(self.at_rest_, self.torn_);
         if constexpr (Visit::restores) self.tree_.refit(self.at_rest_);
     }
 
@@ -90,6 +84,7 @@ class RestContact {
     Points<Scalar> at_rest_;
     LocalSurface<Scalar> surface_;
     AabbTree<Scalar> tree_;
+    bool torn_ = false;
 };
 
 template <Real Scalar>
@@ -98,8 +93,9 @@ Contact<Scalar> RestContact<Scalar>::contact_with(const ConstPointsRef<Scalar>& 
                                                   const Tool<Scalar>& tool) const noexcept {
     MEMBRANE_ASSERT(anchors.cols() == at_rest_.cols());
     Contact<Scalar> lowest;
-    if (!is_valid(tool) || (!surface_.closed() && !contact.touching())) return lowest;
-    const Scalar side = surface_.closed() ? Scalar(1) : contact.side;
+    const bool closed = surface_.closed() && !torn_;
+    if (!is_valid(tool) || (!closed && !contact.touching())) return lowest;
+    const Scalar side = closed ? Scalar(1) : contact.side;
     const int points = feature_pairs(tool) == 1 ? 1 : points_along_shaft;
     for (int i = 0; i < points; ++i) {
         const Scalar along = points == 1 ? Scalar(0) : static_cast<Scalar>(i) / static_cast<Scalar>(points - 1);

@@ -53,16 +53,16 @@ class SmoothContact {
     }
 
     ///@{
-    /// A vertex becomes two; a vertex moves at rest. Normals stay those of the surface before it tore, so that the force is
-    /// continuous over a tear that is closed. Online. Cost: the triangles around the vertex.
-    void split(const VertexSplit& split) noexcept;
+    /// A vertex becomes two; a vertex moves at rest. The surface without the tool does not part: the normal is continuous
+    /// over a tear. Online.
+    void split(const VertexSplit& /*split*/) noexcept {}
     void reshape(const MovedVertex<Scalar>& moved) noexcept { at_rest_.col(moved.vertex) = moved.rest; }
     ///@}
 
     /// Visits what a tear changes, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.triangles_, self.adjacency_, self.at_rest_, self.normals_);
+        visit(self.at_rest_);
     }
 
   private:
@@ -108,13 +108,6 @@ template <Real Scalar>
 }
 
 }  // namespace detail
-
-template <Real Scalar>
-void SmoothContact<Scalar>::split(const VertexSplit& split) noexcept {
-    for (const Index f : split.triangles) split.replace_in(triangles_.col(f));
-    adjacency_.split(split);
-    for (auto* points : {&at_rest_, &normals_}) points->col(split.copy) = points->col(split.vertex);
-}
 
 template <Real Scalar>
 Contact<Scalar> SmoothContact<Scalar>::over(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
