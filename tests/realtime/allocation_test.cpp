@@ -21,6 +21,7 @@
 #include "support/catch.hpp"
 #include "support/haptic_loop.hpp"
 #include "support/whole_loop.hpp"
+#include "support/wild_tear.hpp"
 
 using namespace membrane;
 
@@ -231,4 +232,16 @@ TEST_CASE("a recorder, full or not, allocates nothing, nor does a replay", "[all
               }
           }) == 0);
     CHECK(replay.differing() == 0);
+}
+
+TEST_CASE("a membrane that tears allocates nothing", "[allocation]") {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+        CAPTURE(seed);
+        test::WildTear<double> loop(seed);
+        const long allocated = allocated_by([&] {
+            for (int tick = 0; tick < 250; ++tick) static_cast<void>(loop.tick());
+        });
+        CHECK(allocated == 0);
+        CHECK(loop.splits > 0);
+    }
 }

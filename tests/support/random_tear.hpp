@@ -2,7 +2,9 @@
 #pragma once
 
 #include <algorithm>
-#include <vector>
+#include <array>
+#include <cstddef>
+#include <span>
 
 #include <membrane/tear/tearing.hpp>
 
@@ -19,20 +21,22 @@ typename membrane::Tearing<Scalar>::Events cut_at_random(Random& random, membran
                                                          membrane::Points<Scalar>& x) {
     using membrane::Index;
     const auto& surface = tear.surface();
-    std::vector<Index> path;
+    std::array<Index, 6> path{};  // allocates nothing
+    std::size_t count = 0;
     Index f = random.index(static_cast<Index>(surface.triangles().cols()));
-    path.push_back(surface.corners(f)[static_cast<std::size_t>(random.index(3))]);
-    const Index length = 2 + random.index(4);
-    for (Index n = 0; n < 20 && static_cast<Index>(path.size()) < length; ++n) {
-        const auto around = surface.adjacency().triangles_of(path.back());
+    path[count++] = surface.corners(f)[static_cast<std::size_t>(random.index(3))];
+    const auto length = static_cast<std::size_t>(2 + random.index(4));
+    for (Index n = 0; n < 20 && count < length; ++n) {
+        const Index last = path[count - 1];
+        const auto around = surface.adjacency().triangles_of(last);
         f = around[static_cast<std::size_t>(random.index(static_cast<Index>(around.size())))];
         const Index next = surface.corners(f)[static_cast<std::size_t>(random.index(3))];
-        const bool is_new = std::find(path.begin(), path.end(), next) == path.end();
-        if (!is_new || !surface.has_inner_edge(path.back(), next)) continue;
-        path.push_back(next);
+        const auto end = path.begin() + static_cast<std::ptrdiff_t>(count);
+        if (std::find(path.begin(), end, next) != end || !surface.has_inner_edge(last, next)) continue;
+        path[count++] = next;
         if (surface.adjacency().on_border(next)) break;
     }
-    return tear.cut_along(path, x);
+    return tear.cut_along(std::span(path).first(count), x);
 }
 
 }  // namespace test

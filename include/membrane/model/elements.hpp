@@ -64,7 +64,8 @@ using Corners = std::array<Vector3<Scalar>, count>;
 ///
 /// Optional, so that a membrane may tear:
 /// - `E::triangles`: the triples of corners that are triangles of the mesh, if there is more than one.
-/// - `reshaped(before, after)`: the element of the same material whose triangle has other corners at rest.
+/// - `reshaped(before, after)`: the element of the same material whose triangle has other corners at rest; or `E::is_load`,
+///   if its energy does not depend on the shape at rest.
 ///
 /// Optional, for speed, and satisfied by the elements of this library:
 /// - `CornerForce::remainder`: with it most updates need no evaluation of the energy.
@@ -440,6 +441,10 @@ template <Real Scalar, CheckedElement Each>
 void Elements<Scalar, Each>::add_response([[maybe_unused]] const std::array<Index, 3>& corners,
                                           [[maybe_unused]] const ConstPointsRef<Scalar>& x,
                                           [[maybe_unused]] TriangleResponse<Scalar>& sum) const noexcept {
+    static_assert(
+        detail::CanReshape<Each, Scalar> || Each::corner_count != 3 || requires { Each::is_load; },
+        "an element of a membrane that tears must have reshaped(before, after), or is_load if its energy does "
+        "not depend on the shape at rest");
     if constexpr (detail::CanReshape<Each, Scalar>) {
         const Index number = number_of(corners);
         if (number == no_index) return;

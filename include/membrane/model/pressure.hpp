@@ -28,6 +28,8 @@ struct PressureLoad {
     static constexpr std::array<std::array<std::size_t, 3>, 3> orders{
         {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}}};  ///< see `Element`
 
+    static constexpr bool is_load = true;  ///< see `Element`
+
     Scalar pressure;  ///< [Pa], positive from inside
 
     ///@{
