@@ -232,8 +232,8 @@ void TearableSprings<Scalar, Law>::split(const VertexSplit& split) noexcept {
     capacity_[at(v)] -= capacity_[at(copy)];
     this->ends_.split(
         v, copy, [&](const SpringEnd<Scalar>& end) { return end_at(end.other, v) == nullptr; }, at(capacity_[at(v)]));
-    for (std::size_t n = 0; n < split.triangles.size(); ++n) {
-        for (const Index side : sides_[at(split.triangles[n])]) {
+    for (const Index f : split.triangles) {
+        for (const Index side : sides_[at(f)]) {
             if (side == no_index) continue;
             const auto& spring = this->springs_[at(side)];
             if (spring.first != copy && spring.second != copy) continue;
@@ -260,8 +260,8 @@ void TearableSprings<Scalar, Law>::reshape(const MovedVertex<Scalar>& moved) noe
             const Index s = sides_[at(triangle.triangle)][k];
             if (s == no_index) continue;
             const std::size_t next = (k + 1) % 3;
-            const Scalar before = norm<Scalar>(triangle.before[next] - triangle.before[k]);
-            const Scalar after = norm<Scalar>(triangle.after[next] - triangle.after[k]);
+            const auto before = norm<Scalar>(triangle.before[next] - triangle.before[k]);
+            const auto after = norm<Scalar>(triangle.after[next] - triangle.after[k]);
             auto& spring = this->springs_[at(s)];
             Shares& shares = shares_[at(s)];
             const bool is_first = shares[0].triangle == triangle.triangle;

@@ -50,7 +50,7 @@ class Adjacency {
     [[nodiscard]] bool closed() const noexcept { return border_vertices_.empty(); }
 
     /// The part without edges, for `pseudo_normal`.
-    operator const TriangleAdjacency&() const noexcept { return around_; }
+    operator const TriangleAdjacency&() const noexcept { return around_; }  // NOLINT(google-explicit-constructor)
 
   private:
     template <Real Scalar>

@@ -304,7 +304,7 @@ void VertexNormals<Scalar>::set_ring(Index v, Fan fan) noexcept {
     }
     if (count % 2 == 1) put(first);
     ring.overflow_size = count > here ? static_cast<Index>(count - here) : 0;
-    while (count < here) put(first);
+    std::fill(ring.vertices.begin() + static_cast<std::ptrdiff_t>((std::min)(count, here)), ring.vertices.end(), first);
 }
 
 /// Computes the normals of `vertex(n)` for n from 0 to `count` - 1.

@@ -138,8 +138,11 @@ class Tearing {
     }
     void list_patch(Index v, Scalar radius) noexcept;
     template <class Network, class Volume>
-    [[nodiscard]] TipState<Scalar> state_at(const TearTip<Scalar>& tip, const ConstPointsRef<Scalar>& x, Scalar dt,
-                                            const Network& network, const Volume& volume) noexcept;
+    [[nodiscard]] Vector3<Scalar> driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
+                                                   const Network& network, const Volume& volume) noexcept;
+    template <class Network>
+    void find_tension(TipState<Scalar>& state, Index tip, const ConstPointsRef<Scalar>& x,
+                      const Network& network) const noexcept;
     template <class Network>
     [[nodiscard]] bool advance(TearTip<Scalar>& tip, const Vector3<Scalar>& direction, PointsRef<Scalar>& x,
                                const Network& network) noexcept;
@@ -294,8 +297,9 @@ auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Ne
     for (auto& tip : all) {
         bool goes_on = true;
         if (!is_opening(tip.behind[1])) {
-            const auto state = state_at(tip, x, dt, network, volume);
-            tip.driving_force = state.driving_force;
+            tip.driving_force = driving_force_at(tip.vertex, x, dt, network, volume);
+            TipState<Scalar> state{tip.driving_force, 0, Vector3<Scalar>::Zero(), tip.heading};
+            find_tension(state, tip.vertex, x, network);
             const Vector3<Scalar> direction = criterion_.direction(state);
             if (is_finite(direction) && criterion_.opens(state)) goes_on = advance(tip, direction, x, network);
         }
@@ -322,58 +326,62 @@ void Tearing<Scalar, Criterion>::list_patch(Index v, Scalar radius) noexcept {
     }
 }
 
-// The driving force is the configurational force of the patch: of all its vertices, those nearer to the tip in full, those
-// farther away less. That of a vertex on the membrane's own border does not count: the tear does not move it.
+// The configurational force of the patch: of all its vertices, those nearer to the tip in full, those farther away less.
+// That of a vertex on the membrane's own border does not count: the tear does not move it.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network, class Volume>
-TipState<Scalar> Tearing<Scalar, Criterion>::state_at(const TearTip<Scalar>& tip, const ConstPointsRef<Scalar>& x,
-                                                      Scalar dt, const Network& network,
-                                                      const Volume& volume) noexcept {
+Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
+                                                             const Network& network, const Volume& volume) noexcept {
     const auto& rest = surface_.rest_positions();
-    const Scalar radius = static_cast<Scalar>(options_.patch_radius) * surface_.mean_edge(tip.vertex);
+    const Scalar radius = static_cast<Scalar>(options_.patch_radius) * surface_.mean_edge(tip);
     const auto weight = [&](Index v) {
-        const Scalar distance = norm<Scalar>(point(rest, v) - point(rest, tip.vertex));
+        const auto distance = norm<Scalar>(point(rest, v) - point(rest, tip));
         if (is_outer_border_[static_cast<std::size_t>(v)] != 0) return Scalar(0);
         return std::clamp(2 - 2 * distance / radius, Scalar(0), Scalar(1));
     };
-    TipState<Scalar> state{Vector3<Scalar>::Zero(), 0, Vector3<Scalar>::Zero(), tip.heading};
-    Symmetric3<Scalar> squares;
-    Scalar area = 0;
-    list_patch(tip.vertex, radius);
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    list_patch(tip, radius);
     for (const Index f : patch_.items()) {
         const auto corners = surface_.corners(f);
         const std::array<Scalar, 3> weights{weight(corners[0]), weight(corners[1]), weight(corners[2])};
-        const bool at_tip = std::find(corners.begin(), corners.end(), tip.vertex) != corners.end();
-        // The three forces of a triangle add up to zero.
-        if (weights[0] == weights[1] && weights[1] == weights[2] && !at_tip) continue;
-        const auto at_rest = surface_.corners_at(rest, f), now = surface_.corners_at(x, f);
-        const RestTriangle<Scalar> shape(at_rest);
+        if (weights[0] == weights[1] && weights[1] == weights[2]) continue;  // the three forces add up to zero
+        const RestTriangle<Scalar> shape(surface_.corners_at(rest, f));
+        const auto now = surface_.corners_at(x, f);
         const auto response = network.triangle_response(f, corners, x);
-        for (std::size_t k = 0; k < 3; ++k) {
-            state.driving_force += weights[k] * configurational_force(shape, now, response, k);
-        }
-        if (!at_tip) continue;
-        area += shape.area;
-        squares += shape.area * squared_tension(shape, at_rest, response);
+        for (std::size_t k = 0; k < 3; ++k) sum += weights[k] * configurational_force(shape, now, response, k);
     }
     if constexpr (!std::same_as<Volume, NoFoundation>) {
         for (const Index v : patch_vertices_.items()) {
             const Scalar part = weight(v);
             const Vector3<Scalar> at = point(x, v);
-            if (part > 0) state.driving_force -= part * volume.force_on(v, at, at, dt).force;
+            if (part > 0) sum -= part * volume.force_on(v, at, at, dt).force;
         }
     }
-    const Vector3<Scalar> normal = surface_.rest_normal(tip.vertex);
-    state.driving_force -= dot(state.driving_force, normal) * normal;
-    if (area > 0) {
-        const Vector3<Scalar> ahead = direction_or_zero<Scalar>(tip.heading - dot(tip.heading, normal) * normal);
-        const Vector3<Scalar> aside = cross(normal, ahead);
-        const Scalar along = dot<Scalar>(ahead, squares * ahead), across = dot<Scalar>(aside, squares * aside);
-        const Scalar twice = 2 * dot<Scalar>(ahead, squares * aside), angle = std::atan2(twice, along - across) / 2;
-        state.tension_direction = std::cos(angle) * ahead + std::sin(angle) * aside;
-        state.tension = std::sqrt((along + across + std::hypot(twice, along - across)) / (2 * area));
+    const Vector3<Scalar> normal = surface_.rest_normal(tip);
+    return sum - dot(sum, normal) * normal;
+}
+
+// The largest principal value of the mean of the squared tensions, in the plane of the triangles around the tip.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Network>
+void Tearing<Scalar, Criterion>::find_tension(TipState<Scalar>& state, Index tip, const ConstPointsRef<Scalar>& x,
+                                              const Network& network) const noexcept {
+    Symmetric3<Scalar> squares;
+    Scalar area = 0;
+    for (const Index f : surface_.adjacency().triangles_of(tip)) {
+        const auto at_rest = surface_.corners_at(surface_.rest_positions(), f);
+        const RestTriangle<Scalar> shape(at_rest);
+        area += shape.area;
+        squares += shape.area * squared_tension(shape, at_rest, network.triangle_response(f, surface_.corners(f), x));
     }
-    return state;
+    if (!(area > 0)) return;
+    const Vector3<Scalar> normal = surface_.rest_normal(tip);
+    const Vector3<Scalar> ahead = direction_or_zero<Scalar>(state.heading - dot(state.heading, normal) * normal);
+    const Vector3<Scalar> aside = cross(normal, ahead);
+    const auto along = dot<Scalar>(ahead, squares * ahead), across = dot<Scalar>(aside, squares * aside);
+    const auto twice = 2 * dot<Scalar>(ahead, squares * aside), angle = std::atan2(twice, along - across) / 2;
+    state.tension_direction = std::cos(angle) * ahead + std::sin(angle) * aside;
+    state.tension = std::sqrt((along + across + std::hypot(twice, along - across)) / (2 * area));
 }
 
 // Opens the edge from the tip that is nearest to the direction. Returns whether the tip is still within the membrane.
@@ -435,17 +443,17 @@ void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index 
     const VertexSplit& split = surface_.events().back().split;
     const auto share = static_cast<Scalar>(split.area_share);
     const Vector3<Scalar> force = (1 - share) * forces_on(copy, split) - share * forces_on(v, split);
-    const Scalar strength = norm(force);
+    const auto strength = norm(force);
     if (!(strength > 0) || !is_finite(force)) {
         failed_ += static_cast<double>(energy);
         return;
     }
-    constexpr Scalar yields =
-        Scalar(0.98);  // so that it opens at once, though the membrane's force is not quite linear
+    // Below the membrane's force: it opens at once, though that does not decrease quite linearly.
+    constexpr auto yields = Scalar(0.98);
     Ligament<Scalar> ligament{v, copy, yields * force, yields * strength};
     ligament.failure_opening = 2 * energy / strength;
     const auto [left, right] = tip.behind;
-    const Scalar opens = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
+    const auto opens = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
     if (ligament.failure_opening > opens && opens > 0) {
         ligament.plateau = (std::min)(ligament.failure_opening - opens, opens);
         ligament.failure_opening = opens;

@@ -150,7 +150,7 @@ Index TornSurface<Scalar>::nearest_in_direction(Index v, const Vector3<Scalar>& 
         const std::size_t k = corner_of(f, v);
         if (adjacency_.triangle_neighbours(f)[k] == no_index) continue;
         const Index other = corner(f, k + 1);
-        const Scalar along = dot<Scalar>(direction, direction_or_zero<Scalar>(point(rest_, other) - point(rest_, v)));
+        const auto along = dot<Scalar>(direction, direction_or_zero<Scalar>(point(rest_, other) - point(rest_, v)));
         if (along > largest) largest = along, nearest = other;
     }
     return nearest;
