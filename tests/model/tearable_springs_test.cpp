@@ -2,6 +2,9 @@
 #include <membrane/model/tearable_springs.hpp>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <set>
 #include <vector>
 
@@ -132,6 +135,129 @@ TEST_CASE("after random cuts and moved vertices springs and elements are those o
     CHECK(moves > cases(40));
 }
 
+namespace {
+
+template <Real Scalar>
+auto network_of(const TriangleMesh<Scalar>& mesh, const std::vector<Index>& pinned) {
+    return MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = spring_stiffnesses(mesh, material), .pinned = pinned});
+}
+
+template <Real Scalar>
+auto sheet_of(const TriangleMesh<Scalar>& mesh, const auto& springs) {
+    return Tissue(springs, triangular_springs(mesh, material, 1.1), neo_hookean(mesh, material),
+                  fung(mesh, material, {.stiffening = 2}, 1.02));
+}
+
+std::set<Index> others_of(const auto& ends) {
+    std::set<Index> all;
+    for (const auto& end : ends) all.insert(end.other);
+    REQUIRE(all.size() == ends.size());
+    return all;
+}
+
+// Energies, forces and neighbours of all vertices; the tolerance is of stiffness times size.
+template <Real Scalar>
+void check_same(const auto& found, const auto& expected, const TornSurface<Scalar>& surface, const Points<Scalar>& x,
+                double tolerance) {
+    std::vector<Vector3<double>> forces(static_cast<std::size_t>(x.cols()), Vector3<double>::Zero());
+    double energy = 0, right_energy = 0, all_energy = 0;
+    for (Index f = 0; f < surface.triangles().cols(); ++f) {
+        const auto corners = surface.corners(f);
+        const auto part = found.triangle_response(f, corners, x);
+        energy += static_cast<double>(part.energy);
+        for (std::size_t k = 0; k < 3; ++k) {
+            forces[static_cast<std::size_t>(corners[k])] += part.force[k].template cast<double>();
+        }
+    }
+    const auto add_to = [&](double& sum) {
+        return [&](const auto& element) { sum += static_cast<double>(element.element.energy(element.where(x))); };
+    };
+    expected.for_each_element(add_to(right_energy));
+    found.for_each_element(add_to(all_energy));
+    REQUIRE(energy == Approx(right_energy).epsilon(tolerance));
+    REQUIRE(all_energy == Approx(right_energy).epsilon(tolerance));
+    Vector3<double> sum = Vector3<double>::Zero();
+    double size = 0;
+    for (Index v = 0; v < x.cols(); ++v) {
+        CAPTURE(v);
+        const auto force = found.force_on(v, x), right = expected.force_on(v, x);
+        const double scale = static_cast<double>(right.stiffness + norm(right.force));
+        REQUIRE(static_cast<double>(norm<Scalar>(force.force - right.force)) <= tolerance * scale);
+        REQUIRE(norm<double>(force.force.template cast<double>() - forces[static_cast<std::size_t>(v)]) <=
+                tolerance * scale);
+        REQUIRE(static_cast<double>(force.stiffness) ==
+                Approx(static_cast<double>(right.stiffness)).epsilon(tolerance));
+        REQUIRE(others_of(found.neighbours(v)) == others_of(expected.neighbours(v)));
+        REQUIRE(found.pinned(v) == expected.pinned(v));
+        sum += force.force.template cast<double>();
+        size = std::max(size, scale);
+    }
+    REQUIRE(norm(sum) <= tolerance * size);
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("vertices that split and move in any order leave springs and elements those of the torn mesh",
+                   "[tear]", double, float) {
+    const double tolerance = 3e4 * static_cast<double>(std::numeric_limits<TestType>::epsilon());
+    int splits = 0, moves = 0;
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto whole = seed % 3 != 0 ? disc<TestType>({.radius = 1, .rings = 5})
+                                         : icosphere<TestType>({.radius = 1, .subdivisions = 2});
+        const auto mesh = with_reserve(whole, 30);
+        std::vector<Index> pinned{3, 4, 20, 21, 22};
+        TearableSprings springs(mesh, network_of(mesh, pinned));
+        auto sheet = sheet_of(mesh, springs);
+        FoundationSprings<TestType> layer(mesh, {.normal = TestType(4), .tangential = TestType(2)});
+        VirtualVolumeSprings<TestType> volume(mesh, {.stiffness = TestType(3), .damping = TestType(2)});
+        std::vector<Index> first(static_cast<std::size_t>(mesh.vertex_count()));  // of which each is a copy
+        for (Index v = 0; v < mesh.vertex_count(); ++v) first[static_cast<std::size_t>(v)] = v;
+        TornSurface<TestType> surface(mesh);
+        Points<TestType> positions = mesh.positions();
+        for (int n = 0; n < 60; ++n) {
+            test::change_at_random(random, surface, positions, true);
+            if (surface.events().empty()) continue;
+            for (const auto& event : surface.events()) {
+                follow(event, springs, sheet, layer, volume);
+                moves += event.moved.vertex != no_index ? 1 : 0;
+                if (event.split.vertex == no_index) continue;
+                ++splits;
+                first[static_cast<std::size_t>(event.split.copy)] = first[static_cast<std::size_t>(event.split.vertex)];
+                if (springs.pinned(event.split.vertex)) pinned.push_back(event.split.copy);
+            }
+            const TriangleMesh<TestType> torn(surface.rest_positions(), surface.triangles());
+            Points<TestType> x = torn.positions();
+            for (TestType& number : x.reshaped())
+                number = TestType(1.2) * number + random.number(TestType(-0.02), TestType(0.02));
+            const auto anew = network_of(torn, pinned);
+            check_same(springs, TearableSprings(torn, anew), surface, x, tolerance);
+            check_same(sheet, sheet_of(torn, TearableSprings(torn, anew)), surface, x, tolerance);
+            REQUIRE(springs.springs().size() == anew.springs().size());
+        }
+        std::vector<double> normal(first.size(), 0), stiffness(first.size(), 0), damping(first.size(), 0);
+        for (std::size_t v = 0; v < first.size(); ++v) {
+            const auto at = static_cast<std::size_t>(first[v]);
+            if (static_cast<Index>(at) >= whole.vertex_count()) continue;  // of the reserve
+            normal[at] += static_cast<double>(layer.normal_stiffness(static_cast<Index>(v)));
+            stiffness[at] += static_cast<double>(volume.stiffness(static_cast<Index>(v)));
+            damping[at] += static_cast<double>(volume.damping(static_cast<Index>(v)));
+            REQUIRE(volume.anchors().col(static_cast<Index>(v)) == surface.rest_positions().col(static_cast<Index>(v)));
+            REQUIRE(layer.anchors().col(static_cast<Index>(v)) == surface.rest_positions().col(static_cast<Index>(v)));
+        }
+        for (Index v = 0; v < whole.vertex_count(); ++v) {
+            const auto at = static_cast<std::size_t>(v);
+            REQUIRE(normal[at] == Approx(4).epsilon(tolerance));
+            REQUIRE(stiffness[at] == Approx(3).epsilon(tolerance));
+            REQUIRE(damping[at] == Approx(2).epsilon(tolerance));
+        }
+    }
+    CAPTURE(splits, moves);
+    CHECK(splits > 10 * cases(40));
+    CHECK(moves > 10 * cases(40));
+}
+
 TEST_CASE("before a tear the springs have the bits of the network", "[tear]") {
     const auto mesh = with_reserve(icosphere<float>({.radius = 1, .subdivisions = 2}), 5);
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = spring_stiffnesses(mesh, material)});
@@ -143,6 +269,29 @@ TEST_CASE("before a tear the springs have the bits of the network", "[tear]") {
     CHECK(springs.springs().size() == network.springs().size());
     CHECK(test::refusal([&] { TearableSprings(icosphere<float>({.subdivisions = 1}), network); }) ==
           "TearableSprings: network must be of the mesh of 42 vertices, got one of 167");
+    // The same vertices, the diagonal the other way.
+    const TriangleMesh<float> one(Points<float>{{0, 1, 1, 0}, {0, 0, 1, 1}, {0, 0, 0, 0}},
+                                  Triangles{{0, 0}, {1, 2}, {2, 3}});
+    const TriangleMesh<float> other(one.positions(), Triangles{{0, 1}, {1, 2}, {3, 3}});
+    CHECK(test::refusal([&] { TearableSprings(one, MassSpringNetwork(other, LinearSpring{}, {.stiffness = 1.0F})); }) ==
+          "TearableSprings: network must be of the mesh, spring 3 is no edge of it");
+}
+
+TEST_CASE("a split divides mass and viscosity by area, and keeps a pin", "[tear]") {
+    const auto mesh = with_reserve(disc<double>({.radius = 1, .rings = 3}), 2);
+    TearableSprings springs(mesh, MassSpringNetwork(mesh, LinearSpring{},
+                                                    {.stiffness = 1.0, .mass = 6.0, .viscosity = 3.0, .pinned = {0}}));
+    TornSurface<double> surface(mesh);
+    Points<double> all = mesh.positions();
+    PointsRef<double> x = all;
+    const Index copy = surface.split(x, 0, 1, 4);  // half of the six triangles
+    REQUIRE(copy != no_index);
+    springs.split(surface.events()[0].split);
+    CHECK(springs.mass(0) == Approx(3));
+    CHECK(springs.mass(copy) == Approx(3));
+    CHECK(springs.viscosity(0) == Approx(1.5));
+    CHECK(springs.viscosity(copy) == Approx(1.5));
+    CHECK(springs.pinned(copy));
 }
 
 TEST_CASE("foundations divide a vertex by area", "[tear]") {
