@@ -80,6 +80,8 @@ class ActiveVertices {
 
     /// Other vertices are neighbours, or other forces join them: the next step builds the queue anew.
     void network_changed() noexcept { has_changed_ = true; }
+    /// Whether that has been said since the queue was built.
+    [[nodiscard]] bool has_changed() const noexcept { return has_changed_; }
 
     /// Makes all asleep, and the queue empty. The next step builds it anew.
     void clear() noexcept;

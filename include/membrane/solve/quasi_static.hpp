@@ -302,7 +302,8 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
     }
 }
 
-// Collects the active vertices of this step, including those prescribed only until the last step.
+// Collects the active vertices of this step, including those prescribed only until the last step. After a tear the
+// neighbours of those that were woken too: a split does not list the triangles that stay.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
@@ -312,6 +313,10 @@ void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
     }
     for (const Index v : woken_.items()) {
         if (!network.pinned(v)) active_.wake(v);
+        if (!active_.has_changed()) continue;
+        for (const auto& end : network.neighbours(v)) {
+            if (!network.pinned(end.other)) active_.wake(end.other);
+        }
     }
     woken_.clear();
     active_.begin_step(network, state_.seeds.items(), options_);
