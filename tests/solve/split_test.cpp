@@ -22,6 +22,7 @@
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tear/tearing.hpp>
 
+#include "support/bits.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/orders.hpp"
@@ -73,7 +74,7 @@ struct TornDisc {
                           .sweeps = 10,
                           .order = test::order_of(seed),
                           .predict = seed % 2 == 0,
-                          .force_tolerance = is_double ? 1e-10 : 0}),
+                          .force_tolerance = Scalar(is_double ? 1e-10 : 0)}),
           tree(mesh),
           tracker(mesh),
           grasper(mesh),
@@ -219,5 +220,66 @@ TEMPLATE_TEST_CASE("after a split the vertices around both wake, and come to bal
                 disc.tissue.force_on(v, disc.x).force + disc.foundation.force_on(v, at, at, 1).force;
             REQUIRE(norm(force) <= 2e-10);
         }
+    }
+}
+
+namespace {
+
+template <class Scalar, class Kind>
+void check_restores(int seed) {
+    using Disc = TornDisc<Scalar, Kind>;
+    CAPTURE(seed);
+    Disc disc(seed), other(seed);
+    const auto save = [](const Disc& of) {
+        std::vector<std::byte> bytes(
+            snapshot_capacity(of.tissue, of.foundation, of.surface, of.solver, of.tree, of.tracker, of.grasper, of.x));
+        bytes.resize(save_snapshot(bytes, of.tissue, of.foundation, of.surface, of.solver, of.tree, of.tracker,
+                                   of.grasper, of.x));
+        REQUIRE(!bytes.empty());
+        return bytes;
+    };
+    const auto restore = [](const std::vector<std::byte>& from, Disc& to) {
+        REQUIRE(restore_snapshot(from, to.tissue, to.foundation, to.surface, to.solver, to.tree, to.tracker, to.grasper,
+                                 to.x));
+        to.tree.refit(to.x);
+    };
+    // Presses, pulls and tears, from a tick on: the same for each loop.
+    const auto run = [](Disc& with, int from, int to, std::vector<Points<Scalar>>& path) {
+        int splits = 0;
+        for (int n = from; n < to; ++n) {
+            test::Random random(static_cast<std::uint64_t>(n));
+            with.tool.position = {Scalar(0.05), Scalar(0.01 * n), Scalar(0.35 - 0.02 * (n % 12))};
+            with.tool.grasping = n % 20 > 8;
+            REQUIRE(with.tick().status == StepStatus::advanced);
+            path.push_back(with.x);
+            if (n % 3 == 2) splits += with.tear(random);
+        }
+        return splits;
+    };
+    std::vector<Points<Scalar>> first, again, sewn, scratch;
+    const auto whole = save(disc);
+    CHECK(run(disc, 0, 8, first) > 0);
+    const auto torn = save(disc);
+    CHECK(run(disc, 8, 16, first) > 0);
+    static_cast<void>(run(other, 3, 12, scratch));  // torn elsewhere
+    restore(torn, other);
+    CHECK((save(other) == torn));
+    static_cast<void>(run(other, 8, 16, again));
+    for (std::size_t n = 0; n < again.size(); ++n) REQUIRE(test::same_bits(again[n], first[8 + n]));
+    restore(whole, disc);
+    CHECK(disc.surface.triangles() == disc.mesh.triangles());
+    CHECK(disc.surface.rest_positions() == disc.mesh.positions());
+    static_cast<void>(run(disc, 0, 16, sewn));
+    for (std::size_t n = 0; n < sewn.size(); ++n) REQUIRE(test::same_bits(sewn[n], first[n]));
+}
+
+}  // namespace
+
+TEMPLATE_TEST_CASE("parts restored from a snapshot go on with the same bits, torn or sewn up again", "[snapshot][tear]",
+                   double, float) {
+    for (int seed = 1; seed <= cases(30); ++seed) {
+        check_restores<TestType, SpringsAlone<TestType>>(seed);
+        check_restores<TestType, WithTriangles<TestType>>(seed);
+        check_restores<TestType, WithHinges<TestType>>(seed);
     }
 }
