@@ -39,8 +39,8 @@ typename membrane::Tearing<Scalar>::Events cut_at_random(Random& random, membran
     return tear.cut_along(std::span(path).first(count), x);
 }
 
-/// Splits a vertex of `surface` where an edge, or two, can open, and those at the ends of these on a border; or moves one
-/// in the plane, if `moves`. The events since the last `begin` may be none.
+/// Splits a vertex of `surface` where an edge, or two, can open, and those at the ends of these on a border; or moves
+/// one in the plane, if `moves`. There may be no event.
 template <membrane::Real Scalar>
 void change_at_random(Random& random, membrane::TornSurface<Scalar>& surface, membrane::Points<Scalar>& positions,
                       bool moves) {

@@ -172,6 +172,146 @@ TEST_CASE("a snapshot holds the tear: ticks go on with the same bits, and before
     CHECK(strip.x == strip.mesh.positions());
 }
 
+namespace {
+
+/// Opens each tip that heads this way, straight on, without energy.
+struct Heading {
+    double least = -2;  // along x
+    bool opens(const auto& tip) const noexcept { return tip.heading[0] >= least; }
+    auto direction(const auto& tip) const noexcept { return tip.heading; }
+    double resistance() const noexcept { return 0; }
+};
+
+/// A sheet of 6 x 6 squares: vertex 7 row + column.
+struct TornSquare {
+    explicit TornSquare(Index reserve, Heading criterion = {})
+        : mesh(with_reserve(sheet<double>({.columns = 6, .rows = 6}), reserve)),
+          springs(mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 1.0})),
+          tear(mesh, criterion),
+          x(mesh.positions()) {}
+
+    std::size_t cut(const std::vector<Index>& path) {
+        const auto events = tear.cut_along(path, x);
+        for (const auto& event : events) follow(event, springs);
+        return events.size();
+    }
+    std::size_t update() {
+        const auto events = tear.update(x, 1e-3, springs, NoFoundation());
+        for (const auto& event : events) follow(event, springs);
+        std::size_t splits = 0;
+        for (const auto& event : events) splits += event.split.vertex != no_index ? 1U : 0U;
+        return splits;
+    }
+
+    TriangleMesh<double> mesh;
+    TearableSprings<double, LinearSpring> springs;
+    Tearing<double, Heading> tear;
+    Points<double> x;
+};
+
+}  // namespace
+
+TEST_CASE("tears that meet are one: there is no tip where they join", "[tear]") {
+    SECTION("a cut ends at a tip") {
+        TornSquare square(9);
+        CHECK(square.cut({22, 23, 24}) == 1);
+        CHECK(square.tear.tips().size() == 2);
+        CHECK(square.cut({27, 26, 25, 24}) == 4);
+        REQUIRE(square.tear.tips().size() == 1);
+        CHECK(square.tear.tips()[0].vertex == 22);
+    }
+    SECTION("a cut goes on from a tip") {
+        TornSquare square(9);
+        CHECK(square.cut({22, 23, 24}) == 1);
+        CHECK(square.cut({24, 31, 38}) == 2);
+        REQUIRE(square.tear.tips().size() == 2);
+        CHECK(square.tear.tips()[0].vertex == 22);
+        CHECK(square.tear.tips()[1].vertex == 38);
+    }
+    SECTION("a tear runs to a tip, and the other one waits for the network") {
+        TornSquare square(9);
+        CHECK(square.cut({21, 22, 23}) == 2);
+        CHECK(square.cut({27, 26, 25}) == 2);
+        CHECK(square.update() == 1);  // from 23 to 24; 25 is beside what has changed
+        REQUIRE(square.tear.tips().size() == 2);
+        CHECK(square.tear.tips()[0].vertex == 24);
+        CHECK(square.tear.tips()[1].vertex == 25);
+        CHECK(square.update() == 2);
+        CHECK(square.tear.tips().empty());
+        CHECK(square.update() == 0);
+        const double edge = square.mesh.positions()(0, 1) - square.mesh.positions()(0, 0);
+        CHECK(square.tear.torn_length() == Approx(2 * edge));
+    }
+}
+
+TEST_CASE("a cut into the side of a tear leaves its tip the vertices beside it", "[tear]") {
+    for (const bool left : {false, true}) {
+        CAPTURE(left);
+        TornSquare square(9);
+        CHECK(square.cut({21, 22, 23, 24}) == 3);  // the copies are above or below
+        const auto& surface = square.tear.surface();
+        const auto tip = square.tear.tips()[0];
+        const Index side = tip.behind[left ? 0 : 1];  // in the place of vertex 23
+        Index end = no_index;
+        for (Index v = 0; v < 49; ++v) {
+            const double off = surface.rest_positions()(0, v) - surface.rest_positions()(0, 23);
+            if (std::abs(off) < 1e-9 && surface.has_inner_edge(side, v)) end = v;
+        }
+        REQUIRE(end != no_index);
+        CHECK(square.cut({end, side}) == 1);
+        REQUIRE(square.tear.tips().size() == 2);
+        for (const Index v : square.tear.tips()[0].behind) {
+            bool is_beside = false;
+            for (const Index f : surface.adjacency().triangles_of(24)) {
+                for (const Index corner : surface.corners(f)) is_beside |= corner == v;
+            }
+            CHECK(is_beside);
+        }
+    }
+}
+
+TEST_CASE("a reserve too small for one tip is reported, though another one advances", "[tear]") {
+    TornSquare square(3, {.least = 0.5});
+    CHECK(square.cut({26, 25, 24}) == 1);  // its first tip would reach the border, and double two
+    CHECK(square.cut({8, 9, 10}) == 1);
+    CHECK(square.update() == 1);
+    CHECK(square.tear.reserve_used_up());
+    CHECK(square.tear.tips()[0].vertex == 26);
+    CHECK(square.tear.tips()[3].vertex == 11);
+    CHECK(square.update() == 0);
+    CHECK(square.tear.reserve_used_up());
+}
+
+TEST_CASE("the driving forces of near tips are those before any of them advances", "[tear]") {
+    const auto forces = [](double toughness, std::size_t& splits) {
+        TornStrip<double> strip({.columns = 24, .rows = 24, .turn = 0.2, .toughness = toughness});
+        const auto& rest = strip.tear.surface().rest_positions();
+        Index at = 0;
+        for (Index v = 0; v < strip.surface.vertex_count(); ++v) {
+            const auto off = [&](Index w) { return (rest.col(w) - Eigen::Vector3d(12e-3, 12e-3, 0)).norm(); };
+            if (off(v) < off(at)) at = v;
+        }
+        for (const auto& event : strip.tear.cut_along(strip.tear.slit_at(at, {1, 0, 0}), strip.x)) {
+            follow(event, strip.sheet, strip.solver);
+        }
+        for (int n = 0; n < 400; ++n) {
+            strip.x.row(1) = 1.4 * rest.row(1);
+            strip.solver.wake_all();
+            static_cast<void>(strip.solver.step(strip.x, 1e-3, strip.sheet, NoFoundation()));
+        }
+        const auto events = strip.tear.update(strip.x, 1e-3, strip.sheet, NoFoundation());
+        for (const auto& event : events) splits += event.split.vertex != no_index ? 1U : 0U;
+        REQUIRE(strip.tear.tips().size() == 2);
+        return std::array{strip.tear.tips()[0].driving_force, strip.tear.tips()[1].driving_force};
+    };
+    std::size_t none = 0, both = 0;
+    const auto expected = forces(1e9, none), found = forces(1, both);
+    CHECK(none == 0);
+    CHECK(both == 2);
+    CHECK(found[0] == expected[0]);
+    CHECK(found[1] == expected[1]);
+}
+
 TEST_CASE("options of a tear are checked", "[tear]") {
     const auto mesh = sheet<double>({.columns = 2, .rows = 2});
     const auto with = [&](TearOptions options) {

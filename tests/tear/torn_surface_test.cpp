@@ -40,8 +40,8 @@ bool has_corner(const TornSurface<Scalar>& surface, Index f, Index v) {
     return std::find(corners.begin(), corners.end(), v) != corners.end();
 }
 
-// The triangles to the left of the edge from `v` to `out`, as far as the edge to `back` or to a border: each next one is
-// searched among all.
+// The triangles to the left of the edge from `v` to `out`, as far as the edge to `back` or to a border: each next one
+// is searched among all.
 template <Real Scalar>
 std::vector<Index> left_of(const TornSurface<Scalar>& surface, Index v, Index out, Index back) {
     std::vector<Index> fan;
@@ -271,8 +271,8 @@ std::vector<Index> random_path(test::Random& random, const TornSurface<Scalar>& 
     return path;
 }
 
-// What `Tearing::cut_along` says about a path, from the triangles alone; the number of vertices that the cut doubles, or
-// -1.
+// What `Tearing::cut_along` says about a path, from the triangles alone; the number of vertices that the cut doubles,
+// or -1.
 template <Real Scalar>
 Index doubled_by(const std::vector<Index>& path, const TornSurface<Scalar>& surface) {
     std::map<std::pair<Index, Index>, int> sides;
@@ -342,7 +342,7 @@ void check_cut(const TornSurface<Scalar>& surface, const Triangles& whole,
 
 TEMPLATE_TEST_CASE("a cut parts the edges of its path and nothing else; another path changes nothing", "[tear]", double,
                    float) {
-    int cuts = 0, refused = 0, used_up = 0, across = 0;
+    int cuts = 0, refused = 0, used_up = 0, across = 0, joined = 0;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -372,10 +372,12 @@ TEMPLATE_TEST_CASE("a cut parts the edges of its path and nothing else; another 
                     }
                 }
             }
-            std::size_t inner_ends = 0;
+            std::size_t inner_ends = 0, at_tips = 0;
             if (legal) {
-                for (const Index v : {path.front(), path.back()})
+                for (const Index v : {path.front(), path.back()}) {
                     inner_ends += surface.adjacency().on_border(v) ? 0U : 1U;
+                    for (const auto& tip : tear.tips()) at_tips += tip.vertex == v ? 1U : 0U;
+                }
             }
             const auto events = tear.cut_along(path, x);
             REQUIRE(events.size() == static_cast<std::size_t>(legal ? doubled : 0));
@@ -389,19 +391,34 @@ TEMPLATE_TEST_CASE("a cut parts the edges of its path and nothing else; another 
             }
             ++cuts;
             across += inner_ends == 0 ? 1 : 0;
+            joined += at_tips > 0 ? 1 : 0;
+            REQUIRE(tear.tips().size() == std::min(tips + inner_ends - at_tips, std::size_t{4}));
             cut_sides.insert(sides.begin(), sides.end());
             check_cut(surface, mesh.triangles(), cut_sides);
             check_lists(surface);
             REQUIRE(surface.reserve() == reserve - doubled);
+            for (const auto& tip : tear.tips()) {
+                REQUIRE(surface.adjacency().on_border(tip.vertex));
+                // The sides of the tear are the borders to the two vertices behind.
+                for (const Index v : tip.behind) {
+                    bool is_beside = false;
+                    for (const Index f : surface.adjacency().triangles_of(tip.vertex))
+                        is_beside |= has_corner(surface, f, v);
+                    CAPTURE(tip.vertex, v);
+                    REQUIRE(is_beside);
+                    REQUIRE(!surface.has_inner_edge(tip.vertex, v));
+                }
+            }
             REQUIRE(tear.dissipated() == 0);
             REQUIRE(tear.torn_length() == 0);
         }
     }
-    CAPTURE(cuts, refused, used_up, across);
+    CAPTURE(cuts, refused, used_up, across, joined);
     CHECK(cuts > 2 * cases(100));
     CHECK(refused > 10 * cases(100));
     CHECK(used_up > 0);
     CHECK(across > 0);
+    CHECK(joined > 0);
 }
 
 TEST_CASE("a vertex that moves at rest keeps the area, the angles, and its point of the membrane", "[tear]") {

@@ -128,6 +128,8 @@ class Tearing {
   private:
     [[nodiscard]] bool is_path(std::span<const Index> path) const noexcept;
     void add_tip(Index v, Index behind, Index copy) noexcept;
+    void join_tears(const VertexSplit& split) noexcept;
+    void drop_tips() noexcept;
     void set_outer_border(Index copy, Index v) noexcept {
         is_outer_border_[static_cast<std::size_t>(copy)] = is_outer_border_[static_cast<std::size_t>(v)];
     }
@@ -136,6 +138,7 @@ class Tearing {
         const auto all = ligaments_.items();
         return std::any_of(all.begin(), all.end(), [copy](const auto& ligament) { return ligament.copy == copy; });
     }
+    [[nodiscard]] bool has_changed_around(Index v) const noexcept;
     void list_patch(Index v, Scalar radius) noexcept;
     template <class Network, class Volume>
     [[nodiscard]] Vector3<Scalar> driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
@@ -154,6 +157,7 @@ class Tearing {
     TearOptions options_;
     TornSurface<Scalar> surface_;
     FixedVector<TearTip<Scalar>> tips_;
+    std::vector<Vector3<Scalar>> opens_;  // of each tip, where it advances to in this update; 0: nowhere
     FixedVector<Ligament<Scalar>> ligaments_;
     double failed_ = 0, torn_length_ = 0;
     bool used_up_ = false;
@@ -182,6 +186,7 @@ Tearing<Scalar, Criterion>::Tearing(const TriangleMesh<Scalar>& mesh, const Crit
       options_((options.check(), options)),
       surface_(mesh),
       tips_(static_cast<std::size_t>(options.max_tips)),
+      opens_(tips_.capacity()),
       ligaments_(2 * tips_.capacity()),
       is_outer_border_(static_cast<std::size_t>(mesh.vertex_count())),
       patch_vertices_(mesh.vertex_count()),
@@ -222,7 +227,9 @@ auto Tearing<Scalar, Criterion>::cut_along(std::span<const Index> path, PointsRe
     if (used_up_) return {};
     const auto split = [&](std::size_t i, Index out, Index back) {
         const Index copy = surface_.split(x, path[i], out, back);
-        if (copy != no_index) set_outer_border(copy, path[i]);
+        if (copy == no_index) return copy;
+        set_outer_border(copy, path[i]);
+        join_tears(surface_.events().back().split);
         return copy;
     };
     Index first = no_index, copy = no_index;
@@ -231,8 +238,9 @@ auto Tearing<Scalar, Criterion>::cut_along(std::span<const Index> path, PointsRe
         copy = split(i, path[i + 1], path[i - 1]);
         if (first == no_index) first = copy;
     }
-    if (!from_border) add_tip(path[0], path[1], to_border && last == 1 ? split(1, path[0], no_index) : first);
-    if (to_border && (from_border || last > 1)) split(last, path[last - 1], no_index);
+    const Index at_border = to_border ? split(last, path[last - 1], no_index) : no_index;
+    drop_tips();
+    if (!from_border) add_tip(path[0], path[1], first == no_index ? at_border : first);
     if (!to_border) add_tip(path[last], path[last - 1], copy);
     return surface_.events();
 }
@@ -242,6 +250,34 @@ void Tearing<Scalar, Criterion>::add_tip(Index v, Index behind, Index copy) noex
     const auto& rest = surface_.rest_positions();
     const Vector3<Scalar> edge = point(rest, v) - point(rest, behind);
     tips_.try_push_back({v, {behind, copy}, direction_or_zero(edge), norm(edge)});
+}
+
+// A tear runs into the border at a vertex. If that is the tip of another one, there is no tip any more; if it is beside
+// a tip, the side of the tear is the vertex that its triangle has from now on.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+void Tearing<Scalar, Criterion>::join_tears(const VertexSplit& split) noexcept {
+    for (auto& tip : tips_.items()) {
+        if (tip.vertex == split.vertex) tip.vertex = no_index;
+        const auto before = tip.behind;
+        const bool takes_side = std::any_of(split.corners.begin(), split.corners.end(), [&](const auto& corners) {
+            return std::find(corners.begin(), corners.end(), tip.vertex) != corners.end();
+        });
+        if (takes_side) split.replace_in(tip.behind);
+        for (auto& ligament : ligaments_.items()) {
+            if (ligament.vertex == before[0] && ligament.copy == before[1]) {
+                ligament.vertex = tip.behind[0];
+                ligament.copy = tip.behind[1];
+            }
+        }
+    }
+}
+
+// Those that have reached a border.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+void Tearing<Scalar, Criterion>::drop_tips() noexcept {
+    const auto all = tips_.items();
+    const auto end = std::remove_if(all.begin(), all.end(), [](const auto& tip) { return tip.vertex == no_index; });
+    tips_.truncate(static_cast<std::size_t>(end - all.begin()));
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
@@ -293,20 +329,38 @@ auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Ne
     used_up_ = false;
     open_ligaments(x);
     const auto all = tips_.items();
-    std::size_t left = 0;
-    for (auto& tip : all) {
-        bool goes_on = true;
-        if (!is_opening(tip.behind[1])) {
-            tip.driving_force = driving_force_at(tip.vertex, x, dt, network, volume);
-            TipState<Scalar> state{tip.driving_force, 0, Vector3<Scalar>::Zero(), tip.heading};
-            find_tension(state, tip.vertex, x, network);
-            const Vector3<Scalar> direction = criterion_.direction(state);
-            if (is_finite(direction) && criterion_.opens(state)) goes_on = advance(tip, direction, x, network);
-        }
-        if (goes_on) all[left++] = tip;
+    // All before any advances: the network has not followed until the next step.
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        auto& tip = all[i];
+        opens_[i] = Vector3<Scalar>::Zero();
+        if (is_opening(tip.behind[1])) continue;
+        tip.driving_force = driving_force_at(tip.vertex, x, dt, network, volume);
+        TipState<Scalar> state{tip.driving_force, 0, Vector3<Scalar>::Zero(), tip.heading};
+        find_tension(state, tip.vertex, x, network);
+        const Vector3<Scalar> direction = criterion_.direction(state);
+        if (is_finite(direction) && criterion_.opens(state)) opens_[i] = direction;
     }
-    tips_.truncate(left);
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        auto& tip = all[i];
+        if (tip.vertex == no_index || opens_[i] == Vector3<Scalar>::Zero() || has_changed_around(tip.vertex)) continue;
+        if (!advance(tip, opens_[i], x, network)) tip.vertex = no_index;
+    }
+    drop_tips();
     return surface_.events();
+}
+
+// Whether a triangle around `v` has changed since `begin`: the network does not know it.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+bool Tearing<Scalar, Criterion>::has_changed_around(Index v) const noexcept {
+    const auto around = surface_.adjacency().triangles_of(v);
+    const auto is_around = [&](Index f) { return std::find(around.begin(), around.end(), f) != around.end(); };
+    const auto events = surface_.events();
+    return std::any_of(events.begin(), events.end(), [&](const auto& event) {
+        const auto& split = event.split.triangles;
+        const auto& moved = event.moved.triangles;
+        return std::any_of(split.begin(), split.end(), is_around) ||
+               std::any_of(moved.begin(), moved.end(), [&](const auto& one) { return is_around(one.triangle); });
+    });
 }
 
 // The triangles with a corner within `radius` of vertex `v` at rest [m], over triangles that share a corner.
@@ -393,8 +447,11 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     const Index v = tip.vertex, next = surface_.nearest_in_direction(v, direction);
     if (next == no_index) return true;
     const bool reaches_border = surface_.adjacency().on_border(next);
-    used_up_ = surface_.reserve() < (reaches_border ? 2 : 1);
-    if (used_up_) return true;
+    if (surface_.reserve() < (reaches_border ? 2 : 1)) {
+        used_up_ = true;
+        return true;
+    }
+    const Vector3<Scalar> before = point(x, next);
     if (options_.move_vertices && !reaches_border && !network.pinned(next)) {
         const Vector3<Scalar> ahead = direction_or_zero(direction), from = point(rest, v);
         const Vector3<Scalar> place = from + dot<Scalar>(point(rest, next) - from, ahead) * ahead;
@@ -406,10 +463,15 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     set_outer_border(copy, v);
     const Scalar length = norm(edge);
     torn_length_ += static_cast<double>(length);
+    const Vector3<Scalar> moved = point(x, next);
+    set_point(x, next, before);  // the network does not know that it has moved
     add_ligament(tip, copy, length, x, network);
+    set_point(x, next, moved);
     if (reaches_border) {
         const Index other = surface_.split(x, next, v);
-        if (other != no_index) set_outer_border(other, next);
+        if (other == no_index) return false;
+        set_outer_border(other, next);
+        join_tears(surface_.events().back().split);
         return false;
     }
     tip.vertex = next;
