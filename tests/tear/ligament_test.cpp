@@ -1,8 +1,22 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/tear/ligament.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+#include <membrane/model/tearable_springs.hpp>
+#include <membrane/model/volume_springs.hpp>
+#include <membrane/solve/quasi_static.hpp>
+#include <membrane/surface/shapes.hpp>
+#include <membrane/tear/tearing.hpp>
+
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/orders.hpp"
 #include "support/random.hpp"
 
 using namespace membrane;
@@ -30,5 +44,125 @@ TEST_CASE("a ligament takes the work that opens it, however often it closes", "[
         }
         CHECK(ligament.failed() == (ligament.largest_tension() <= ligament.strength / 10));
         if (end >= ligament.failure_opening) CHECK(ligament.dissipated == Approx(energy).epsilon(0.01));
+    }
+}
+
+namespace {
+
+/// A stretched disc with a slit of two edges in its middle, held together by a ligament.
+template <class Scalar>
+struct SlitDisc {
+    explicit SlitDisc(int seed)
+        : mesh(with_reserve(disc<Scalar>({.radius = 1, .rings = 5}), 1)),
+          springs(mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = Scalar(10), .pinned = border(mesh)})),
+          foundation(mesh, {.stiffness = Scalar(0.1)}),
+          surface(mesh),
+          solver(springs, {.layers = unlimited, .sweeps = 20, .order = test::order_of(seed)}),
+          x(Scalar(1.5) * mesh.positions()) {
+        PointsRef<Scalar> ref = x;
+        const Index copy = surface.split(ref, 0, 1, 4);
+        REQUIRE(copy != no_index);
+        follow(surface.events()[0], springs, foundation, solver);
+        ligament.vertex = 0;
+        ligament.copy = copy;
+    }
+
+    StepReport<Scalar> relax() {
+        const LigamentForces<Scalar> forces{{&ligament, 1}};
+        StepReport<Scalar> report;
+        solver.wake_all();
+        for (int n = 0; n < 20'000 && !report.converged; ++n) {
+            report = solver.step(x, Scalar(1e-3), springs, foundation, forces);
+        }
+        return report;
+    }
+    Vector3<double> separation() const {
+        return Vector3<Scalar>(point(x, 0) - point(x, ligament.copy)).template cast<double>();
+    }
+    /// The membrane's and the foundation's force on a vertex.
+    Vector3<double> force_on(Index v) const {
+        const auto at = point(x, v);
+        return Vector3<Scalar>(springs.force_on(v, x).force + foundation.force_on(v, at, at, 1).force)
+            .template cast<double>();
+    }
+
+    TriangleMesh<Scalar> mesh;
+    TearableSprings<Scalar, LinearSpring> springs;
+    VirtualVolumeSprings<Scalar> foundation;
+    TornSurface<Scalar> surface;
+    QuasiStaticSolver<Scalar> solver;
+    Ligament<Scalar> ligament;
+    Points<Scalar> x;
+};
+
+}  // namespace
+
+// The forces of springs and foundation, which the constraint does not know.
+TEMPLATE_TEST_CASE("a step in equilibrium has the force of a ligament's law across the edge", "[tear]", double, float) {
+    int closed = 0, open = 0, plateau = 0, failed = 0, unloaded = 0;
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        SlitDisc<TestType> disc(seed);
+        auto& ligament = disc.ligament;
+        ligament.strength = random.number(TestType(0.5), TestType(20));
+        ligament.force = ligament.strength * random.unit_vector<TestType>();
+        ligament.failure_opening = static_cast<TestType>(std::pow(10, random.number(-2.0, 0.8)));
+        ligament.plateau = random.chance(0.5) ? 0 : random.number(TestType(0), ligament.failure_opening);
+        ligament.reached = random.chance(0.5) ? 0 : random.number(TestType(0), ligament.failure_opening);
+        const auto report = disc.relax();
+        REQUIRE(report.converged);
+        CHECK(norm(report.reactions[0]) == 0);
+        const Vector3<double> apart = disc.separation(), force = disc.force_on(0);
+        const double opening = norm(apart), tolerance = 4 * static_cast<double>(disc.springs.force_tolerance());
+        CAPTURE(opening, ligament.strength, ligament.failure_opening, ligament.plateau, ligament.reached);
+        REQUIRE(norm<double>(force + disc.force_on(ligament.copy)) <= tolerance);
+        const auto at = static_cast<TestType>(opening);
+        const double tension = static_cast<double>(ligament.tension(at));
+        const double size = norm(force);
+        if (10 * opening <= tolerance) {  // of springs that stiff
+            ++closed;
+            REQUIRE(size <= static_cast<double>(ligament.largest_tension()) + tolerance);
+            continue;
+        }
+        // A negligible force on the springs moves the vertices, and that changes the force of a stiff ligament.
+        const double allowed = tolerance * (1 + tension / opening / 10);
+        REQUIRE(size == Approx(tension).margin(allowed));
+        if (tension > 0) REQUIRE(norm<double>(force - (tension / opening) * apart) <= allowed);
+        open += at > ligament.plateau && tension > 0 ? 1 : 0;
+        plateau += at <= ligament.plateau ? 1 : 0;
+        failed += tension == 0 ? 1 : 0;
+        unloaded += at < ligament.reached ? 1 : 0;
+    }
+    CAPTURE(closed, open, plateau, failed, unloaded);
+    CHECK(closed > 0);
+    CHECK(open > 0);
+    CHECK(plateau > 0);
+    CHECK(failed > 0);
+    CHECK(unloaded > 0);
+}
+
+TEST_CASE("a ligament with nonsense in it refuses the step or leaves it finite", "[tear][bad]") {
+    constexpr double wild = std::numeric_limits<double>::infinity();
+    for (const double number : {wild, -wild, std::numeric_limits<double>::quiet_NaN(), -1.0, 0.0, 1e300, 1e-300}) {
+        CAPTURE(number);
+        for (int which = 0; which < 5; ++which) {
+            CAPTURE(which);
+            SlitDisc<double> disc(1);
+            auto& ligament = disc.ligament;
+            ligament.strength = 5, ligament.force = {0, 5, 0}, ligament.failure_opening = 1;
+            (which == 0   ? ligament.strength
+             : which == 1 ? ligament.failure_opening
+             : which == 2 ? ligament.plateau
+             : which == 3 ? ligament.reached
+                          : ligament.force[1]) = number;
+            const Points<double> before = disc.x;
+            for (int n = 0; n < 5; ++n) {
+                const auto report = disc.solver.step(disc.x, 1e-3, disc.springs, disc.foundation,
+                                                     LigamentForces<double>{{&ligament, 1}});
+                if (report.status != StepStatus::advanced) REQUIRE((n > 0 || disc.x == before));
+                REQUIRE(disc.x.allFinite());
+            }
+        }
     }
 }

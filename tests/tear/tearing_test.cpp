@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/tear/tearing.hpp>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <numbers>
 #include <span>
 #include <vector>
@@ -310,6 +313,32 @@ TEST_CASE("the driving forces of near tips are those before any of them advances
     CHECK(both == 2);
     CHECK(found[0] == expected[0]);
     CHECK(found[1] == expected[1]);
+}
+
+// The next vertex has moved by then, at rest and now, which the network does not know yet.
+TEST_CASE("a ligament begins with the force that the membrane transmitted through the vertex", "[tear]") {
+    for (const double turn : {10.0, 20.0, 30.0}) {
+        CAPTURE(turn);
+        TornStrip<double> strip({.turn = turn * degree});
+        strip.cut();
+        strip.stretch(1.02 * strip.critical_stretch());
+        const Points<double> x = strip.x;
+        Vector3<double> force = Vector3<double>::Zero();
+        bool has_moved = false;
+        for (const auto& event : strip.tear.update(strip.x, 1e-3, strip.sheet, NoFoundation())) {
+            has_moved |= event.moved.vertex != no_index;
+            for (const Index f : event.split.triangles) {
+                const auto& corners = event.split.corners_of(f);
+                const auto response = strip.sheet.triangle_response(f, corners, x);
+                const auto at = std::find(corners.begin(), corners.end(), event.split.vertex) - corners.begin();
+                force += response.force[static_cast<std::size_t>(at)];
+            }
+        }
+        CHECK(has_moved);
+        const auto forces = strip.tear.ligaments();
+        REQUIRE(forces.ligaments.size() == 1);
+        CHECK(norm<double>(forces.ligaments[0].force - force) < 0.03 * norm(force));
+    }
 }
 
 TEST_CASE("options of a tear are checked", "[tear]") {
