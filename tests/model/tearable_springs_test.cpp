@@ -269,7 +269,7 @@ TEST_CASE("before a tear the springs have the bits of the network", "[tear]") {
     CHECK(springs.springs().size() == network.springs().size());
     CHECK(test::refusal([&] { TearableSprings(icosphere<float>({.subdivisions = 1}), network); }) ==
           "TearableSprings: network must be of the mesh of 42 vertices, got one of 167");
-    // The same vertices, the diagonal the other way.
+    // The same vertices, the other diagonal.
     const TriangleMesh<float> one(Points<float>{{0, 1, 1, 0}, {0, 0, 1, 1}, {0, 0, 0, 0}},
                                   Triangles{{0, 0}, {1, 2}, {2, 3}});
     const TriangleMesh<float> other(one.positions(), Triangles{{0, 1}, {1, 2}, {3, 3}});

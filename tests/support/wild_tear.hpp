@@ -65,11 +65,11 @@ struct WildTear {
         const auto contact = tracker.update(tree, x, tool);
         const auto report =
             solver.step(x, dt, sheet, foundation, press(tool, contact), membrane::pull(held, pulled), tear.ligaments());
+        const bool advanced = report.status == membrane::StepStatus::advanced;
+        if (advanced) follow(tear.update(x, dt, sheet, foundation));
         tree.refit(x, report.moved);
         normals.update(x, report.moved);
-        if (report.status != membrane::StepStatus::advanced) return false;
-        follow(tear.update(x, dt, sheet, foundation));
-        return true;
+        return advanced;
     }
 
     std::array<Scalar, 2> state() const { return {x.sum(), static_cast<Scalar>(tear.torn_length())}; }

@@ -177,7 +177,7 @@ TEST_CASE("a snapshot holds the tear: ticks go on with the same bits, and before
 
 namespace {
 
-/// Opens each tip that heads this way, straight on, without energy.
+/// Opens each tip with a heading along x of `least` or more, straight on, without energy.
 struct Heading {
     double least = -2;  // along x
     bool opens(const auto& tip) const noexcept { return tip.heading[0] >= least; }
@@ -275,7 +275,7 @@ TEST_CASE("a cut into the side of a tear leaves its tip the vertices beside it",
 
 TEST_CASE("a reserve too small for one tip is reported, though another one advances", "[tear]") {
     TornSquare square(3, {.least = 0.5});
-    CHECK(square.cut({26, 25, 24}) == 1);  // its first tip would reach the border, and double two
+    CHECK(square.cut({26, 25, 24}) == 1);  // its first tip is next to the border: two would double
     CHECK(square.cut({8, 9, 10}) == 1);
     CHECK(square.update() == 1);
     CHECK(square.tear.reserve_used_up());

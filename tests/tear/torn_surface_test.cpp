@@ -294,8 +294,8 @@ Index doubled_by(const std::vector<Index>& path, const TornSurface<Scalar>& surf
     return doubled > 0 ? doubled : -1;
 }
 
-// Corners of two triangles are one vertex if they are at one vertex of the mesh before, and a way around it from one
-// triangle to the other crosses no edge that was cut.
+// Corners of two triangles are one vertex if they are at one vertex of the mesh before, and triangles around it join
+// them over edges that were not cut.
 template <Real Scalar>
 void check_cut(const TornSurface<Scalar>& surface, const Triangles& whole,
                const std::set<std::array<Index, 2>>& cut_sides) {

@@ -70,6 +70,9 @@ class AabbTree {
     /// vertex.
     void split(const VertexSplit& split) noexcept { boxes_.split(split); }
 
+    /// A vertex has moved as a tear has moved it: the next refit includes it. Online. Cost: the leaves around it.
+    void reshape(const MovedVertex<Scalar>& moved) noexcept { boxes_.reshape(moved); }
+
     // All queries take the positions of the last refit. They do not allocate. They report the number of boxes visited:
     // O(log F) for a small query near the surface, all boxes at worst.
 

@@ -49,8 +49,13 @@ class WideBvh {
     void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
     ///@}
 
-    /// A vertex becomes two: see `AabbTree`.
+    ///@{
+    /// A vertex becomes two; a vertex moves: see `AabbTree`.
     void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept {
+        for (const Index leaf : leaves_of_[moved.vertex]) stale_leaves_.insert(leaf);
+    }
+    ///@}
 
     /// Calls `examine(Index f, triangle)` for each triangle with a key below `limit`, of boxes with a key below
     /// `limit`. Visits sibling boxes by ascending key; `examine` may lower the limit. `key(box)` is one number a box;
@@ -131,7 +136,7 @@ class WideBvh {
     // Padded by repetition: branch prediction is better if nearly all rows have the same length.
     CompressedRows<Index> vertices_of_;       // of a leaf
     CompressedRows<Index> leaves_of_;         // around a vertex
-    IndexSet stale_leaves_;                   // to be refitted
+    IndexSet stale_leaves_;                   // to be refitted, by the next refit at the latest
     std::vector<std::uint64_t> stale_nodes_;  // 64 nodes a word
     TreeStatistics statistics_;
     bool has_reserve_;
@@ -363,13 +368,13 @@ void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x) noexcept {
     MEMBRANE_ASSERT(x.cols() == leaves_of_.row_count());
     for (Index leaf = 0; leaf < statistics_.leaves; ++leaf) fit_leaf(x, leaf);
     for (Index n = node_count(); n-- > 0;) fit_node(n);  // children come after their parent
+    stale_leaves_.clear();
 }
 
 template <Real Scalar>
 void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
     MEMBRANE_ASSERT(x.cols() == leaves_of_.row_count());
     if (moved.size() >= static_cast<std::size_t>(x.cols()) / 2) return refit(x);  // cheaper from here on
-    stale_leaves_.clear();
     for (const Index v : moved) {
         for (const Index leaf : leaves_of_[v]) stale_leaves_.insert(leaf);
     }
@@ -387,6 +392,7 @@ void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x, std::span<const Ind
             if (n != 0) mark_parent(n);
         }
     }
+    stale_leaves_.clear();
 }
 
 template <Real Scalar>
