@@ -15,6 +15,7 @@
 #include <membrane/model/triangular_springs.hpp>
 #include <membrane/surface/shapes.hpp>
 
+#include "support/orders.hpp"
 #include "support/random_tear.hpp"
 
 /// A stretched disc that is cut, pulled and pressed at random until its reserve is used up.
@@ -29,11 +30,12 @@ struct WildTear {
     using Vector = membrane::Vector3<Scalar>;
     using Springs = membrane::TearableSprings<Scalar, membrane::LinearSpring>;
     using Sheet = membrane::Tissue<Springs, membrane::Elements<Scalar, membrane::TriangularSpring<Scalar>>>;
+    static constexpr Index reserve = 25;
     static constexpr membrane::Material material{.young_modulus = 1e5, .poisson_ratio = 0.4, .thickness = 1e-4};
 
     explicit WildTear(std::uint64_t seed)
         : random(seed),
-          mesh(membrane::with_reserve(membrane::disc<Scalar>({.radius = 0.01, .rings = 8}), 40)),
+          mesh(membrane::with_reserve(membrane::disc<Scalar>({.radius = 0.01, .rings = 8}), reserve)),
           rim(membrane::border(mesh)),
           sheet(Springs(mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
                                                           {.stiffness = Scalar(1), .pinned = rim})),
@@ -43,6 +45,7 @@ struct WildTear {
                {.max_tips = 6, .move_vertices = random.chance(0.8)}),
           solver(sheet, {.layers = random.index(2) == 0 ? membrane::unlimited : 6,
                          .sweeps = 1 + random.index(4),
+                         .order = order_of(static_cast<int>(seed)),
                          .predict = random.chance(0.5)}),
           tree(mesh),
           tracker(mesh),
@@ -53,7 +56,7 @@ struct WildTear {
     /// One tick; returns whether the step advanced.
     bool tick() {
         if (random.chance(0.02)) follow(cut_at_random(random, tear, x));
-        if (random.chance(0.05)) held = random.index(mesh.vertex_count() - 40), target = membrane::point(x, held);
+        if (random.chance(0.05)) held = random.index(mesh.vertex_count() - reserve), target = membrane::point(x, held);
         target += random.template vector<Scalar>(Scalar(-2e-4), Scalar(2e-4));
         Vector pulled = target;
         tool.position =

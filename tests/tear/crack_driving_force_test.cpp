@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/tear/crack_driving_force.hpp>
 
+#include <membrane/model/fung.hpp>
 #include <membrane/model/neo_hookean.hpp>
 #include <membrane/model/triangular_springs.hpp>
 
@@ -66,6 +67,7 @@ void check(Make make) {
 TEST_CASE("the configurational force is the derivative of the energy by a rest position", "[tear]") {
     check([](const auto& mesh) { return triangular_springs(mesh, material); });
     check([](const auto& mesh) { return neo_hookean(mesh, material); });
+    check([](const auto& mesh) { return fung(mesh, material, {.stiffening = 1.5}); });
 }
 
 TEST_CASE("the squared tension of a triangle in uniaxial tension is that tension", "[tear]") {

@@ -348,7 +348,17 @@ TEST_CASE("options of a tear are checked", "[tear]") {
     };
     CHECK(with({.max_tips = 0}) == "Tearing: max_tips must be at least 1, got 0");
     CHECK(with({.patch_radius = 1}) == "Tearing: patch_radius must be 2 to 100 [edges], got 1");
+    CHECK(with({.patch_radius = 101}) == "Tearing: patch_radius must be 2 to 100 [edges], got 101");
+    CHECK(with({.patch_radius = NAN}) == "Tearing: patch_radius must be 2 to 100 [edges], got nan");
     CHECK(with({.min_angle = -1}) == "Tearing: min_angle must be 0 to 1 [rad], got -1");
+    CHECK(with({.min_angle = 1}) == "Tearing: min_angle must be 0 to 1 [rad], got 1");
+    CHECK(with({.min_angle = NAN}) == "Tearing: min_angle must be 0 to 1 [rad], got nan");
+    CHECK(with({}).empty());
+    CHECK(test::refusal([&] {
+              Tearing(mesh, EnergyRelease{0, 1});
+          }) == "EnergyRelease: toughness must be finite and positive [J/m^2], got 0");
+    CHECK(test::refusal([&] { Tearing(mesh, LargestTension{NAN}); }) ==
+          "LargestTension: strength must be finite and positive [N/m], got nan");
     CHECK(test::refusal([&] { static_cast<void>(with_reserve(mesh, -1)); }) ==
           "with_reserve: count must not be negative, got -1");
 }
