@@ -71,9 +71,11 @@ struct TornDisc {
           foundation(mesh, {.stiffness = Scalar(0.5)}),
           surface(mesh),
           solver(tissue, {.layers = unlimited,
+                          .adaptive_layers = seed % 5 == 4,
                           .sweeps = 10,
                           .order = test::order_of(seed),
                           .predict = seed % 2 == 0,
+                          .max_vertex_updates = seed % 7 == 6 ? 1500 : unlimited,
                           .force_tolerance = Scalar(is_double ? 1e-10 : 0)}),
           tree(mesh),
           tracker(mesh),
@@ -157,7 +159,7 @@ void check_follows(int& splits) {
         TornDisc<Scalar, Kind> disc(seed);
         const auto relax = [&] {
             StepReport<Scalar> report;
-            for (int n = 0; n < 3000 && !report.converged; ++n) report = disc.tick();
+            for (int n = 0; n < 20'000 && !report.converged; ++n) report = disc.tick();
             return report;
         };
         for (int n = 0; n < 4; ++n) disc.tool.position[2] -= Scalar(0.05), static_cast<void>(disc.tick());

@@ -135,6 +135,7 @@ TEMPLATE_TEST_CASE("a step in equilibrium has the force of a ligament's law acro
         unloaded += at < ligament.reached ? 1 : 0;
     }
     CAPTURE(closed, open, plateau, failed, unloaded);
+    if (cases(100) < 20) return;  // too few for each kind
     CHECK(closed > 0);
     CHECK(open > 0);
     CHECK(plateau > 0);
