@@ -77,7 +77,8 @@ class TornSurface {
     bool move_vertex(PointsRef<Scalar>& x, Index v, const Vector3<Scalar>& place, Scalar min_angle) noexcept;
 
     /// Doubles `v`: the triangles on the left of its edge to `out` get a copy, as far as the edge to `back` or to the next
-    /// border. Returns the copy, or `no_index` if nothing can part.
+    /// border. Returns the copy, or `no_index` if nothing can part. An end of such an edge that is on a border must be
+    /// split next, or it joins two fans of triangles; `back` is for a vertex that is not on a border.
     Index split(PointsRef<Scalar>& x, Index v, Index out, Index back = no_index) noexcept;
 
     /// Visits what a tear changes, see `core/snapshot.hpp`.
