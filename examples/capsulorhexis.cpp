@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
 //
-// Continuous curvilinear capsulorhexis: forceps lead a tear in the lens capsule round, until it meets its beginning. Force
+// Continuous curvilinear capsulorhexis: forceps guide a tear in the lens capsule round, until it meets its beginning. Force
 // beside that of surgeons, energies, how round the opening is, tension.
 #include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <numbers>
 
 #include <membrane/membrane.hpp>
 #include <membrane/meshing/distmesh.hpp>
@@ -26,7 +27,7 @@ const membrane::Material capsule = membrane::materials::lens_capsule().typical;
 constexpr double stiffer = 30;  // in bending than the capsule: else the flap crumples, as finely as its triangles
 constexpr double tick = 1e-3;   // [s]
 
-Opened open(const RhexisScene& scene, double toughness, Index sweeps) {
+Opened open(const RhexisScene& scene, double toughness, double lift, Index sweeps) {
     const auto& mesh = scene.mesh;
     const auto none = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
                                                   {.stiffness = 0.0, .pinned = scene.pinned});  // no springs
@@ -38,24 +39,25 @@ Opened open(const RhexisScene& scene, double toughness, Index sweeps) {
     auto tear =
         membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = toughness, .thickness = capsule.thickness});
     auto x = mesh.positions();
-    const auto settle = [&] {
+    const auto run_to_equilibrium = [&] {
         solver.wake_all();
         for (int i = 0; i < 300 && !solver.step(x, tick, tissue, body).converged; ++i) solver.wake_all();
     };
-    settle();  // its tension presses it onto the body
+    run_to_equilibrium();  // its tension presses it onto the body
     for (const auto& event : tear.cut_along(scene.cut(tear.surface()), x)) follow(event, tissue, body, solver);
+    if (tear.tips().size() < 2) membrane::refuse("capsulorhexis", "the mesh must have room for a cut");
 
-    Forceps forceps(scene);
+    Forceps forceps(scene, lift);
     Opened result;
-    while (result.ticks < 30'000 && (tear.tips().size() == 2 || !tear.ligaments().ligaments.empty())) {
+    while (result.ticks < 30'000 && !is_round(tear)) {
         const auto start = std::chrono::steady_clock::now();
-        forceps.lead(tear, x, tick);
+        forceps.guide(tear, x, tick);
         const auto report = solver.step(x, tick, tissue, body, forceps.hold(tear), tear.ligaments());
         for (const auto& event : tear.update(x, tick, tissue, body)) follow(event, tissue, body, solver);
         result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         result.add(scene, tissue, body, tear, x, forceps, report.reactions[0]);
     }
-    settle();
+    run_to_equilibrium();
     result.states.push_back(picture_of(scene, tissue, tear, x, forceps, Vector::Zero()));
     result.circularity = opening_of(scene, tear.surface()).circularity;
     return result;
@@ -65,11 +67,13 @@ int main(int argc, char** argv) {
     auto folder = std::filesystem::path(argv[0]).parent_path() / "pictures";
     MeshOptions other;
     double toughness = 1.4e3;  // of the amnion: that of the capsule is not known
+    double lift = 12;          // [degrees]
     Index sweeps = 4;
     CommandLine command("Tears a round opening into the lens capsule, and draws its tension.");
     other.add_to(command);
     command.add("--out", folder, "folder for pictures");
     command.add("--toughness", toughness, "energy that the tear takes [J/m^2]");
+    command.add_within("--lift", lift, 0, 80, "angle of the pull over the surface [degrees]");
     command.add("--sweeps", sweeps, "passes over the vertices in each step");
     return command.run(argc, argv, [&] {
         constexpr double ball = 10e-3, rim = 4e-3, edge = 0.3e-3;  // [m]
@@ -79,7 +83,7 @@ int main(int argc, char** argv) {
         const auto scene = other.file.empty() ? capsule_scene(membrane::distmesh(front, {.edge_length = edge}), ball)
                                               : rhexis_scene(other.specimen(stock_sphere()));
         std::filesystem::create_directories(folder);
-        const Opened opened = open(scene, toughness, sweeps);
+        const Opened opened = open(scene, toughness, lift * std::numbers::pi / 180, sweeps);
         print(scene, opened, toughness * capsule.thickness);
         save(folder / "capsulorhexis.svg", drawn(rhexis_figure(scene, opened.states)));
         std::puts(plot(folder / "capsulorhexis_force", {opened.force}, "capsulorhexis").c_str());

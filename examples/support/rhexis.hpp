@@ -21,7 +21,7 @@
 #include "support/peel.hpp"
 #include "support/specimen.hpp"
 
-/// A capsulorhexis: forceps lead a tear in the lens capsule round, to its own beginning.
+/// A capsulorhexis: forceps guide a tear in the lens capsule round, to its own beginning.
 namespace examples {
 
 using Vector = membrane::Vector3<double>;
@@ -179,6 +179,15 @@ inline std::vector<membrane::Index> RhexisScene::cut(const membrane::TornSurface
     return path;
 }
 
+/// Whether the leading tip has met the beginning of the tear, and the last edge has opened. One at the tip near the axis
+/// may be opening still.
+[[nodiscard]] inline bool is_round(const Tear& tear) {
+    if (tear.tips().size() > 1) return false;
+    const auto opening = tear.ligaments().ligaments;
+    const membrane::Index within = tear.tips().empty() ? membrane::no_index : tear.tips().front().behind[1];
+    return std::all_of(opening.begin(), opening.end(), [&](const auto& one) { return one.copy == within; });
+}
+
 /// Forceps that hold the flap behind the tear's tip, and their hand. While the tear advances toward d, the hand moves
 /// along e, and the flap between tip and forceps becomes longer against m: unit vectors from the tip to the held point,
 /// now and at rest. The driving force is the force times e - m. So the hand goes where the mirror image of the flap is,
@@ -186,11 +195,11 @@ inline std::vector<membrane::Index> RhexisScene::cut(const membrane::TornSurface
 /// ahead, the forceps open and grasp anew.
 class Forceps {
   public:
-    /// For a scene that outlives them.
-    explicit Forceps(const RhexisScene& scene) : scene_(scene) {}
+    /// For a scene that outlives them; they pull at an angle `lift` to the surface [rad].
+    Forceps(const RhexisScene& scene, double lift) : scene_(scene), lift_(lift) {}
 
     /// Moves the hand for a tick of `dt` [s], or opens or closes the forceps.
-    void lead(const Tear& tear, const membrane::Points<double>& x, double dt);
+    void guide(const Tear& tear, const membrane::Points<double>& x, double dt);
 
     /// What holds the flap.
     [[nodiscard]] membrane::PointAttachment<double> hold(const Tear& tear) const {
@@ -202,10 +211,9 @@ class Forceps {
     [[nodiscard]] int grasps() const { return grasps_; }
 
   private:
-    static constexpr double speed = 4e-3;      // of the hand [m/s]
+    static constexpr double speed = 6e-3;      // of the hand [m/s]
     static constexpr double ahead = 0.3;       // part of it at which it draws away from the tip
     static constexpr double open_time = 0.05;  // between two grasps [s]
-    static constexpr double lift = 0.2;        // of the flap over the surface [rad]
 
     static Vector middle_of(const std::array<Vector, 3>& corners) {
         return (corners[0] + corners[1] + corners[2]) / 3.0;
@@ -214,6 +222,7 @@ class Forceps {
     void grasp(const membrane::TornSurface<double>& surface, const Vector& place);
 
     const RhexisScene& scene_;
+    double lift_;
     membrane::Index triangle_ = membrane::no_index;
     Vector position_ = Vector::Zero();
     double open_for_ = 0;            // [s]
@@ -242,7 +251,7 @@ inline void Forceps::grasp(const membrane::TornSurface<double>& surface, const V
     ++grasps_;
 }
 
-inline void Forceps::lead(const Tear& tear, const membrane::Points<double>& x, double dt) {
+inline void Forceps::guide(const Tear& tear, const membrane::Points<double>& x, double dt) {
     if (tear.tips().size() < 2) {  // round
         position_ += ahead * speed * dt * drawn_;
         return;
@@ -257,18 +266,18 @@ inline void Forceps::lead(const Tear& tear, const membrane::Points<double>& x, d
     if (!closed() && open_for_ > 0) return;
     const Vector normal = surface.rest_normal(tip.vertex), toward = wanted_direction(start, normal);
     if (!closed()) {
-        grasp(surface, start - 0.3 * scene_.radius * toward + scene_.edge * normal.cross(toward));
+        grasp(surface, start - 0.3 * scene_.radius * toward + 1.5 * scene_.edge * normal.cross(toward));
         position_ = middle_of(surface.corners_at(x, triangle_));
         stretch_ = (position_ - now).norm() / to_held().norm();
     }
     const double length = to_held().norm(), most = speed * dt;
     const Vector held = membrane::direction_or_zero<double>(to_held() - normal.dot(to_held()) * normal);
     const double behind = -held.dot(toward);
-    fold_ = std::min(fold_ + most / length, std::numbers::pi - lift);
-    if (fold_ == std::numbers::pi - lift) stretch_ += ahead * most / length;
+    fold_ = std::min(fold_ + most / length, std::numbers::pi - lift_);
+    if (fold_ == std::numbers::pi - lift_) stretch_ += ahead * most / length;
     drawn_ = held + behind * ((1 - std::cos(fold_)) * toward + std::sin(fold_) * normal);
-    const Vector way = now + stretch_ * length * drawn_ - position_;
-    position_ += std::min(1.0, most / std::max(way.norm(), most)) * way;
+    const Vector move = now + stretch_ * length * drawn_ - position_;
+    position_ += std::min(1.0, most / std::max(move.norm(), most)) * move;
 }
 
 }  // namespace examples

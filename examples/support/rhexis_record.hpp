@@ -85,6 +85,10 @@ template <class Tissue>
     membrane::Points<double> rest(3, x.cols() + ball.vertex_count()), points = rest;
     rest << surface.rest_positions(), ball.positions();
     points << x, ball.positions();
+    for (Eigen::Index v = 0; v < x.cols(); ++v) {  // the flap lies on the membrane: drawn a little above, to hide it
+        if ((points.col(v) - rest.col(v)).norm() > scene.radius / 6)
+            points.col(v) += scene.radius / 12 * scene.axis.eigen();
+    }
     Picture picture{.mesh = {rest, triangles.leftCols(used)}, .points = points};
     picture.values = values.head(used).eval();
     if (opening.circularity > 0) return picture;
@@ -140,8 +144,9 @@ void Opened::add(const RhexisScene& scene, const Tissue& tissue, const BallUnder
     held_ = forceps.closed();
     last_ = forceps.position();
     last_force_ = felt;
+    if (!held_ || tear.tips().size() < 2) return;
     const bool is_half = scene.angle(tear.surface().rest_positions().col(tear.tips().back().vertex)) > std::numbers::pi;
-    if (held_ && tear.tips().size() == 2 && states.size() < (is_half ? 2u : 1u)) {
+    if (states.size() < (is_half ? 2u : 1u)) {
         states.push_back(picture_of(scene, tissue, tear, x, forceps, felt));
     }
 }
