@@ -45,7 +45,7 @@ Opened open(const RhexisScene& scene, double toughness, double lift, Index sweep
     };
     run_to_equilibrium();  // its tension presses it onto the body
     for (const auto& event : tear.cut_along(scene.cut(tear.surface()), x)) follow(event, tissue, body, solver);
-    if (tear.tips().size() < 2) membrane::refuse("capsulorhexis", "the mesh must have room for a cut");
+    if (tear.tips().size() < 2) membrane::refuse("capsulorhexis", "the mesh must be fine enough for a cut");
 
     Forceps forceps(scene, lift);
     Opened result;
