@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdio>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include <membrane/model/triangular_springs.hpp>
+
+#include "support/plot.hpp"
+#include "support/rhexis.hpp"
+#include "support/tension.hpp"
+
+/// What a capsulorhexis took: force, energies, the opening, pictures.
+namespace examples {
+
+/// The opening, once the tear has met its beginning.
+struct Opening {
+    std::vector<bool> inside;  ///< for each triangle: it has come off
+    double circularity = 0;    ///< 4 pi area / perimeter^2 at rest, seen along the axis; 0: it is not closed
+};
+
+/// The triangles that are not joined to `scene.pinned`, and the border that they leave.
+[[nodiscard]] inline Opening opening_of(const RhexisScene& scene, const membrane::TornSurface<double>& surface) {
+    using membrane::Index;
+    const auto at = [](Index f) { return static_cast<std::size_t>(f); };
+    const auto& adjacency = surface.adjacency();
+    const membrane::TriangleAdjacency before(scene.mesh);
+    Opening opening{std::vector<bool>(at(scene.mesh.triangle_count()), true)};
+    std::vector<Index> left;
+    for (const Index v : scene.pinned) {
+        for (const Index f : adjacency.triangles_of(v)) left.push_back(f);
+    }
+    double area = 0, length = 0;
+    while (!left.empty()) {
+        const Index f = left.back();
+        left.pop_back();
+        if (!opening.inside[at(f)]) continue;
+        opening.inside[at(f)] = false;
+        const auto corners = surface.corners_at(surface.rest_positions(), f);
+        for (std::size_t k = 0; k < 3; ++k) {
+            const Index across = adjacency.triangle_neighbours(f)[k];
+            if (across != membrane::no_index) left.push_back(across);
+            if (across != membrane::no_index || before.triangle_neighbours(f)[k] == membrane::no_index) continue;
+            const Vector from = corners[k] - scene.middle, to = corners[(k + 1) % 3] - scene.middle;
+            area -= scene.axis.dot(from.cross(to)) / 2;
+            length += scene.axis.cross(to - from).norm();
+        }
+    }
+    const bool closed = std::find(opening.inside.begin(), opening.inside.end(), true) != opening.inside.end();
+    if (closed) opening.circularity = 4 * std::numbers::pi * area / (length * length);
+    return opening;
+}
+
+/// The membrane with its tension as colour, the ball under it, and the forceps with the force on them. What has come off
+/// is taken away.
+template <class Tissue>
+[[nodiscard]] Picture picture_of(const RhexisScene& scene, const Tissue& tissue, const Tear& tear,
+                                 const membrane::Points<double>& x, const Forceps& forceps, const Vector& felt) {
+    const auto& surface = tear.surface();
+    const Opening opening = opening_of(scene, surface);
+    const auto ball = scene.ball_under_opening();
+    const Eigen::Index count = surface.triangles().cols(),
+                       under = scene.ball_stiffness > 0 ? ball.triangles().cols() : 0;
+    Eigen::VectorXd tension;
+    tissue.for_each_kind([&]<class E>(const membrane::Elements<double, E>& elements) {
+        if constexpr (std::same_as<E, membrane::TriangularSpring<double>>) tension = tensions(elements, x);
+    });
+    membrane::Triangles triangles(3, count + under);
+    Eigen::VectorXd values = Eigen::VectorXd::Zero(count + under);
+    Eigen::Index used = 0;
+    for (Eigen::Index f = 0; f < count; ++f) {
+        if (opening.circularity > 0 && opening.inside[static_cast<std::size_t>(f)]) continue;
+        triangles.col(used) = surface.triangles().col(f);
+        values[used++] = tension[f];
+    }
+    triangles.middleCols(used, under) =
+        ball.triangles().leftCols(under).array() + static_cast<membrane::Index>(x.cols());
+    used += under;
+    membrane::Points<double> rest(3, x.cols() + ball.vertex_count()), points = rest;
+    rest << surface.rest_positions(), ball.positions();
+    points << x, ball.positions();
+    for (Eigen::Index v = 0; v < x.cols(); ++v) {  // the flap lies on the membrane: drawn a little above, to hide it
+        if ((points.col(v) - rest.col(v)).norm() > scene.radius / 6)
+            points.col(v) += scene.radius / 12 * scene.axis.eigen();
+    }
+    Picture picture{.mesh = {rest, triangles.leftCols(used)}, .points = points};
+    picture.values = values.head(used).eval();
+    if (opening.circularity > 0) return picture;
+    picture.tool = membrane::Tool<double>{.position = forceps.position(), .radius = scene.edge / 2};
+    picture.force = felt.eigen();
+    return picture;
+}
+
+/// What a capsulorhexis took.
+struct Opened {
+    Curve force = {};             ///< on the forceps over the torn length [mm], [mN]
+    std::vector<Picture> states;  ///< before, during, after
+    double work = 0;              ///< of the hand [J]
+    double let_go = 0;            ///< lost while the forceps are open [J]
+    double stored = 0, torn = 0;  ///< in membrane, ball and opening edges; by the tear [J]
+    double length = 0;            ///< torn [m]
+    double circularity = 0;       ///< of the opening
+    double seconds = 0;           ///< of computation
+    int ticks = 0, grasps = 0;
+
+    /// A tick.
+    template <class Tissue>
+    void add(const RhexisScene& scene, const Tissue& tissue, const BallUnder& body, const Tear& tear,
+             const membrane::Points<double>& x, const Forceps& forceps, const Vector& felt);
+
+    ///@{
+    /// Of the force that is felt: root of the mean square, largest [N]. Mean angle between it and the tear [rad].
+    [[nodiscard]] double rms() const { return std::sqrt(squares_ / held_ticks_); }
+    [[nodiscard]] double peak() const { return peak_; }
+    [[nodiscard]] double angle() const { return angles_ / advances_; }
+    ///@}
+
+  private:
+    void add_force(const Tear& tear, const Forceps& forceps, const Vector& felt);
+
+    Vector last_ = Vector::Zero(), last_force_ = Vector::Zero();
+    bool held_ = false;
+    double squares_ = 0, held_ticks_ = 0, peak_ = 0, angles_ = 0, advances_ = 0;
+};
+
+template <class Tissue>
+void Opened::add(const RhexisScene& scene, const Tissue& tissue, const BallUnder& body, const Tear& tear,
+                 const membrane::Points<double>& x, const Forceps& forceps, const Vector& felt) {
+    if (forceps.closed()) add_force(tear, forceps, felt);
+    const double before = stored + torn;
+    stored = body.energy(x) + tear.stored(x);
+    tissue.for_each_element([&](const auto& one) { stored += one.element.energy(one.where(x)); });
+    torn = tear.dissipated();
+    if (!forceps.closed()) let_go += before - stored - torn;
+    length = tear.torn_length();
+    grasps = forceps.grasps();
+    ++ticks;
+    held_ = forceps.closed();
+    last_ = forceps.position();
+    last_force_ = felt;
+    if (!held_ || tear.tips().size() < 2) return;
+    const bool is_half = scene.angle(tear.surface().rest_positions().col(tear.tips().back().vertex)) > std::numbers::pi;
+    if (states.size() < (is_half ? 2u : 1u)) {
+        states.push_back(picture_of(scene, tissue, tear, x, forceps, felt));
+    }
+}
+
+inline void Opened::add_force(const Tear& tear, const Forceps& forceps, const Vector& felt) {
+    if (held_) work -= (last_force_ + felt).dot(forceps.position() - last_) / 2;
+    squares_ += felt.squaredNorm();
+    ++held_ticks_;
+    peak_ = std::max(peak_, felt.norm());
+    force.push_back({1e3 * tear.torn_length(), 1e3 * felt.norm()});
+    if (!(tear.torn_length() > length) || tear.tips().size() < 2) return;
+    angles_ += std::acos(-tear.tips().back().heading.dot(felt) / felt.norm());
+    ++advances_;
+}
+
+/// Prints it; `resistance` is the energy that a length of the tear takes [J/m].
+inline void print(const RhexisScene& scene, const Opened& opened, double resistance) {
+    std::printf("%s, %d vertices: circularity %.3f; %.3g mm torn in %d ticks, %.0f us for a tick, %d grasps\n",
+                scene.name.c_str(), int{scene.mesh.vertex_count()}, opened.circularity, 1e3 * opened.length,
+                opened.ticks, 1e6 * opened.seconds / opened.ticks, opened.grasps);
+    std::printf("  force: RMS %.3g mN (surgeons: expert 8.97, novice 17.16), peak %.3g mN, %.0f degrees off the tear\n",
+                1e3 * opened.rms(), 1e3 * opened.peak(), 180 / std::numbers::pi * opened.angle());
+    std::printf("  the tear took %.3f of toughness * thickness * length\n", opened.torn / (resistance * opened.length));
+    std::printf("  the hand's work %.3g uJ = %.3g stored + %.3g torn + %.3g as the forceps opened, within %.1f %%\n",
+                1e6 * opened.work, 1e6 * opened.stored, 1e6 * opened.torn, 1e6 * opened.let_go,
+                100 * std::abs(1 - (opened.stored + opened.torn + opened.let_go) / opened.work));
+}
+
+/// The pictures side by side.
+[[nodiscard]] inline Figure rhexis_figure(const RhexisScene& scene, std::vector<Picture> states) {
+    const auto& rest = scene.mesh.positions();
+    const double width = (rest.rowwise().maxCoeff() - rest.rowwise().minCoeff()).maxCoeff();
+    double tension = 0, force = 1e-9;
+    for (const Picture& state : states) {
+        tension = std::max(tension, detail::quantile(*state.values, 0.98));
+        force = std::max(force, state.force.norm());
+    }
+    Figure figure{.name = scene.name,
+                  .title = "Capsulorhexis: tension before, during and after",
+                  .camera = {.target = scene.middle.eigen(),
+                             .azimuth = -28,
+                             .elevation = 55,
+                             .distance = 8 * width,
+                             .metre = 270 / width},
+                  .cell_height = 250};
+    const std::vector<std::string> titles{"The cut", "Half round", "The flap is taken out"};
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        states[i].arrow = 0.2 * width / force;
+        states[i].colours = {
+            .name = "mean tension", .unit = "N/m", .per_unit = 1, .low = 0, .high = std::ceil(tension)};
+        figure.panels.push_back({i + 1 < states.size() ? titles[i] : titles.back(),
+                                 i == 0 ? std::to_string(scene.mesh.vertex_count()) + " vertices" : "", states[i]});
+    }
+    return figure;
+}
+
+}  // namespace examples

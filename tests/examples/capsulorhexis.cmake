@@ -1,0 +1,22 @@
+# cmake -D program=FILE -D folder=DIR -P capsulorhexis.cmake: the tear meets its beginning, the opening is round, and the
+# picture is small and whole.
+file(REMOVE_RECURSE ${folder})
+execute_process(COMMAND ${program} --out ${folder} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
+if(NOT code EQUAL 0 OR NOT error STREQUAL "")
+    message(FATAL_ERROR "expected exit code 0 and no error, got ${code}:\n${error}")
+endif()
+if(NOT output MATCHES "^capsule, [^;]* circularity ([0-9.]+); ")
+    message(FATAL_ERROR "expected the circularity of the opening:\n${output}")
+endif()
+if(NOT CMAKE_MATCH_1 GREATER 0.9 OR CMAKE_MATCH_1 GREATER 1)
+    message(FATAL_ERROR "expected a circularity of 0.9 to 1:\n${output}")
+endif()
+
+set(svg ${folder}/capsulorhexis.svg)
+file(SIZE ${svg} size)
+file(READ ${svg} text)
+string(REGEX MATCHALL "<circle " tools "${text}")
+list(LENGTH tools count)
+if(size GREATER 300000 OR NOT count EQUAL 2 OR NOT text MATCHES "^<svg .*</svg>\n$" OR text MATCHES "nan|inf[^o]")
+    message(FATAL_ERROR "${svg} is not a small drawing with forceps in two of three states: ${size} bytes, ${count} tools")
+endif()
