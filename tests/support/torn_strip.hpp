@@ -141,6 +141,13 @@ class TornStrip {
         work = energy();
     }
 
+    /// Holds this vertex where it is, moved by `displacement`, and finds the equilibrium.
+    void hold(Index v, const Vector& displacement) {
+        held.push_back(v);
+        x.col(v) += displacement;
+        relax(3000);
+    }
+
     /// The clamps move apart by `by` of the height; up to 20 steps, and what tears then.
     void tick(double by) {
         const double apart = by * height();
@@ -192,8 +199,8 @@ class TornStrip {
     void relax(int steps) {
         for (int i = 0; i < steps; ++i) {
             solver.wake_all();
-            report =
-                solver.step(x, Scalar(1e-3), sheet, membrane::NoFoundation(), tear.ligaments(), membrane::pin(top));
+            report = solver.step(x, Scalar(1e-3), sheet, membrane::NoFoundation(), tear.ligaments(), membrane::pin(top),
+                                 membrane::pin(held));
             if (at_rest()) return;
         }
     }
@@ -211,7 +218,8 @@ class TornStrip {
     membrane::Tearing<Scalar> tear;
     membrane::QuasiStaticSolver<Scalar> solver;
     membrane::Points<Scalar> x;
-    std::vector<Index> top;
+    std::vector<Index> top;   ///< vertices of the upper clamp
+    std::vector<Index> held;  ///< others that are held
     membrane::StepReport<Scalar> report;
     Vector start = Vector::Zero();  ///< of the tear
     double stretched = 1, work = 0;

@@ -53,7 +53,8 @@ TEST_CASE("a tear in pure shear begins at the right stretch, on any grid, and ru
         REQUIRE(strip.torn_edges() >= 12);
         CHECK(begins == Approx(strip.critical_stretch()).epsilon(0.03));
         CHECK(off_line <= 0.7);
-        CHECK(strip.balance() == Approx(1).epsilon(0.025));  // with what the relaxation of quick ticks takes
+        CHECK(strip.balance() ==
+              Approx(1).epsilon(0.012));  // an edge opens in quick ticks, whose relaxation takes energy
     }
 }
 
@@ -80,6 +81,49 @@ TEST_CASE("the driving force is the energy that is released, whatever the length
 }
 
 // Without moved vertices a tear keeps to the edges of a turned grid.
+TEST_CASE("what forceps do near a tip is not taken for the tear's driving force", "[tear]") {
+    std::array<double, 3> forces{};
+    const std::array<double, 3> patches{2, 5, 5};
+    for (std::size_t i = 0; i < 3; ++i) {
+        TornStrip<double> strip({.tear = {.patch_radius = patches[i]}});
+        strip.cut();
+        strip.stretch(0.9 * strip.critical_stretch());
+        Index near = 0;  // beyond the smaller patch, within the larger one
+        const auto distance = [&](Index v) {
+            const auto at = strip.start + Vector3<double>(1.5, 2.2, 0) * strip.edge;
+            return norm<double>(point(strip.mesh.positions(), v) - at);
+        };
+        for (Index v = 0; v < strip.surface.vertex_count(); ++v) near = distance(v) < distance(near) ? v : near;
+        strip.hold(near, Vector3<double>(1, 0.5, 0) * (0.3 * strip.edge));
+        const std::array<Index, 1> held{near};
+        const auto ignored = i == 1 ? std::span<const Index>(held) : std::span<const Index>();
+        REQUIRE(strip.tear.update(strip.x, 1e-3, strip.sheet, NoFoundation(), ignored).empty());
+        forces[i] = norm(strip.tear.tips()[0].driving_force);
+    }
+    CAPTURE(forces[0], forces[1], forces[2]);
+    CHECK(forces[1] == Approx(forces[0]).epsilon(0.05));
+    CHECK(forces[2] != Approx(forces[0]).epsilon(0.2));
+}
+
+TEST_CASE("an edge that the load does not draw apart does not hold the tip", "[tear]") {
+    TornStrip<double> strip({});
+    strip.cut();
+    strip.stretch(0.98 * strip.critical_stretch());
+    const double resistance = 1000 * strip.thickness;
+    double largest = 0;
+    for (int tick = 0; tick < 400 && strip.torn_edges() < 3; ++tick) {
+        strip.tick(strip.at_rest() ? 1e-3 : 0.0);
+        REQUIRE(strip.report.status == StepStatus::advanced);
+        const auto opening = strip.tear.ligaments().ligaments;
+        if (strip.held.empty() && !opening.empty()) strip.held = {opening[0].vertex, opening[0].copy};
+        largest = std::max(largest, norm(strip.tear.tips()[0].driving_force) / resistance);
+    }
+    CHECK(!strip.held.empty());
+    CHECK(strip.torn_edges() >= 3);
+    CHECK(largest > 1.45);
+    CHECK(largest < 2);
+}
+
 TEST_CASE("without moved vertices the grid steers the tear", "[tear]") {
     TornStrip<double> strip({.turn = 20 * degree, .tear = {.move_vertices = false}});
     double off_line = 0;

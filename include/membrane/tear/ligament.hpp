@@ -39,6 +39,9 @@ struct Ligament {
     /// The largest force at any separation from now on [N].
     [[nodiscard]] Scalar largest_tension() const noexcept { return first_tension(reached); }
 
+    /// That it takes until it fails [J].
+    [[nodiscard]] Scalar energy() const noexcept { return strength * (plateau + failure_opening) / 2; }
+
     /// Energy that it would give back [J].
     [[nodiscard]] Scalar stored(Scalar opening) const noexcept { return tension(opening) * opening / 2; }
 

@@ -47,6 +47,7 @@ struct TearTip {
     std::array<Index, 2> behind{no_index, no_index};          ///< the vertex behind it and its copy
     Vector3<Scalar> heading = Vector3<Scalar>::Zero();        ///< direction of its last advance at rest
     Scalar advanced = 0;                                      ///< by its last advance [m]
+    Scalar energy_left = 0;                                   ///< that the next edge takes besides its own [J]
     Vector3<Scalar> driving_force = Vector3<Scalar>::Zero();  ///< by the last update [N]
 };
 
@@ -72,7 +73,8 @@ void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
 /// [Miehe07] says what energy an advance would release, and in which direction most. If the `Criterion` says so, the next
 /// vertex in that direction moves onto it, at rest and now, and the edge to it opens: the tip's vertex becomes two, from a
 /// reserve (`with_reserve`). A `Ligament` takes up the energy of the edge as it opens. The tip goes on when that has
-/// failed. Triangles keep their numbers; other parts `follow` the events.
+/// failed. An edge that the load no longer draws apart would hold the tip: at 1.5 times the resistance it fails as well,
+/// and the next edge takes what is left of its energy. Triangles keep their numbers; other parts `follow` the events.
 ///
 /// A flap may pass through the membrane: there is no contact of the membrane with itself. A membrane that slips over its
 /// foundation and elements that are no triangles do not count in the driving force.
@@ -98,9 +100,11 @@ class Tearing {
     /// The forces across opening edges: a constraint of the step.
     [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items()}; }
 
-    /// After a step of `dt` [s]: edges open, tips advance.
+    /// After a step of `dt` [s]: edges open, tips advance. `held`: the few vertices on which tools act, as the corners of a
+    /// triangle in forceps; their forces are none of a tear.
     template <class Network, class Volume>
-    [[nodiscard]] Events update(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume) noexcept;
+    [[nodiscard]] Events update(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
+                                std::span<const Index> held = {}) noexcept;
 
     /// The tips within the membrane.
     [[nodiscard]] std::span<const TearTip<Scalar>> tips() const noexcept { return tips_.items(); }
@@ -134,6 +138,7 @@ class Tearing {
         is_outer_border_[static_cast<std::size_t>(copy)] = is_outer_border_[static_cast<std::size_t>(v)];
     }
     void open_ligaments(const ConstPointsRef<Scalar>& x) noexcept;
+    void let_go(TearTip<Scalar>& tip) noexcept;
     [[nodiscard]] bool is_opening(Index copy) const noexcept {
         const auto all = ligaments_.items();
         return std::any_of(all.begin(), all.end(), [copy](const auto& ligament) { return ligament.copy == copy; });
@@ -157,6 +162,7 @@ class Tearing {
     TearOptions options_;
     TornSurface<Scalar> surface_;
     FixedVector<TearTip<Scalar>> tips_;
+    std::span<const Index> held_;         // in this update
     std::vector<Vector3<Scalar>> opens_;  // of each tip, where it advances to in this update; 0: nowhere
     FixedVector<Ligament<Scalar>> ligaments_;
     double failed_ = 0, torn_length_ = 0;
@@ -249,7 +255,7 @@ template <Real Scalar, TearCriterion<Scalar> Criterion>
 void Tearing<Scalar, Criterion>::add_tip(Index v, Index behind, Index copy) noexcept {
     const auto& rest = surface_.rest_positions();
     const Vector3<Scalar> edge = point(rest, v) - point(rest, behind);
-    tips_.try_push_back({v, {behind, copy}, direction_or_zero(edge), norm(edge)});
+    tips_.try_push_back({v, {behind, copy}, direction_or_zero(edge), norm(edge), 0});
 }
 
 // A tear runs into the border at a vertex. If that is the tip of another one, there is no tip any more; if it is beside
@@ -297,12 +303,27 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
     for (auto& ligament : all) {
         ligament.open(norm<Scalar>(point(x, ligament.vertex) - point(x, ligament.copy)));
         if (ligament.failed()) {
-            failed_ += static_cast<double>(ligament.dissipated);
+            failed_ += static_cast<double>(ligament.dissipated + ligament.stored(ligament.reached));
         } else {
             all[left++] = ligament;
         }
     }
     ligaments_.truncate(left);
+}
+
+// The edge behind the tip fails before its time: what it has not taken, the next one will, but no more than that of an edge.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+void Tearing<Scalar, Criterion>::let_go(TearTip<Scalar>& tip) noexcept {
+    const auto all = ligaments_.items();
+    const auto most = static_cast<Scalar>(criterion_.resistance()) * tip.advanced;
+    const auto end = std::remove_if(all.begin(), all.end(), [&](const auto& ligament) {
+        if (ligament.copy != tip.behind[1]) return false;
+        const Scalar taken = ligament.dissipated + ligament.stored(ligament.reached);
+        failed_ += static_cast<double>(taken);
+        tip.energy_left = std::clamp(ligament.energy() - taken, Scalar(0), most);
+        return true;
+    });
+    ligaments_.truncate(static_cast<std::size_t>(end - all.begin()));
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
@@ -323,9 +344,10 @@ double Tearing<Scalar, Criterion>::stored(const ConstPointsRef<Scalar>& x) const
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network, class Volume>
-auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Network& network,
-                                        const Volume& volume) noexcept -> Events {
+auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
+                                        std::span<const Index> held) noexcept -> Events {
     surface_.begin();
+    held_ = held;
     used_up_ = false;
     open_ligaments(x);
     const auto all = tips_.items();
@@ -333,9 +355,14 @@ auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Ne
     for (std::size_t i = 0; i < all.size(); ++i) {
         auto& tip = all[i];
         opens_[i] = Vector3<Scalar>::Zero();
-        if (is_opening(tip.behind[1])) continue;
         tip.driving_force = driving_force_at(tip.vertex, x, dt, network, volume);
         TipState<Scalar> state{tip.driving_force, 0, Vector3<Scalar>::Zero(), tip.heading};
+        if (is_opening(tip.behind[1])) {
+            constexpr auto overload = Scalar(1.5);
+            state.driving_force /= overload;
+            if (criterion_.opens(state)) let_go(tip);
+            continue;
+        }
         find_tension(state, tip.vertex, x, network);
         const Vector3<Scalar> direction = criterion_.direction(state);
         if (is_finite(direction) && criterion_.opens(state)) opens_[i] = direction;
@@ -391,6 +418,7 @@ Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const Co
     const auto weight = [&](Index v) {
         const auto distance = norm<Scalar>(point(rest, v) - point(rest, tip));
         if (is_outer_border_[static_cast<std::size_t>(v)] != 0) return Scalar(0);
+        if (v != tip && std::find(held_.begin(), held_.end(), v) != held_.end()) return Scalar(0);
         return std::clamp(2 - 2 * distance / radius, Scalar(0), Scalar(1));
     };
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
@@ -478,18 +506,20 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     tip.heading = direction_or_zero(edge);
     tip.behind = {v, copy};
     tip.advanced = length;
+    tip.energy_left = 0;
     return true;
 }
 
 // It begins with the force that the membrane has transmitted through the vertex, and ends with the opening that the edge
 // behind has now, as in a virtual crack closure [Rybicki77]. A force that decreases linearly has half their product as its
-// energy. Where the sides part without stretch, as the legs of a torn strip, more: it first keeps its strength.
+// energy. Where the sides part without stretch, as the legs of a torn strip, more: it first keeps its strength, and if that
+// is not enough, it is stronger.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network>
 void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index copy, Scalar length,
                                               const ConstPointsRef<Scalar>& x, const Network& network) noexcept {
     const Index v = tip.vertex;
-    const auto energy = static_cast<Scalar>(criterion_.resistance()) * length;
+    const auto energy = static_cast<Scalar>(criterion_.resistance()) * length + tip.energy_left;
     if (!(energy > 0)) return;
     const auto forces_on = [&](Index end, const VertexSplit& split) {
         Vector3<Scalar> sum = Vector3<Scalar>::Zero();
@@ -512,15 +542,15 @@ void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index 
     }
     // Below the membrane's force: it opens at once, though that does not decrease quite linearly.
     constexpr auto yields = Scalar(0.98);
-    Ligament<Scalar> ligament{v, copy, yields * force, yields * strength};
-    ligament.failure_opening = 2 * energy / strength;
+    Ligament<Scalar> ligament{v, copy, yields * force};
     const auto [left, right] = tip.behind;
-    const auto opens = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
-    if (ligament.failure_opening > opens && opens > 0) {
-        ligament.plateau = (std::min)(ligament.failure_opening - opens, opens);
-        ligament.failure_opening = opens;
-        ligament.strength = (std::max)(ligament.strength, yields * energy / opens);
-    }
+    const auto behind = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
+    const Scalar opens = (std::max)(behind, length / 4);  // the edge behind may hardly be open
+    ligament.strength = (std::max)(strength, energy / opens);
+    const Scalar sum = 2 * energy / ligament.strength;
+    ligament.failure_opening = (std::min)(sum, opens);
+    ligament.plateau = sum - ligament.failure_opening;
+    ligament.strength *= yields;
     if (!ligaments_.try_push_back(ligament)) failed_ += static_cast<double>(energy);
 }
 
