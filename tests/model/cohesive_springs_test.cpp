@@ -296,6 +296,40 @@ TEST_CASE("damage is permanent until a reset, kept by a snapshot, and not done b
     CHECK(springs.adheres(0));
 }
 
+TEST_CASE("a vertex that becomes several has the forces, the energy and the damage of one that does not",
+          "[cohesion][tear]") {
+    for (int seed = 1; seed <= cases(100); ++seed) {
+        CAPTURE(seed);
+        Bonded<double> whole(seed), parted(seed);
+        std::vector<Index> parts{0};
+        for (int tick = 0; tick < 30; ++tick) {
+            const auto x = parted.at(whole.random.number(-0.3, 0.7), whole.random.number(-0.7, 0.7));
+            if (parts.size() < 4 && whole.random.chance(0.2)) {
+                const Index v = parts[static_cast<std::size_t>(whole.random.index(static_cast<Index>(parts.size())))];
+                const auto copy = static_cast<Index>(parts.size());  // of the sphere: it has no part in this
+                parted.springs.split({.vertex = v, .copy = copy, .area_share = whole.random.number()});
+                parts.push_back(copy);
+            }
+            double energy = 0;
+            Vector3<double> force = Vector3<double>::Zero();
+            for (const Index v : parts) {
+                energy += parted.springs.energy(v, x);
+                force += parted.springs.force_on(v, x, x, 1).force;
+            }
+            const auto expected = whole.springs.force_on(0, x, x, 1).force;
+            REQUIRE(norm<double>(force - expected) <= 1e-12 * norm(expected));
+            REQUIRE(energy == Approx(whole.springs.energy(0, x)).epsilon(1e-12));
+            if (whole.random.chance(0.5)) continue;
+            whole.move_to(x);
+            Points<double> all = parted.mesh.positions();
+            for (const Index v : parts) all.col(v) = x;
+            parted.springs.update(all, parts);
+            REQUIRE(parted.springs.dissipated() == Approx(whole.springs.dissipated()).epsilon(1e-12));
+            for (const Index v : parts) REQUIRE(parted.springs.damage(v) == whole.springs.damage(0));
+        }
+    }
+}
+
 TEST_CASE("a vertex of strength zero does not adhere, and is supported", "[cohesion]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     std::vector<double> strength(12, 1.0);

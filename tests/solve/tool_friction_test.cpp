@@ -14,10 +14,13 @@
 #include <membrane/core/snapshot.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/model/moving_foundation.hpp>
+#include <membrane/model/tearable_springs.hpp>
+#include <membrane/tear/tearing.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/random_tear.hpp"
 #include "support/refusal.hpp"
 #include "support/soft_disc.hpp"
 
@@ -81,6 +84,50 @@ struct Drag : test::SoftDisc<S> {
             normal += static_cast<double>(point.pressure);
         }
         return tangential / normal;
+    }
+};
+
+/// A ball that drags a disc which tears.
+template <Real S>
+struct TornDrag {
+    double radius, depth;  // of the ball; pressed in [m]
+    S stiffness;           // of the membrane's springs [N/m]
+    test::SoftDisc<S> whole{12};
+    TriangleMesh<S> mesh = with_reserve(whole.mesh, 40);
+    TearableSprings<S, LinearSpring> network{
+        mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = stiffness, .pinned = border(mesh)})};
+    FoundationSprings<S> foundation{
+        mesh,
+        {.normal = normal_stiffnesses(mesh, whole.layer), .tangential = tangential_stiffnesses(mesh, whole.layer)}};
+    TornSurface<S> surface{mesh};
+    QuasiStaticSolver<S> solver{network, {.layers = unlimited, .sweeps = 20}};
+    AabbTree<S> tree{mesh};
+    ContactTracker<S> tracker{mesh};
+    ToolFriction<S> friction{{.coefficient = 0.6}};
+    Points<S> x = mesh.positions();
+    Tool<S> tool{.position = {S(0), S(0), S(radius)}, .radius = S(radius)};
+
+    /// The ball's lowest point goes to `at` along the disc, in ten ticks, and stays for `wait`.
+    void drag_to(const Vector3<S>& at, int wait) {
+        const Vector3<S> from = tool.position, to(at[0], at[1], S(radius - depth));
+        for (int i = 1; i <= 10 + wait; ++i) {
+            tool.position = from + S(std::min(0.1 * i, 1.0)) * (to - from);
+            const auto contact = tracker.update(tree, x, tool);
+            const auto report = solver.step(x, S(1e-3), network, foundation, friction.press(tool, contact));
+            REQUIRE(report.status == StepStatus::advanced);
+            tree.refit(x, report.moved);
+        }
+    }
+    void follow_events() {
+        for (const auto& event : surface.events()) follow(event, network, foundation, solver, tree, tracker, friction);
+    }
+    [[nodiscard]] Vector3<S> rest_place(const StickingPoint<S>& point) const {
+        return point_at(triangle_at(surface.rest_positions(), surface.corners(point.triangle)), point.weights);
+    }
+    /// Distance along the surface of a point's place from where the tool holds it [m].
+    [[nodiscard]] S off(const StickingPoint<S>& point) const {
+        const Vector3<S> off = point_at(triangle_at(x, point.corners), point.weights) - tool.position - point.offset;
+        return norm<S>(off - dot(off, point.normal) * point.normal);
     }
 };
 
@@ -295,6 +342,67 @@ TEST_CASE("friction is restored from a snapshot, and runs on to the same bits", 
     drag.friction.reset();
     CHECK(drag.friction.points().empty());
     CHECK_FALSE(drag.friction.slips());
+}
+
+TEMPLATE_TEST_CASE("a held place stays the same place of the tissue as vertices split and move at rest",
+                   "[friction][tear]", double, float) {
+    int parted = 0, reshaped = 0;
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        TornDrag<TestType> drag{10e-3, 0.2e-3, TestType(20)};
+        drag.drag_to(TestType(1e-3) * random.unit_vector<TestType>(), 5);
+        REQUIRE(drag.friction.points().size() > 3);
+        for (int n = 0; n < 100; ++n) {
+            const std::vector<StickingPoint<TestType>> before(drag.friction.points().begin(),
+                                                              drag.friction.points().end());
+            std::vector<Vector3<TestType>> places;
+            for (const auto& point : before) places.push_back(drag.rest_place(point));
+            test::change_at_random(random, drag.surface, drag.x, true);
+            drag.follow_events();
+            for (std::size_t i = 0; i < before.size(); ++i) {
+                const auto& point = drag.friction.points()[i];
+                REQUIRE(point.triangle == before[i].triangle);
+                REQUIRE(point.corners == drag.surface.corners(point.triangle));
+                const TestType rounding = 100 * std::numeric_limits<TestType>::epsilon();
+                REQUIRE(norm<TestType>(drag.rest_place(point) - places[i]) < rounding * TestType(5e-3));
+                REQUIRE(point.force == before[i].force);
+                REQUIRE(point.offset == before[i].offset);
+                parted += point.corners != before[i].corners;
+                reshaped += point.weights != before[i].weights;
+            }
+        }
+    }
+    CHECK(parted > cases(40));
+    CHECK(reshaped > cases(40));
+}
+
+TEMPLATE_TEST_CASE("places that are held stay where they are on the tool as the membrane tears under it",
+                   "[friction][tear]", double, float) {
+    TornDrag<TestType> drag{2e-3, 0.05e-3, TestType(2)};
+    drag.drag_to({0, 0, 0}, 50);
+    drag.drag_to({TestType(0.5e-6), 0, 0}, 100);
+    const std::vector<StickingPoint<TestType>> before(drag.friction.points().begin(), drag.friction.points().end());
+    drag.surface.begin();
+    PointsRef<TestType> x = drag.x;
+    const auto along = drag.surface.nearest_in_direction(0, {0, 1, 0}),
+               back = drag.surface.nearest_in_direction(0, {0, -1, 0});
+    const Index copy = drag.surface.split(x, 0, along, back);
+    REQUIRE(copy != no_index);
+    drag.follow_events();
+    drag.drag_to({TestType(0.5e-6), 0, 0}, 200);
+    int held = 0, parted = 0;
+    for (const auto& point : drag.friction.points()) {
+        const bool is_held = std::any_of(before.begin(), before.end(), [&](const auto& other) {
+            return other.triangle == point.triangle && other.weights == point.weights && other.offset == point.offset;
+        });
+        if (!is_held) continue;
+        CHECK(drag.off(point) < TestType(0.01e-6));
+        ++held;
+        parted += std::count(point.corners.begin(), point.corners.end(), copy) > 0;
+    }
+    CHECK(held >= 3);
+    CHECK(parted >= 1);
 }
 
 TEST_CASE("nonsense from a device is refused, and friction goes on", "[friction]") {

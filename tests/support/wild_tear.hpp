@@ -6,9 +6,11 @@
 
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
+#include <membrane/contact/grasper.hpp>
+#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/solve/quasi_static.hpp>
-#include <membrane/solve/tool_contact.hpp>
+#include <membrane/solve/tool_friction.hpp>
 #include <membrane/surface/normals.hpp>
 
 #include <membrane/model/tissue.hpp>
@@ -18,7 +20,7 @@
 #include "support/orders.hpp"
 #include "support/random_tear.hpp"
 
-/// A stretched disc that is cut, pulled and pressed at random until its reserve is used up.
+/// A stretched disc on a foundation or adhering to its body, that is cut, pulled, grasped, pressed and dragged at random.
 ///
 ///     test::WildTear<double> loop(seed);
 ///     for (int tick = 0; tick < 500; ++tick) loop.tick();
@@ -30,7 +32,8 @@ struct WildTear {
     using Vector = membrane::Vector3<Scalar>;
     using Springs = membrane::TearableSprings<Scalar, membrane::LinearSpring>;
     using Sheet = membrane::Tissue<Springs, membrane::Elements<Scalar, membrane::TriangularSpring<Scalar>>>;
-    static constexpr Index reserve = 25;
+    using Report = membrane::StepReport<Scalar>;
+    static constexpr Index reserve = 40;
     static constexpr membrane::Material material{.young_modulus = 1e5, .poisson_ratio = 0.4, .thickness = 1e-4};
 
     explicit WildTear(std::uint64_t seed)
@@ -40,60 +43,123 @@ struct WildTear {
           sheet(Springs(mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
                                                           {.stiffness = Scalar(1), .pinned = rim})),
                 membrane::triangular_springs(mesh, material)),
+          adheres(random.chance(0.5)),
           foundation(mesh, {.normal = Scalar(0.5), .tangential = Scalar(0.1), .recovery_time = Scalar(0.05)}),
+          adhesion(mesh, adhesion_options()),
           tear(mesh, membrane::EnergyRelease{.toughness = random.number(5.0, 100.0), .thickness = 1e-4},
                {.max_tips = 6, .move_vertices = random.chance(0.8)}),
-          solver(sheet, {.layers = random.index(2) == 0 ? membrane::unlimited : 6,
-                         .sweeps = 1 + random.index(4),
-                         .order = order_of(static_cast<int>(seed)),
-                         .predict = random.chance(0.5)}),
+          solver(sheet, options(static_cast<int>(seed))),
           tree(mesh),
           tracker(mesh),
+          grasper(mesh, {.snap_to_vertex = random.chance(0.3),
+                         .holding_force = random.number(1e-3, 0.05),
+                         .jaw_length = random.number(0.5e-3, 5e-3)}),
+          coefficient(random.number(0.0, 1.5)),
+          friction({.coefficient = coefficient}),
           normals(mesh),
           x(Scalar(random.number(1.0, 1.3)) * mesh.positions()),
-          target(Vector(0, 0, 0)) {}
+          target(Vector(0, 0, 0)) {
+        tree.refit(x);
+        tool.axis = random.chance(0.3) ? Vector(Scalar(2e-3) * random.unit_vector<Scalar>()) : Vector(0, 0, 0);
+        tool.radius = Scalar(random.chance(0.2) ? 0.0 : random.number(0.3e-3, 2e-3));
+    }
 
-    /// One tick; returns whether the step advanced.
-    bool tick() {
+    /// One tick. Whether the step advanced: its report's status.
+    Report tick() {
         if (random.chance(0.02)) follow(cut_at_random(random, tear, x));
-        if (random.chance(0.05)) held = random.index(mesh.vertex_count() - reserve), target = membrane::point(x, held);
+        if (random.chance(0.05)) held = random.index(mesh.vertex_count() - tear.surface().reserve()), target = at(held);
         target += random.template vector<Scalar>(Scalar(-2e-4), Scalar(2e-4));
+        move_tool();
         Vector pulled = target;
-        tool.position =
-            Vector(Scalar(random.number(-5e-3, 5e-3)), Scalar(random.number(-5e-3, 5e-3)), tool.position[2]);
-        tool.position[2] = Scalar(random.number(-1e-3, 2e-3));
-        tool.radius = Scalar(1e-3);
         Scalar dt = Scalar(1e-3);
         if (random.chance(0.1)) nonsense(pulled, dt);
         const auto contact = tracker.update(tree, x, tool);
-        const auto report =
-            solver.step(x, dt, sheet, foundation, press(tool, contact), membrane::pull(held, pulled), tear.ligaments());
-        const bool advanced = report.status == membrane::StepStatus::advanced;
-        if (advanced) follow(tear.update(x, dt, sheet, foundation));
+        const auto grasp = grasper.update(contact, x, tool);
+        grasps = grasp.holding();
+        grasps_surface = !grasps || grasp.corners == tear.surface().corners(grasp.triangle);
+        const auto step = [&](const auto& under) {
+            return solver.step(x, dt, sheet, under, friction.press(tool, contact, grasp), pull(tool, grasp),
+                               membrane::pull(held, pulled), tear.ligaments());
+        };
+        const Report report = adheres ? step(adhesion) : step(foundation);
+        if (report.status == membrane::StepStatus::advanced) {
+            if (adheres) adhesion.update(x, report.moved);
+            if (grasper.slip(x, tool, report.reactions[1])) ++slips;
+            follow(adheres ? tear.update(x, dt, sheet, adhesion) : tear.update(x, dt, sheet, foundation));
+        }
         tree.refit(x, report.moved);
         normals.update(x, report.moved);
-        return advanced;
+        return report;
     }
 
-    std::array<Scalar, 2> state() const { return {x.sum(), static_cast<Scalar>(tear.torn_length())}; }
+    /// Cuts until the reserve is too small for a cut.
+    void use_up_reserve() {
+        do follow(cut_at_random(random, tear, x));
+        while (!tear.reserve_used_up());
+    }
+
+    /// Calls `act` with what a snapshot must hold.
+    template <class Self, class Act>
+    static auto with_state(Self& self, const Act& act) {
+        return act(self.sheet, self.foundation, self.adhesion, self.tear, self.solver, self.tree, self.tracker,
+                   self.grasper, self.friction, self.normals, self.x);
+    }
 
     Random random;
     membrane::TriangleMesh<Scalar> mesh;
     std::vector<Index> rim;
     Sheet sheet;
+    bool adheres;
     membrane::FoundationSprings<Scalar> foundation;
+    membrane::CohesiveSprings<Scalar> adhesion;
     membrane::Tearing<Scalar> tear;
     membrane::QuasiStaticSolver<Scalar> solver;
     membrane::AabbTree<Scalar> tree;
     membrane::ContactTracker<Scalar> tracker;
+    membrane::Grasper<Scalar> grasper;
+    double coefficient;
+    membrane::ToolFriction<Scalar> friction;
     membrane::VertexNormals<Scalar> normals;
     membrane::Points<Scalar> x;
     membrane::Tool<Scalar> tool;
     Index held = 0;
     Vector target;
-    int splits = 0;
+    int splits = 0, slips = 0;  // of vertices; of tissue through the jaws
+    bool grasps = false,
+         grasps_surface = true;  // whether the forceps hold a point; whether that is of the torn surface
 
   private:
+    membrane::CohesionOptions<Scalar> adhesion_options() {
+        const double strength = random.number(30.0, 1e3), energy = random.number(0.05, 0.5);
+        return {.stiffness = Scalar(strength * strength / energy * random.number(0.6, 20.0)),
+                .strength = Scalar(strength),
+                .energy = Scalar(energy),
+                .tangential_strength = Scalar(strength * random.number(0.5, 2.0)),
+                .tangential_energy = Scalar(energy * random.number(0.5, 2.0))};
+    }
+    membrane::SolverOptions<Scalar> options(int seed) {
+        membrane::SolverOptions<Scalar> with{.layers = random.chance(0.5) ? membrane::unlimited : random.index(8),
+                                             .sweeps = 1 + random.index(4),
+                                             .order = order_of(seed),
+                                             .predict = random.chance(0.5)};
+        with.adaptive_layers = random.chance(0.2);
+        with.contact_iterations = random.index(4) + 1;
+        if (random.chance(0.2)) with.max_vertex_updates = random.index(300) + 1;
+        return with;
+    }
+    Vector at(Index v) const { return membrane::point(x, v); }
+
+    // It jumps, or goes on a little, and opens and closes.
+    void move_tool() {
+        const Scalar far = Scalar(5e-3);
+        if (!membrane::is_valid(tool) || !(norm(tool.position) < 4 * far) || random.chance(0.02)) {
+            tool.position = random.template vector<Scalar>(-far, far);
+            tool.position[2] = Scalar(2e-3);
+        }
+        const Scalar down = tool.grasping ? Scalar(3e-5) : Scalar(tool.position[2] > -far / 5 ? -1e-4 : 1e-3);
+        tool.position += Scalar(1e-4) * random.template vector<Scalar>() + Vector(0, 0, down);
+        if (random.chance(0.03)) tool.grasping = !tool.grasping;
+    }
     void nonsense(Vector& pulled, Scalar& dt) {
         constexpr std::array<Scalar, 4> wild{std::numeric_limits<Scalar>::quiet_NaN(),
                                              std::numeric_limits<Scalar>::infinity(), Scalar(-1),
@@ -106,8 +172,8 @@ struct WildTear {
     }
     void follow(std::span<const membrane::TearEvent<Scalar>> events) {
         for (const auto& event : events) {
-            membrane::follow(event, sheet, foundation, solver, tree, tracker, normals);
-            ++splits;
+            membrane::follow(event, sheet, foundation, adhesion, solver, tree, tracker, grasper, friction, normals);
+            splits += event.split.vertex != membrane::no_index ? 1 : 0;
         }
     }
 };

@@ -13,6 +13,8 @@
 #include <membrane/core/check.hpp>
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/solve/tool_contact.hpp>
+#include <membrane/surface/triangle.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Coulomb friction between a tool and the membrane: the tool drags the tissue along.
 ///
@@ -113,6 +115,17 @@ class ToolFriction {
         return std::any_of(points().begin(), points().end(),
                            [this](const Point& point) { return point.pressure > 0 && is_at_limit(point); });
     }
+
+    ///@{
+    /// A vertex becomes two; a vertex moves at rest. A point holds the same place of the membrane. Online. Cost: contact
+    /// points times the triangles around the vertex.
+    void split(const VertexSplit& split) noexcept {
+        for (Point& point : kept_.items()) {
+            if (split.takes(point.triangle)) split.replace_in(point.corners);
+        }
+    }
+    void reshape(const MovedVertex<Scalar>& moved) noexcept;
+    ///@}
 
     /// Forgets all places. Cost: O(1).
     void reset() noexcept {
@@ -311,6 +324,31 @@ void ToolFriction<Scalar>::end(const Context& context, const Tool<Scalar>& tool)
     std::swap(points_, kept_);
     tool_ = tool;
     has_tool_ = true;
+}
+
+namespace detail {
+
+/// The weights of the point of the triangle's plane that is nearest to `q`; negative beyond a side.
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> weights_in_plane(const Triangle<Scalar>& triangle, const Vector3<Scalar>& q) noexcept {
+    const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
+    const Vector3<Scalar> twice = cross(ab, ac), normal = direction_or_zero(twice);
+    const Scalar b = dot(cross(aq, ac), normal) / norm(twice), c = dot(cross(ab, aq), normal) / norm(twice);
+    return {1 - b - c, b, c};
+}
+
+}  // namespace detail
+
+// The place may be beyond a side of its triangle from then on: as far as the membrane is smooth, the same place.
+template <Real Scalar>
+void ToolFriction<Scalar>::reshape(const MovedVertex<Scalar>& moved) noexcept {
+    const auto at = [](const std::array<Vector3<Scalar>, 3>& x) { return Triangle<Scalar>{x[0], x[1], x[2]}; };
+    for (Point& point : kept_.items()) {
+        for (const auto& one : moved.triangles) {
+            if (one.triangle != point.triangle) continue;
+            point.weights = detail::weights_in_plane(at(one.after), point_at(at(one.before), point.weights));
+        }
+    }
 }
 
 static_assert(Constraint<FrictionalContact<double>, double> && Constraint<FrictionalContact<float>, float>);
