@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 //
-// Runs 24 scenes in double and in float, and prints a hash of all positions, forces and reports after 1, 10, ... ticks:
+// Runs 27 scenes in double and in float, and prints a hash of all positions, forces and reports after 1, 10, ... ticks:
 //
 //     scenes [--ticks 10000] [--threads 1] [--scene NAME]
 //     scenes [--ticks 1000] [--threads 1] --record FILE
@@ -32,11 +32,15 @@
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/model/bending.hpp>
+#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/model/pressure.hpp>
+#include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/tissue.hpp>
 #include <membrane/model/triangular_springs.hpp>
+#include <membrane/solve/tool_friction.hpp>
 #include <membrane/surface/moving_body.hpp>
+#include <membrane/tear/tearing.hpp>
 
 namespace {
 
@@ -108,7 +112,11 @@ class Strokes {
         const int t = tick_++ % 250;
         const double down = smooth_step(std::clamp(t / 60.0, 0.0, 1.0) - std::clamp((t - 190) / 60.0, 0.0, 1.0));
         const double along = smooth_step(std::clamp((t - 60) / 130.0, 0.0, 1.0));
-        const double height = 1.1 * radius + 0.05 * size_ - down * (depth_ + 0.1 * radius + 0.05 * size_);
+        double height = 1.1 * radius + 0.05 * size_ - down * (depth_ + 0.1 * radius + 0.05 * size_);
+        if (lift_ > 0) {
+            height +=
+                lift_ * smooth_step(std::clamp((t - 60) / 120.0, 0.0, 1.0) - std::clamp((t - 200) / 50.0, 0.0, 1.0));
+        }
         const Vector place = from_ + along * (to_ - from_);
         const Vector position =
             flat_ ? Vector(size_ * place[0], size_ * place[1], height) : (size_ + height) * unit(place);
@@ -124,7 +132,11 @@ class Strokes {
         return tool;
     }
 
-    void grasp() noexcept { grasps_ = true; }
+    /// Forceps close in each stroke, and draw what they hold up [m].
+    void grasp(double lift) noexcept {
+        grasps_ = true;
+        lift_ = lift;
+    }
 
   private:
     Vector place() {
@@ -144,7 +156,7 @@ class Strokes {
     double size_, deepest_;
     bool flat_, grasps_ = false;
     Vector from_, to_, position_ = Vector::Zero();
-    double depth_ = 0;
+    double depth_ = 0, lift_ = 0;
     int tick_ = 0;
 };
 
@@ -202,6 +214,8 @@ struct Variant {
     membrane::SolverOptions<Scalar> options = {.layers = 4};
     Rule rule = {};
     double radius = 0.002, depth = 0.0015;  // of the tool, of a press [m]
+    double lift = 0;                        // by which forceps draw up what they hold [m]
+    double friction = 0;                    // coefficient
     Vector axis = Vector::Zero();           // of the tool [m]
     bool flat = false, grasps = false, two_tools = false, loads = false;
 };
@@ -221,10 +235,11 @@ class Loop {
           tracker_(mesh),
           second_tracker_(mesh),
           grasper_(mesh),
+          friction_({.coefficient = variant.friction}),
           strokes_(seed_of(name), 0.01, variant.depth, variant.flat),
           second_(seed_of(name) + 1, 0.01, variant.depth, variant.flat),
           x_(mesh.positions()) {
-        if (variant.grasps) strokes_.grasp();
+        if (variant.grasps) strokes_.grasp(variant.lift);
     }
 
     [[nodiscard]] membrane::Tool<Scalar> next_tool() {
@@ -248,6 +263,8 @@ class Loop {
             finish(step(foundation_, press(tool, contact, grasp),
                         membrane::load(corners, Vector(0.5, 0.25, 0.25).cast<Scalar>(), force.cast<Scalar>()),
                         membrane::pin(std::span<const Index>(pinned))));
+        } else if (variant_.friction > 0) {
+            finish(step(foundation_, friction_.press(tool, contact, grasp), pull(tool, grasp)));
         } else {
             finish(step(foundation_, press(tool, contact, grasp), pull(tool, grasp)));
         }
@@ -283,13 +300,14 @@ class Loop {
     }
 
     const membrane::TriangleMesh<Scalar> mesh_;
-    const Network network_;
-    const Foundation foundation_;
+    Network network_;
+    Foundation foundation_;
     const Variant<Scalar, Rule> variant_;
     membrane::QuasiStaticSolver<Scalar, Rule> solver_;
     membrane::AabbTree<Scalar> tree_;
     membrane::ContactTracker<Scalar> tracker_, second_tracker_;
     membrane::Grasper<Scalar> grasper_;
+    membrane::ToolFriction<Scalar> friction_;
     Strokes strokes_, second_;
     membrane::Points<Scalar> x_;
     membrane::Contact<Scalar> contact_;
@@ -333,6 +351,89 @@ class OnBody : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
   private:
     membrane::MovingBody<Scalar> body_;
     bool deforms_;
+    int tick_ = 0;
+};
+
+/// A membrane that adheres to its body, until forceps peel it off; after four strokes it adheres again.
+template <class Scalar, class Network>
+class Peeled : public Loop<Scalar, Network, membrane::CohesiveSprings<Scalar>, membrane::BlockStep> {
+    using Base = Loop<Scalar, Network, membrane::CohesiveSprings<Scalar>, membrane::BlockStep>;
+
+  public:
+    Peeled(std::string_view name, const membrane::TriangleMesh<Scalar>& mesh, const Network& network,
+           const membrane::CohesionOptions<Scalar>& cohesion, const Variant<Scalar>& variant)
+        : Base(name, mesh, network, {mesh, cohesion}, variant, membrane::AnyExecutor()) {}
+
+    void tick() {
+        if (tick_++ % 1000 == 0) this->foundation_.reset();
+        Base::tick();
+        this->foundation_.update(this->x_, this->report_.moved);
+        this->hash_.add(this->foundation_.dissipated());
+    }
+
+  private:
+    int tick_ = 0;
+};
+
+/// A stretched membrane that tears from slits where forceps draw it up. It is whole again when its reserve is used up.
+template <class Scalar, class Network, class Foundation>
+class Torn : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
+    using Base = Loop<Scalar, Network, Foundation, membrane::BlockStep>;
+
+  public:
+    Torn(std::string_view name, const membrane::TriangleMesh<Scalar>& mesh, const Network& network,
+         const Foundation& foundation, const membrane::EnergyRelease& criterion, const Variant<Scalar>& variant)
+        : Base(name, mesh, network, foundation, variant, membrane::AnyExecutor()), tear_(mesh, criterion) {
+        this->x_.template topRows<2>() *= Scalar(1.05);
+        visit_parts([&](auto&... parts) {
+            whole_.resize(membrane::snapshot_capacity(parts...));
+            whole_.resize(membrane::save_snapshot(whole_, parts...));
+        });
+    }
+
+    void tick() {
+        if (tear_.reserve_used_up()) {
+            visit_parts([&](auto&... parts) {
+                if (!membrane::restore_snapshot(whole_, parts...)) std::abort();
+            });
+            this->tree_.refit(this->x_);
+        }
+        const auto tool = this->next_tool();
+        const auto contact = this->tracker_.update(this->tree_, this->x_, tool);
+        if (++tick_ % 250 == 40 && contact.touching()) {
+            const Vector direction(tick_ % 500 - 145, 200, 0);
+            follow(tear_.cut_along(tear_.slit_at(contact.corners[0], direction.cast<Scalar>()), this->x_));
+        }
+        const auto grasp = this->grasper_.update(contact, this->x_, tool);
+        this->finish(this->step(this->foundation_, press(tool, contact, grasp), pull(tool, grasp), tear_.ligaments()));
+        follow(tear_.update(this->x_, Scalar(1e-3), this->network_, this->foundation_));
+        this->hash_.add(tear_.dissipated());
+    }
+
+    /// Positions, triangles, and the length torn.
+    [[nodiscard]] std::uint64_t hash() const {
+        Hash all;
+        all.add(Base::hash());
+        for (const Index v : tear_.surface().triangles().reshaped()) all.add(static_cast<std::uint64_t>(v));
+        all.add(tear_.torn_length());
+        return all.value();
+    }
+
+  private:
+    template <class Act>
+    void visit_parts(Act act) {
+        act(this->network_, this->foundation_, this->solver_, this->tree_, this->tracker_, this->grasper_, this->x_,
+            tear_);
+    }
+    void follow(typename membrane::Tearing<Scalar>::Events events) {
+        for (const auto& event : events) {
+            membrane::follow(event, this->network_, this->foundation_, this->solver_, this->tree_, this->tracker_,
+                             this->grasper_);
+        }
+    }
+
+    membrane::Tearing<Scalar> tear_;
+    std::vector<std::byte> whole_;
     int tick_ = 0;
 };
 
@@ -447,6 +548,7 @@ class Scenes {
         run_rules_and_orders(ball);
         run_bodies(ball);
         run_tissues(ball);
+        run_drag_peel_tear(ball);
     }
 
   private:
@@ -537,6 +639,23 @@ class Scenes {
              membrane::Tissue(network(ball), membrane::bending_springs(ball, membrane::flexural_rigidity(material)),
                               membrane::pressure(ball, Scalar(20))),
              foundation(ball));
+    }
+
+    void run_drag_peel_tear(const membrane::TriangleMesh<Scalar>& ball) {
+        loop("drag", ball, network(ball), foundation(ball), Variant<Scalar>{.friction = 0.4});
+        const Variant<Scalar> forceps{.lift = 0.004, .flat = true, .grasps = true};
+        if (const auto flat = sheet<Scalar>(); asked("peel")) {
+            const membrane::CohesionOptions<Scalar> cohesion{
+                .stiffness = Scalar(1e5), .strength = Scalar(20), .energy = Scalar(0.02)};
+            run<Scalar>(request_, "peel", Peeled("peel", flat, network(flat), cohesion, forceps));
+        }
+        if (const auto flat = membrane::with_reserve(sheet<Scalar>(), 60); asked("tear")) {
+            const membrane::Material material{.young_modulus = 5e5, .poisson_ratio = 0.4, .thickness = 1e-4};
+            const auto springs = membrane::TearableSprings(flat, network(flat));
+            const auto tissue = membrane::Tissue(springs, membrane::triangular_springs(flat, material));
+            const membrane::EnergyRelease criterion{.toughness = 100, .thickness = material.thickness};
+            run<Scalar>(request_, "tear", Torn("tear", flat, tissue, foundation(flat), criterion, forceps));
+        }
     }
 
     [[nodiscard]] bool asked(std::string_view name) const { return request_.scene.empty() || request_.scene == name; }

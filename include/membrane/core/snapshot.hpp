@@ -25,7 +25,7 @@
 ///
 /// A snapshot holds what a component keeps from tick to tick, not its constants: it is restored into components that
 /// were constructed from the same mesh with the same options. The tree and normals depend on the positions alone:
-/// refit and update them afterwards.
+/// refit and update them afterwards. If the membrane tears, these and all others that follow it are saved, too.
 namespace membrane {
 
 namespace detail {
