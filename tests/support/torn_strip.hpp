@@ -2,13 +2,9 @@
 #pragma once
 
 #include <cmath>
-#include <map>
 #include <type_traits>
 #include <utility>
 #include <vector>
-
-#include <CGAL/Delaunay_triangulation_2.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 
 #include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/tissue.hpp>
@@ -16,7 +12,7 @@
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/tear/tearing.hpp>
 
-#include "support/meshes.hpp"
+#include "support/turned_grid.hpp"
 
 /// A strip between two clamps, with a notch, that is torn.
 ///
@@ -24,45 +20,6 @@
 ///     while (strip.torn_edges() < 12) strip.tick();
 ///     CHECK(strip.balance() == Approx(1).epsilon(0.01));
 namespace test {
-
-/// A rectangle on a grid of equilateral triangles with edges of 1 mm that is turned by `turn` [rad]; its border is
-/// straight. Triangulated by CGAL.
-template <membrane::Real Scalar>
-Surface<Scalar> turned_grid(int columns, int rows, double turn) {
-    using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-    using Delaunay = CGAL::Delaunay_triangulation_2<Kernel>;
-    constexpr double edge = 1e-3;
-    const double length = columns * edge, height = rows * edge, cosine = std::cos(turn), sine = std::sin(turn);
-    Delaunay delaunay;
-    for (int i = 0; i <= columns; ++i) {
-        for (const double y : {0.0, height}) delaunay.insert({i * edge, y});
-    }
-    for (int i = 0; i <= rows; ++i) {
-        for (const double x : {0.0, length}) delaunay.insert({x, i * edge});
-    }
-    const int extent = columns + rows;
-    for (int i = -extent; i <= extent; ++i) {
-        for (int j = -extent; j <= extent; ++j) {
-            const double a = (i + j / 2.0 + 0.3) * edge, b = (j * std::sqrt(0.75) + 0.4) * edge;
-            const double x = length / 2 + cosine * a - sine * b, y = height / 2 + sine * a + cosine * b;
-            const double gap = 0.6 * edge;
-            if (x > gap && x < length - gap && y > gap && y < height - gap) delaunay.insert({x, y});
-        }
-    }
-    Surface<Scalar> surface;
-    std::map<Delaunay::Vertex_handle, membrane::Index> number;
-    for (auto v = delaunay.finite_vertices_begin(); v != delaunay.finite_vertices_end(); ++v) {
-        const auto x = static_cast<Scalar>(v->point().x()), y = static_cast<Scalar>(v->point().y());
-        number[v] = surface.add(membrane::Vector3<Scalar>(x, y, 0));
-    }
-    for (auto f = delaunay.finite_faces_begin(); f != delaunay.finite_faces_end(); ++f) {
-        const auto at = [&](int i) { return number[f->vertex(i)]; };
-        const membrane::Index f0 = surface.add(at(0), at(1), at(2));
-        const auto x = membrane::triangle_at(surface.x, surface.triangles.col(f0));
-        if (!(norm(membrane::area_vector(x)) > 1e-3 * edge * edge)) surface.remove_triangle(f0);
-    }
-    return surface;
-}
 
 struct TornStripOptions {
     int columns = 40, rows = 20;      ///< edges of 1 mm
@@ -88,7 +45,7 @@ class TornStrip {
 
     explicit TornStrip(const TornStripOptions& options)
         : options_(options),
-          surface(turned_grid<Scalar>(options.columns, options.rows, options.turn)),
+          surface(turned_grid<Scalar>(options.columns, options.rows, edge, options.turn)),
           mesh(membrane::with_reserve(surface.mesh(), 100)),
           sheet(springs_of(), membrane::triangular_springs(mesh, material_of())),
           tear(mesh, membrane::EnergyRelease{options.toughness, thickness}, options.tear),

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: MIT
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include <membrane/model/material.hpp>
+#include <membrane/model/tearable_springs.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/model/triangular_springs.hpp>
+#include <membrane/solve/quasi_static.hpp>
+#include <membrane/tear/tearing.hpp>
+
+#include "support/turned_grid.hpp"
+
+/// A flat sheet that two hands tear, and the energy that they give.
+///
+///     bench::TornSheet sheet(mesh, {.hands = {bottom, top}, .tolerance = 1e-6}, membrane::EnergyRelease{1e3, 1e-5});
+///     sheet.cut({0, 10e-3, 0}, {1, 0, 0}, 12);
+///     while (sheet.tear.torn_length() < 5e-3) sheet.tick({Vector(0, 0, 0), Vector(0, 1e-5, 0)});
+namespace bench {
+
+using membrane::Index;
+using Vector = membrane::Vector3<double>;
+
+inline constexpr membrane::Material torn_material{.young_modulus = 1e6, .poisson_ratio = 0.3, .thickness = 1e-5};
+
+struct TornSheetOptions {
+    std::array<std::vector<Index>, 2> hands;      ///< the vertices that each holds
+    std::vector<Index> fixed = {};                ///< other vertices that do not move
+    double tolerance;                             ///< residual force that counts as none [N]
+    double damping = 0;                           ///< of each vertex, by a body that does not support it [N s/m]
+    Index sweeps = 6;                             ///< of a step
+    Index steps = 20;                             ///< of a tick, at most
+    membrane::TearOptions tear = {};              ///< how it tears
+    membrane::Material material = torn_material;  ///< of the sheet
+};
+
+/// The vertices of a mesh without a reserve at which `is_in(position at rest)`.
+template <class IsIn>
+[[nodiscard]] std::vector<Index> vertices_where(const membrane::TriangleMesh<double>& mesh, const IsIn& is_in) {
+    std::vector<Index> result;
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        if (is_in(membrane::point(mesh.positions(), v))) result.push_back(v);
+    }
+    return result;
+}
+
+/// The energy that all elements of a tissue store [J].
+template <class Tissue>
+[[nodiscard]] double stored_in(const Tissue& tissue, const membrane::Points<double>& x) {
+    double sum = 0;
+    tissue.for_each_element([&](const auto& instance) { sum += instance.element.energy(instance.where(x)); });
+    return sum;
+}
+
+/// Triangular springs and `Others`, elements that follow a tear.
+template <class Criterion = membrane::EnergyRelease, class... Others>
+class TornSheet {
+    using Springs = membrane::TearableSprings<double, membrane::LinearSpring>;
+    using Triangles = membrane::Elements<double, membrane::TriangularSpring<double>>;
+
+  public:
+    using Tissue = membrane::Tissue<Springs, Triangles, Others...>;
+    static constexpr double dt = 1e-3;  ///< [s]
+
+    /// `reserved` is a mesh with a reserve, of which `others` are too.
+    TornSheet(const membrane::TriangleMesh<double>& reserved, const TornSheetOptions& options,
+              const Criterion& criterion, Others... others)
+        : options_(options),
+          mesh(reserved),
+          tissue(no_springs(mesh, options), membrane::triangular_springs(mesh, options.material), others...),
+          foundation(mesh, {.stiffness = 0.0, .damping = options.damping}),
+          tear(mesh, criterion, options.tear),
+          solver(tissue, {.layers = membrane::unlimited, .sweeps = options.sweeps, .predict = false}),
+          x(mesh.positions()) {}
+
+    /// Cuts from the vertex nearest to `from` as nearly as possible along a line.
+    void cut(const Vector& from, const Vector& direction, int edges) {
+        const auto& rest = tear.surface().rest_positions();
+        const auto off = [&](Index v) { return norm<double>(membrane::point(rest, v) - from); };
+        std::vector<Index> path{0};
+        for (Index v = 0; v < mesh.vertex_count(); ++v) {
+            if (off(v) < off(path[0])) path[0] = v;
+        }
+        const Vector start = membrane::point(rest, path[0]);
+        const double edge = tear.surface().mean_edge(path[0]);
+        for (int i = 0; i < edges; ++i) {
+            const Vector at = membrane::point(rest, path.back()) - start;
+            const Vector aside = dot(at, direction) * direction - at;
+            path.push_back(tear.surface().nearest_in_direction(path.back(), direction + (0.5 / edge) * aside));
+        }
+        const auto events = tear.cut_along(path, x);
+        if (events.empty()) throw std::runtime_error("the sheet cannot be cut there");
+        follow(events);
+    }
+
+    /// Takes the present positions as where the hands are, once they are at equilibrium.
+    void start() {
+        relax(5000);
+        work = stored();
+        damped = 0;
+    }
+
+    /// The hands move; the membrane follows, up to the tolerance or the number of steps; and what tears then.
+    void tick(const std::array<Vector, 2>& displacements) {
+        for (std::size_t i = 0; i < 2; ++i) {
+            for (const Index v : options_.hands[i]) x.col(v) += Eigen::Vector3d(displacements[i]);
+        }
+        const auto before = forces;
+        relax(options_.steps);
+        for (std::size_t i = 0; i < 2; ++i) work += dot<double>((before[i] + forces[i]) / 2, displacements[i]);
+        update();
+    }
+
+    /// Edges open, tips advance.
+    void update() { follow(tear.update(x, dt, tissue, foundation)); }
+
+    /// Whether the forces balance.
+    [[nodiscard]] bool at_rest() const { return report.residual < options_.tolerance; }
+
+    /// In the membrane and in opening edges [J].
+    [[nodiscard]] double stored() const { return stored_in(tissue, x) + tear.stored(x); }
+
+    /// What the hands gave and nothing has taken [J].
+    [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped; }
+
+  private:
+    static Springs no_springs(const membrane::TriangleMesh<double>& mesh, const TornSheetOptions& options) {
+        std::vector<Index> pinned = options.fixed;
+        for (const auto& hand : options.hands) pinned.insert(pinned.end(), hand.begin(), hand.end());
+        std::sort(pinned.begin(), pinned.end());
+        pinned.erase(std::unique(pinned.begin(), pinned.end()), pinned.end());
+        return Springs(
+            mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 0.0, .pinned = pinned}));
+    }
+    void relax(int steps) {
+        for (int i = 0; i < steps; ++i) {
+            solver.wake_all();
+            const membrane::Points<double> before = x;
+            report = solver.step(x, dt, tissue, foundation, membrane::pin(options_.hands[0]),
+                                 membrane::pin(options_.hands[1]), tear.ligaments());
+            if (report.status != membrane::StepStatus::advanced) throw std::runtime_error("a step was refused");
+            if (options_.damping > 0) add_damping(before);
+            if (at_rest()) break;
+        }
+        for (std::size_t i = 0; i < 2; ++i) forces[i] = -report.reactions[i];
+    }
+    void add_damping(const membrane::Points<double>& before) {
+        for (const Index v : report.moved) {
+            const Vector anchor = membrane::point(foundation.anchors(), v);
+            const double moved =
+                norm<double>(membrane::point(x, v) - anchor) - norm<double>(membrane::point(before, v) - anchor);
+            damped += foundation.damping(v) / dt * moved * moved;
+        }
+    }
+    void follow(std::span<const membrane::TearEvent<double>> events) {
+        for (const auto& event : events) membrane::follow(event, tissue, foundation, solver);
+    }
+
+    TornSheetOptions options_;
+
+  public:
+    membrane::TriangleMesh<double> mesh;
+    Tissue tissue;
+    membrane::VirtualVolumeSprings<double> foundation;
+    membrane::Tearing<double, Criterion> tear;
+    membrane::QuasiStaticSolver<double> solver;
+    membrane::Points<double> x;
+    membrane::StepReport<double> report;
+    std::array<Vector, 2> forces{};  ///< of the hands [N]
+    double work = 0, damped = 0;     ///< of the hands; taken by damping [J]
+};
+
+}  // namespace bench

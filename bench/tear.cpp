@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "support/tear_shear.hpp"
+#include "support/tear_speed.hpp"
+
+// tear FOLDER [--short] [PART...]: tears beside closed forms, over meshes and directions of their grids, and what they
+// cost. Writes Markdown tables to tear.md, and a .tsv for each plot, to FOLDER.
+
+namespace {
+
+using namespace bench::tears;
+
+/// A line of the summary: what was found, and the bar for it; NaN if it has none.
+struct Check {
+    std::string name;
+    double found, bar;
+    const char* unit;
+};
+
+/// The tables, on the page and on the terminal.
+class Page {
+  public:
+    explicit Page(const std::filesystem::path& folder)
+        : folder_(folder), file_(std::fopen((folder / "tear.md").c_str(), "w")) {
+        if (file_ == nullptr) throw std::runtime_error("cannot write to " + folder.string());
+    }
+    Page(const Page&) = delete;
+    Page& operator=(const Page&) = delete;
+    ~Page() { std::fclose(file_); }
+
+    template <class... Values>
+    void print(const char* format, const Values&... values) {
+        for (std::FILE* file : {stdout, file_}) {
+            if constexpr (sizeof...(values) == 0) {
+                std::fputs(format, file);
+            } else {
+                std::fprintf(file, format, values...);
+            }
+            std::fflush(file);
+        }
+    }
+    void add(const Check& check) { checks_.push_back(check); }
+    void summarise() {
+        print("\n| | found | bar |\n|---|---|---|\n");
+        for (const Check& check : checks_) {
+            if (std::isnan(check.bar)) {
+                print("| %s | %.3g %s | none |\n", check.name.c_str(), check.found, check.unit);
+                continue;
+            }
+            const char* const mark = check.found <= check.bar ? "" : "**";
+            print("| %s | %s%.2g %s%s | %g %s |\n", check.name.c_str(), mark, check.found, check.unit, mark, check.bar,
+                  check.unit);
+        }
+    }
+    /// A table for a plot.
+    [[nodiscard]] std::ofstream table(const std::string& name, const std::string& columns) const {
+        std::ofstream file(folder_ / ("tear_" + name + ".tsv"));
+        file.precision(6);
+        file << columns << '\n';
+        return file;
+    }
+
+  private:
+    std::filesystem::path folder_;
+    std::FILE* file_;
+    std::vector<Check> checks_;
+};
+
+/// How much is run.
+struct Effort {
+    std::vector<int> rows;  ///< edges over the height of a strip
+    int directions;         ///< of grids
+    double edges;           ///< of advance
+    int ticks;              ///< for times
+};
+
+constexpr double none = std::numeric_limits<double>::quiet_NaN();
+double percent(double ratio) { return 100 * std::abs(ratio - 1); }
+
+// A strip whose ends are far from the tear, on a grid that is turned so that no edge is along it.
+Shear strip_of(int rows, double edges) {
+    const int notch = rows * 6 / 10;
+    return {.rows = rows, .columns = 2 * notch + static_cast<int>(edges) + 4, .notch = notch, .turn = 17 * degree};
+}
+
+void shear(Page& page, const Effort& effort) {
+    page.print(
+        "\n### A strip in pure shear\n\n| edges over the height | vertices | driving force over the closed form, three "
+        "notches | begins at, over the right stretch | off the line [edges] | energy the tear took, over toughness x "
+        "area | stored and taken, over given |\n|---|---|---|---|---|---|---|\n");
+    double force = 0, begins = 0, off = 0, lost = 0;
+    for (const int rows : effort.rows) {
+        page.print("| %d | ", rows);
+        std::string forces;
+        for (const int tenths : {6, 8, 10}) {
+            const double found = driving_force({.rows = rows, .columns = 2 * rows, .notch = rows * tenths / 10});
+            force = std::max(force, percent(found));
+            char text[20];
+            std::snprintf(text, sizeof text, "%s%.3f", forces.empty() ? "" : ", ", found);
+            forces += text;
+        }
+        const ShearRun found = run(strip_of(rows, effort.edges), effort.edges);
+        begins = std::max(begins, percent(found.begins / Shear::critical_stretch()));
+        off = std::max(off, found.off_line);
+        lost = std::max(lost, std::abs(found.lost) / found.given * 100);
+        page.print("%d | %s | %.4f | %.2f | %.3f | %.3f |\n", int{found.vertices}, forces.c_str(),
+                   found.begins / Shear::critical_stretch(), found.off_line,
+                   found.dissipated / (resistance * found.torn), 1 - found.lost / found.given);
+    }
+    page.add({"pure shear: driving force, from the closed form", force, 5, "%"});
+    page.add({"pure shear: stretch at which it begins, from the right one", begins, 3, "%"});
+    page.add({"pure shear: distance from a straight line", off, 0.7, "edges"});
+    page.add({"pure shear: energy that nothing has taken, of that given", lost, 2.5, "%"});
+}
+
+// Damping, which also takes energy.
+void damping(Page& page, const Effort& effort) {
+    page.print(
+        "\n### The same with damping\n\n| edges over the height | taken by the tear, of the energy given | by damping "
+        "| by nothing |\n|---|---|---|---|\n");
+    double lost = 0;
+    for (const int rows : effort.rows) {
+        Shear shear = strip_of(rows, effort.edges / 2);
+        shear.damping = 1e-2 * 20 / rows;
+        const ShearRun found = run(shear, effort.edges / 2);
+        lost = std::max(lost, std::abs(found.lost) / found.given * 100);
+        page.print("| %d | %.1f %% | %.1f %% | %.1f %% |\n", rows, 100 * found.dissipated / found.given,
+                   100 * found.damped / found.given, 100 * found.lost / found.given);
+    }
+    page.add({"pure shear with damping: energy that nothing has taken, of that given", lost, 2.5, "%"});
+}
+
+void grids(Page& page, const Effort& effort) {
+    page.print(
+        "\n### Grids of %d directions, 0 to 60 degrees\n\n| edges over the height | off the line [edges]: mean | "
+        "largest | at [degrees] | begins at, over the right stretch |\n|---|---|---|---|---|\n",
+        effort.directions);
+    auto paths = page.table("paths", "rows\tturn\tx\ty");
+    auto distances = page.table("grids", "rows\tturn\toff\tbegins");
+    double worst = 0, late = 0;
+    for (const int rows : effort.rows) {
+        double sum = 0, largest = 0, at = 0, least = 2, most = 0;
+        for (int i = 0; i < effort.directions; ++i) {
+            Shear shear = strip_of(rows, effort.edges);
+            const double turn = 60.0 * i / (effort.directions - 1);
+            shear.turn = turn * degree;
+            const ShearRun found = run(shear, effort.edges);
+            const double begins = found.begins / Shear::critical_stretch();
+            sum += found.off_line;
+            if (found.off_line > largest) largest = found.off_line, at = turn;
+            least = std::min(least, begins), most = std::max(most, begins);
+            distances << rows << '\t' << turn << '\t' << found.off_line << '\t' << begins << '\n';
+            for (const auto& [x, y] : found.path) paths << rows << '\t' << turn << '\t' << x << '\t' << y << '\n';
+            paths << "\n\n";
+        }
+        page.print("| %d | %.2f | %.2f | %.0f | %.3f to %.3f |\n", rows, sum / effort.directions, largest, at, least,
+                   most);
+        worst = std::max(worst, largest);
+        late = std::max({late, percent(least), percent(most)});
+    }
+    page.add({"turned grids: distance from a straight line", worst, 0.7, "edges"});
+    page.add({"turned grids: stretch at which it begins, from the right one", late, 3, "%"});
+}
+
+// The strength is that which opens the notch at the critical stretch on the middle mesh.
+void criteria(Page& page, const Effort& effort) {
+    page.print(
+        "\n### Energy and stress\n\n| edge [mm] | force per length at which it begins [N/m], by `EnergyRelease` | by "
+        "`LargestTension` |\n|---|---|---|\n");
+    std::vector<double> stretches;
+    for (int i = 0; i <= 12; ++i) stretches.push_back(1.1 + 0.03 * i);
+    std::vector<std::vector<AtStretch>> states;
+    for (const int rows : effort.rows) {
+        states.push_back(
+            loaded({.rows = rows, .columns = 2 * rows, .notch = rows * 6 / 10, .turn = 17 * degree}, stretches));
+    }
+    const auto released = [](const AtStretch& state) { return state.driving_force; };
+    const auto tension = [](const AtStretch& state) { return state.tension; };
+    const auto force = [](const AtStretch& state) { return state.force; };
+    const auto& middle = states[states.size() / 2];
+    const double usual = value_where(middle, released, force, resistance);
+    const double strength = value_where(middle, force, tension, usual);
+    auto plot = page.table("criteria", "edge\tenergy\ttension");
+    std::vector<double> by_energy, by_tension;
+    for (std::size_t i = 0; i < states.size(); ++i) {
+        by_energy.push_back(value_where(states[i], released, force, resistance));
+        by_tension.push_back(value_where(states[i], tension, force, strength));
+        const double edge = 1e3 * Shear::height / effort.rows[i];
+        page.print("| %g | %.3f | %.3f |\n", edge, by_energy.back(), by_tension.back());
+        plot << edge << '\t' << by_energy.back() << '\t' << by_tension.back() << '\n';
+    }
+    const auto spread = [](const std::vector<double>& values) {
+        const auto [least, most] = std::minmax_element(values.begin(), values.end());
+        return percent(*most / *least);
+    };
+    page.add({"force at which it begins, over the meshes: `EnergyRelease`", spread(by_energy), 5, "%"});
+    page.add({"the same: `LargestTension`", spread(by_tension), none, "%"});
+}
+
+void speed(Page& page, const Effort& effort) {
+    const auto costs = cost_of_ticks(effort.ticks);
+    page.print(
+        "\n### Cost of a tick, 10,267 vertices\n\n| | time of a tick, over that of the whole membrane | one tick of 20 "
+        "is "
+        "slower than | vertex updates | torn [edges] |\n|---|---|---|---|---|\n");
+    const char* const names[]{"whole", "cut, not torn", "a tear runs"};
+    for (std::size_t i = 0; i < costs.size(); ++i) {
+        page.print("| %s | %.2f, %.0f us | %.0f us | %.0f | %.1f |\n", names[i], costs[i].seconds / costs[0].seconds,
+                   1e6 * costs[i].seconds, 1e6 * costs[i].slow, costs[i].vertex_updates,
+                   costs[i].torn / DrawnDisc::edge);
+    }
+    page.add({"a tick while a tear runs, over the same without", costs[2].seconds / costs[0].seconds, none, ""});
+}
+
+struct Part {
+    const char* name;
+    void (*run)(Page&, const Effort&);
+};
+constexpr Part parts[]{
+    {"shear", shear}, {"damping", damping}, {"grids", grids}, {"criteria", criteria}, {"speed", speed}};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+    try {
+        if (argc < 2) throw std::runtime_error("tear FOLDER [--short] [PART...]");
+        Effort effort{.rows = {10, 20, 40}, .directions = 20, .edges = 20, .ticks = 1200};
+        std::vector<std::string> names;
+        for (int i = 2; i < argc; ++i) {
+            if (std::strcmp(argv[i], "--short") == 0) {
+                effort = {.rows = {10, 14}, .directions = 3, .edges = 6, .ticks = 200};
+            } else {
+                names.emplace_back(argv[i]);
+            }
+        }
+        for (const std::string& name : names) {
+            if (std::none_of(std::begin(parts), std::end(parts), [&](const Part& part) { return name == part.name; })) {
+                throw std::runtime_error("there is no part " + name);
+            }
+        }
+        std::filesystem::create_directories(argv[1]);
+        Page page(argv[1]);
+        for (const Part& part : parts) {
+            if (names.empty() || std::find(names.begin(), names.end(), part.name) != names.end()) {
+                part.run(page, effort);
+            }
+        }
+        page.summarise();
+        return 0;
+    } catch (const std::exception& error) {
+        std::fprintf(stderr, "tear: %s\n", error.what());
+        return 2;
+    }
+}
