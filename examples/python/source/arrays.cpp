@@ -64,6 +64,10 @@ IndexArray copy(std::span<const Index> indices) {
                                indices.size());
 }
 
+BoolArray copy(std::span<const unsigned char> flags) {
+    return copy_of<BoolArray>(Api::NPY_BOOL_, {static_cast<Py_intptr_t>(flags.size())}, flags.data(), flags.size());
+}
+
 FloatArray copy(const Points& x) {
     return copy_of<FloatArray>(Api::NPY_DOUBLE_, {x.cols(), 3}, x.data(), static_cast<std::size_t>(x.size()));
 }

@@ -54,6 +54,10 @@ class IndexArray : public py::object {
   public:
     PYBIND11_OBJECT_DEFAULT(IndexArray, py::object, PyObject_Type)
 };
+class BoolArray : public py::object {
+  public:
+    PYBIND11_OBJECT_DEFAULT(BoolArray, py::object, PyObject_Type)
+};
 
 /// An array of a numpy type on memory of `owner`, which may not be written; without `owner`, on memory of its own.
 [[nodiscard]] py::object make_array(int type, std::initializer_list<Py_intptr_t> shape, const void* data,
@@ -86,6 +90,7 @@ class IndexArray : public py::object {
 /// A copy.
 [[nodiscard]] FloatArray copy(std::span<const double> numbers);
 [[nodiscard]] IndexArray copy(std::span<const Index> indices);
+[[nodiscard]] BoolArray copy(std::span<const unsigned char> flags);
 [[nodiscard]] FloatArray copy(const Points& x);
 [[nodiscard]] FloatArray copy(const Eigen::MatrixXd& numbers);
 ///@}
@@ -146,6 +151,10 @@ struct handle_type_name<membrane_python::FloatArray> {
 template <>
 struct handle_type_name<membrane_python::IndexArray> {
     static constexpr auto name = const_name("numpy.typing.NDArray[numpy.int32]");
+};
+template <>
+struct handle_type_name<membrane_python::BoolArray> {
+    static constexpr auto name = const_name("numpy.typing.NDArray[numpy.bool_]");
 };
 
 }  // namespace pybind11::detail

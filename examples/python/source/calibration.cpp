@@ -44,7 +44,7 @@ class Indentation {
             const auto build = [&](Numbers) { return std::pair(springs, volume); };
             return membrane::Indentation(mesh_, tool_, direction_, build)(constants, depths);
         };
-        return unlocked(network, foundation, press_with);
+        return unlocked("Indentation", network, foundation, press_with);
     }
 
     [[nodiscard]] const Tool& touching() const noexcept { return touching_; }

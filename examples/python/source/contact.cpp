@@ -59,6 +59,7 @@ void bind_contact_data(py::module_& module) {
         .def_readonly("barycentric", &Grasp::barycentric, doc("Grasp::barycentric"))
         .def_readonly("offset", &Grasp::offset, doc("Grasp::offset"))
         .def_readonly("origin", &Grasp::origin, doc("Grasp::origin"))
+        .def_readonly("holding_force", &Grasp::holding_force, doc("Grasp::holding_force"))
         .def("displacement", &Grasp::displacement, py::arg("tool"), doc("Grasp::displacement"));
 }
 
@@ -67,7 +68,7 @@ void bind_tree(py::module_& module) {
     const Keywords options("TreeOptions", std::pair("balance_threshold", &TreeOptions::balance_threshold));
     auto tree = py::class_<Tree>(module, "AabbTree", doc("AabbTree"));
     options.def_init(tree, options.taking<const Mesh&>([](const Mesh& mesh, const TreeOptions& o) {
-        return Tree{membrane::AabbTree(mesh, o), mesh.vertex_count()};
+        return Tree{membrane::AabbTree(mesh, o), mesh.vertex_count(), SurfaceVersion(mesh)};
     }),
                      py::arg("mesh"));
     def_in_loop(
@@ -123,7 +124,7 @@ void bind_tracking(py::module_& module) {
                            std::pair("max_contact_points", &TrackerOptions::max_contact_points));
     auto tracker = py::class_<Tracker>(module, "ContactTracker", doc("ContactTracker"));
     options.def_init(tracker, options.taking<const Mesh&>([](const Mesh& mesh, const TrackerOptions& o) {
-        return Tracker{membrane::ContactTracker(mesh, o), mesh.vertex_count()};
+        return Tracker{membrane::ContactTracker(mesh, o), mesh.vertex_count(), SurfaceVersion(mesh)};
     }),
                      py::arg("mesh"));
     def_in_loop<py::return_value_policy::reference_internal>(
@@ -131,6 +132,7 @@ void bind_tracking(py::module_& module) {
         [](Tracker& self, const Tree& tree, Positions x, const Tool& tool) -> Contact& {
             check_count("ContactTracker", "x", x.count, self.vertex_count);
             check_count("ContactTracker", "the tree", tree.vertex_count, self.vertex_count);
+            check_version("ContactTracker", "the tree", tree.version, self.version);
             static_cast<membrane::Contact<double>&>(self.contact) = self.tracker.update(tree.tree, x.map(), tool);
             self.contact.vertex_count = self.vertex_count;
             return self.contact;
@@ -145,7 +147,7 @@ void bind_tracking(py::module_& module) {
                                  std::pair("jaw_length", &GraspOptions::jaw_length));
     auto grasper = py::class_<Forceps>(module, "Grasper", doc("Grasper"));
     grasp_options.def_init(grasper, grasp_options.taking<const Mesh&>([](const Mesh& mesh, const GraspOptions& o) {
-        return Forceps{membrane::Grasper(mesh, o), mesh.vertex_count()};
+        return Forceps{membrane::Grasper(mesh, o), mesh.vertex_count(), SurfaceVersion(mesh)};
     }),
                            py::arg("mesh"));
     def_in_loop<py::return_value_policy::reference_internal>(

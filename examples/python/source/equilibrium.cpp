@@ -14,7 +14,8 @@ using membrane::EquilibriumOptions;
                                const py::args& arguments, const EquilibriumOptions& options) {
     check_fit("equilibrium", mesh.vertex_count(), x.count, network, foundation);
     const Constraints constraints("equilibrium", arguments, mesh.vertex_count());
-    auto found = unlocked(network, foundation, [&](const auto& springs, const auto& volume) {
+    constraints.check_static("equilibrium");
+    auto found = unlocked("equilibrium", network, foundation, [&](const auto& springs, const auto& volume) {
         return std::apply(
             [&](const auto&... each) {
                 return membrane::equilibrium(x.map(), mesh, springs, volume, options, each...);

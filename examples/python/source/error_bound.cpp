@@ -22,8 +22,9 @@ struct BoundOf {
 };
 
 [[nodiscard]] const LinearNetwork& linear(const Network& network) {
-    if (network.any.index() != 0) refuse("ErrorBound", "the springs must be linear, got another law");
-    return std::get<0>(network.any);
+    const auto* springs = std::get_if<LinearNetwork>(&network.any);
+    if (springs == nullptr) refuse("ErrorBound", "the springs must be linear, got another law, or springs that tear");
+    return *springs;
 }
 
 /// The report of `compute(volume, constraint...)`, which is that of the last call for `self`.
@@ -34,6 +35,7 @@ ErrorReport& report_of(BoundOf& self, Positions x, const Network& network, const
     const auto& springs = linear(network);
     check_fit(name, springs.vertex_count(), x.count, network, foundation);
     const Constraints constraints(name, arguments, springs.vertex_count());
+    constraints.check_static(name);
     const auto find = [&](const auto& volume, const auto&... each) {
         if constexpr (membrane::LinearFoundation<std::remove_cvref_t<decltype(volume)>>) {
             return compute(springs, volume, each...);

@@ -33,7 +33,7 @@ void check(const char* name, const Mesh& mesh, const Network& network, const Fou
 [[nodiscard]] References references_of(const Mesh& mesh, const Network& network, const Foundation& foundation,
                                        const Path& path, Index tick_stride) {
     check("equilibria", mesh, network, foundation, path);
-    return unlocked(network, foundation, [&](const auto& springs, const auto& volume) {
+    return unlocked("equilibria", network, foundation, [&](const auto& springs, const auto& volume) {
         return membrane::equilibria(mesh, springs, volume, path.trajectory, tick_stride);
     });
 }

@@ -28,14 +28,14 @@ struct Scene {
 template <class Rule>
 [[nodiscard]] membrane::TrialResult run_trial(const Scene& scene, const References& references,
                                               const SolverOptions& options, const Rule& rule) {
-    return unlocked(scene.network, scene.foundation, [&](const auto& springs, const auto& volume) {
+    return unlocked("run_trial", scene.network, scene.foundation, [&](const auto& springs, const auto& volume) {
         return membrane::run_trial(scene.mesh, springs, volume, scene.trajectory, references, options, rule);
     });
 }
 template <class Rule>
 [[nodiscard]] Choice choose_settings(const Scene& scene, const membrane::Requirement& requirement,
                                      const Experiment& experiment, const Rule& rule) {
-    return unlocked(scene.network, scene.foundation, [&](const auto& springs, const auto& volume) {
+    return unlocked("choose_settings", scene.network, scene.foundation, [&](const auto& springs, const auto& volume) {
         return membrane::choose_settings(scene.mesh, springs, volume, scene.trajectory, requirement, experiment, rule);
     });
 }

@@ -14,7 +14,8 @@ namespace {
                                                 const SolverOptions& options) {
     const auto build = [&](const auto& springs, const auto& one) {
         using Type = SolverOf<std::remove_cvref_t<decltype(one)>>;
-        return std::make_unique<Solver>(Solver{Type(springs, options, one), springs.vertex_count()});
+        return std::make_unique<Solver>(
+            Solver{Type(detail::in_step(springs), options, one), springs.vertex_count(), network.version});
     };
     return std::visit(build, network.any, rule);
 }
@@ -23,6 +24,7 @@ StepReport& step(Solver& solver, double seconds, MovingPositions x, double dt, c
                  const Foundation& foundation, const py::args& arguments) {
     constexpr auto name = "QuasiStaticSolver";
     check_fit(name, solver.vertex_count, x.count, network, foundation);
+    check_version(name, "the network", network.version, solver.version);
     const Constraints constraints(name, arguments, solver.vertex_count);
     const StepArguments with{x, dt, network, constraints, seconds};
     solver.report = std::visit([&](auto& one, const auto& volume) { return take_step(one, with, volume); }, solver.any,
@@ -91,6 +93,47 @@ void bind_constraints(py::module_& module) {
         py::arg("vertices"), "`vertices` keep their positions.");
 }
 
+void bind_friction(py::module_& module) {
+    using Point = membrane::StickingPoint<double>;
+    py::class_<Point>(module, "StickingPoint", doc("StickingPoint"))
+        .def_readonly("triangle", &Point::triangle, doc("StickingPoint::triangle"))
+        .def_readonly("feature", &Point::feature, doc("StickingPoint::feature"))
+        .def_readonly("corners", &Point::corners, doc("StickingPoint::corners"))
+        .def_readonly("weights", &Point::weights, doc("StickingPoint::weights"))
+        .def_readonly("along", &Point::along, doc("StickingPoint::along"))
+        .def_readonly("offset", &Point::offset, doc("StickingPoint::offset"))
+        .def_readonly("force", &Point::force, doc("StickingPoint::force"))
+        .def_readonly("sticking_force", &Point::sticking_force, doc("StickingPoint::sticking_force"))
+        .def_readonly("pressure", &Point::pressure, doc("StickingPoint::pressure"))
+        .def_readonly("normal", &Point::normal, doc("StickingPoint::normal"));
+    using Options = membrane::ToolFrictionOptions;
+    auto friction = py::class_<ToolFriction>(module, "ToolFriction", doc("ToolFriction"));
+    const std::string text = std::string(doc("ToolFriction::ToolFriction")) +
+                             "\n\ncoefficient: " + doc("ToolFrictionOptions::coefficient") +
+                             "\nmax_contact_points: " + doc("ToolFrictionOptions::max_contact_points") + "\n";
+    friction
+        .def(py::init([](double coefficient, Index max_contact_points) {
+                 return ToolFriction({.coefficient = coefficient, .max_contact_points = max_contact_points});
+             }),
+             py::kw_only(), py::arg("coefficient"), py::arg("max_contact_points") = Options{}.max_contact_points,
+             text.c_str())
+        .def_property_readonly(
+            "points", [](const ToolFriction& self) { return std::vector(self.points().begin(), self.points().end()); },
+            doc("ToolFriction::points"))
+        .def_property_readonly("slips", &ToolFriction::slips, doc("ToolFriction::slips"))
+        .def("reset", &ToolFriction::reset, doc("ToolFriction::reset"));
+    def_in_loop(
+        friction, "press",
+        [](const py::object& self, const Tool& tool, const py::object& contact, const Grasp* grasp) {
+            const auto& of = contact.cast<const Contact&>();
+            return Acting{.any = self.cast<ToolFriction&>().press(tool, of, grasp != nullptr ? *grasp : Grasp{}),
+                          .contact = contact,
+                          .vertex_count = of.vertex_count,
+                          .owner = self};
+        },
+        py::arg("tool"), py::arg("contact"), py::arg("grasp") = py::none(), doc("ToolFriction::press"));
+}
+
 void bind_rules(py::module_& module) {
     using membrane::UpdateOrder;
     py::enum_<UpdateOrder>(module, "UpdateOrder", doc("UpdateOrder"))
@@ -155,6 +198,7 @@ void bind_solver(py::module_& module) {
 void bind_solve(py::module_& module) {
     bind_report(module);
     bind_constraints(module);
+    bind_friction(module);
     bind_rules(module);
     bind_solver(module);
 }

@@ -21,6 +21,7 @@ using SolverOf = membrane::QuasiStaticSolver<double, Rule>;
 struct Solver {
     std::variant<SolverOf<membrane::BlockStep>, SolverOf<membrane::SafeStep>, SolverOf<membrane::MassStep>> any;
     Index vertex_count;
+    SurfaceVersion version;
     StepReport report = {};
 };
 
@@ -40,13 +41,26 @@ template <class Rule, class Volume>
 #define MEMBRANE_PYTHON_STEPS(PREFIX, RULE)                                                                            \
     PREFIX StepReport take_step(SolverOf<RULE>&, const StepArguments&, const membrane::VirtualVolumeSprings<double>&); \
     PREFIX StepReport take_step(SolverOf<RULE>&, const StepArguments&, const membrane::FoundationSprings<double>&);    \
-    PREFIX StepReport take_step(SolverOf<RULE>&, const StepArguments&, const membrane::NoFoundation&)
+    PREFIX StepReport take_step(SolverOf<RULE>&, const StepArguments&, const membrane::NoFoundation&);                 \
+    PREFIX StepReport take_step(SolverOf<RULE>&, const StepArguments&, const membrane::CohesiveSprings<double>&)
 
 MEMBRANE_PYTHON_STEPS(extern template, membrane::BlockStep);
 MEMBRANE_PYTHON_STEPS(extern template, membrane::SafeStep);
 MEMBRANE_PYTHON_STEPS(extern template, membrane::MassStep);
 
 namespace detail {
+
+///@{
+/// A network as a step takes it: springs that tear are like others to it.
+template <class Network>
+[[nodiscard]] const Network& in_step(const Network& network) {
+    return network;
+}
+template <class Law>
+[[nodiscard]] const SpringsOf<Law>& in_step(const TearableOf<Law>& springs) {
+    return springs;
+}
+///@}
 
 /// A step with this number of constraints: it takes them one by one.
 template <class Rule, class Volume, class Springs, std::size_t... i>
@@ -68,19 +82,18 @@ template <class Rule, class Volume, class Springs, std::size_t... i>
 
 template <class Rule, class Volume>
 StepReport take_step(SolverOf<Rule>& solver, const StepArguments& with, const Volume& volume) {
-    return std::visit(
-        [&]<class Springs>(const Springs& springs) {
-            using Step = StepReport (*)(SolverOf<Rule>&, const StepArguments&, const Springs&, const Volume&);
-            constexpr auto by_count = []<std::size_t... n>(std::index_sequence<n...>) {
-                return std::array<Step, sizeof...(n)>{
-                    [](SolverOf<Rule>& of, const StepArguments& a, const Springs& s, const Volume& v) {
-                        return detail::step_with(of, a, s, v, std::make_index_sequence<n>());
-                    }...};
-            }
-            (std::make_index_sequence<max_constraints + 1>());
-            return by_count[with.constraints.count](solver, with, springs, volume);
-        },
-        with.network.any);
+    const auto step_of = [&]<class Springs>(const Springs& springs) {
+        using Step = StepReport (*)(SolverOf<Rule>&, const StepArguments&, const Springs&, const Volume&);
+        constexpr auto by_count = []<std::size_t... n>(std::index_sequence<n...>) {
+            return std::array<Step, sizeof...(n)>{
+                [](SolverOf<Rule>& of, const StepArguments& a, const Springs& s, const Volume& v) {
+                    return detail::step_with(of, a, s, v, std::make_index_sequence<n>());
+                }...};
+        }
+        (std::make_index_sequence<max_constraints + 1>());
+        return by_count[with.constraints.count](solver, with, springs, volume);
+    };
+    return std::visit([&](const auto& network) { return step_of(detail::in_step(network)); }, with.network.any);
 }
 
 }  // namespace membrane_python

@@ -63,7 +63,7 @@ void bind_normals(py::module_& module) {
     auto normals = py::class_<Normals>(module, "VertexNormals", doc("VertexNormals"));
     normals
         .def(py::init([](const Mesh& mesh) {
-                 return Normals{membrane::VertexNormals(mesh), mesh.vertex_count()};
+                 return Normals{membrane::VertexNormals(mesh), mesh.vertex_count(), SurfaceVersion(mesh)};
              }),
              py::arg("mesh"), doc("VertexNormals::VertexNormals"))
         .def_property_readonly(

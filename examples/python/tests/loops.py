@@ -152,7 +152,9 @@ def accuracy():
     trajectory = membrane.ToolTrajectory(mesh, tools, dt)
     references = membrane.equilibria(mesh, network, foundation, trajectory, tick_stride=10)
     rows = [reference.x for reference in references]
-    for rule in (membrane.BlockStep(), membrane.SafeStep(), membrane.MassStep()):
+    rules: list[membrane.BlockStep | membrane.SafeStep | membrane.MassStep] = [
+        membrane.BlockStep(), membrane.SafeStep(), membrane.MassStep()]
+    for rule in rules:
         for layers in (0, 8):
             result = membrane.run_trial(mesh, network, foundation, trajectory, references, rule, layers=layers,
                                         sweeps=4)
@@ -169,6 +171,110 @@ def accuracy():
     pull = membrane.pull(0, 1.001 * mesh.positions[0])
     rows.append(show(bound.compute(mesh.positions, network, foundation, pull)))
     return numpy.vstack(rows)
+
+
+def peel():
+    """Forceps that slip peel a sheet off the plane that it adheres to."""
+    mesh = membrane.sheet(width=4e-3, height=0.48e-3, columns=25, rows=3)
+    network = membrane.MassSpringNetwork(mesh, stiffness=2.5)
+    strengths = numpy.where(mesh.positions[:, 0] < -1.5e-3, 0.0, 100.0)
+    adhesion = membrane.CohesiveSprings(mesh, stiffness=2e6, strength=strengths, energy=0.05, tangential_strength=150)
+    solver = membrane.QuasiStaticSolver(network, layers=membrane.unlimited, sweeps=8)
+    tree = membrane.AabbTree(mesh)
+    tracker = membrane.ContactTracker(mesh)
+    grasper = membrane.Grasper(mesh, snap_to_vertex=True, holding_force=17e-6, jaw_length=0.3e-3)
+    device = membrane.ScriptedDevice([(0.0, (-1.9e-3, 0, 3e-4)), (0.1, (-1.84e-3, 0, 1.5e-4), True),
+                                      (0.8, (0.5e-3, 0, 2e-3), True)], radius=1.6e-4)
+    x = mesh.positions.copy()
+    rows = []
+    while device.running:
+        tool = device.read()
+        contact = tracker.update(tree, x, tool)
+        grasp = grasper.update(contact, x, tool)
+        report = solver.step(x, dt, network, adhesion, membrane.pull(tool, grasp))
+        adhesion.update(x, report.moved)
+        slipped = grasper.slip(x, tool, report.reactions[0])
+        tree.refit(x, report.moved)
+        device.write(report.total_reaction())
+        rows += [report.reactions[0].copy(), numpy.array([slipped, grasp.holding, adhesion.dissipated])]
+    states = numpy.column_stack([adhesion.adheres, adhesion.damage, adhesion.energy(x)])
+    return numpy.append(numpy.vstack([rows, x, states]).ravel(), network.energy(x))
+
+
+def friction():
+    """A tool drags a sphere by friction."""
+    mesh = membrane.icosphere(subdivisions=2)
+    network = membrane.MassSpringNetwork(mesh, stiffness=40.0)
+    foundation = membrane.VirtualVolumeSprings(mesh, stiffness=8.0, damping=0.02)
+    friction = membrane.ToolFriction(coefficient=0.4)
+    solver = membrane.QuasiStaticSolver(network, layers=6, sweeps=4)
+    tree = membrane.AabbTree(mesh)
+    tracker = membrane.ContactTracker(mesh)
+    device = membrane.ScriptedDevice([(0.0, (0, 0, 13e-3)), (0.1, (0, 0, 11e-3)), (0.3, (2e-3, 0, 11e-3))], radius=2e-3)
+    x = mesh.positions.copy()
+    numbers: list[numpy.ndarray] = []
+    while device.running:
+        tool = device.read()
+        contact = tracker.update(tree, x, tool)
+        report = solver.step(x, dt, network, foundation, friction.press(tool, contact))
+        tree.refit(x, report.moved)
+        device.write(report.total_reaction())
+        numbers += [report.reactions[0].copy(), numpy.array([friction.slips])]
+    numbers.append(x.ravel())
+    for point in friction.points:
+        numbers += [point.weights, point.offset, point.force, numpy.array([point.triangle, point.pressure])]
+    return numpy.concatenate(numbers)
+
+
+def tear_disc(mesh, springs, criterion):
+    """A stretched disc is pressed, held and torn; the springs and the criterion are as given."""
+    foundation = membrane.VirtualVolumeSprings(mesh, stiffness=1e-3)
+    solver = membrane.QuasiStaticSolver(springs, layers=12, sweeps=4)
+    tree = membrane.AabbTree(mesh)
+    tracker = membrane.ContactTracker(mesh)
+    grasper = membrane.Grasper(mesh)
+    normals = membrane.VertexNormals(mesh)
+    tear = membrane.Tearing(mesh, criterion)
+    x = 1.3 * mesh.positions
+    rows: list = []
+
+    def follow_all(events):
+        for event in events:
+            membrane.follow(event, springs, foundation, solver, tree, tracker, grasper, normals)
+            rows.append([event.moved.vertex, event.split.vertex, event.split.copy])
+
+    tree.refit(x)
+    path = [tear.surface.nearest_in_direction(tear.slit_at(0, (1, 0, 0))[0], (-1, 0, 0))]
+    while len(path) < 5:
+        path.append(tear.surface.nearest_in_direction(path[-1], (1, 0, 0)))
+    follow_all(tear.cut_along(path, x))
+    for tick in range(200):
+        tool = membrane.Tool(position=(0, 3e-3, 0.5e-3 + 2e-6 * tick), radius=0.6e-3, time=dt * tick,
+                             grasping=tick > 20)
+        contact = tracker.update(tree, x, tool)
+        grasp = grasper.update(contact, x, tool)
+        report = solver.step(x, dt, springs, foundation, membrane.press(tool, contact, grasp),
+                             membrane.pull(tool, grasp), tear.ligaments())
+        follow_all(tear.update(x, dt, springs, foundation))
+        tree.refit(x, report.moved)
+        normals.update(x, report.moved)
+        rows += [*report.reactions.copy(), [tear.torn_length, tear.dissipated, tear.stored(x)]]
+        rows += [tip.driving_force for tip in tear.tips]
+    return numpy.vstack([rows, x, tear.surface.rest_positions, normals.values, tear.surface.triangles])
+
+
+def tear():
+    """Tears by each criterion, of springs and of a tissue, linear and not."""
+    mesh = membrane.with_reserve(membrane.disc(radius=5e-3, rings=8), 100)
+    rim = membrane.border(mesh)
+    linear = membrane.MassSpringNetwork(mesh, stiffness=20.0, pinned=rim)
+    taut = membrane.MassSpringNetwork(mesh, membrane.TensionSpring(), stiffness=20.0, pinned=rim)
+    energy = membrane.EnergyRelease(toughness=1.4e3, thickness=8e-6)
+    return numpy.vstack([
+        tear_disc(mesh, membrane.Tissue(membrane.TearableSprings(mesh, linear)), energy),
+        tear_disc(mesh, membrane.TearableSprings(mesh, linear), energy),
+        tear_disc(mesh, membrane.Tissue(membrane.TearableSprings(mesh, taut)), energy),
+        tear_disc(mesh, membrane.TearableSprings(mesh, taut), membrane.LargestTension(strength=15))])
 
 
 def time_ticks(ticks):

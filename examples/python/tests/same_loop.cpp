@@ -17,8 +17,12 @@
 #include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/membrane.hpp>
 #include <membrane/meshing/distmesh.hpp>
+#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/spring_stiffness.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/solve/tool_friction.hpp>
+#include <membrane/tear/tearing.hpp>
 
 namespace {
 
@@ -230,6 +234,127 @@ void accuracy() {
     show(bound.compute(mesh.positions(), network, foundation, pulled));
 }
 
+/// Forceps that slip peel a sheet off the plane that it adheres to.
+void peel() {
+    const auto mesh = membrane::sheet<double>({.width = 4e-3, .height = 0.48e-3, .columns = 25, .rows = 3});
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 2.5});
+    std::vector<double> strengths;
+    for (const double x : mesh.positions().row(0)) strengths.push_back(x < -1.5e-3 ? 0 : 100);
+    auto adhesion = membrane::CohesiveSprings(
+        mesh, {.stiffness = 2e6, .strength = strengths, .energy = 0.05, .tangential_strength = 150});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = 8});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto grasper = membrane::Grasper(mesh, {.snap_to_vertex = true, .holding_force = 17e-6, .jaw_length = 0.3e-3});
+    auto device = membrane::ScriptedDevice<double>(
+        {{0.0, {-1.9e-3, 0, 3e-4}}, {0.1, {-1.84e-3, 0, 1.5e-4}, true}, {0.8, {0.5e-3, 0, 2e-3}, true}},
+        {.radius = 1.6e-4});
+    auto x = mesh.positions();
+    while (device.running()) {
+        const auto tool = device.read();
+        const auto contact = tracker.update(tree, x, tool);
+        const auto grasp = grasper.update(contact, x, tool);
+        const auto report = solver.step(x, dt, network, adhesion, pull(tool, grasp));
+        adhesion.update(x, report.moved);
+        const bool slipped = grasper.slip(x, tool, report.reactions[0]);
+        tree.refit(x, report.moved);
+        device.write(report.total_reaction());
+        print(report.reactions[0]);
+        std::printf("%d %d %.17g\n", slipped, grasp.holding(), adhesion.dissipated());
+    }
+    print_points(x);
+    for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) {
+        std::printf("%d %.17g %.17g\n", adhesion.adheres(v), adhesion.damage(v),
+                    adhesion.energy(v, membrane::point(x, v)));
+    }
+    std::printf("%.17g\n", network.energy(x));
+}
+
+/// A tool drags a sphere by friction.
+void friction() {
+    const auto mesh = membrane::icosphere<double>({.subdivisions = 2});
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 40.0});
+    const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
+    auto friction = membrane::ToolFriction<double>({.coefficient = 0.4});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 4});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto device = membrane::ScriptedDevice<double>(
+        {{0.0, {0, 0, 13e-3}}, {0.1, {0, 0, 11e-3}}, {0.3, {2e-3, 0, 11e-3}}}, {.radius = 2e-3});
+    auto x = mesh.positions();
+    while (device.running()) {
+        const auto tool = device.read();
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, foundation, friction.press(tool, contact));
+        tree.refit(x, report.moved);
+        device.write(report.total_reaction());
+        print(report.reactions[0]);
+        std::printf("%d\n", friction.slips());
+    }
+    print_points(x);
+    for (const auto& point : friction.points()) {
+        print(point.weights);
+        print(point.offset);
+        print(point.force);
+        std::printf("%d %.17g\n", point.triangle, point.pressure);
+    }
+}
+
+/// A stretched disc is pressed, held and torn; the springs and `criterion` are as given.
+template <class Springs>
+void tear_disc(const membrane::TriangleMesh<double>& mesh, Springs springs, const auto& criterion) {
+    auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 1e-3});
+    auto solver = membrane::QuasiStaticSolver(springs, {.layers = 12, .sweeps = 4});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto grasper = membrane::Grasper(mesh);
+    auto normals = membrane::VertexNormals(mesh);
+    auto tear = membrane::Tearing(mesh, criterion);
+    membrane::Points<double> x = 1.3 * mesh.positions();
+    const auto follow_all = [&](const auto& events) {
+        for (const auto& event : events) {
+            follow(event, springs, foundation, solver, tree, tracker, grasper, normals);
+            std::printf("%d %d %d\n", event.moved.vertex, event.split.vertex, event.split.copy);
+        }
+    };
+    tree.refit(x);
+    std::vector<membrane::Index> path{tear.surface().nearest_in_direction(tear.slit_at(0, {1, 0, 0})[0], {-1, 0, 0})};
+    while (path.size() < 5) path.push_back(tear.surface().nearest_in_direction(path.back(), {1, 0, 0}));
+    follow_all(tear.cut_along(path, x));
+    for (int tick = 0; tick < 200; ++tick) {
+        const double height = 0.5e-3 + 2e-6 * tick;
+        const membrane::Tool<double> tool{
+            .position = {0, 3e-3, height}, .radius = 0.6e-3, .time = dt * tick, .grasping = tick > 20};
+        const auto contact = tracker.update(tree, x, tool);
+        const auto grasp = grasper.update(contact, x, tool);
+        const auto report =
+            solver.step(x, dt, springs, foundation, press(tool, contact, grasp), pull(tool, grasp), tear.ligaments());
+        follow_all(tear.update(x, dt, springs, foundation));
+        tree.refit(x, report.moved);
+        normals.update(x, report.moved);
+        for (const auto& reaction : report.reactions) print(reaction);
+        std::printf("%.17g %.17g %.17g\n", tear.torn_length(), tear.dissipated(), tear.stored(x));
+        for (const auto& tip : tear.tips()) print(tip.driving_force);
+    }
+    print_points(x);
+    print_points(tear.surface().rest_positions());
+    print_points(normals.values());
+    for (const auto& f : tear.surface().triangles().colwise()) std::printf("%d %d %d\n", f[0], f[1], f[2]);
+}
+
+/// Tears by each criterion, of springs and of a tissue, linear and not.
+void tear() {
+    const auto mesh = membrane::with_reserve(membrane::disc<double>({.radius = 5e-3, .rings = 8}), 100);
+    const auto rim = membrane::border(mesh);
+    const auto linear = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 20.0, .pinned = rim});
+    const auto taut = membrane::MassSpringNetwork(mesh, membrane::TensionSpring{}, {.stiffness = 20.0, .pinned = rim});
+    const membrane::EnergyRelease energy{.toughness = 1.4e3, .thickness = 8e-6};
+    tear_disc(mesh, membrane::Tissue(membrane::TearableSprings(mesh, linear)), energy);
+    tear_disc(mesh, membrane::TearableSprings(mesh, linear), energy);
+    tear_disc(mesh, membrane::Tissue(membrane::TearableSprings(mesh, taut)), energy);
+    tear_disc(mesh, membrane::TearableSprings(mesh, taut), membrane::LargestTension{.strength = 15});
+}
+
 /// The loop of the README for `ticks` ticks: a tool goes in and out.
 void time_ticks(int ticks) {
     const auto mesh = membrane::icosphere<double>({.radius = 10e-3, .subdivisions = 3});
@@ -263,9 +388,10 @@ void time_ticks(int ticks) {
 
 int main(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";
-    const std::pair<std::string_view, void (*)()> scenes[] = {{"sphere", sphere},   {"cap", cap},
-                                                              {"offline", offline}, {"published", published},
-                                                              {"law", law},         {"accuracy", accuracy}};
+    const std::pair<std::string_view, void (*)()> scenes[] = {
+        {"sphere", sphere},       {"cap", cap},           {"offline", offline},
+        {"published", published}, {"law", law},           {"accuracy", accuracy},
+        {"peel", peel},           {"friction", friction}, {"tear", tear}};
     for (const auto& [scene, run] : scenes) {
         if (name == scene) return run(), 0;
     }

@@ -14,17 +14,36 @@ import pytest
 
 HERE = pathlib.Path(__file__).resolve().parents[1]
 PAGE = (HERE / "README.md").read_text()
+PROGRAMS = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 PUBLIC = [name for name in dir(membrane._membrane) if not name.startswith("_")]
 
 
 def test_the_program_of_the_page_runs():
-    program, = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    program = PROGRAMS[0]
     assert program.count("\n") <= 32
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(program, {})  # noqa: S102
     felt, error = re.fullmatch(r"The hand feels (\S+) N, (\S+) N from the equilibrium.\n", printed.getvalue()).groups()
     assert 0.01 < float(felt) < 0.5 and float(error) < 0.05 * float(felt)
+
+
+def test_the_tick_of_the_page_tears():
+    mesh = membrane.with_reserve(membrane.disc(rings=8), 100)
+    network = membrane.MassSpringNetwork(mesh, stiffness=20.0, pinned=membrane.border(mesh))
+    tissue = membrane.Tissue(membrane.TearableSprings(mesh, network))
+    scene = {"membrane": membrane, "dt": 1e-3, "tissue": tissue, "x": 1.3 * mesh.positions,
+             "foundation": membrane.VirtualVolumeSprings(mesh, stiffness=1e-3), "tree": membrane.AabbTree(mesh),
+             "solver": membrane.QuasiStaticSolver(tissue, layers=12), "tracker": membrane.ContactTracker(mesh),
+             "tear": membrane.Tearing(mesh, membrane.EnergyRelease(toughness=100, thickness=1e-5))}
+    path = [scene["tear"].surface.nearest_in_direction(0, (-1, 0, 0)), 0]
+    while len(path) < 5:
+        path.append(scene["tear"].surface.nearest_in_direction(path[-1], (1, 0, 0)))
+    for event in scene["tear"].cut_along(path, scene["x"]):
+        membrane.follow(event, *(scene[name] for name in ("tissue", "foundation", "solver", "tree", "tracker")))
+    for _ in range(50):
+        exec(PROGRAMS[1], scene)  # noqa: S102
+    assert len(PROGRAMS) == 2 and scene["tear"].torn_length > 0
 
 
 def test_the_names_of_the_page_are_bound():
@@ -75,7 +94,7 @@ def test_a_wrong_type_is_found_by_the_stubs(tmp_path):
     assert run.returncode == 1 and "Found 2 errors" in run.stdout
 
 
-@pytest.mark.parametrize("name", ["figure_4", "trade", "fit", "convergence", "sweep"])
+@pytest.mark.parametrize("name", ["figure_4", "trade", "fit", "convergence", "sweep", "tear"])
 def test_examples_run(name, tmp_path):
     run = subprocess.run([sys.executable, HERE / f"scripts/{name}.py"], cwd=tmp_path, capture_output=True, text=True)
     assert run.returncode == 0 and run.stdout, run.stderr

@@ -1,0 +1,341 @@
+// SPDX-License-Identifier: MIT
+#include <pybind11/stl.h>
+
+#include "loop_call.hpp"
+#include "solver.hpp"
+
+namespace membrane_python {
+
+namespace {
+
+using Surface = membrane::TornSurface<double>;
+using Tip = membrane::TearTip<double>;
+using membrane::EnergyRelease;
+using membrane::LargestTension;
+using membrane::TearOptions;
+
+/// An event with memory of its own.
+class Event {
+  public:
+    Event(const membrane::TearEvent<double>& event, const SurfaceVersion& before)
+        : event_(event),
+          triangles_(event.split.triangles.begin(), event.split.triangles.end()),
+          corners_(event.split.corners.begin(), event.split.corners.end()),
+          reshaped_(event.moved.triangles.begin(), event.moved.triangles.end()),
+          before_(before),
+          after_(before.after(event)) {
+        event_.split.triangles = triangles_;
+        event_.split.corners = corners_;
+        event_.moved.triangles = reshaped_;
+    }
+    Event(const Event&) = delete;
+    Event& operator=(const Event&) = delete;
+
+    [[nodiscard]] const membrane::TearEvent<double>& event() const noexcept { return event_; }
+    [[nodiscard]] const SurfaceVersion& before() const noexcept { return before_; }
+    [[nodiscard]] const SurfaceVersion& after() const noexcept { return after_; }
+
+  private:
+    membrane::TearEvent<double> event_;
+    std::vector<Index> triangles_;
+    std::vector<std::array<Index, 3>> corners_;
+    std::vector<membrane::ReshapedTriangle<double>> reshaped_;
+    SurfaceVersion before_, after_;
+};
+using Events = std::vector<std::unique_ptr<Event>>;
+
+}  // namespace
+
+/// Tears by one of the criteria.
+struct Tear {
+    std::variant<membrane::Tearing<double, EnergyRelease>, membrane::Tearing<double, LargestTension>> any;
+    Index vertex_count;
+    SurfaceVersion version;
+
+    /// What `of(tearing)` is.
+    template <class Of>
+    [[nodiscard]] decltype(auto) get(Of of) const {
+        return std::visit(of, any);
+    }
+    [[nodiscard]] const Surface& surface() const {
+        return get([](const auto& one) -> const Surface& { return one.surface(); });
+    }
+    /// The events of a call, which the parts are to follow.
+    [[nodiscard]] Events to_follow(std::span<const membrane::TearEvent<double>> events) {
+        Events list;
+        for (const auto& event : events) {
+            list.push_back(std::make_unique<Event>(event, version));
+            version = list.back()->after();
+        }
+        return list;
+    }
+};
+
+namespace {
+
+constexpr auto component = "Tearing";
+
+[[nodiscard]] Events update(Tear& self, MovingPositions x, double dt, const Network& network,
+                            const Foundation& foundation, const std::vector<Index>& held) {
+    check_fit(component, self.vertex_count, x.count, network, foundation);
+    check_version(component, "the network", network.version, self.version);
+    auto events = std::visit(
+        [&]<class Springs>(auto& tearing, const Springs& springs, const auto& volume) -> Events {
+            if constexpr (membrane::FollowsSplit<Springs>) {
+                return self.to_follow(tearing.update(x.map(), dt, springs, volume, held));
+            } else {
+                refuse(component, "the network must be TearableSprings or a Tissue, got a MassSpringNetwork");
+            }
+        },
+        self.any, network.any, foundation.any);
+    if (events.empty()) network.rethrow();  // else the next call raises it: these events are to be followed
+    return events;
+}
+
+///@{
+/// Whether a class of Python may follow a tear, and its part that does.
+[[nodiscard]] auto& part_of(Normals& of) { return of.normals; }
+[[nodiscard]] auto& part_of(Tree& of) { return of.tree; }
+[[nodiscard]] auto& part_of(Tracker& of) { return of.tracker; }
+[[nodiscard]] auto& part_of(Forceps& of) { return of.grasper; }
+[[nodiscard]] auto& part_of(Solver& of) { return of.any; }
+[[nodiscard]] auto& part_of(Network& of) { return of.any; }
+[[nodiscard]] auto& part_of(Foundation& of) { return of.any; }
+///@}
+
+template <class Part>
+inline constexpr bool follows = membrane::FollowsSplit<Part> || membrane::FollowsMovedVertex<Part, double>;
+
+/// Calls `act(part, version)` for what an object holds.
+template <class Act>
+void with_part(const py::handle& object, Act act) {
+    const auto refuse_part = [&] {
+        throw py::type_error("this part does not follow a tear: " +
+                             py::cast<std::string>(py::type::handle_of(object).attr("__name__")));
+    };
+    const auto act_if_follows = [&](auto& part, SurfaceVersion& version) {
+        if constexpr (follows<std::remove_reference_t<decltype(part)>>) {
+            act(part, version);
+        } else {
+            refuse_part();
+        }
+    };
+    const auto try_class = [&]<class Class>(std::type_identity<Class>) {
+        if (!py::isinstance<Class>(object)) return false;
+        auto& of = object.cast<Class&>();
+        auto& part = part_of(of);
+        if constexpr (requires { part.index(); }) {
+            std::visit([&](auto& one) { act_if_follows(one, of.version); }, part);
+        } else {
+            act_if_follows(part, of.version);
+        }
+        return true;
+    };
+    const auto try_classes = [&]<class... Class>(std::type_identity<Class>... classes) {
+        return (try_class(classes) || ...);
+    };
+    const bool found =
+        try_classes(std::type_identity<Network>(), std::type_identity<Foundation>(), std::type_identity<Solver>(),
+                    std::type_identity<Tree>(), std::type_identity<Tracker>(), std::type_identity<Forceps>(),
+                    std::type_identity<Normals>());
+    if (!found) refuse_part();
+}
+
+/// All parts, or none: an error leaves each as it was.
+void follow(const Event& event, const py::args& parts) {
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+        with_part(parts[i], [&](const auto&, const SurfaceVersion& version) {
+            if (version == event.before()) return;
+            refuse("follow", "part ", i, " must be of the tear's mesh and have followed its ", event.before().events(),
+                   " events before this one, got ", version.events());
+        });
+        for (std::size_t k = 0; k < i; ++k) {
+            if (parts[i].is(parts[k])) refuse("follow", "parts must be different, got the same for ", k, " and ", i);
+        }
+    }
+    for (const auto& part : parts) {
+        with_part(part, [&](auto& one, SurfaceVersion& version) {
+            membrane::follow(event.event(), one);
+            version = event.after();
+        });
+    }
+}
+
+void check_vertex(Index v, const Surface& surface) {
+    const auto vertices = static_cast<Index>(surface.rest_positions().cols());
+    if (v < 0 || v >= vertices) refuse("TornSurface", "vertices must be 0 to ", vertices - 1, ", got ", v);
+}
+
+void bind_criteria(py::module_& module) {
+    py::class_<EnergyRelease>(module, "EnergyRelease", doc("EnergyRelease"))
+        .def(py::init([](double toughness, double thickness) {
+                 const EnergyRelease criterion{.toughness = toughness, .thickness = thickness};
+                 criterion.check();
+                 return criterion;
+             }),
+             py::kw_only(), py::arg("toughness"), py::arg("thickness"), doc("EnergyRelease::check"))
+        .def_readonly("toughness", &EnergyRelease::toughness, doc("EnergyRelease::toughness"))
+        .def_readonly("thickness", &EnergyRelease::thickness, doc("EnergyRelease::thickness"));
+    py::class_<LargestTension>(module, "LargestTension", doc("LargestTension"))
+        .def(py::init([](double strength) {
+                 const LargestTension criterion{.strength = strength};
+                 criterion.check();
+                 return criterion;
+             }),
+             py::kw_only(), py::arg("strength"), doc("LargestTension::check"))
+        .def_readonly("strength", &LargestTension::strength, doc("LargestTension::strength"));
+}
+
+void bind_events(py::module_& module) {
+    using membrane::VertexSplit;
+    using Moved = membrane::MovedVertex<double>;
+    py::class_<Moved>(module, "MovedVertex", doc("MovedVertex"))
+        .def_readonly("vertex", &Moved::vertex, doc("MovedVertex::vertex"))
+        .def_readonly("rest", &Moved::rest, doc("MovedVertex::rest"));
+    py::class_<VertexSplit>(module, "VertexSplit", doc("VertexSplit"))
+        .def_readonly("vertex", &VertexSplit::vertex, doc("VertexSplit::vertex"))
+        .def_readonly("copy", &VertexSplit::copy, doc("VertexSplit::copy"))
+        .def_property_readonly(
+            "triangles", [](const py::object& self) { return view(self.cast<const VertexSplit&>().triangles, self); },
+            doc("VertexSplit::triangles"))
+        .def_readonly("area_share", &VertexSplit::area_share, doc("VertexSplit::area_share"));
+    py::class_<Event>(module, "TearEvent", doc("TearEvent"))
+        .def_property_readonly(
+            "moved", [](const Event& self) -> const Moved& { return self.event().moved; }, doc("TearEvent::moved"))
+        .def_property_readonly(
+            "split", [](const Event& self) -> const VertexSplit& { return self.event().split; },
+            doc("TearEvent::split"));
+    module.def("follow", &follow, py::arg("event"), doc("follow"));
+}
+
+void bind_torn_surface(py::module_& module) {
+    py::class_<Surface>(module, "TornSurface", doc("TornSurface"))
+        .def_property_readonly(
+            "triangles", [](const py::object& self) { return view(self.cast<const Surface&>().triangles(), self); },
+            doc("TornSurface::triangles"))
+        .def_property_readonly(
+            "rest_positions",
+            [](const py::object& self) { return view(self.cast<const Surface&>().rest_positions(), self); },
+            doc("TornSurface::rest_positions"))
+        .def_property_readonly("reserve", &Surface::reserve, doc("TornSurface::reserve"))
+        .def(
+            "has_inner_edge",
+            [](const Surface& self, Index v, Index other) {
+                check_vertex(v, self);
+                return self.has_inner_edge(v, other);
+            },
+            py::arg("v"), py::arg("other"), doc("TornSurface::has_inner_edge"))
+        .def(
+            "nearest_in_direction",
+            [](const Surface& self, Index v, const Vector& direction) {
+                check_vertex(v, self);
+                return self.nearest_in_direction(v, direction);
+            },
+            py::arg("v"), py::arg("direction"), doc("TornSurface::nearest_in_direction"))
+        .def(
+            "mean_edge",
+            [](const Surface& self, Index v) {
+                check_vertex(v, self);
+                return self.mean_edge(v);
+            },
+            py::arg("v"), doc("TornSurface::mean_edge"))
+        .def(
+            "rest_normal",
+            [](const Surface& self, Index v) {
+                check_vertex(v, self);
+                return self.rest_normal(v);
+            },
+            py::arg("v"), doc("TornSurface::rest_normal"));
+    py::class_<Tip>(module, "TearTip", doc("TearTip"))
+        .def_readonly("vertex", &Tip::vertex, doc("TearTip::vertex"))
+        .def_readonly("behind", &Tip::behind, doc("TearTip::behind"))
+        .def_readonly("heading", &Tip::heading, doc("TearTip::heading"))
+        .def_readonly("advanced", &Tip::advanced, doc("TearTip::advanced"))
+        .def_readonly("driving_force", &Tip::driving_force, doc("TearTip::driving_force"));
+}
+
+template <class Class>
+void bind_tear_results(Class& tear) {
+    tear.def_property_readonly(
+            "tips",
+            [](const Tear& self) {
+                return self.get([](const auto& one) { return std::vector(one.tips().begin(), one.tips().end()); });
+            },
+            doc("Tearing::tips"))
+        .def_property_readonly("surface", &Tear::surface, doc("Tearing::surface"))
+        .def_property_readonly(
+            "reserve_used_up",
+            [](const Tear& self) { return self.get([](const auto& one) { return one.reserve_used_up(); }); },
+            doc("Tearing::reserve_used_up"))
+        .def_property_readonly(
+            "torn_length", [](const Tear& self) { return self.get([](const auto& one) { return one.torn_length(); }); },
+            doc("Tearing::torn_length"))
+        .def_property_readonly(
+            "dissipated", [](const Tear& self) { return self.get([](const auto& one) { return one.dissipated(); }); },
+            doc("Tearing::dissipated"))
+        .def(
+            "stored",
+            [](const Tear& self, Positions x) {
+                check_count(component, "x", x.count, self.vertex_count);
+                return self.get([&](const auto& one) { return one.stored(x.map()); });
+            },
+            py::arg("x"), doc("Tearing::stored"));
+}
+
+void bind_tearing(py::module_& module) {
+    const Keywords options("TearOptions", std::pair("max_tips", &TearOptions::max_tips),
+                           std::pair("patch_radius", &TearOptions::patch_radius),
+                           std::pair("min_angle", &TearOptions::min_angle),
+                           std::pair("move_vertices", &TearOptions::move_vertices));
+    using Criterion = std::variant<EnergyRelease, LargestTension>;
+    auto tear = py::class_<Tear>(module, "Tearing", doc("Tearing"));
+    options.def_init(tear,
+                     options.taking<const Mesh&, const Criterion&>([](const Mesh& mesh, const Criterion& criterion,
+                                                                      const TearOptions& o) {
+                         const auto build = [&](const auto& one) {
+                             return Tear{membrane::Tearing(mesh, one, o), mesh.vertex_count(), SurfaceVersion(mesh)};
+                         };
+                         return std::visit(build, criterion);
+                     }),
+                     py::arg("mesh"), py::arg("criterion"));
+    tear.def(
+        "cut_along",
+        [](Tear& self, const std::vector<Index>& path, MovingPositions x) {
+            check_count(component, "x", x.count, self.vertex_count);
+            return std::visit([&](auto& one) { return self.to_follow(one.cut_along(path, x.map())); }, self.any);
+        },
+        py::arg("path"), py::arg("x"), doc("Tearing::cut_along"));
+    tear.def(
+        "slit_at",
+        [](const Tear& self, Index v, const Vector& direction) {
+            return self.get([&](const auto& one) { return one.slit_at(v, direction); });
+        },
+        py::arg("v"), py::arg("direction"), doc("Tearing::slit_at"));
+    def_in_loop(
+        tear, "ligaments",
+        [](const py::object& self) {
+            const auto& of = self.cast<const Tear&>();
+            return Acting{.any = of.get([](const auto& one) { return one.ligaments(); }),
+                          .vertex_count = of.vertex_count,
+                          .owner = self};
+        },
+        doc("Tearing::ligaments"));
+    def_in_loop(
+        tear, "update",
+        [](Tear& self, MovingPositions x, double dt, const Network& network, const Foundation& foundation,
+           const std::vector<Index>& held) { return update(self, x, dt, network, foundation, held); },
+        py::arg("x"), py::arg("dt"), py::arg("network"), py::arg("foundation"), py::arg("held") = std::vector<Index>(),
+        doc("Tearing::update"));
+    bind_tear_results(tear);
+}
+
+}  // namespace
+
+void bind_tear(py::module_& module) {
+    bind_criteria(module);
+    bind_events(module);
+    bind_torn_surface(module);
+    bind_tearing(module);
+}
+
+}  // namespace membrane_python
