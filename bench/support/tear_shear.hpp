@@ -137,8 +137,8 @@ struct AtStretch {
 }
 
 /// `wanted(state)` where `at(state)`, which increases, is `value`: linear between stretches; NaN beyond them.
-template <class At, class Wanted>
-[[nodiscard]] double value_where(const std::vector<AtStretch>& states, const At& at, const Wanted& wanted,
+template <class At, class Value>
+[[nodiscard]] double value_where(const std::vector<AtStretch>& states, const At& at, const Value& wanted,
                                  double value) {
     for (std::size_t i = 1; i < states.size(); ++i) {
         const double before = at(states[i - 1]), after = at(states[i]);
