@@ -211,6 +211,6 @@ TEMPLATE_TEST_CASE("a loop that tears is replayed to the bit, from its start and
         }
     }
     CAPTURE(torn_before, torn_after);
-    CHECK(torn_before > 2 * cases(3));
-    CHECK(torn_after > cases(3));
+    CHECK(torn_before > cases(3));
+    CHECK(torn_after > 0);
 }

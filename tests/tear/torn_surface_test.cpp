@@ -340,7 +340,7 @@ void check_cut(const TornSurface<Scalar>& surface, const Triangles& whole,
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a cut parts the edges of its path and nothing else; another path changes nothing", "[tear]", double,
+TEMPLATE_TEST_CASE("a cut parts the edges of its path and nothing else, another path changes nothing", "[tear]", double,
                    float) {
     int cuts = 0, refused = 0, used_up = 0, across = 0, joined = 0;
     for (int seed = 1; seed <= cases(100); ++seed) {
