@@ -12,8 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "support/peel_strip.hpp"
+#include "support/tear_centre.hpp"
 #include "support/tear_shear.hpp"
 #include "support/tear_speed.hpp"
+#include "support/tear_trousers.hpp"
 
 // tear FOLDER [--short] [PART...]: tears beside closed forms, over meshes and directions of their grids, and what they
 // cost. Writes Markdown tables to tear.md, and a .tsv for each plot, to FOLDER.
@@ -80,10 +83,11 @@ class Page {
 
 /// How much is run.
 struct Effort {
-    std::vector<int> rows;  ///< edges over the height of a strip
-    int directions;         ///< of grids
-    double edges;           ///< of advance
-    int ticks;              ///< for times
+    std::vector<int> rows;    ///< edges over the height of a strip
+    std::vector<int> widths;  ///< of a leg [edges]
+    int directions;           ///< of grids
+    double edges;             ///< of advance
+    int ticks;                ///< for times
 };
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
@@ -209,6 +213,84 @@ void criteria(Page& page, const Effort& effort) {
     page.add({"the same: `LargestTension`", spread(by_tension), none, "%"});
 }
 
+void trouser_test(Page& page, const Effort& effort) {
+    page.print(
+        "\n### Trousers, grids of %d directions\n\n| edges over the width of a leg | force over the closed form: mean "
+        "| "
+        "least and largest mean of a grid | least and largest of any tick | energy that nothing has taken | off the "
+        "line "
+        "[edges] |\n|---|---|---|---|---|---|\n",
+        effort.directions);
+    auto curves = page.table("trousers", "width\tturn\tdrawn\tforce");
+    auto means = page.table("trouser_means", "width\tturn\tmean\tlow\thigh");
+    double all = 0, bottom = 10, top = 0;
+    for (const int width : effort.widths) {
+        double sum = 0, lost = 0, off = 0, least = 10, largest = 0, low = 10, high = 0;
+        for (int i = 0; i < effort.directions; ++i) {
+            const double turn = 60.0 * i / (effort.directions - 1);
+            const TrouserRun found = run(Trousers{.width = width, .turn = turn * degree}, effort.edges);
+            sum += found.mean / effort.directions, lost += found.lost / effort.directions;
+            off = std::max(off, found.off_line);
+            least = std::min(least, found.mean), largest = std::max(largest, found.mean);
+            low = std::min(low, found.low), high = std::max(high, found.high);
+            means << width << '\t' << turn << '\t' << found.mean << '\t' << found.low << '\t' << found.high << '\n';
+            for (std::size_t k = 0; k < found.curve.size(); k += 4) {
+                const auto& [drawn, force] = found.curve[k];
+                curves << width << '\t' << turn << '\t' << drawn << '\t' << force << '\n';
+            }
+            curves << "\n\n";
+        }
+        page.print("| %d | %.3f | %.3f to %.3f | %.2f to %.2f | %.0f %% | %.2f |\n", width, sum, least, largest, low,
+                   high, 100 * lost, off);
+        all += sum / static_cast<double>(effort.widths.size());
+        bottom = std::min(bottom, least), top = std::max(top, largest);
+    }
+    page.add({"trousers: mean force, from the closed form", percent(all), 5, "%"});
+    page.add({"trousers: spread of the means of all meshes and grids", 100 * (top - bottom) / all, 10, "%"});
+}
+
+void centre(Page& page, const Effort& effort) {
+    page.print(
+        "\n### A cut in a sheet stretched in both directions\n\n| edges along a side | directions | driving force, "
+        "from "
+        "the cut [degrees] | of both ends, difference | off the line while it tears [edges] | difference of the "
+        "advances [edges] |\n|---|---|---|---|---|---|\n");
+    double angle = 0, unlike = 0, off = 0;
+    for (const int rows : effort.rows) {
+        CentreRun worst;
+        for (const double turn : {0.0, 15.0, 30.0, 45.0}) {
+            const CentreRun found = run(Centre{.rows = rows * 3 / 2, .turn = turn * degree}, effort.edges / 5);
+            worst.angle = std::max(worst.angle, found.angle);
+            worst.unlike = std::max(worst.unlike, found.unlike);
+            worst.off_line = std::max(worst.off_line, found.off_line);
+            worst.longer = std::max(worst.longer, found.longer);
+        }
+        page.print("| %d | 4 | %.2f | %.1f %% | %.2f | %.1f |\n", rows * 3 / 2, worst.angle / degree,
+                   100 * worst.unlike, worst.off_line, worst.longer);
+        angle = std::max(angle, worst.angle / degree), unlike = std::max(unlike, worst.unlike);
+        off = std::max(off, worst.off_line);
+    }
+    page.add({"cut in a sheet: driving force, from the cut", angle, 3, "degrees"});
+    page.add({"cut in a sheet: driving forces of both ends, difference", 100 * unlike, 5, "%"});
+    page.add({"cut in a sheet: distance from a straight line", off, 0.7, "edges"});
+}
+
+void peel(Page& page, const Effort&) {
+    page.print(
+        "\n### Peel at 90 degrees\n\n| edge [um] | energy per area by the force, over that of adhesion | stored and "
+        "taken, over given |\n|---|---|---|\n");
+    double force = 0, lost = 0;
+    for (const double edge : {12e-6, 8e-6, 6e-6}) {
+        test::PeelStrip<double> strip(edge);
+        const double found = strip.peel() / strip.energy;
+        const double balance = (strip.stored() + strip.adhesion.dissipated()) / strip.work;
+        page.print("| %g | %.3f | %.3f |\n", 1e6 * edge, found, balance);
+        force = std::max(force, percent(found)), lost = std::max(lost, percent(balance));
+    }
+    page.add({"peel: force, from the closed form", force, 2, "%"});
+    page.add({"peel: energy that nothing has taken, of that given", lost, 1, "%"});
+}
+
 void speed(Page& page, const Effort& effort) {
     const auto costs = cost_of_ticks(effort.ticks);
     page.print(
@@ -228,19 +310,19 @@ struct Part {
     const char* name;
     void (*run)(Page&, const Effort&);
 };
-constexpr Part parts[]{
-    {"shear", shear}, {"damping", damping}, {"grids", grids}, {"criteria", criteria}, {"speed", speed}};
+constexpr Part parts[]{{"shear", shear},   {"damping", damping},   {"grids", grids}, {"trousers", trouser_test},
+                       {"centre", centre}, {"criteria", criteria}, {"peel", peel},   {"speed", speed}};
 
 }  // namespace
 
 int main(int argc, char** argv) {
     try {
         if (argc < 2) throw std::runtime_error("tear FOLDER [--short] [PART...]");
-        Effort effort{.rows = {10, 20, 40}, .directions = 20, .edges = 20, .ticks = 1200};
+        Effort effort{.rows = {10, 20, 40}, .widths = {4, 6, 8}, .directions = 20, .edges = 20, .ticks = 1200};
         std::vector<std::string> names;
         for (int i = 2; i < argc; ++i) {
             if (std::strcmp(argv[i], "--short") == 0) {
-                effort = {.rows = {10, 14}, .directions = 3, .edges = 6, .ticks = 200};
+                effort = {.rows = {10, 14}, .widths = {4}, .directions = 3, .edges = 6, .ticks = 200};
             } else {
                 names.emplace_back(argv[i]);
             }

@@ -136,15 +136,14 @@ struct AtStretch {
     return result;
 }
 
-/// `wanted(state)` where `at(state)`, which increases, is `value`: linear between stretches; NaN beyond them.
-template <class At, class Value>
-[[nodiscard]] double value_where(const std::vector<AtStretch>& states, const At& at, const Value& wanted,
-                                 double value) {
+/// `y(state)` where `x(state)`, which increases, is `value`: linear between stretches; NaN beyond them.
+template <class X, class Y>
+[[nodiscard]] double value_where(const std::vector<AtStretch>& states, const X& x, const Y& y, double value) {
     for (std::size_t i = 1; i < states.size(); ++i) {
-        const double before = at(states[i - 1]), after = at(states[i]);
+        const double before = x(states[i - 1]), after = x(states[i]);
         if (before <= value && value <= after) {
             const double part = (value - before) / (after - before);
-            return wanted(states[i - 1]) + part * (wanted(states[i]) - wanted(states[i - 1]));
+            return y(states[i - 1]) + part * (y(states[i]) - y(states[i - 1]));
         }
     }
     return std::numeric_limits<double>::quiet_NaN();

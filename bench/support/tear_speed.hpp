@@ -19,8 +19,8 @@
 /// What a tear costs in a tick.
 namespace bench::tears {
 
-/// A stretched disc of springs with a clamped rim. A hand draws the lip of a cut, just behind its tip, up and aside, for
-/// three edges; then takes hold anew. Without a cut it draws a vertex at the same place.
+/// A stretched disc of springs with a clamped rim. A hand draws the lip of a cut, just behind its tip, up and aside,
+/// for three edges; then takes hold anew. Without a cut it draws a vertex at the same place.
 class DrawnDisc {
   public:
     static constexpr int rings = 58;                                ///< 10,267 vertices

@@ -5,8 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include <membrane/model/material.hpp>
@@ -32,7 +34,7 @@ inline constexpr membrane::Material torn_material{.young_modulus = 1e6, .poisson
 
 struct TornSheetOptions {
     std::array<std::vector<Index>, 2> hands;      ///< the vertices that each holds
-    std::vector<Index> fixed = {};                ///< other vertices that do not move
+    std::vector<Index> fixed = {};                ///< vertices that never move
     double tolerance;                             ///< residual force that counts as none [N]
     double damping = 0;                           ///< of each vertex, by a body that does not support it [N s/m]
     Index sweeps = 6;                             ///< of a step
@@ -73,8 +75,9 @@ class TornSheet {
     TornSheet(const membrane::TriangleMesh<double>& reserved, const TornSheetOptions& options,
               const Criterion& criterion, Others... others)
         : options_(options),
+          hands(options.hands),
           mesh(reserved),
-          tissue(no_springs(mesh, options), membrane::triangular_springs(mesh, options.material), others...),
+          tissue(no_springs(mesh, options.fixed), membrane::triangular_springs(mesh, options.material), others...),
           foundation(mesh, {.stiffness = 0.0, .damping = options.damping}),
           tear(mesh, criterion, options.tear),
           solver(tissue, {.layers = membrane::unlimited, .sweeps = options.sweeps, .predict = false}),
@@ -110,7 +113,7 @@ class TornSheet {
     /// The hands move; the membrane follows, up to the tolerance or the number of steps; and what tears then.
     void tick(const std::array<Vector, 2>& displacements) {
         for (std::size_t i = 0; i < 2; ++i) {
-            for (const Index v : options_.hands[i]) x.col(v) += Eigen::Vector3d(displacements[i]);
+            for (const Index v : hands[i]) x.col(v) += Eigen::Vector3d(displacements[i]);
         }
         const auto before = forces;
         relax(options_.steps);
@@ -131,23 +134,28 @@ class TornSheet {
     [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped; }
 
   private:
-    static Springs no_springs(const membrane::TriangleMesh<double>& mesh, const TornSheetOptions& options) {
-        std::vector<Index> pinned = options.fixed;
-        for (const auto& hand : options.hands) pinned.insert(pinned.end(), hand.begin(), hand.end());
-        std::sort(pinned.begin(), pinned.end());
-        pinned.erase(std::unique(pinned.begin(), pinned.end()), pinned.end());
+    static Springs no_springs(const membrane::TriangleMesh<double>& mesh, const std::vector<Index>& pinned) {
         return Springs(
             mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 0.0, .pinned = pinned}));
     }
+    // Without damping only the equilibrium matters: steps extrapolate the last ones, as long as the residual force
+    // decreases [Nesterov83].
     void relax(int steps) {
-        for (int i = 0; i < steps; ++i) {
+        membrane::Points<double> last = x;
+        double residual = std::numeric_limits<double>::infinity();
+        for (int i = 0, in_turn = 0; i < steps; ++i) {
             solver.wake_all();
             const membrane::Points<double> before = x;
-            report = solver.step(x, dt, tissue, foundation, membrane::pin(options_.hands[0]),
-                                 membrane::pin(options_.hands[1]), tear.ligaments());
+            report = solver.step(x, dt, tissue, foundation, membrane::pin(hands[0]), membrane::pin(hands[1]),
+                                 tear.ligaments());
             if (report.status != membrane::StepStatus::advanced) throw std::runtime_error("a step was refused");
             if (options_.damping > 0) add_damping(before);
-            if (at_rest()) break;
+            if (at_rest() || i + 1 == steps) break;
+            if (options_.damping > 0) continue;
+            in_turn = report.residual < std::exchange(residual, report.residual) ? in_turn + 1 : 0;
+            const membrane::Points<double> now = x;
+            x += in_turn / (in_turn + 3.0) * (now - last);
+            last = now;
         }
         for (std::size_t i = 0; i < 2; ++i) forces[i] = -report.reactions[i];
     }
@@ -166,6 +174,7 @@ class TornSheet {
     TornSheetOptions options_;
 
   public:
+    std::array<std::vector<Index>, 2> hands;  ///< the vertices that each holds
     membrane::TriangleMesh<double> mesh;
     Tissue tissue;
     membrane::VirtualVolumeSprings<double> foundation;

@@ -14,8 +14,8 @@
 ///     const auto surface = test::turned_grid<double>(40, 20, 1e-3, 0.3);  // 40 mm x 20 mm
 namespace test {
 
-/// A rectangle of `columns` x `rows` edges [m], from the origin on, on a grid of equilateral triangles that is turned by
-/// `turn` [rad]; its border is straight. Triangulated by CGAL.
+/// A rectangle of `columns` x `rows` edges [m], from the origin on, on a grid of equilateral triangles that is turned
+/// by `turn` [rad]; its border is straight. Triangulated by CGAL.
 template <membrane::Real Scalar>
 Surface<Scalar> turned_grid(int columns, int rows, double edge, double turn) {
     using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
