@@ -116,11 +116,11 @@ void shear(Page& page, const Effort& effort) {
             forces += text;
         }
         const ShearRun found = run(strip_of(rows, effort.edges), effort.edges);
-        begins = std::max(begins, percent(found.begins / Shear::critical_stretch()));
+        begins = std::max(begins, percent(found.begins / Shear::closed_form.critical_stretch()));
         off = std::max(off, found.off_line);
         lost = std::max(lost, std::abs(found.lost) / found.given * 100);
         page.print("%d | %s | %.4f | %.2f | %.3f | %.3f |\n", int{found.vertices}, forces.c_str(),
-                   found.begins / Shear::critical_stretch(), found.off_line,
+                   found.begins / Shear::closed_form.critical_stretch(), found.off_line,
                    found.dissipated / (resistance * found.torn), 1 - found.lost / found.given);
     }
     page.add({"pure shear: driving force, from the closed form", force, 5, "%"});
@@ -161,7 +161,7 @@ void grids(Page& page, const Effort& effort) {
             const double turn = 60.0 * i / (effort.directions - 1);
             shear.turn = turn * degree;
             const ShearRun found = run(shear, effort.edges);
-            const double begins = found.begins / Shear::critical_stretch();
+            const double begins = found.begins / Shear::closed_form.critical_stretch();
             sum += found.off_line;
             if (found.off_line > largest) largest = found.off_line, at = turn;
             least = std::min(least, begins), most = std::max(most, begins);

@@ -52,9 +52,9 @@ Opened open(const RhexisScene& scene, double toughness, double lift, Index sweep
     while (result.ticks < 30'000 && !is_round(tear)) {
         const auto start = std::chrono::steady_clock::now();
         forceps.guide(tear, x, tick);
-        const auto report = solver.step(x, tick, tissue, body, forceps.hold(tear), tear.ligaments());
-        for (const auto& event : tear.update(x, tick, tissue, body, forceps.held(tear)))
-            follow(event, tissue, body, solver);
+        const auto held = forceps.hold(tear);
+        const auto report = solver.step(x, tick, tissue, body, held, tear.ligaments());
+        for (const auto& event : tear.update(x, tick, tissue, body, held.corners)) follow(event, tissue, body, solver);
         result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         result.add(scene, tissue, body, tear, x, forceps, report.reactions[0]);
     }

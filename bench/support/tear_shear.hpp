@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "support/pure_shear.hpp"
 #include "support/torn_sheet.hpp"
 
 /// A strip in pure shear: clamps along both long sides move apart, and a notch from a short side tears on.
@@ -23,18 +24,9 @@ struct Shear {
     double damping = 0;                       ///< of a vertex [N s/m]
 
     static constexpr double height = 20e-3;  ///< [m]
+    static constexpr test::PureShear closed_form{torn_material, toughness, height};
 
     [[nodiscard]] double edge() const { return height / rows; }
-    /// Energy per area where the strip cannot become narrower: what a tear releases is that times the height.
-    [[nodiscard]] static double energy_density(double stretch) {
-        const double nu = torn_material.poisson_ratio, strain = (stretch * stretch - 1) / 2;
-        return torn_material.young_modulus * torn_material.thickness / (1 - nu * nu) * strain * strain / 2;
-    }
-    /// The stretch at which that is the toughness.
-    [[nodiscard]] static double critical_stretch() {
-        const double nu = torn_material.poisson_ratio;
-        return std::sqrt(1 + 2 * std::sqrt(2 * toughness * (1 - nu * nu) / (torn_material.young_modulus * height)));
-    }
 
     template <class Criterion>
     [[nodiscard]] TornSheet<Criterion> notched(const Criterion& criterion) const {
@@ -71,7 +63,7 @@ struct ShearRun {
 /// Tears on by this number of edges, as slowly as forces balance.
 [[nodiscard]] inline ShearRun run(const Shear& shear, double edges) {
     auto strip = shear.notched(membrane::EnergyRelease{toughness, torn_material.thickness});
-    const double critical = Shear::critical_stretch();
+    const double critical = Shear::closed_form.critical_stretch();
     double stretch = 0.98 * critical;
     Shear::stretch(strip, stretch);
     const auto& rest = strip.tear.surface().rest_positions();
@@ -99,11 +91,11 @@ struct ShearRun {
 
 /// The driving force at the notch over the closed form, at nine tenths of the critical stretch.
 [[nodiscard]] inline double driving_force(const Shear& shear) {
-    const double stretch = 0.9 * Shear::critical_stretch();
+    const double stretch = 0.9 * Shear::closed_form.critical_stretch();
     auto strip = shear.notched(membrane::EnergyRelease{toughness, torn_material.thickness});
     Shear::stretch(strip, stretch);
     strip.update();
-    return norm(strip.tear.tips()[0].driving_force) / (Shear::energy_density(stretch) * Shear::height);
+    return norm(strip.tear.tips()[0].driving_force) / (Shear::closed_form.energy_density(stretch) * Shear::height);
 }
 
 /// At the tip, what criteria get.

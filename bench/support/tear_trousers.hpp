@@ -90,9 +90,9 @@ class TrouserTest {
         sheet.cut({0, Trousers::leg_width, 0}, {1, 0, 0}, 2 * scene.width);
         const auto& rest = sheet.tear.surface().rest_positions();
         const double end = tip()[0];
-        legs_ = detail::legs_of(sheet, Trousers::leg_width, end);
+        const auto legs = detail::legs_of(sheet, Trousers::leg_width, end);
         for (Index v = 0; v < rest.cols(); ++v) {
-            const int leg = legs_[static_cast<std::size_t>(v)];
+            const int leg = legs[static_cast<std::size_t>(v)];
             if (leg != 0) sheet.x.col(v) << end, rest(1, v), leg * (end - rest(0, v));
         }
         at_ = end;
@@ -135,16 +135,15 @@ class TrouserTest {
     void hold() {
         const double end = tip()[0];
         const auto& rest = sheet.tear.surface().rest_positions();
-        legs_ = detail::legs_of(sheet, Trousers::leg_width, end);
+        const auto legs = detail::legs_of(sheet, Trousers::leg_width, end);
         for (auto& hand : sheet.hands) hand.clear();
         for (Index v = 0; v < rest.cols(); ++v) {
-            const int leg = legs_[static_cast<std::size_t>(v)];
+            const int leg = legs[static_cast<std::size_t>(v)];
             if (leg != 0 && rest(0, v) < end - 1.5 * Trousers::leg_width) sheet.hands[leg > 0 ? 0 : 1].push_back(v);
         }
     }
 
     Trousers scene_;
-    std::vector<int> legs_;
     double at_ = 0, line_ = 0;
 
   public:

@@ -206,12 +206,6 @@ class Forceps {
         if (!closed()) return {};
         return {triangle_, tear.surface().corners(triangle_), {1.0 / 3, 1.0 / 3, 1.0 / 3}, position_};
     }
-    /// The vertices that they hold.
-    [[nodiscard]] std::vector<membrane::Index> held(const Tear& tear) const {
-        if (!closed()) return {};
-        const auto corners = tear.surface().corners(triangle_);
-        return {corners.begin(), corners.end()};
-    }
     [[nodiscard]] bool closed() const { return triangle_ != membrane::no_index; }
     [[nodiscard]] const Vector& position() const { return position_; }
     [[nodiscard]] int grasps() const { return grasps_; }

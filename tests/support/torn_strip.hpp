@@ -12,6 +12,7 @@
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/tear/tearing.hpp>
 
+#include "support/pure_shear.hpp"
 #include "support/turned_grid.hpp"
 
 /// A strip between two clamps, with a notch, that is torn.
@@ -61,17 +62,8 @@ class TornStrip {
     static membrane::Material material() {
         return {.young_modulus = 1e6, .poisson_ratio = 0.3, .thickness = thickness};
     }
-    /// Energy per area at this stretch, where the sheet cannot become narrower [J/m^2].
-    double energy_density(double stretch) const {
-        const double nu = material().poisson_ratio, strain = (stretch * stretch - 1) / 2;
-        return material().young_modulus * thickness / (1 - nu * nu) * strain * strain / 2;
-    }
-    /// The stretch at which the energy released is the toughness.
-    double critical_stretch() const {
-        const double nu = material().poisson_ratio;
-        const double strain = std::sqrt(2 * options_.toughness * (1 - nu * nu) / (material().young_modulus * height()));
-        return std::sqrt(1 + 2 * strain);
-    }
+    /// Its closed forms.
+    PureShear pure_shear() const { return {material(), options_.toughness, height()}; }
 
     /// Cuts the notch from the middle of the left side.
     void cut() {

@@ -86,9 +86,8 @@ struct WildTear {
         if (report.status == membrane::StepStatus::advanced) {
             if (adheres) adhesion.update(x, report.moved);
             if (grasper.slip(x, tool, report.reactions[1])) ++slips;
-            const auto holding = grasps ? std::span<const Index>(grasp.corners) : std::span<const Index>();
-            follow(adheres ? tear.update(x, dt, sheet, adhesion, holding)
-                           : tear.update(x, dt, sheet, foundation, holding));
+            follow(adheres ? tear.update(x, dt, sheet, adhesion, grasp.corners)
+                           : tear.update(x, dt, sheet, foundation, grasp.corners));
         }
         tree.refit(x, report.moved);
         normals.update(x, report.moved);

@@ -45,6 +45,9 @@ struct Ligament {
     /// Energy that it would give back [J].
     [[nodiscard]] Scalar stored(Scalar opening) const noexcept { return tension(opening) * opening / 2; }
 
+    /// Energy taken so far, with what is stored at the largest separation: once it fails that is lost as well [J].
+    [[nodiscard]] Scalar taken() const noexcept { return dissipated + stored(reached); }
+
     /// After a tick, at a separation of `opening`. The membrane's force across the edge has decreased from that before to
     /// that now, and the mean of both is what it has parted the edge with: also in a tick in which the edge fails, where
     /// the membrane gives up more than the ligament takes.

@@ -147,7 +147,8 @@ class Tearing {
     void list_patch(Index v, Scalar radius) noexcept;
     template <class Network, class Volume>
     [[nodiscard]] Vector3<Scalar> driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
-                                                   const Network& network, const Volume& volume) noexcept;
+                                                   const Network& network, const Volume& volume,
+                                                   std::span<const Index> held) noexcept;
     template <class Network>
     void find_tension(TipState<Scalar>& state, Index tip, const ConstPointsRef<Scalar>& x,
                       const Network& network) const noexcept;
@@ -162,7 +163,6 @@ class Tearing {
     TearOptions options_;
     TornSurface<Scalar> surface_;
     FixedVector<TearTip<Scalar>> tips_;
-    std::span<const Index> held_;         // in this update
     std::vector<Vector3<Scalar>> opens_;  // of each tip, where it advances to in this update; 0: nowhere
     FixedVector<Ligament<Scalar>> ligaments_;
     double failed_ = 0, torn_length_ = 0;
@@ -303,7 +303,7 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
     for (auto& ligament : all) {
         ligament.open(norm<Scalar>(point(x, ligament.vertex) - point(x, ligament.copy)));
         if (ligament.failed()) {
-            failed_ += static_cast<double>(ligament.dissipated + ligament.stored(ligament.reached));
+            failed_ += static_cast<double>(ligament.taken());
         } else {
             all[left++] = ligament;
         }
@@ -315,15 +315,13 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 void Tearing<Scalar, Criterion>::let_go(TearTip<Scalar>& tip) noexcept {
     const auto all = ligaments_.items();
+    const auto behind =
+        std::find_if(all.begin(), all.end(), [&](const auto& ligament) { return ligament.copy == tip.behind[1]; });
     const auto most = static_cast<Scalar>(criterion_.resistance()) * tip.advanced;
-    const auto end = std::remove_if(all.begin(), all.end(), [&](const auto& ligament) {
-        if (ligament.copy != tip.behind[1]) return false;
-        const Scalar taken = ligament.dissipated + ligament.stored(ligament.reached);
-        failed_ += static_cast<double>(taken);
-        tip.energy_left = std::clamp(ligament.energy() - taken, Scalar(0), most);
-        return true;
-    });
-    ligaments_.truncate(static_cast<std::size_t>(end - all.begin()));
+    failed_ += static_cast<double>(behind->taken());
+    tip.energy_left = std::clamp(behind->energy() - behind->taken(), Scalar(0), most);
+    std::move(behind + 1, all.end(), behind);
+    ligaments_.truncate(all.size() - 1);
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
@@ -347,7 +345,6 @@ template <class Network, class Volume>
 auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                         std::span<const Index> held) noexcept -> Events {
     surface_.begin();
-    held_ = held;
     used_up_ = false;
     open_ligaments(x);
     const auto all = tips_.items();
@@ -355,7 +352,7 @@ auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Ne
     for (std::size_t i = 0; i < all.size(); ++i) {
         auto& tip = all[i];
         opens_[i] = Vector3<Scalar>::Zero();
-        tip.driving_force = driving_force_at(tip.vertex, x, dt, network, volume);
+        tip.driving_force = driving_force_at(tip.vertex, x, dt, network, volume, held);
         TipState<Scalar> state{tip.driving_force, 0, Vector3<Scalar>::Zero(), tip.heading};
         if (is_opening(tip.behind[1])) {
             constexpr auto overload = Scalar(1.5);
@@ -412,13 +409,14 @@ void Tearing<Scalar, Criterion>::list_patch(Index v, Scalar radius) noexcept {
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network, class Volume>
 Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
-                                                             const Network& network, const Volume& volume) noexcept {
+                                                             const Network& network, const Volume& volume,
+                                                             std::span<const Index> held) noexcept {
     const auto& rest = surface_.rest_positions();
     const Scalar radius = static_cast<Scalar>(options_.patch_radius) * surface_.mean_edge(tip);
     const auto weight = [&](Index v) {
         const auto distance = norm<Scalar>(point(rest, v) - point(rest, tip));
         if (is_outer_border_[static_cast<std::size_t>(v)] != 0) return Scalar(0);
-        if (v != tip && std::find(held_.begin(), held_.end(), v) != held_.end()) return Scalar(0);
+        if (v != tip && std::find(held.begin(), held.end(), v) != held.end()) return Scalar(0);
         return std::clamp(2 - 2 * distance / radius, Scalar(0), Scalar(1));
     };
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
