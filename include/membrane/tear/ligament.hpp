@@ -13,16 +13,19 @@ namespace membrane {
 
 /// What still joins the two vertices into which a tear has parted one: a force against their separation that is `strength`
 /// up to the separation `plateau` and decreases linearly to zero at `failure_opening`; the area below is what the edge
-/// takes to open: a cohesive law that is rigid at first [Camacho96]. A tear so advances without a jump, and takes that energy however coarse mesh and ticks are. If the
-/// separation decreases, the force decreases in proportion.
+/// takes to open: a cohesive law that is rigid at first [Camacho96]. A tear so advances without a jump, and takes that
+/// energy however coarse mesh and ticks are. If the separation decreases, the force decreases in proportion.
 template <Real Scalar>
 struct Ligament {
+    /// Its strength is below the membrane's force when it begins, so that it opens at once.
+    static constexpr auto yields = Scalar(0.98);
+
     ///@{
     /// The vertices that it joins.
     Index vertex = no_index, copy = no_index;
     ///@}
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< on `vertex` when it begins; the opposite acts on `copy` [N]
-    Scalar strength = 0;                              ///< when it begins [N]
+    Scalar strength = 0;                              ///< when it begins, `yields` of the membrane's force then [N]
     Scalar plateau = 0;                               ///< separation up to which it keeps its strength [m]
     Scalar failure_opening = 0;                       ///< separation at which it fails [m]
     Scalar reached = 0;                               ///< largest separation in earlier ticks [m]
@@ -53,7 +56,7 @@ struct Ligament {
     /// the membrane gives up more than the ligament takes.
     void open(Scalar opening) noexcept {
         if (!(opening > reached)) return;
-        const Scalar before = largest_tension(), stored_before = before * reached / 2;
+        const Scalar before = reached > 0 ? largest_tension() : strength / yields, stored_before = before * reached / 2;
         const Scalar grown = opening - reached;
         reached = opening;
         const Scalar now = largest_tension();

@@ -538,8 +538,7 @@ void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index 
         failed_ += static_cast<double>(energy);
         return;
     }
-    // Below the membrane's force: it opens at once, though that does not decrease quite linearly.
-    constexpr auto yields = Scalar(0.98);
+    constexpr auto yields = Ligament<Scalar>::yields;
     Ligament<Scalar> ligament{v, copy, yields * force};
     const auto [left, right] = tip.behind;
     const auto behind = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
