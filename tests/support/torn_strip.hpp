@@ -66,7 +66,8 @@ class TornStrip {
     PureShear pure_shear() const { return {material(), options_.toughness, height()}; }
 
     /// Cuts the notch from the middle of the left side.
-    void cut() {
+    template <class... Parts>
+    void cut(Parts&... parts) {
         Index first = 0;
         for (Index v = 0; v < surface.vertex_count(); ++v) {
             const auto off = [&](Index w) { return std::abs(surface.x(1, w) - height() / 2); };
@@ -77,7 +78,7 @@ class TornStrip {
             const double off = (height() / 2 - static_cast<double>(surface.x(1, path.back()))) / (2 * edge);
             path.push_back(tear.surface().nearest_in_direction(path.back(), Vector(1, static_cast<Scalar>(off), 0)));
         }
-        follow(tear.cut_along(path, x));
+        follow(tear.cut_along(path, x), parts...);
         start = membrane::point(tear.surface().rest_positions(), path.back());
     }
 
@@ -153,8 +154,9 @@ class TornStrip {
             if (at_rest()) return;
         }
     }
-    void follow(std::span<const membrane::TearEvent<Scalar>> events) {
-        for (const auto& event : events) membrane::follow(event, sheet, solver);
+    template <class... Parts>
+    void follow(std::span<const membrane::TearEvent<Scalar>> events, Parts&... parts) {
+        for (const auto& event : events) membrane::follow(event, sheet, solver, parts...);
     }
 
     TornStripOptions options_;

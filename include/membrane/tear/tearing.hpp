@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <membrane/core/index_set.hpp>
+#include <membrane/core/rigid_frame.hpp>
 #include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/tear/crack_driving_force.hpp>
@@ -76,8 +77,8 @@ void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
 /// failed. An edge that the load no longer draws apart would hold the tip: at 1.5 times the resistance it fails as well,
 /// and the next edge takes what is left of its energy. Triangles keep their numbers; other parts `follow` the events.
 ///
-/// A flap may pass through the membrane: there is no contact of the membrane with itself. A membrane that slips over its
-/// foundation and elements that are no triangles do not count in the driving force.
+/// A flap may pass through the membrane: there is no contact of the membrane with itself. Elements that are no triangles do
+/// not count in the driving force; a foundation does, with its energy if it has one, as for any even foundation.
 ///
 /// Online but for the constructor; cost of a tick: that of the forces of some 60 triangles at each tip.
 template <Real Scalar, TearCriterion<Scalar> Criterion = EnergyRelease>
@@ -149,6 +150,9 @@ class Tearing {
     [[nodiscard]] Vector3<Scalar> driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
                                                    const Network& network, const Volume& volume,
                                                    std::span<const Index> held) noexcept;
+    template <class Volume, class Weight>
+    [[nodiscard]] Vector3<Scalar> foundation_force(const Weight& weight, const ConstPointsRef<Scalar>& x, Scalar dt,
+                                                   const Volume& volume) const noexcept;
     template <class Network>
     void find_tension(TipState<Scalar>& state, Index tip, const ConstPointsRef<Scalar>& x,
                       const Network& network) const noexcept;
@@ -430,15 +434,40 @@ Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const Co
         const auto response = network.triangle_response(f, corners, x);
         for (std::size_t k = 0; k < 3; ++k) sum += weights[k] * configurational_force(shape, now, response, k);
     }
-    if constexpr (!std::same_as<Volume, NoFoundation>) {
-        for (const Index v : patch_vertices_.items()) {
-            const Scalar part = weight(v);
-            const Vector3<Scalar> at = point(x, v);
-            if (part > 0) sum -= part * volume.force_on(v, at, at, dt).force;
-        }
-    }
+    if constexpr (!std::same_as<Volume, NoFoundation>) sum += foundation_force(weight, x, dt, volume);
     const Vector3<Scalar> normal = surface_.rest_normal(tip);
     return sum - dot(sum, normal) * normal;
+}
+
+// The part of a foundation in it. Its anchors move with the rest positions, and its energy is in proportion to the area.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Volume, class Weight>
+Vector3<Scalar> Tearing<Scalar, Criterion>::foundation_force(const Weight& weight, const ConstPointsRef<Scalar>& x,
+                                                             Scalar dt, const Volume& volume) const noexcept {
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    for (const Index v : patch_vertices_.items()) {
+        const Vector3<Scalar> at = point(x, v);
+        if (const Scalar part = weight(v); part > 0) {
+            Vector3<Scalar> force = volume.force_on(v, at, at, dt).force;
+            if constexpr (requires { volume.body(); }) {
+                const RigidFrame<Scalar> turn{.rotation = volume.body().rotation_at(v)};
+                force = turn.vector_to_body(force);
+            }
+            sum -= part * force;
+        }
+        if constexpr (requires { volume.energy(v, at); }) {
+            Scalar area = 0;
+            Vector3<Scalar> growth = Vector3<Scalar>::Zero();  // of the area, per weighted displacement at rest
+            for (const Index f : surface_.adjacency().triangles_of(v)) {
+                const RestTriangle<Scalar> shape(surface_.corners_at(surface_.rest_positions(), f));
+                const auto corners = surface_.corners(f);
+                area += shape.area;
+                for (std::size_t k = 0; k < 3; ++k) growth += weight(corners[k]) * shape.area * shape.gradient[k];
+            }
+            if (area > 0) sum -= volume.energy(v, at) / area * growth;
+        }
+    }
+    return sum;
 }
 
 // The largest principal value of the mean of the squared tensions, in the plane of the triangles around the tip.
