@@ -14,6 +14,7 @@
 #include <membrane/core/index_set.hpp>
 #include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
+#include <membrane/tear/border_flaw.hpp>
 #include <membrane/tear/crack_driving_force.hpp>
 #include <membrane/tear/ligament.hpp>
 #include <membrane/tear/tear_criterion.hpp>
@@ -97,6 +98,17 @@ class Tearing {
     /// the membrane. All are `no_index` if there is none.
     [[nodiscard]] std::array<Index, 3> slit_at(Index v, const Vector3<Scalar>& direction) const noexcept;
 
+    /// The path of a tear that starts at vertex `v` of the membrane's border, or nothing: for `cut_along`. A border tears
+    /// from a flaw, a cut too small for the mesh, of length `flaw` [m], if the criterion opens a tip with the flaw's
+    /// driving force (`border_state`, `flaw_driving_force`). The path goes inward, at right angles to the border, and is
+    /// as long as the flaw or longer by less than an edge, but of 32 edges at most; a flaw that would be longer than it is
+    /// taken to be as long. There is no start at a pinned vertex, beside a tip, or if positions or `flaw` are not finite
+    /// and positive; nor if the reserve or the capacity for tips is too small. What the first edge takes is not in
+    /// `dissipated`, as of any cut. @pre the network has followed all events. Valid until the next call.
+    template <class Network>
+    [[nodiscard]] std::span<const Index> start_at(Index v, Scalar flaw, const ConstPointsRef<Scalar>& x,
+                                                  const Network& network) noexcept;
+
     /// The forces across opening edges: a constraint of the step.
     [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items()}; }
 
@@ -132,6 +144,8 @@ class Tearing {
   private:
     [[nodiscard]] bool is_path(std::span<const Index> path) const noexcept;
     void add_tip(Index v, Index behind, Index copy) noexcept;
+    [[nodiscard]] bool is_beside_tip(Index v) const noexcept;
+    [[nodiscard]] Scalar list_start(const BorderState<Scalar>& border, Index v, Scalar length) noexcept;
     void join_tears(const VertexSplit& split) noexcept;
     void drop_tips() noexcept;
     void set_outer_border(Index copy, Index v) noexcept {
@@ -169,6 +183,7 @@ class Tearing {
     bool used_up_ = false;
     std::vector<unsigned char> is_outer_border_;  // vertices on the border of the membrane before it tore
     IndexSet patch_vertices_, patch_;             // around a tip; triangles
+    FixedVector<Index> path_;                     // of a start
 };
 
 template <Real Scalar, class Criterion>
@@ -196,7 +211,8 @@ Tearing<Scalar, Criterion>::Tearing(const TriangleMesh<Scalar>& mesh, const Crit
       ligaments_(2 * tips_.capacity()),
       is_outer_border_(static_cast<std::size_t>(mesh.vertex_count())),
       patch_vertices_(mesh.vertex_count()),
-      patch_(mesh.triangle_count()) {
+      patch_(mesh.triangle_count()),
+      path_(33) {
     if constexpr (requires { criterion.check(); }) criterion.check();
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         is_outer_border_[static_cast<std::size_t>(v)] = surface_.adjacency().on_border(v) ? 1 : 0;
@@ -293,6 +309,55 @@ std::array<Index, 3> Tearing<Scalar, Criterion>::slit_at(Index v, const Vector3<
     const Index ahead = surface_.nearest_in_direction(v, direction);
     const Index behind = surface_.nearest_in_direction(v, -direction);
     return ahead == no_index || behind == no_index ? none : std::array<Index, 3>{behind, v, ahead};
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+bool Tearing<Scalar, Criterion>::is_beside_tip(Index v) const noexcept {
+    const auto tips = tips_.items();
+    return std::any_of(tips.begin(), tips.end(), [v](const auto& tip) {
+        return tip.vertex == v || std::find(tip.behind.begin(), tip.behind.end(), v) != tip.behind.end();
+    });
+}
+
+// Lists the vertices inward from `v` to a distance of `length` at least, or to the next border. Returns the distance.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+Scalar Tearing<Scalar, Criterion>::list_start(const BorderState<Scalar>& border, Index v, Scalar length) noexcept {
+    const auto& rest = surface_.rest_positions();
+    const Vector3<Scalar> from = point(rest, v);
+    Scalar distance = 0;
+    path_.clear();
+    path_.try_push_back(v);
+    while (distance < length) {
+        const Vector3<Scalar> at = point(rest, path_.items().back()) - from;
+        const Vector3<Scalar> ahead = distance * border.inward - at + surface_.mean_edge(v) * border.inward;
+        const Index next = surface_.nearest_in_direction(path_.items().back(), ahead);
+        if (next == no_index) break;
+        const auto further = dot<Scalar>(point(rest, next) - from, border.inward);
+        if (!(further > distance) || !path_.try_push_back(next)) break;
+        distance = further;
+        if (surface_.adjacency().on_border(next)) break;
+    }
+    return distance;
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Network>
+std::span<const Index> Tearing<Scalar, Criterion>::start_at(Index v, Scalar flaw, const ConstPointsRef<Scalar>& x,
+                                                            const Network& network) noexcept {
+    used_up_ = false;
+    if (v < 0 || v >= surface_.rest_positions().cols() || !(is_finite(flaw) && flaw > 0)) return {};
+    if (!surface_.adjacency().on_border(v) || is_outer_border_[static_cast<std::size_t>(v)] == 0) return {};
+    if (network.pinned(v) || is_beside_tip(v) || tips_.size() == tips_.capacity()) return {};
+    const auto border = border_state(surface_, v, x, network);
+    const Scalar length = list_start(border, v, flaw);
+    const Scalar force = flaw_driving_force(border, (std::min)(flaw, length));
+    if (!is_finite(force) || !(force > 0)) return {};
+    const TipState<Scalar> state{force * border.inward, border.tension, border.along, border.inward};
+    if (!criterion_.opens(state)) return {};
+    const auto path = std::as_const(path_).items();
+    const std::size_t needed = path.size() - (surface_.adjacency().on_border(path.back()) ? 0 : 1);
+    used_up_ = needed > static_cast<std::size_t>(surface_.reserve());
+    return used_up_ ? std::span<const Index>() : path;
 }
 
 // Makes the separations permanent, and drops what has failed.
