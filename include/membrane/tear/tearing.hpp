@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include <membrane/contact/contact.hpp>
 #include <membrane/core/index_set.hpp>
 #include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
@@ -98,13 +99,19 @@ class Tearing {
     /// the membrane. All are `no_index` if there is none.
     [[nodiscard]] std::array<Index, 3> slit_at(Index v, const Vector3<Scalar>& direction) const noexcept;
 
-    /// The path of a tear that starts at vertex `v` of the membrane's border, or nothing: for `cut_along`. A border tears
-    /// from a flaw, a cut too small for the mesh, of length `flaw` [m], if the criterion opens a tip with the flaw's
-    /// driving force (`border_state`, `flaw_driving_force`). The path goes inward, at right angles to the border, and is
-    /// as long as the flaw or longer by less than an edge, but of 32 edges at most; a flaw that would be longer than it is
-    /// taken to be as long. There is no start at a pinned vertex, beside a tip, or if positions or `flaw` are not finite
-    /// and positive; nor if the reserve or the capacity for tips is too small. What the first edge takes is not in
-    /// `dissipated`, as of any cut. @pre the network has followed all events. Valid until the next call.
+    /// The path where a sharp tool perforates, for `cut_along`: the slit at the vertex of the contact triangle that is
+    /// nearest to the contact point, if the membrane's force on the tool along the contact's normal is `force` [N] or more.
+    /// All are `no_index` if the tool does not perforate there. `reaction`: of the step under this contact.
+    [[nodiscard]] std::array<Index, 3> slit_under(const Contact<Scalar>& contact, const Vector3<Scalar>& reaction,
+                                                  Scalar force, const Vector3<Scalar>& direction) const noexcept;
+
+    /// The path of a tear that starts at vertex `v` of the membrane's border, for `cut_along`; empty if none starts. A border
+    /// tears from a flaw, a cut that may be too small for the mesh, of length `flaw` [m]: if the criterion opens a tip with
+    /// the flaw's driving force (see `border_flaw.hpp`). The path goes inward, at right angles to the border, and is twice
+    /// as long as the flaw or longer by less than an edge, so that the tear goes on; it ends at a border, and has 32 edges
+    /// at most. None starts at a pinned vertex, beside a tip, if positions or `flaw` are not finite and positive, or if the
+    /// reserve or the capacity for tips is too small. As of any cut, the energy of its edges is not in `dissipated`.
+    /// Valid until the next call. @pre the network has followed all events. Cost: the triangles around the path.
     template <class Network>
     [[nodiscard]] std::span<const Index> start_at(Index v, Scalar flaw, const ConstPointsRef<Scalar>& x,
                                                   const Network& network) noexcept;
@@ -312,6 +319,20 @@ std::array<Index, 3> Tearing<Scalar, Criterion>::slit_at(Index v, const Vector3<
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
+std::array<Index, 3> Tearing<Scalar, Criterion>::slit_under(const Contact<Scalar>& contact,
+                                                            const Vector3<Scalar>& reaction, Scalar force,
+                                                            const Vector3<Scalar>& direction) const noexcept {
+    const auto normal_force = dot(reaction, contact.normal);
+    if (!contact.touching() || !is_finite(normal_force) || !is_finite(force) || !is_finite(contact.barycentric) ||
+        !(normal_force >= force)) {
+        return {no_index, no_index, no_index};
+    }
+    const std::array<Scalar, 3> weights{contact.barycentric[0], contact.barycentric[1], contact.barycentric[2]};
+    const auto largest = std::max_element(weights.begin(), weights.end()) - weights.begin();
+    return slit_at(contact.corners[static_cast<std::size_t>(largest)], direction);
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
 bool Tearing<Scalar, Criterion>::is_beside_tip(Index v) const noexcept {
     const auto tips = tips_.items();
     return std::any_of(tips.begin(), tips.end(), [v](const auto& tip) {
@@ -349,7 +370,7 @@ std::span<const Index> Tearing<Scalar, Criterion>::start_at(Index v, Scalar flaw
     if (!surface_.adjacency().on_border(v) || is_outer_border_[static_cast<std::size_t>(v)] == 0) return {};
     if (network.pinned(v) || is_beside_tip(v) || tips_.size() == tips_.capacity()) return {};
     const auto border = border_state(surface_, v, x, network);
-    const Scalar length = list_start(border, v, flaw);
+    const Scalar length = list_start(border, v, 2 * flaw);
     const Scalar force = flaw_driving_force(border, (std::min)(flaw, length));
     if (!is_finite(force) || !(force > 0)) return {};
     const TipState<Scalar> state{force * border.inward, border.tension, border.along, border.inward};
