@@ -165,6 +165,7 @@ class Tearing {
         return std::any_of(all.begin(), all.end(), [copy](const auto& ligament) { return ligament.copy == copy; });
     }
     [[nodiscard]] bool has_changed_around(Index v) const noexcept;
+    [[nodiscard]] Scalar patch_radius_at(Index tip) const noexcept;
     void list_patch(Index v, Scalar radius) noexcept;
     template <class Network, class Volume>
     [[nodiscard]] Vector3<Scalar> driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
@@ -490,6 +491,20 @@ void Tearing<Scalar, Criterion>::list_patch(Index v, Scalar radius) noexcept {
     }
 }
 
+// Not as far as to another tip, whose driving force would be added: that of the other end of a short slit is opposite.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+Scalar Tearing<Scalar, Criterion>::patch_radius_at(Index tip) const noexcept {
+    const auto& rest = surface_.rest_positions();
+    const Scalar edge = surface_.mean_edge(tip);
+    Scalar radius = static_cast<Scalar>(options_.patch_radius) * edge;
+    for (const auto& other : tips_.items()) {
+        if (other.vertex == tip || other.vertex == no_index) continue;
+        const auto distance = norm<Scalar>(point(rest, other.vertex) - point(rest, tip));
+        radius = (std::min)(radius, (std::max)(distance, edge));
+    }
+    return radius;
+}
+
 // The configurational force of the patch: of all its vertices, those nearer to the tip in full, those farther away less.
 // That of a vertex on the membrane's own border does not count: the tear does not move it.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
@@ -498,7 +513,7 @@ Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const Co
                                                              const Network& network, const Volume& volume,
                                                              std::span<const Index> held) noexcept {
     const auto& rest = surface_.rest_positions();
-    const Scalar radius = static_cast<Scalar>(options_.patch_radius) * surface_.mean_edge(tip);
+    const Scalar radius = patch_radius_at(tip);
     const auto weight = [&](Index v) {
         const auto distance = norm<Scalar>(point(rest, v) - point(rest, tip));
         if (is_outer_border_[static_cast<std::size_t>(v)] != 0) return Scalar(0);
