@@ -34,7 +34,7 @@ namespace membrane {
 /// How a tear runs.
 struct TearOptions {
     Index max_tips = 16;        ///< capacity
-    double patch_radius = 3.5;  ///< around a tip, where the driving force is found [edges], at least 2
+    double patch_radius = 3.5;  ///< around a tip, where its driving force is found [edges], at least 2; to the next tip
     double min_angle = 0.35;    ///< of a triangle that a moved vertex may leave [rad]
     bool move_vertices = true;  ///< onto the tear's direction; if not, it runs along the edges that there are
 
@@ -100,8 +100,9 @@ class Tearing {
     [[nodiscard]] std::array<Index, 3> slit_at(Index v, const Vector3<Scalar>& direction) const noexcept;
 
     /// The path where a sharp tool perforates, for `cut_along`: the slit at the vertex of the contact triangle that is
-    /// nearest to the contact point, if the membrane's force on the tool along the contact's normal is `force` [N] or more.
-    /// All are `no_index` if the tool does not perforate there. `reaction`: of the step under this contact.
+    /// nearest to the contact point, along `direction`, if the membrane's force on the tool along the contact's normal is
+    /// `force` [N] or more. All are `no_index` if the tool does not perforate there. `reaction`: of the step under this
+    /// contact.
     [[nodiscard]] std::array<Index, 3> slit_under(const Contact<Scalar>& contact, const Vector3<Scalar>& reaction,
                                                   Scalar force, const Vector3<Scalar>& direction) const noexcept;
 
