@@ -228,7 +228,7 @@ TEST_CASE("a border does not start to tear where it is pinned, or if there can b
     test::TornStrip<double> strip({});
     strip.x.row(0) *= 1.4;  // along both clamps
     const Index v = strip.top[strip.top.size() / 2];
-    CHECK(strip.tear.start_at(v, 1e-3, strip.x, strip.sheet).empty());
+    CHECK(strip.tear.start_at(v, 3e-3, strip.x, strip.sheet).empty());
     Sheet<double> sheet(0.2, 1e-3, 100, 20, {.max_tips = 1});
     sheet.stretch(1.3);
     REQUIRE_FALSE(sheet.tear.cut_along(sheet.start(sheet.at_side(), 1e-3), sheet.x).empty());
@@ -264,7 +264,8 @@ struct FlawedStrip {
 
 TEST_CASE("a tear that starts from a flaw runs on, and a tougher one does not", "[tear]") {
     constexpr double flaw = 0.4e-3;
-    for (const double turn : {0.0, 0.2}) {
+    for (const double turn : {0.2, 0.0}) {
+        if (cases_are_slow && turn == 0) return;
         CAPTURE(turn);
         const double force = flaw_driving_force(FlawedStrip(200, turn, 1.2).border(), flaw);
         const auto path_at = [&](double part, double& torn, double& driving_force) {
