@@ -216,12 +216,29 @@ TEMPLATE_TEST_CASE("a start from nonsense is none", "[tear]", double, float) {
     const std::vector<Index> first(path.begin(), path.end());
     CHECK(sheet.start(v, 3.5e-3).empty());  // seven vertices would double
     CHECK(sheet.tear.reserve_used_up());
-    REQUIRE_FALSE(sheet.tear.cut_along(first, sheet.x).empty());
+    for (const auto& event : sheet.tear.cut_along(first, sheet.x)) follow(event, sheet.tissue);
+    REQUIRE(sheet.tear.tips().size() == 1);
     const auto tip = sheet.tear.tips()[0];
     for (const Index beside : {tip.vertex, tip.behind[0], tip.behind[1]}) {
         CHECK(sheet.start(beside, 0.4e-3).empty());
         CHECK_FALSE(sheet.tear.reserve_used_up());
     }
+}
+
+TEST_CASE("a border that has just started to tear does not start again at the same vertex", "[tear]") {
+    Sheet<double> sheet(0.2, 1e-3, 1);
+    sheet.stretch(1.3);
+    for (const auto& event : sheet.tear.cut_along(sheet.start(sheet.at_side(), 0.4e-3), sheet.x)) {
+        follow(event, sheet.tissue);
+    }
+    REQUIRE(sheet.tear.tips().size() == 1);
+    for (const Index beside : sheet.tear.tips()[0].behind) {
+        const auto border = border_state<double>(sheet.tear.surface(), beside, sheet.x, sheet.tissue);
+        REQUIRE(sheet.tear.surface().nearest_in_direction(beside, border.inward) != no_index);
+        REQUIRE(flaw_driving_force(border, 0.4e-3) > 2 * 1 * material.thickness);
+        CHECK(sheet.start(beside, 0.4e-3).empty());
+    }
+    CHECK_FALSE(sheet.start(sheet.at_side(true), 0.4e-3).empty());
 }
 
 TEST_CASE("a border does not start to tear where it is pinned, or if there can be no further tip", "[tear]") {
