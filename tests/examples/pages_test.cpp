@@ -664,6 +664,32 @@ TEST_CASE("pages: tear") {
     CHECK(tear.tips().size() == 2);
 }
 
+TEST_CASE("pages: tear_starts") {
+    const auto mesh = membrane::with_reserve(membrane::disc<double>({.radius = 0.005, .rings = 8}), 50);
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 20.0});
+    auto tissue = membrane::Tissue(membrane::TearableSprings(mesh, network));
+    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 12});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 1.0, .thickness = 12e-6});
+    membrane::Points<double> x = 1.3 * mesh.positions();
+    tree.refit(x);
+    const membrane::Index v = membrane::border(mesh)[0];
+    const auto contact = tracker.update(tree, x, membrane::Tool<double>{.position = {0, 0, -1e-5}, .radius = 1e-4});
+    REQUIRE(contact.touching());
+    struct {
+        std::vector<Eigen::Vector3d> reactions;
+    } report{{0.03 * contact.normal}};
+    // [tear_starts]
+    const auto is_pulled = tear.start_at(v, 50e-6, x, tissue);  // the border at v has flaws of 50 um
+    for (const auto& event : tear.cut_along(is_pulled, x)) follow(event, tissue, solver, tree, tracker);
+
+    const auto is_poked = tear.slit_under(contact, report.reactions[0], 20e-3, {1, 0, 0});  // a blade along x: at 20 mN
+    for (const auto& event : tear.cut_along(is_poked, x)) follow(event, tissue, solver, tree, tracker);
+    // [/tear_starts]
+    CHECK(tear.tips().size() == 3);
+}
+
 TEST_CASE_METHOD(Touched, "pages: equilibrium") {
     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [equilibrium]

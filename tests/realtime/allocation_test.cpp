@@ -245,3 +245,23 @@ TEST_CASE("a membrane that tears allocates nothing", "[allocation]") {
         CHECK(loop.splits > 0);
     }
 }
+
+TEST_CASE("starts of a tear allocate nothing", "[allocation]") {
+    const auto mesh = with_reserve(sheet<double>({.columns = 8, .rows = 8}), 20);
+    auto tissue = Tissue(TearableSprings(mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 10.0})));
+    Tearing tear(mesh, EnergyRelease{.toughness = 1, .thickness = 1e-5});
+    Points<double> x = 1.2 * mesh.positions();
+    const double edge = norm<double>(point(mesh.positions(), 1) - point(mesh.positions(), 0));
+    Contact<double> contact;
+    contact.phase = ContactPhase::ongoing;
+    contact.triangle = tear.surface().adjacency().triangles_of(40)[0];  // in the middle of 9 x 9 vertices
+    contact.corners = tear.surface().corners(contact.triangle);
+    contact.barycentric = {0.3, 0.4, 0.3};
+    contact.normal = {0, 0, 1};
+    CHECK(allocated_by([&] {
+              for (const auto& event : tear.cut_along(tear.start_at(4, edge, x, tissue), x)) follow(event, tissue);
+              const auto slit = tear.slit_under(contact, Vector3<double>(0, 0, 1), 0.5, {1, 0, 0});
+              for (const auto& event : tear.cut_along(slit, x)) follow(event, tissue);
+          }) == 0);
+    CHECK(tear.tips().size() == 3);
+}

@@ -9,10 +9,12 @@
 #include <vector>
 
 #include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/core/snapshot.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/model/spring_stiffness.hpp>
+#include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/cases.hpp"
@@ -442,4 +444,137 @@ TEST_CASE("options of a tear are checked", "[tear]") {
           "LargestTension: strength must be finite and positive [N/m], got nan");
     CHECK(test::refusal([&] { static_cast<void>(with_reserve(mesh, -1)); }) ==
           "with_reserve: count must not be negative, got -1");
+}
+
+namespace {
+
+/// A disc between pinned rims, on which a fine ball presses at its middle, deeper in each tick.
+template <class Scalar>
+struct PokedDisc {
+    explicit PokedDisc(double toughness)
+        : mesh(with_reserve(disc<Scalar>({.radius = Scalar(5e-3), .rings = 10}), 100)),
+          tissue(
+              TearableSprings(
+                  mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = Scalar(0), .pinned = border(mesh)})),
+              triangular_springs(mesh, {.young_modulus = 1e6, .poisson_ratio = 0.3, .thickness = 1e-5}, Scalar(1.05))),
+          tear(mesh, EnergyRelease{toughness, 1e-5}),
+          solver(tissue, {.layers = unlimited, .sweeps = 10}),
+          tree(mesh),
+          tracker(mesh),
+          x(mesh.positions()) {}
+
+    /// Presses to a depth until the forces balance, tears nothing; returns the force along the contact's normal.
+    double press_to(double depth) {
+        for (int i = 0; i < 300; ++i) {
+            const Tool<Scalar> tool{
+                .position = Vector3<Scalar>(Scalar(1e-4), Scalar(5e-5), static_cast<Scalar>(2e-4 - depth)),
+                .radius = Scalar(2e-4)};
+            contact = tracker.update(tree, x, tool);
+            report = solver.step(x, Scalar(1e-3), tissue, NoFoundation(), press(tool, contact), tear.ligaments());
+            REQUIRE(report.status == StepStatus::advanced);
+            tree.refit(x, report.moved);
+            follow(tear.update(x, Scalar(1e-3), tissue, NoFoundation()));
+            if (report.residual < Scalar(1e-5)) break;
+        }
+        return static_cast<double>(dot<Scalar>(report.reactions[0], contact.normal));
+    }
+    void follow(std::span<const TearEvent<Scalar>> events) {
+        for (const auto& event : events) membrane::follow(event, tissue, solver, tree, tracker);
+    }
+
+    TriangleMesh<Scalar> mesh;
+    Tissue<TearableSprings<Scalar, LinearSpring>, Elements<Scalar, TriangularSpring<Scalar>>> tissue;
+    Tearing<Scalar> tear;
+    QuasiStaticSolver<Scalar> solver;
+    AabbTree<Scalar> tree;
+    ContactTracker<Scalar> tracker;
+    Points<Scalar> x;
+    Contact<Scalar> contact;
+    StepReport<Scalar> report;
+};
+
+}  // namespace
+
+TEMPLATE_TEST_CASE(
+    "a sharp tool perforates at its force and not before, and the slit tears on if the membrane is brittle", "[tear]",
+    double, float) {
+    constexpr double perforation = 3e-3;
+    for (const double toughness : {1.0, 1e5}) {
+        CAPTURE(toughness);
+        PokedDisc<TestType> disc(toughness);
+        double force = 0, before = 0, depth = 0;
+        while (disc.tear.tips().empty() && depth < 3e-3) {
+            depth += 2e-5;
+            before = force;
+            force = disc.press_to(depth);
+            const auto path =
+                disc.tear.slit_under(disc.contact, disc.report.reactions[0], TestType(perforation), {1, 0, 0});
+            disc.follow(disc.tear.cut_along(path, disc.x));
+        }
+        CAPTURE(depth, before, force);
+        CHECK(before < perforation);
+        CHECK(force >= perforation);
+        REQUIRE(disc.tear.tips().size() == 2);
+        const Vector3<TestType> under(TestType(1e-4), TestType(5e-5), 0);
+        CHECK(norm<TestType>(point(disc.mesh.positions(), Index(0)) - under) < TestType(2.5e-4));
+        const auto behind = disc.tear.tips()[0].behind;
+        CHECK((behind[0] == 0 || behind[1] == 0));
+        for (int i = 1; i <= 10; ++i) force = disc.press_to(depth + i * 2e-5);
+        CHECK(force < perforation / 10);  // the tool is through
+        if (toughness > 1) {
+            CHECK(disc.tear.torn_length() == 0);
+            REQUIRE(disc.tear.tips().size() == 2);
+            CHECK(norm<TestType>(point(disc.x, behind[0]) - point(disc.x, behind[1])) > TestType(5e-5));
+        } else {
+            CHECK(disc.tear.torn_length() > 3e-3);
+        }
+    }
+}
+
+TEST_CASE("a tool that is in no contact, or whose force is no number, does not perforate", "[tear]") {
+    PokedDisc<double> disc(1e5);
+    REQUIRE(disc.press_to(3e-4) > 0);
+    const auto slit = [&](const auto& contact, const Vector3<double>& reaction, double force) {
+        return disc.tear.slit_under(contact, reaction, force, {1, 0, 0})[1];
+    };
+    const Vector3<double> reaction = 1e-3 * disc.contact.normal, aside(1, 0, 0);
+    CHECK(slit(disc.contact, reaction, 0.999e-3) == 0);
+    CHECK(slit(disc.contact, reaction, 1.001e-3) == no_index);
+    CHECK(slit(disc.contact, aside - dot(aside, disc.contact.normal) * disc.contact.normal, 1e-6) == no_index);
+    CHECK(slit(Contact<double>::none(), reaction, 0.5e-3) == no_index);
+    CHECK(slit(disc.contact, NAN * reaction, 0.5e-3) == no_index);
+    CHECK(slit(disc.contact, reaction, NAN) == no_index);
+    CHECK(slit(disc.contact, reaction, -INFINITY) == no_index);
+}
+
+// Closed form of a slit of length 2a under the same tension in all directions.
+TEST_CASE("the driving forces of both ends of a short slit do not cancel", "[tear]") {
+    for (const int half : {1, 2, 4}) {
+        CAPTURE(half);
+        PokedDisc<double> disc(1e5);
+        const auto& surface = disc.tear.surface();
+        const auto corners = surface.corners(0);
+        const auto at = surface.corners_at(disc.x, 0);
+        const auto squared =
+            squared_tension(RestTriangle<double>(at), at, disc.tissue.triangle_response(0, corners, disc.x));
+        std::vector<Index> path{0};
+        for (int i = 0; i < half; ++i) path.push_back(surface.nearest_in_direction(path.back(), {1, 0, 0}));
+        std::reverse(path.begin(), path.end());
+        for (int i = 0; i < half; ++i) path.push_back(surface.nearest_in_direction(path.back(), {-1, 0, 0}));
+        disc.follow(disc.tear.cut_along(path, disc.x));
+        for (int i = 0; i < 300; ++i) {
+            disc.solver.wake_all();
+            static_cast<void>(disc.solver.step(disc.x, 1e-3, disc.tissue, NoFoundation()));
+        }
+        disc.follow(disc.tear.update(disc.x, 1e-3, disc.tissue, NoFoundation()));
+        const double length = std::abs(disc.mesh.positions()(0, path[0]));
+        const double expected = std::numbers::pi * squared.xx * length / (1e6 * 1e-5);
+        const auto tips = disc.tear.tips();
+        REQUIRE(tips.size() == 2);
+        CHECK(norm(tips[0].driving_force) > (half == 1 ? 0.3 : 0.5) * expected);
+        CHECK(norm(tips[0].driving_force) < expected);
+        CHECK(norm(tips[1].driving_force) == Approx(norm(tips[0].driving_force)).epsilon(0.01));
+        CHECK(tips[0].driving_force[0] > 0);
+        CHECK(tips[1].driving_force[0] < 0);
+    }
 }

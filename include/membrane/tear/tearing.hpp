@@ -11,10 +11,12 @@
 #include <utility>
 #include <vector>
 
+#include <membrane/contact/contact.hpp>
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/volume_springs.hpp>
+#include <membrane/tear/border_flaw.hpp>
 #include <membrane/tear/crack_driving_force.hpp>
 #include <membrane/tear/ligament.hpp>
 #include <membrane/tear/tear_criterion.hpp>
@@ -33,7 +35,7 @@ namespace membrane {
 /// How a tear runs.
 struct TearOptions {
     Index max_tips = 16;        ///< capacity
-    double patch_radius = 3.5;  ///< around a tip, where the driving force is found [edges], at least 2
+    double patch_radius = 3.5;  ///< around a tip, where its driving force is found [edges], at least 2; to the next tip
     double min_angle = 0.35;    ///< of a triangle that a moved vertex may leave [rad]
     bool move_vertices = true;  ///< onto the tear's direction; if not, it runs along the edges that there are
 
@@ -98,6 +100,24 @@ class Tearing {
     /// the membrane. All are `no_index` if there is none.
     [[nodiscard]] std::array<Index, 3> slit_at(Index v, const Vector3<Scalar>& direction) const noexcept;
 
+    /// The path where a sharp tool perforates, for `cut_along`: the slit at the vertex of the contact triangle that is
+    /// nearest to the contact point, along `direction`, if the membrane's force on the tool along the contact's normal is
+    /// `force` [N] or more. All are `no_index` if the tool does not perforate there. `reaction`: of the step under this
+    /// contact.
+    [[nodiscard]] std::array<Index, 3> slit_under(const Contact<Scalar>& contact, const Vector3<Scalar>& reaction,
+                                                  Scalar force, const Vector3<Scalar>& direction) const noexcept;
+
+    /// The path of a tear that starts at vertex `v` of the membrane's border, for `cut_along`; empty if none starts. A border
+    /// tears from a flaw, a cut that may be too small for the mesh, of length `flaw` [m]: if the criterion opens a tip with
+    /// the flaw's driving force (see `border_flaw.hpp`). The path goes inward, at right angles to the border, and is twice
+    /// as long as the flaw or longer by less than an edge, so that the tear goes on; it ends at a border, and has 32 edges
+    /// at most. None starts at a pinned vertex, beside a tip, if positions or `flaw` are not finite and positive, or if the
+    /// reserve or the capacity for tips is too small. As of any cut, the energy of its edges is not in `dissipated`.
+    /// Valid until the next call. @pre the network has followed all events. Cost: the triangles around the path.
+    template <class Network>
+    [[nodiscard]] std::span<const Index> start_at(Index v, Scalar flaw, const ConstPointsRef<Scalar>& x,
+                                                  const Network& network) noexcept;
+
     /// The forces across opening edges: a constraint of the step.
     [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items()}; }
 
@@ -133,6 +153,8 @@ class Tearing {
   private:
     [[nodiscard]] bool is_path(std::span<const Index> path) const noexcept;
     void add_tip(Index v, Index behind, Index copy) noexcept;
+    [[nodiscard]] bool is_beside_tip(Index v) const noexcept;
+    [[nodiscard]] Scalar list_start(const BorderState<Scalar>& border, Index v, Scalar length) noexcept;
     void join_tears(const VertexSplit& split) noexcept;
     void drop_tips() noexcept;
     void set_outer_border(Index copy, Index v) noexcept {
@@ -145,6 +167,7 @@ class Tearing {
         return std::any_of(all.begin(), all.end(), [copy](const auto& ligament) { return ligament.copy == copy; });
     }
     [[nodiscard]] bool has_changed_around(Index v) const noexcept;
+    [[nodiscard]] Scalar patch_radius_at(Index tip) const noexcept;
     void list_patch(Index v, Scalar radius) noexcept;
     template <class Network, class Volume>
     [[nodiscard]] Vector3<Scalar> driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
@@ -173,6 +196,7 @@ class Tearing {
     bool used_up_ = false;
     std::vector<unsigned char> is_outer_border_;  // vertices on the border of the membrane before it tore
     IndexSet patch_vertices_, patch_;             // around a tip; triangles
+    FixedVector<Index> path_;                     // of a start
 };
 
 template <Real Scalar, class Criterion>
@@ -200,7 +224,8 @@ Tearing<Scalar, Criterion>::Tearing(const TriangleMesh<Scalar>& mesh, const Crit
       ligaments_(2 * tips_.capacity()),
       is_outer_border_(static_cast<std::size_t>(mesh.vertex_count())),
       patch_vertices_(mesh.vertex_count()),
-      patch_(mesh.triangle_count()) {
+      patch_(mesh.triangle_count()),
+      path_(33) {
     if constexpr (requires { criterion.check(); }) criterion.check();
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         is_outer_border_[static_cast<std::size_t>(v)] = surface_.adjacency().on_border(v) ? 1 : 0;
@@ -297,6 +322,69 @@ std::array<Index, 3> Tearing<Scalar, Criterion>::slit_at(Index v, const Vector3<
     const Index ahead = surface_.nearest_in_direction(v, direction);
     const Index behind = surface_.nearest_in_direction(v, -direction);
     return ahead == no_index || behind == no_index ? none : std::array<Index, 3>{behind, v, ahead};
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+std::array<Index, 3> Tearing<Scalar, Criterion>::slit_under(const Contact<Scalar>& contact,
+                                                            const Vector3<Scalar>& reaction, Scalar force,
+                                                            const Vector3<Scalar>& direction) const noexcept {
+    const auto normal_force = dot(reaction, contact.normal);
+    if (!contact.touching() || !is_finite(normal_force) || !is_finite(force) || !is_finite(contact.barycentric) ||
+        !(normal_force >= force)) {
+        return {no_index, no_index, no_index};
+    }
+    const std::array<Scalar, 3> weights{contact.barycentric[0], contact.barycentric[1], contact.barycentric[2]};
+    const auto largest = std::max_element(weights.begin(), weights.end()) - weights.begin();
+    return slit_at(contact.corners[static_cast<std::size_t>(largest)], direction);
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+bool Tearing<Scalar, Criterion>::is_beside_tip(Index v) const noexcept {
+    const auto tips = tips_.items();
+    return std::any_of(tips.begin(), tips.end(), [v](const auto& tip) {
+        return tip.vertex == v || std::find(tip.behind.begin(), tip.behind.end(), v) != tip.behind.end();
+    });
+}
+
+// Lists the vertices inward from `v` to a distance of `length` at least, or to the next border. Returns the distance.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+Scalar Tearing<Scalar, Criterion>::list_start(const BorderState<Scalar>& border, Index v, Scalar length) noexcept {
+    const auto& rest = surface_.rest_positions();
+    const Vector3<Scalar> from = point(rest, v);
+    Scalar distance = 0;
+    path_.clear();
+    path_.try_push_back(v);
+    while (distance < length) {
+        const Vector3<Scalar> at = point(rest, path_.items().back()) - from;
+        const Vector3<Scalar> ahead = distance * border.inward - at + surface_.mean_edge(v) * border.inward;
+        const Index next = surface_.nearest_in_direction(path_.items().back(), ahead);
+        if (next == no_index) break;
+        const auto further = dot<Scalar>(point(rest, next) - from, border.inward);
+        if (!(further > distance) || !path_.try_push_back(next)) break;
+        distance = further;
+        if (surface_.adjacency().on_border(next)) break;
+    }
+    return distance;
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Network>
+std::span<const Index> Tearing<Scalar, Criterion>::start_at(Index v, Scalar flaw, const ConstPointsRef<Scalar>& x,
+                                                            const Network& network) noexcept {
+    used_up_ = false;
+    if (v < 0 || v >= surface_.rest_positions().cols() || !(is_finite(flaw) && flaw > 0)) return {};
+    if (!surface_.adjacency().on_border(v) || is_outer_border_[static_cast<std::size_t>(v)] == 0) return {};
+    if (network.pinned(v) || is_beside_tip(v) || tips_.size() == tips_.capacity()) return {};
+    const auto border = border_state(surface_, v, x, network);
+    const Scalar length = list_start(border, v, 2 * flaw);
+    const Scalar force = flaw_driving_force(border, (std::min)(flaw, length));
+    if (!is_finite(force) || !(force > 0)) return {};
+    const TipState<Scalar> state{force * border.inward, border.tension, border.along, border.inward};
+    if (!criterion_.opens(state)) return {};
+    const auto path = std::as_const(path_).items();
+    const std::size_t needed = path.size() - (surface_.adjacency().on_border(path.back()) ? 0 : 1);
+    used_up_ = needed > static_cast<std::size_t>(surface_.reserve());
+    return used_up_ ? std::span<const Index>() : path;
 }
 
 // Makes the separations permanent, and drops what has failed.
@@ -408,6 +496,20 @@ void Tearing<Scalar, Criterion>::list_patch(Index v, Scalar radius) noexcept {
     }
 }
 
+// Not as far as to another tip, whose driving force would be added: that of the other end of a short slit is opposite.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+Scalar Tearing<Scalar, Criterion>::patch_radius_at(Index tip) const noexcept {
+    const auto& rest = surface_.rest_positions();
+    const Scalar edge = surface_.mean_edge(tip);
+    Scalar radius = static_cast<Scalar>(options_.patch_radius) * edge;
+    for (const auto& other : tips_.items()) {
+        if (other.vertex == tip || other.vertex == no_index) continue;
+        const auto distance = norm<Scalar>(point(rest, other.vertex) - point(rest, tip));
+        radius = (std::min)(radius, (std::max)(distance, edge));
+    }
+    return radius;
+}
+
 // The configurational force of the patch: of all its vertices, those nearer to the tip in full, those farther away less.
 // That of a vertex on the membrane's own border does not count: the tear does not move it.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
@@ -416,7 +518,7 @@ Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const Co
                                                              const Network& network, const Volume& volume,
                                                              std::span<const Index> held) noexcept {
     const auto& rest = surface_.rest_positions();
-    const Scalar radius = static_cast<Scalar>(options_.patch_radius) * surface_.mean_edge(tip);
+    const Scalar radius = patch_radius_at(tip);
     const auto weight = [&](Index v) {
         const auto distance = norm<Scalar>(point(rest, v) - point(rest, tip));
         if (is_outer_border_[static_cast<std::size_t>(v)] != 0) return Scalar(0);
