@@ -2,15 +2,13 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
-#include <memory>
 #include <numbers>
-#include <optional>
 #include <utility>
 
 #include <membrane/model/triangular_springs.hpp>
 
 #include "hand.hpp"
+#include "session.hpp"
 #include "support/capsulorhexis.hpp"
 #include "support/opening.hpp"
 #include "support/peeling.hpp"
@@ -19,13 +17,9 @@
 /// The operations of the page: those of the examples, led as there or by the user's hand.
 namespace web {
 
-using membrane::Index;
-using Vector3 = membrane::Vector3<double>;
 using Points = membrane::Points<double>;
-using Mesh = membrane::TriangleMesh<double>;
 
-constexpr double dt = examples::Capsulorhexis::tick;  // [s]
-static_assert(dt == examples::Peeling::tick);
+static_assert(dt == examples::Capsulorhexis::tick && dt == examples::Peeling::tick);
 
 /// How far it is.
 struct Progress {

@@ -36,7 +36,7 @@ export class Hand {
   }
 
   get pulls() {
-    return this.scene.operation || this.options.mode === "pull";
+    return this.scene.operation !== null || this.options.mode === "pull";
   }
 
   begin(x, y, pull) {

@@ -171,7 +171,11 @@ window.membrane = {
     const { force, touching, holding, positions, left, progress } = state ?? { force: [0, 0, 0], positions: [] };
     const vertices = positions.length / 3;
     const run = { frames, recording, left, progress, time: plot.time, ...times.summary() };
-    return { force, touching, holding, vertices, triangles: scene.triangles, ...run };
+    return { force, touching, holding, vertices, ...run };
+  },
+  // What is drawn.
+  get surface() {
+    return { positions: [...state.positions], triangles: [...scene.triangles] };
   },
   csv: () => csvOf(rows),
 

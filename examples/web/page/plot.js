@@ -24,7 +24,7 @@ export class Plot {
         },
         axes: [
           { ...axis, size: 26, values: (_, splits) => splits.map((t) => (t < 0 ? "" : `${t} s`)) },
-          { ...axis, size: 62, values: (_, splits) => splits.map((f) => `${f} mN`) },
+          { ...axis, size: 72, values: (_, splits) => splits.map((f) => `${f} mN`) },
         ],
         series: [
           {},

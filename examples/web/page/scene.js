@@ -65,6 +65,7 @@ export class Scene {
     this.arrow.shaft.renderOrder = 1;
     this.arrow.head.renderOrder = 2;
     this.scene.add(this.membrane, this.tool, this.arrow);
+    this.operation = null;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     this.resize();
   }
