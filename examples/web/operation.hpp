@@ -36,8 +36,9 @@ struct ForcepsState {
 
 class Operation {
   public:
-    /// `edge`: mean length of the membrane's edges [m].
-    Operation(double edge, double max_speed) : edge_(edge), hand_(edge / 2, max_speed) {}
+    /// `edge`: mean length of the membrane's edges [m]. The user's forceps slip off at `max_force` [N].
+    Operation(double edge, double max_speed, double max_force)
+        : edge_(edge), max_force_(max_force), hand_(edge / 2, max_speed) {}
     virtual ~Operation() = default;
 
     /// From now on the hand of the example leads.
@@ -49,7 +50,8 @@ class Operation {
         triangle_ = membrane::no_index;
     }
 
-    /// The user's hand moves toward `target`, and closes its forceps at the membrane. They end the demonstration.
+    /// The user's hand moves toward `target`, and closes its forceps at the membrane: this ends the demonstration. Those
+    /// that have slipped off take hold again after they were open.
     void aim(const Vector3& target, bool close) {
         target_ = target;
         close_ = close;
@@ -62,13 +64,13 @@ class Operation {
             return;
         }
         hand_.follow(target_, close_, dt);
-        const Vector3& at = hand_.tool().position;
-        if (!close_ || finished())
+        slipped_ = close_ && (slipped_ || membrane::norm(forceps_.force) > max_force_);
+        if (!close_ || slipped_ || finished())
             triangle_ = membrane::no_index;
         else if (triangle_ == membrane::no_index)
-            grasp(at);
-        const auto held = attachment(triangle_, at);
-        forceps_ = {at, step(held), triangle_ != membrane::no_index};
+            grasp();
+        const Vector3& at = hand_.tool().position;
+        forceps_ = {at, step(attachment(triangle_, at)), triangle_ != membrane::no_index};
     }
 
     [[nodiscard]] const ForcepsState& forceps() const { return forceps_; }
@@ -95,7 +97,8 @@ class Operation {
     }
 
     /// Closes the forceps if a triangle is within their reach.
-    void grasp(const Vector3& at) {
+    void grasp() {
+        const Vector3 at = hand_.tool().position;
         const auto& now = triangles();
         const Points x = positions();
         double nearest = edge_;
@@ -112,10 +115,10 @@ class Operation {
         return {f, {now(0, f), now(1, f), now(2, f)}, {1.0 / 3, 1.0 / 3, 1.0 / 3}, at};
     }
 
-    double edge_;
+    double edge_, max_force_;
     Hand hand_;
     Vector3 target_ = Vector3::Zero();
-    bool close_ = false, demonstrated_ = false;
+    bool close_ = false, slipped_ = false, demonstrated_ = false;
     Index triangle_ = membrane::no_index;  // that the user holds
     ForcepsState forceps_;
 };
@@ -124,7 +127,7 @@ class Operation {
 class RhexisOperation : public Operation {
   public:
     explicit RhexisOperation(const examples::RhexisScene& scene = shared_scene())
-        : Operation(scene.edge, 10e-3),
+        : Operation(scene.edge, 10e-3, 60e-3),
           scene_(scene),
           loop_(scene),
           leader_(scene, examples::capsule_lift * std::numbers::pi / 180),
@@ -200,7 +203,7 @@ class RhexisOperation : public Operation {
 class PeelOperation : public Operation {
   public:
     explicit PeelOperation(const examples::PeelScene& scene = examples::circle_scene())
-        : Operation(examples::mean_edge(scene.mesh), 3e-3),
+        : Operation(examples::mean_edge(scene.mesh), 3e-3, 1e-3),
           scene_(scene),
           loop_(scene),
           device_(scene.script(), {.tick = dt, .radius = examples::mean_edge(scene.mesh)}),

@@ -408,7 +408,7 @@ async function reset(page, rest, what) {
 
 async function testCapsulorhexis() {
   const native = nativeOperation("capsulorhexis"); // meanwhile
-  const page = await open({ viewport: { width: 700, height: 500 } });
+  const page = await open();
   await operate(page, "capsulorhexis");
   const rest = await surface(page);
   const part = await drawnPart(page, "capsulorhexis");
@@ -441,7 +441,7 @@ async function testCapsulorhexis() {
 }
 
 async function testPeel() {
-  const page = await open({ viewport: { width: 700, height: 500 }, colorScheme: "dark" });
+  const page = await open({ colorScheme: "dark" });
   await operate(page, "peel");
   const rest = await surface(page);
   const part = await drawnPart(page, "peel");
@@ -456,7 +456,7 @@ async function testPeel() {
   await drawnPart(page, "peeled");
   await reset(page, rest, "the peeled membrane");
 
-  await drag(page, [[0.26, 0.45], [0.5, 0.45], [0.8, 0.45]]);
+  await drag(page, [[0.25, 0.55], [0.5, 0.55], [0.85, 0.55]]);
   await until(page, "progress.area > 2e-7");
   check("the user peels", true, await page.textContent("#progress"));
   await page.mouse.up();
