@@ -10,9 +10,9 @@
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/mesh_check/validate.hpp>
 
-#include "support/surface_state.hpp"
 #include "hand.hpp"
 #include "recording.hpp"
+#include "support/surface_state.hpp"
 #include "views.hpp"
 
 using namespace emscripten;

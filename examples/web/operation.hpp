@@ -14,7 +14,7 @@
 #include "support/peeling.hpp"
 #include "support/surface_state.hpp"
 
-/// The operations of the page: those of the examples, led as there or by the user's hand.
+/// The operations of the page: those of the examples, by the hand there or by the user's.
 namespace web {
 
 using Points = membrane::Points<double>;
@@ -41,7 +41,7 @@ class Operation {
         : edge_(edge), max_force_(max_force), hand_(edge / 2, max_speed) {}
     virtual ~Operation() = default;
 
-    /// From now on the hand of the example leads.
+    /// From now on the forceps follow the hand of the example.
     void demonstrate() { demonstrated_ = true; }
 
     /// Puts the user's hand at another position, without a path from the last one.
@@ -60,7 +60,7 @@ class Operation {
 
     void step() {
         if (demonstrated_) {
-            forceps_ = lead();
+            forceps_ = follow_example();
             return;
         }
         hand_.follow(target_, close_, dt);
@@ -86,8 +86,8 @@ class Operation {
     [[nodiscard]] virtual Mesh body() const = 0;                   ///< under it
 
   protected:
-    /// A tick led by the example's hand.
-    [[nodiscard]] virtual ForcepsState lead() = 0;
+    /// A tick with the example's hand.
+    [[nodiscard]] virtual ForcepsState follow_example() = 0;
     /// A tick with what the user holds; returns the force on the hand [N].
     [[nodiscard]] virtual Vector3 step(const membrane::PointAttachment<double>& held) = 0;
 
@@ -96,7 +96,7 @@ class Operation {
         return (x.col(triangles(0, f)) + x.col(triangles(1, f)) + x.col(triangles(2, f))) / 3;
     }
 
-    /// Closes the forceps if a triangle is within their reach.
+    /// Closes the forceps if a triangle is within an edge's length.
     void grasp() {
         const Vector3 at = hand_.tool().position;
         const auto& now = triangles();
@@ -130,7 +130,7 @@ class RhexisOperation : public Operation {
         : Operation(scene.edge, 10e-3, 60e-3),
           scene_(scene),
           loop_(scene),
-          leader_(scene, examples::capsule_lift * std::numbers::pi / 180),
+          example_hand_(scene, examples::capsule_lift * std::numbers::pi / 180),
           triangles_(loop_.tear().surface().triangles()) {}
 
     [[nodiscard]] const Points& rest() const override { return loop_.tear().surface().rest_positions(); }
@@ -156,11 +156,11 @@ class RhexisOperation : public Operation {
     [[nodiscard]] Mesh body() const override { return scene_.ball_under_opening(); }
 
   protected:
-    [[nodiscard]] ForcepsState lead() override {
-        if (finished_) return {leader_.position(), step(membrane::PointAttachment<double>())};
-        leader_.guide(loop_.tear(), loop_.x(), dt);
-        const Vector3 force = step(leader_.hold(loop_.tear()));
-        return {leader_.position(), force, leader_.closed() && !finished_};
+    [[nodiscard]] ForcepsState follow_example() override {
+        if (finished_) return {example_hand_.position(), step(membrane::PointAttachment<double>())};
+        example_hand_.guide(loop_.tear(), loop_.x(), dt);
+        const Vector3 force = step(example_hand_.hold(loop_.tear()));
+        return {example_hand_.position(), force, example_hand_.closed() && !finished_};
     }
 
     [[nodiscard]] Vector3 step(const membrane::PointAttachment<double>& held) override {
@@ -193,7 +193,7 @@ class RhexisOperation : public Operation {
 
     const examples::RhexisScene& scene_;
     examples::Capsulorhexis loop_;
-    examples::Forceps leader_;
+    examples::Forceps example_hand_;
     membrane::Triangles triangles_;  // of what is drawn
     double circularity_ = 0;
     bool finished_ = false;
@@ -223,7 +223,7 @@ class PeelOperation : public Operation {
     }
 
   protected:
-    [[nodiscard]] ForcepsState lead() override {
+    [[nodiscard]] ForcepsState follow_example() override {
         const auto tool = device_.read();
         const auto held = membrane::pull(tool, loop_.grasp(tool));
         const Vector3 force = loop_.step(held).total_reaction();

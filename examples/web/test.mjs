@@ -429,7 +429,7 @@ async function testCapsulorhexis() {
   const { progress } = await state(page);
   const opened = await surface(page);
   const { length, circularity } = await native;
-  check("a tear led round closes a round opening", progress.circularity > 0.9, progress.circularity.toFixed(4));
+  check("the demonstration closes a round opening", progress.circularity > 0.9, progress.circularity.toFixed(4));
   const same = Math.abs(progress.circularity - circularity) < 0.01 && Math.abs(progress.length / length - 1) < 0.02;
   const pair = [progress.length, length].map((each) => `${(1e3 * each).toFixed(6)} mm`);
   check("that of the native program", same, pair.join(", "));

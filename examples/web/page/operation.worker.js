@@ -26,7 +26,7 @@ const handlers = {
     });
   },
 
-  // Makes the membrane whole again, and may let the hand of the example lead.
+  // Makes the membrane whole again, and may demonstrate the operation.
   reset({ kind, demonstrate }) {
     begin(kind);
     if (demonstrate) loop.demonstrate();
