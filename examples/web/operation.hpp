@@ -70,7 +70,7 @@ class Operation {
         else if (triangle_ == membrane::no_index)
             grasp();
         const Vector3& at = hand_.tool().position;
-        forceps_ = {at, step(attachment(triangle_, at)), triangle_ != membrane::no_index};
+        forceps_ = {at, advance(attachment(triangle_, at)), triangle_ != membrane::no_index};
     }
 
     [[nodiscard]] const ForcepsState& forceps() const { return forceps_; }
@@ -89,7 +89,7 @@ class Operation {
     /// A tick with the example's hand.
     [[nodiscard]] virtual ForcepsState follow_example() = 0;
     /// A tick with what the user holds; returns the force on the hand [N].
-    [[nodiscard]] virtual Vector3 step(const membrane::PointAttachment<double>& held) = 0;
+    [[nodiscard]] virtual Vector3 advance(const membrane::PointAttachment<double>& held) = 0;
 
   private:
     static Vector3 middle_of(const membrane::Triangles& triangles, const Points& x, Index f) {
@@ -157,13 +157,13 @@ class RhexisOperation : public Operation {
 
   protected:
     [[nodiscard]] ForcepsState follow_example() override {
-        if (finished_) return {example_hand_.position(), step(membrane::PointAttachment<double>())};
+        if (finished_) return {example_hand_.position(), advance(membrane::PointAttachment<double>())};
         example_hand_.guide(loop_.tear(), loop_.x(), dt);
-        const Vector3 force = step(example_hand_.hold(loop_.tear()));
+        const Vector3 force = advance(example_hand_.hold(loop_.tear()));
         return {example_hand_.position(), force, example_hand_.closed() && !finished_};
     }
 
-    [[nodiscard]] Vector3 step(const membrane::PointAttachment<double>& held) override {
+    [[nodiscard]] Vector3 advance(const membrane::PointAttachment<double>& held) override {
         if (finished_) {
             loop_.run_to_equilibrium(1);
             return Vector3::Zero();
@@ -230,7 +230,7 @@ class PeelOperation : public Operation {
         return {tool.position, force, tool.grasping};
     }
 
-    [[nodiscard]] Vector3 step(const membrane::PointAttachment<double>& held) override {
+    [[nodiscard]] Vector3 advance(const membrane::PointAttachment<double>& held) override {
         return loop_.step(held).total_reaction();
     }
 

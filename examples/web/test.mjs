@@ -532,7 +532,7 @@ async function drawOperations() {
 }
 
 async function drawPage() {
-  const page = await open({ viewport: { width: 1100, height: 860 } });
+  const page = await open({ viewport: { width: 1100, height: 1000 } });
   await page.check("#contact");
   await stroke(page, [[0.62, 0.42], [0.54, 0.48]]);
   await simulate(page, 3);
