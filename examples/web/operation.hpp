@@ -50,8 +50,8 @@ class Operation {
         triangle_ = membrane::no_index;
     }
 
-    /// The user's hand moves toward `target`, and closes its forceps at the membrane: this ends the demonstration. Those
-    /// that have slipped off take hold again after they were open.
+    /// The user's hand moves toward `target`, and closes its forceps at the membrane: this ends the demonstration.
+    /// Forceps that have slipped off take hold again after they were open.
     void aim(const Vector3& target, bool close) {
         target_ = target;
         close_ = close;

@@ -424,6 +424,14 @@ async function testCapsulorhexis() {
   await until(page, "!holding");
   await reset(page, rest, "the capsule");
 
+  await page.mouse.move(...(await at(page, 0.5, 0.85)));
+  await page.mouse.down();
+  await page.mouse.move(...(await at(page, 0.5, 0.4)), { steps: 8 });
+  await simulate(page, 0.5);
+  const { holding, progress: whole } = await state(page);
+  check("forceps slip off the taut capsule", !holding && whole.length === 0);
+  await page.mouse.up();
+
   await page.click("#demonstrate");
   await page.waitForFunction(() => window.membrane.state.progress.finished, undefined, { timeout: 500_000 });
   const { progress } = await state(page);

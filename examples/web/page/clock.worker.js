@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// The time of a loop: as many ticks as milliseconds have passed, however often the page is drawn. The text of each worker
-// with a loop stands behind this one.
+// The time of a loop: as many ticks as milliseconds have passed, however often the page is drawn. The text of each
+// worker with a loop stands behind this one.
 const maxPause = 100; // longer ones are not made up for: the membrane goes on where it was [ms]
 const budget = 25; // of ticks in a row: messages are read in between [ms]
 

@@ -6,7 +6,7 @@ const mm = (length) => `${(1e3 * length).toFixed(1)} mm`;
 export const operations = {
   capsulorhexis: {
     name: "Capsulorhexis",
-    hint: "Take the flap beside the cut, and draw it round: the tear follows. Drag beside the membrane to turn the view.",
+    hint: "Take the flap beside the cut and draw it round: the tear follows. Drag beside the capsule to turn the view.",
     maxTension: 8, // of the colours [N/m]
     force: 10e-3, // that is usual [N]
     body: 0xe2d3b4,

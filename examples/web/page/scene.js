@@ -173,8 +173,8 @@ export class Scene {
     return { point: hit.point.clone().multiplyScalar(this.size), normal: normal.clone().normalize() };
   }
 
-  // The point under a point of the window in the plane through `point` [m], parallel to the screen or, in an operation, to
-  // the membrane.
+  // The point under a point of the window in the plane through `point` [m], parallel to the screen or, in an operation,
+  // to the membrane.
   onPlane(x, y, point) {
     const facing = this.operation ? outward : this.camera.getWorldDirection(new THREE.Vector3());
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(facing, point.clone().divideScalar(this.size));
