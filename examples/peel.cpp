@@ -9,65 +9,29 @@
 #include <utility>
 #include <vector>
 
-#include <membrane/membrane.hpp>
-#include <membrane/model/cohesive_springs.hpp>
-#include <membrane/model/spring_stiffness.hpp>
-
 #include "support/peel.hpp"
+#include "support/peeling.hpp"
 #include "support/plot.hpp"
 #include "support/specimen.hpp"
 
 using namespace examples;
 using membrane::Index;
 
-// Assumed, not measured: E is that of the lens capsule [Fisher69], which is a basement membrane too, and the Poisson
-// ratio that of springs. Thickness and energy are plausible.
-const membrane::Material ilm{.young_modulus = membrane::materials::lens_capsule().typical.young_modulus,
-                             .poisson_ratio = 1.0 / 3,
-                             .thickness = 2e-6};
-constexpr double energy = 0.05;  // [J/m^2]
-constexpr double tick = 1e-3;    // [s]
-
-/// Adhesion but for the flap. The strength is the largest that the edges resolve.
-membrane::CohesiveSprings<double> adhesion_of(const PeelScene& scene) {
-    const double strength = energy / (3 * mean_edge(scene.mesh));
-    std::vector<double> strengths;
-    for (Index v = 0; v < scene.mesh.vertex_count(); ++v) strengths.push_back(scene.in_flap(v) ? 0 : strength);
-    const double stiffness = 10 * strength * strength / energy;  // damage begins at a 20th of the failure opening
-    return {scene.mesh, {.stiffness = stiffness, .strength = strengths, .energy = energy}};
-}
-
 Peeled peel(const PeelScene& scene, Index sweeps) {
-    const auto& mesh = scene.mesh;
-    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
-                                                     {.stiffness = membrane::spring_stiffnesses(mesh, ilm)});
-    auto adhesion = adhesion_of(scene);
-    auto solver = membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = sweeps});
-    auto tree = membrane::AabbTree(mesh);
-    auto tracker = membrane::ContactTracker(mesh);
-    auto grasper = membrane::Grasper(mesh, {.snap_to_vertex = true});
-    membrane::ScriptedDevice<double> device(scene.script(), {.tick = tick, .radius = mean_edge(mesh)});
-    auto x = mesh.positions();
+    Peeling operation(scene, sweeps);  // its loop: support/peeling.hpp
+    membrane::ScriptedDevice<double> device(scene.script(), {.tick = Peeling::tick, .radius = mean_edge(scene.mesh)});
     Peeled result;
     while (device.running()) {
         const auto start = std::chrono::steady_clock::now();
         const auto tool = device.read();
-        const auto contact = tracker.update(tree, x, tool);
-        const auto grasp = grasper.update(contact, x, tool);
-        const auto report = solver.step(x, tick, network, adhesion, pull(tool, grasp));
-        adhesion.update(x, report.moved);
-        tree.refit(x, report.moved);
+        const auto report = operation.step(pull(tool, operation.grasp(tool)));
         device.write(report.total_reaction());
         result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        result.add(scene, x, tool, report.total_reaction());
+        result.add(scene, operation.x(), tool, report.total_reaction());
     }
-    result.stored = network.energy(x);
-    result.dissipated = adhesion.dissipated();
-    const auto areas = membrane::vertex_areas(mesh);
-    for (Index v = 0; v < mesh.vertex_count(); ++v) {
-        result.stored += adhesion.energy(v, x.col(v));
-        if (!scene.in_flap(v) && !adhesion.adheres(v)) result.area += areas[static_cast<std::size_t>(v)];
-    }
+    result.stored = operation.stored();
+    result.dissipated = operation.dissipated();
+    result.area = operation.area();
     return result;
 }
 
@@ -76,7 +40,7 @@ std::vector<Curve> show(const PeelScene& scene, const std::filesystem::path& fol
     const Peeled peeled = peel(scene, sweeps);
     std::printf("%s, %d vertices: peak %.3g mN, mean %.3g mN", scene.name.c_str(), int{scene.mesh.vertex_count()},
                 1e3 * peeled.peak, 1e3 * peeled.mean());
-    if (scene.width) std::printf(", %.3f of the closed form", peeled.of_closed_form(energy));
+    if (scene.width) std::printf(", %.3f of the closed form", peeled.of_closed_form(peel_energy));
     std::printf(
         "; %.3g mm^2 have let go\n  the hand's work %.3g nJ = %.3g stored + %.3g dissipated, within %.1f %%; "
         "%.0f us for a tick\n",
@@ -84,7 +48,7 @@ std::vector<Curve> show(const PeelScene& scene, const std::filesystem::path& fol
         100 * std::abs(1 - (peeled.stored + peeled.dissipated) / peeled.work),
         1e6 * peeled.seconds / static_cast<double>(peeled.force.size()));
     save(folder / ("peel_" + scene.name + ".svg"), drawn(peel_figure(scene.name, ilm, peeled.states)));
-    return {peeled.force, peeled.closed_form(energy)};
+    return {peeled.force, peeled.closed_form(peel_energy)};
 }
 
 int main(int argc, char** argv) {

@@ -18,7 +18,7 @@
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tear/tearing.hpp>
 
-#include "support/peel.hpp"
+#include "support/peel_scene.hpp"
 #include "support/specimen.hpp"
 
 /// A capsulorhexis: forceps guide a tear in the lens capsule round, to its own beginning.

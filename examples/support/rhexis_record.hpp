@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <cstdio>
 #include <numbers>
@@ -12,65 +11,25 @@
 
 #include <membrane/model/triangular_springs.hpp>
 
+#include "support/capsulorhexis.hpp"
+#include "support/opening.hpp"
 #include "support/plot.hpp"
-#include "support/rhexis.hpp"
 #include "support/tension.hpp"
 
 /// What a capsulorhexis took: force, energies, the opening, pictures.
 namespace examples {
 
-/// The opening, once the tear has met its beginning.
-struct Opening {
-    std::vector<bool> inside;  ///< for each triangle: it has come off
-    double circularity = 0;    ///< 4 pi area / perimeter^2 at rest, seen along the axis; 0: it is not closed
-};
-
-/// The triangles that are not joined to `scene.pinned`, and the border that they leave.
-[[nodiscard]] inline Opening opening_of(const RhexisScene& scene, const membrane::TornSurface<double>& surface) {
-    using membrane::Index;
-    const auto at = [](Index f) { return static_cast<std::size_t>(f); };
-    const auto& adjacency = surface.adjacency();
-    const membrane::TriangleAdjacency before(scene.mesh);
-    Opening opening{std::vector<bool>(at(scene.mesh.triangle_count()), true)};
-    std::vector<Index> left;
-    for (const Index v : scene.pinned) {
-        for (const Index f : adjacency.triangles_of(v)) left.push_back(f);
-    }
-    double area = 0, length = 0;
-    while (!left.empty()) {
-        const Index f = left.back();
-        left.pop_back();
-        if (!opening.inside[at(f)]) continue;
-        opening.inside[at(f)] = false;
-        const auto corners = surface.corners_at(surface.rest_positions(), f);
-        for (std::size_t k = 0; k < 3; ++k) {
-            const Index across = adjacency.triangle_neighbours(f)[k];
-            if (across != membrane::no_index) left.push_back(across);
-            if (across != membrane::no_index || before.triangle_neighbours(f)[k] == membrane::no_index) continue;
-            const Vector from = corners[k] - scene.middle, to = corners[(k + 1) % 3] - scene.middle;
-            area -= scene.axis.dot(from.cross(to)) / 2;
-            length += scene.axis.cross(to - from).norm();
-        }
-    }
-    const bool closed = std::find(opening.inside.begin(), opening.inside.end(), true) != opening.inside.end();
-    if (closed) opening.circularity = 4 * std::numbers::pi * area / (length * length);
-    return opening;
-}
-
 /// The membrane with its tension as colour, the ball under it, and the forceps with the force on them. What has come off
 /// is taken away.
-template <class Tissue>
-[[nodiscard]] Picture picture_of(const RhexisScene& scene, const Tissue& tissue, const Tear& tear,
-                                 const membrane::Points<double>& x, const Forceps& forceps, const Vector& felt) {
-    const auto& surface = tear.surface();
+[[nodiscard]] inline Picture picture_of(const RhexisScene& scene, const Capsulorhexis& operation,
+                                        const Forceps& forceps, const Vector& felt) {
+    const auto& surface = operation.tear().surface();
+    const auto& x = operation.x();
     const Opening opening = opening_of(scene, surface);
     const auto ball = scene.ball_under_opening();
     const Eigen::Index count = surface.triangles().cols(),
                        under = scene.ball_stiffness > 0 ? ball.triangles().cols() : 0;
-    Eigen::VectorXd tension;
-    tissue.for_each_kind([&]<class E>(const membrane::Elements<double, E>& elements) {
-        if constexpr (std::same_as<E, membrane::TriangularSpring<double>>) tension = tensions(elements, x);
-    });
+    const Eigen::VectorXd tension = tensions(operation.sheet(), x);
     membrane::Triangles triangles(3, count + under);
     Eigen::VectorXd values = Eigen::VectorXd::Zero(count + under);
     Eigen::Index used = 0;
@@ -110,9 +69,7 @@ struct Opened {
     int ticks = 0, grasps = 0;
 
     /// A tick.
-    template <class Tissue>
-    void add(const RhexisScene& scene, const Tissue& tissue, const BallUnder& body, const Tear& tear,
-             const membrane::Points<double>& x, const Forceps& forceps, const Vector& felt);
+    void add(const RhexisScene& scene, const Capsulorhexis& operation, const Forceps& forceps, const Vector& felt);
 
     ///@{
     /// Of the force that is felt: root of the mean square, largest [N]. Mean angle between it and the tear [rad].
@@ -129,13 +86,14 @@ struct Opened {
     double squares_ = 0, held_ticks_ = 0, peak_ = 0, angles_ = 0, advances_ = 0;
 };
 
-template <class Tissue>
-void Opened::add(const RhexisScene& scene, const Tissue& tissue, const BallUnder& body, const Tear& tear,
-                 const membrane::Points<double>& x, const Forceps& forceps, const Vector& felt) {
+inline void Opened::add(const RhexisScene& scene, const Capsulorhexis& operation, const Forceps& forceps,
+                        const Vector& felt) {
+    const auto& tear = operation.tear();
+    const auto& x = operation.x();
     if (forceps.closed()) add_force(tear, forceps, felt);
     const double before = stored + torn;
-    stored = body.energy(x) + tear.stored(x);
-    tissue.for_each_element([&](const auto& one) { stored += one.element.energy(one.where(x)); });
+    stored = operation.body().energy(x) + tear.stored(x);
+    operation.tissue().for_each_element([&](const auto& one) { stored += one.element.energy(one.where(x)); });
     torn = tear.dissipated();
     if (!forceps.closed()) let_go += before - stored - torn;
     length = tear.torn_length();
@@ -147,7 +105,7 @@ void Opened::add(const RhexisScene& scene, const Tissue& tissue, const BallUnder
     if (!held_ || tear.tips().size() < 2) return;
     const bool is_half = scene.angle(tear.surface().rest_positions().col(tear.tips().back().vertex)) > std::numbers::pi;
     if (states.size() < (is_half ? 2u : 1u)) {
-        states.push_back(picture_of(scene, tissue, tear, x, forceps, felt));
+        states.push_back(picture_of(scene, operation, forceps, felt));
     }
 }
 

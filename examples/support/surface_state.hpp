@@ -42,4 +42,18 @@ template <class Network, class Volume>
     return state;
 }
 
+/// The mean tension of a sheet of elements at each vertex [N/m], averaged over its triangles; 0 without triangles.
+template <class Sheet>
+[[nodiscard]] Eigen::VectorXd vertex_tensions(const Sheet& sheet, const membrane::Points<double>& x) {
+    Eigen::VectorXd sum = Eigen::VectorXd::Zero(x.cols()), count = sum;
+    for (const auto& placed : sheet.all()) {
+        const double tension = placed.element.mean_tension(sheet.where(placed, x));
+        for (const membrane::Index v : placed.corners) {
+            sum[v] += tension;
+            ++count[v];
+        }
+    }
+    return sum.cwiseQuotient(count.cwiseMax(1));
+}
+
 }  // namespace examples

@@ -7,6 +7,7 @@
 #include <membrane/model/elements.hpp>
 
 #include "support/figure.hpp"
+#include "support/surface_state.hpp"
 
 /// Tension as colour.
 namespace examples {
@@ -15,19 +16,11 @@ namespace examples {
 /// in which it is constant, jumps from one to the next.
 template <class Sheet>
 [[nodiscard]] Eigen::VectorXd tensions(const Sheet& sheet, const membrane::Points<double>& x) {
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(x.cols()), count = sum;
-    for (const auto& placed : sheet.all()) {
-        const double tension = placed.element.mean_tension(sheet.where(placed, x));
-        for (const membrane::Index v : placed.corners) {
-            sum[v] += tension;
-            ++count[v];
-        }
-    }
-    Eigen::VectorXd result = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(sheet.all().size()));
+    const Eigen::VectorXd around = vertex_tensions(sheet, x);
+    Eigen::VectorXd result(static_cast<Eigen::Index>(sheet.all().size()));
     for (std::size_t f = 0; f < sheet.all().size(); ++f) {
-        for (const membrane::Index v : sheet.all()[f].corners) {
-            result[static_cast<Eigen::Index>(f)] += sum[v] / count[v] / 3;
-        }
+        const auto& corners = sheet.all()[f].corners;
+        result[static_cast<Eigen::Index>(f)] = (around[corners[0]] + around[corners[1]] + around[corners[2]]) / 3;
     }
     return result;
 }

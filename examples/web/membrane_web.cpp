@@ -6,14 +6,14 @@
 #include <string>
 
 #include <emscripten.h>
-#include <emscripten/bind.h>
 #include <membrane/accuracy/choose_settings.hpp>
 #include <membrane/accuracy/equilibrium.hpp>
 #include <membrane/mesh_check/validate.hpp>
 
-#include "../support/surface_state.hpp"
 #include "hand.hpp"
 #include "recording.hpp"
+#include "support/surface_state.hpp"
+#include "views.hpp"
 
 using namespace emscripten;
 using namespace web;
@@ -22,16 +22,6 @@ using namespace web;
 EM_JS(void, throw_error, (const char* message), { throw new Error(UTF8ToString(message)); });
 
 namespace {
-
-template <class Number>
-val view(const std::vector<Number>& numbers) {
-    return val(typed_memory_view(numbers.size(), numbers.data()));
-}
-
-template <class Matrix>
-val view(const Matrix& numbers) {
-    return val(typed_memory_view(static_cast<std::size_t>(numbers.size()), numbers.data()));
-}
 
 /// What a stroke needs, by `choose_settings`.
 struct Choice {

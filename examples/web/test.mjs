@@ -2,7 +2,7 @@
 //
 // Drives build/web/membrane.html in Chromium: `node test.mjs FOLDER [--states]`, the folder with the page, the native
 // program `replay` and node_modules. Saves pictures there. --states: makes states/*.png anew.
-import { execFileSync } from "node:child_process";
+import { execFile, execFileSync } from "node:child_process";
 import { readFileSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { join } from "node:path";
@@ -45,7 +45,7 @@ const picture = (page, name) => page.screenshot({ path: join(folder, `${name}.pn
 
 // Waits for a condition on the state of the page, in JavaScript.
 const until = (page, condition) => page.waitForFunction(`(({ ${names} }) => ${condition})(membrane.state)`);
-const names = ["force", "touching", "holding", "vertices", "frames", "recording", "left", "time"];
+const names = ["force", "touching", "holding", "vertices", "frames", "recording", "left", "time", "progress"];
 
 // Waits for some simulated time [s].
 async function simulate(page, seconds) {
@@ -340,6 +340,143 @@ async function testMishaps() {
   await page.close();
 }
 
+// Progress of an operation that the native program demonstrates.
+function nativeOperation(kind) {
+  return new Promise((resolve, reject) => {
+    execFile(join(folder, "replay"), [kind], (error, output) => {
+      const [ticks, length, circularity, area] = output.split(",").map(Number);
+      if (error) reject(error);
+      else resolve({ ticks, length, circularity, area });
+    });
+  });
+}
+
+async function operate(page, kind) {
+  await pick(page, "operation", kind);
+  await page.waitForFunction((name) => document.body.dataset.operation === name, kind);
+  await until(page, "progress");
+  await simulate(page, 0.05);
+}
+
+const surface = (page) => page.evaluate(() => window.membrane.surface);
+
+// Vertices that triangles have.
+const used = ({ triangles }) => new Set(triangles).size;
+
+// The largest distance between positions of a vertex that triangles have [m].
+function distance(a, b) {
+  const between = (v) => size([0, 1, 2].map((k) => a.positions[3 * v + k] - b.positions[3 * v + k]));
+  return Math.max(...a.triangles.map(between));
+}
+
+// Part of the pixels of the view that are not those of its corner.
+async function drawnPart(page, name) {
+  const png = await page.locator("#view").screenshot({ path: join(folder, `${name}.png`) });
+  return page.evaluate(async (url) => {
+    const image = new Image();
+    image.src = url;
+    await image.decode();
+    const canvas = new OffscreenCanvas(image.width, image.height).getContext("2d");
+    canvas.drawImage(image, 0, 0);
+    const pixels = canvas.getImageData(0, 0, image.width, image.height).data;
+    const drawn = (_, i) => [0, 1, 2].some((k) => pixels[4 * i + k] !== pixels[k]);
+    const count = pixels.length / 4;
+    return Array.from({ length: count }, (_, i) => i).filter(drawn).length / count;
+  }, `data:image/png;base64,${png.toString("base64")}`);
+}
+
+// Drags the forceps of an operation along points of the view.
+async function drag(page, points) {
+  await page.mouse.move(...(await at(page, ...points[0])));
+  await page.mouse.down();
+  await until(page, "holding");
+  for (const point of points.slice(1)) {
+    await page.mouse.move(...(await at(page, ...point)), { steps: 8 });
+    await simulate(page, 0.4);
+  }
+}
+
+async function reset(page, rest, what) {
+  await page.click("#reset");
+  await until(page, "progress.length === 0 && progress.area === 0 && !progress.finished && !holding");
+  await simulate(page, 0.02);
+  const now = await surface(page);
+  const same = now.triangles.join() === rest.triangles.join();
+  const moved = distance(rest, now);
+  check(`${what} is whole after a reset`, same && moved < 1e-4, `moved by ${(1e6 * moved).toFixed(2)} µm`);
+}
+
+async function testCapsulorhexis() {
+  const native = nativeOperation("capsulorhexis"); // meanwhile
+  const page = await open();
+  await operate(page, "capsulorhexis");
+  const rest = await surface(page);
+  const part = await drawnPart(page, "capsulorhexis");
+  check("the capsule is drawn", part > 0.2, `${(100 * part).toFixed(0)} % of the view`);
+
+  await drag(page, [[0.66, 0.5], [0.6, 0.4], [0.5, 0.3], [0.4, 0.25]]);
+  const pulled = await state(page);
+  const torn = await surface(page);
+  const found = `${(1e3 * size(pulled.force)).toFixed(1)} mN, ${(1e3 * pulled.progress.length).toFixed(2)} mm`;
+  check("the user tears the capsule", pulled.progress.length > 5e-4 && size(pulled.force) > 1e-3, found);
+  check("its triangles have more vertices", used(torn) > used(rest), `${used(rest)}, ${used(torn)}`);
+  await page.mouse.up();
+  await until(page, "!holding");
+  await reset(page, rest, "the capsule");
+
+  await page.mouse.move(...(await at(page, 0.5, 0.85)));
+  await page.mouse.down();
+  await page.mouse.move(...(await at(page, 0.5, 0.4)), { steps: 8 });
+  await simulate(page, 0.5);
+  const { holding, progress: whole } = await state(page);
+  check("forceps slip off the taut capsule", !holding && whole.length === 0);
+  await page.mouse.up();
+
+  await page.click("#demonstrate");
+  await page.waitForFunction(() => window.membrane.state.progress.finished, undefined, { timeout: 500_000 });
+  const { progress } = await state(page);
+  const opened = await surface(page);
+  const { length, circularity } = await native;
+  check("the demonstration closes a round opening", progress.circularity > 0.9, progress.circularity.toFixed(4));
+  const same = Math.abs(progress.circularity - circularity) < 0.01 && Math.abs(progress.length / length - 1) < 0.02;
+  const pair = [progress.length, length].map((each) => `${(1e3 * each).toFixed(6)} mm`);
+  check("that of the native program", same, pair.join(", "));
+  check("the flap is taken out", opened.triangles.length < 0.8 * rest.triangles.length);
+  check("the page says so", /circularity 0\.9/.test(await page.textContent("#progress")));
+  await drawnPart(page, "capsulorhexis_opened");
+  await reset(page, rest, "the opened capsule");
+  await page.close();
+}
+
+async function testPeel() {
+  const page = await open({ colorScheme: "dark" });
+  await operate(page, "peel");
+  const rest = await surface(page);
+  const part = await drawnPart(page, "peel");
+  check("the membrane to peel is drawn", part > 0.2, `${(100 * part).toFixed(0)} % of the view`);
+  await page.click("#demonstrate");
+  await until(page, "time > 2.4");
+  const { progress, force } = await state(page);
+  const { area } = await nativeOperation("peel");
+  const found = [progress.area, area].map((each) => `${(1e6 * each).toFixed(3)} mm²`).join(", ");
+  check("the peel peels as the native one", area > 1e-6 && Math.abs(progress.area / area - 1) < 0.02, found);
+  check("the forceps feel it", size(force) > 2e-5 && size(force) < 5e-4, `${(1e3 * size(force)).toFixed(4)} mN`);
+  await drawnPart(page, "peeled");
+  await reset(page, rest, "the peeled membrane");
+
+  await drag(page, [[0.25, 0.55], [0.5, 0.55], [0.85, 0.55]]);
+  await until(page, "progress.area > 2e-7");
+  check("the user peels", true, await page.textContent("#progress"));
+  await page.mouse.up();
+  await until(page, "!holding");
+  await pick(page, "operation", "press");
+  await until(page, "vertices === 642");
+  await stroke(page, path.slice(0, 1));
+  check("and presses a sphere again", size((await state(page)).force) > 0.01);
+  await page.mouse.up();
+  await page.close();
+}
+
 // A stroke on the sphere of 642 vertices as rows of a recording: down 3 mm in 200 ticks, then along the surface.
 function recordedStroke(grasping) {
   const up = [0.36, -0.8, 0.48];
@@ -390,9 +527,20 @@ function differing(page, a, b) {
   return page.evaluate(compare, [[url(a), url(b)], maxDifference]);
 }
 
-// The picture of the whole page, for the gallery.
+// Pictures of the whole page, for the gallery.
+async function drawOperations() {
+  const page = await open({ viewport: { width: 900, height: 680 } });
+  for (const [kind, seconds] of Object.entries({ capsulorhexis: 5.4, peel: 2.3 })) {
+    await operate(page, kind);
+    await page.click("#demonstrate");
+    await page.waitForFunction((time) => window.membrane.state.time > time, seconds, { timeout: 300_000 });
+    await page.screenshot({ path: near(`states/${kind}.png`) });
+  }
+  await page.close();
+}
+
 async function drawPage() {
-  const page = await open({ viewport: { width: 1100, height: 860 } });
+  const page = await open({ viewport: { width: 1100, height: 1000 } });
   await page.check("#contact");
   await stroke(page, [[0.62, 0.42], [0.54, 0.48]]);
   await simulate(page, 3);
@@ -419,8 +567,12 @@ async function testStates() {
   }
 }
 
-if (renew) await drawPage();
-const tests = [testFirstPress, testRealTime, testForces, testFiles, testKeys, testMembranes, testMishaps, testStates];
+if (renew) {
+  await drawPage();
+  await drawOperations();
+}
+const ofPress = [testFirstPress, testRealTime, testForces, testFiles, testKeys, testMembranes, testMishaps, testStates];
+const tests = [...ofPress, testCapsulorhexis, testPeel];
 try {
   for (const test of tests) await test();
 } catch (error) {

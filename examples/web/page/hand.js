@@ -3,7 +3,7 @@
 // The hand: pointer and keyboard as a target of the tool.
 const hover = 0.5; // height of a lifted tool above the membrane [tool radii]
 const graspDepth = 0.1; // of the tool when its forceps close [tool radii]
-const maxDrag = 0.8; // of the forceps [size]
+const maxDrag = { press: 0.8, operation: 4 }; // of the forceps [size]
 const liftTime = 300; // until a lifted tool may be put elsewhere [ms]
 const step = 6; // of an arrow key [px]
 
@@ -35,6 +35,10 @@ export class Hand {
     this.drag = null;
   }
 
+  get pulls() {
+    return this.scene.operation !== null || this.options.mode === "pull";
+  }
+
   begin(x, y, pull) {
     const aim = this.scene.aim(x, y);
     if (!aim) return false;
@@ -46,7 +50,8 @@ export class Hand {
 
   moveTo(x, y) {
     if (this.down && this.pull) {
-      this.drag = this.scene.onPlane(x, y, this.aim.point).sub(this.start).clampLength(0, maxDrag * this.scene.size);
+      const most = (this.scene.operation ? maxDrag.operation : maxDrag.press) * this.scene.size;
+      this.drag = this.scene.onPlane(x, y, this.aim.point).sub(this.start).clampLength(0, most);
     } else {
       const aim = this.scene.aim(x, y);
       if (!aim) return;
@@ -65,7 +70,7 @@ export class Hand {
 
   onDown(event) {
     if (this.down) return;
-    const pull = this.options.mode === "pull" || event.shiftKey || event.button === 2;
+    const pull = this.pulls || event.shiftKey || event.button === 2;
     if (!this.begin(event.clientX, event.clientY, pull)) return;
     this.scene.controls.enabled = false; // a drag on the membrane does not turn the view
     this.pointer = event.pointerId;
@@ -86,7 +91,7 @@ export class Hand {
 
   onKey(event, pressed) {
     if (event.code === "Space") {
-      if (pressed && !this.down && this.x !== undefined) this.begin(this.x, this.y, this.options.mode === "pull");
+      if (pressed && !this.down && this.x !== undefined) this.begin(this.x, this.y, this.pulls);
       if (!pressed) this.release();
     } else if (event.key.startsWith("Arrow")) {
       if (pressed) this.keys.add(event.key);

@@ -34,6 +34,10 @@ const panel = new Panel({
   record: () => (recording ? physics.send({ type: "stop" }) : begin({ type: "record" })),
   replay: () => begin({ type: "replay", rows }),
   download: () => save(csvOf(rows), "membrane.csv"),
+  reset(demonstrate) {
+    physics.send({ type: "reset", kind: physics.build.mesh.kind, demonstrate });
+    beginAtRest();
+  },
 });
 const scene = new Scene(view);
 const hand = new Hand(view, scene, panel.options);
@@ -48,14 +52,14 @@ function open(mesh, name) {
       physics = next;
       waiting = false;
       radius = message.radius;
-      scene.build(message);
       panel.begin(mesh, name, message.size);
+      scene.build(message, panel.operation);
       setRecording(false, null);
       replaying = false;
       beginAtRest();
       physics.send({ type: "hide", hidden: document.hidden });
       if (message.findings) panel.notice(`${name} is accepted, with warnings.\n${message.findings}`);
-      else if (mesh.kind !== "file") panel.hint();
+      else if (mesh.kind !== "file") panel.hint(panel.operation?.hint);
       else panel.hint(`${name} has no defect. It is scaled to 20 mm across.`);
     },
     refused({ text }) {
@@ -94,7 +98,7 @@ async function openFile(file) {
 
 function beginAtRest() {
   hand.reset();
-  plot.clear();
+  plot.clear(panel.operation ? 1e3 * panel.operation.force : undefined);
   times.clear();
 }
 
@@ -140,6 +144,7 @@ function show(message) {
   if (message.moment && message.touching) physics.measure(message.moment, plot.time);
   scene.show(message, panel.scale());
   panel.showForce(Math.hypot(...message.force), message.touching || message.holding);
+  panel.showProgress(message.progress);
   panel.showReplay(message.left > 0 ? "runs" : replaying ? "ended" : "", message.differing);
   if (plot.worstError() === null) panel.showError(undefined, null);
 }
@@ -163,9 +168,14 @@ function frame() {
 
 window.membrane = {
   get state() {
-    const { force, touching, holding, positions, left } = state ?? { force: [0, 0, 0], positions: [] };
+    const { force, touching, holding, positions, left, progress } = state ?? { force: [0, 0, 0], positions: [] };
     const vertices = positions.length / 3;
-    return { force, touching, holding, vertices, frames, recording, left, time: plot.time, ...times.summary() };
+    const run = { frames, recording, left, progress, time: plot.time, ...times.summary() };
+    return { force, touching, holding, vertices, ...run };
+  },
+  // What is drawn.
+  get surface() {
+    return { positions: [...state.positions], triangles: [...scene.triangles] };
   },
   csv: () => csvOf(rows),
 

@@ -2,6 +2,7 @@
 //
 // Inputs and outputs of the page.
 import { gradient } from "./colours.js";
+import { operations } from "./operations.js";
 
 const maxTension = 4; // [N/m]
 const pressFirst = "Press or pull first: settings are tried on your last stroke.";
@@ -16,7 +17,9 @@ export class Panel {
   settings = { layers: 6, sweeps: 2, safeStep: false, volumeSprings: true };
   size = 0; // of the membrane [m]
 
-  // `on` has a function for each request: mesh, file, settings, choose, record, replay, download.
+  operation = null; // what is shown of it; null: press and pull
+
+  // `on` has a function for each request: mesh, file, settings, choose, record, replay, download, reset.
   constructor(on) {
     const { options, settings } = this;
     const set = (target, key, value) => {
@@ -40,6 +43,12 @@ export class Panel {
       const mesh = kind === "file" ? this.fileMesh : { kind, subdivisions: Number(subdivisions) };
       on.mesh(mesh, selectedOptions[0].text);
     });
+    changed("operation", ({ value }) => {
+      if (value === "press") element("mesh").dispatchEvent(new Event("change"));
+      else on.mesh({ kind: value }, operations[value].name);
+    });
+    element("demonstrate").addEventListener("click", () => on.reset(true));
+    element("reset").addEventListener("click", () => on.reset(false));
     changed("file", (input) => {
       on.file(input.files[0]);
       input.value = ""; // the same file may be opened again
@@ -88,6 +97,11 @@ export class Panel {
   // Another membrane, of this size [m].
   begin(mesh, name, size) {
     this.size = size;
+    this.operation = operations[mesh.kind] ?? null;
+    const kind = this.operation ? mesh.kind : "press";
+    document.body.dataset.operation = kind;
+    element("operation").querySelector(`[value=${kind}]`).checked = true;
+    if (this.operation) element("colour").querySelector("[value=tension]").click();
     element("depth").dispatchEvent(new Event("input"));
     element("error").textContent = element("worstError").textContent = "–";
     element("choice").textContent = "";
@@ -107,9 +121,10 @@ export class Panel {
 
   // Of the colours: the value of the darkest, and what stands at the two ends.
   scale() {
+    const most = this.operation?.maxTension ?? maxTension; // [N/m]
     return {
       displacement: { max: 0.3 * this.size, labels: ["0", `${(300 * this.size).toFixed(1)} mm`] },
-      tension: { max: maxTension, labels: ["0", `${maxTension} N/m`] },
+      tension: { max: most, labels: ["0", `${most} N/m`] },
       layers: { max: 1, labels: ["outside the queue", "layer 0"] },
     }[this.options.colour];
   }
@@ -120,9 +135,13 @@ export class Panel {
   }
 
   showForce(newtons, touching) {
-    element("force").textContent = `${newtons.toFixed(4)} N`;
+    element("force").textContent = this.operation ? `${(1e3 * newtons).toPrecision(3)} mN` : `${newtons.toFixed(4)} N`;
     if (newtons > 0) element("hint").classList.add("done");
     if (touching && element("choice").textContent === pressFirst) element("choice").textContent = "";
+  }
+
+  showProgress(progress) {
+    if (this.operation) element("progress").textContent = this.operation.progress(progress);
   }
 
   // `differing`: replayed ticks that have other forces than the recording.

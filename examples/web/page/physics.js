@@ -3,12 +3,15 @@
 // The two workers: one runs the loop, the other finds equilibria. Each membrane gets new ones, so that no membrane can
 // leave anything behind.
 import module from "../../../build/web/membrane.wasm.js";
+import clock from "./clock.worker.js";
 import equilibriumSource from "./equilibrium.worker.js";
+import operationSource from "./operation.worker.js";
+import { operations } from "./operations.js";
 import physicsSource from "./physics.worker.js";
 
 // A page that was opened as a file may start a worker only from a blob.
-function start(source, receive) {
-  const url = URL.createObjectURL(new Blob([module, source], { type: "text/javascript" }));
+function start(sources, receive) {
+  const url = URL.createObjectURL(new Blob([module, ...sources], { type: "text/javascript" }));
   const worker = new Worker(url);
   URL.revokeObjectURL(url);
   worker.onmessage = ({ data }) => receive(data);
@@ -22,7 +25,8 @@ export class Physics {
     this.busy = false; // the worker of equilibria
     this.next = 0; // time of the next measurement, at least [ms]
     this.build = { type: "build", mesh, settings };
-    this.loop = start(physicsSource, (message) => on[message.type](message));
+    const source = mesh.kind in operations ? operationSource : physicsSource;
+    this.loop = start([clock, source], (message) => on[message.type](message));
     this.loop.postMessage(this.build);
   }
 
@@ -54,7 +58,7 @@ export class Physics {
   }
 
   startEquilibria() {
-    const worker = start(equilibriumSource, (message) => {
+    const worker = start([equilibriumSource], (message) => {
       const now = performance.now();
       this.busy = false;
       this.next = now + 3 * (now - this.begun);

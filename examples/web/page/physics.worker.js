@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Runs the loop of one membrane by its own clock: as many ticks as milliseconds have passed, however often the page is
-// drawn. The text of the WebAssembly module, `loadMembrane`, stands in front of this one.
-const maxPause = 100; // longer ones are not made up for: the membrane goes on where it was [ms]
-const budget = 25; // of ticks in a row: messages are read in between [ms]
-
+// Runs the loop of one membrane by its own clock. The texts of the WebAssembly module, `loadMembrane`, and of the clock
+// stand in front of this one.
 const module = loadMembrane();
 
 let membrane; // the module
@@ -14,8 +11,6 @@ let builds = 0;
 let hidden = false; // no time passes while the page is hidden,
 let held = false; // or shows a tick of a recording,
 let aimed = false; // or the pointer has put the tool nowhere yet
-let last = 0; // time up to which ticks were made [ms]
-let lastFrame = 0; // [ms]
 
 function built({ settings }) {
   loop?.delete();
@@ -28,18 +23,6 @@ function built({ settings }) {
     lens: () => membrane.lens(settings),
     file: () => membrane.surface(positions, triangles, settings),
   }[kind]();
-}
-
-function advance() {
-  const now = performance.now();
-  if (!loop || hidden || held || !aimed) {
-    last = now;
-    return;
-  }
-  const due = Math.min(now - last, maxPause);
-  const ticks = Math.floor(due);
-  last = now - due + ticks;
-  loop.run(ticks, budget);
 }
 
 const handlers = {
@@ -75,12 +58,11 @@ const handlers = {
       loop.aim(target, close);
       aimed = true;
     }
-    const begin = performance.now();
     const now = loop.moment();
     const state = {
       type: "frame",
       build: builds,
-      elapsed: begin - lastFrame,
+      elapsed: elapsed(),
       left: loop.left(),
       differing: loop.differing(),
       positions: new Float32Array(loop.positions()),
@@ -98,7 +80,6 @@ const handlers = {
     };
     if (moment) state.moment = { ...now, build: builds, positions: new Float64Array(loop.positions()) };
     loop.beginFrame();
-    lastFrame = begin;
     postMessage(state, [state.positions.buffer, state.normals.buffer, state.values.buffer]);
   },
 
@@ -139,4 +120,4 @@ onmessage = async ({ data }) => {
     postMessage({ type: "failed", text: error.message });
   }
 };
-setInterval(advance, 1);
+setInterval(() => advance(loop, hidden || held || !aimed), 1);

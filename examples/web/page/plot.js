@@ -5,6 +5,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 
 const seconds = 5;
+const pressForce = 10; // of a press [mN]
 
 export class Plot {
   constructor(parent) {
@@ -19,11 +20,11 @@ export class Plot {
         cursor: { show: false },
         scales: {
           x: { time: false, range: () => [this.time - seconds, this.time] },
-          y: { range: (_, low, high) => [0, Math.max(10, 1.15 * (high || 0))] },
+          y: { range: (_, low, high) => [0, Math.max(this.usual, 1.15 * (high || 0))] },
         },
         axes: [
           { ...axis, size: 26, values: (_, splits) => splits.map((t) => (t < 0 ? "" : `${t} s`)) },
-          { ...axis, size: 62, values: (_, splits) => splits.map((f) => `${f} mN`) },
+          { ...axis, size: 72, values: (_, splits) => splits.map((f) => `${f} mN`) },
         ],
         series: [
           {},
@@ -38,7 +39,9 @@ export class Plot {
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.chart.redraw());
   }
 
-  clear() {
+  // `usual`: a force that is seen in any case [mN].
+  clear(usual = pressForce) {
+    this.usual = usual;
     this.time = 0; // [s]
     this.errors = [];
     this.ticks = [[], [], []]; // time [s], force, force of the equilibrium [mN]

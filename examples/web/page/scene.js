@@ -5,19 +5,22 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { paint } from "./colours.js";
 
-const arrowScale = 5; // length for each newton
+const arrowScale = 5; // length for each newton,
+const usualArrow = 0.5; // or for the usual force of an operation
 const maxArrow = 1.5;
 const maxVerticesWithEdges = 3000;
 const up = new THREE.Vector3(0, 1, 0);
+const outward = new THREE.Vector3(0, 0, 1); // of the membrane of an operation
 
+// Each edge once, on a border or not.
 function edgesOf(triangles) {
-  const edges = [];
+  const edges = new Map();
   for (let i = 0; i < triangles.length; i += 3)
     for (let k = 0; k < 3; ++k) {
-      const [a, b] = [triangles[i + k], triangles[i + ((k + 1) % 3)]];
-      if (a < b) edges.push(a, b);
+      const [a, b] = [triangles[i + k], triangles[i + ((k + 1) % 3)]].sort((p, q) => p - q);
+      edges.set(2 ** 26 * a + b, [a, b]);
     }
-  return edges;
+  return [...edges.values()].flat();
 }
 
 function arrowOf(material) {
@@ -26,6 +29,14 @@ function arrowOf(material) {
   arrow.head = new THREE.Mesh(new THREE.ConeGeometry(0.065, 0.16, 24), material);
   arrow.add(arrow.shaft, arrow.head);
   return arrow;
+}
+
+function bodyOf({ positions, triangles }, color) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(positions, 3));
+  geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+  geometry.computeVertexNormals();
+  return new THREE.Mesh(geometry, new THREE.MeshStandardMaterial({ color, roughness: 0.9, side: THREE.DoubleSide }));
 }
 
 export class Scene {
@@ -54,6 +65,7 @@ export class Scene {
     this.arrow.shaft.renderOrder = 1;
     this.arrow.head.renderOrder = 2;
     this.scene.add(this.membrane, this.tool, this.arrow);
+    this.operation = null;
     new ResizeObserver(() => this.resize()).observe(canvas.parentElement);
     this.resize();
   }
@@ -67,18 +79,22 @@ export class Scene {
     this.camera.updateProjectionMatrix();
   }
 
-  // Another membrane, at rest.
-  build({ rest, normals, triangles, radius, size }) {
+  // Another membrane, at rest; of an operation with the body under it.
+  build({ rest, normals, triangles, radius, size, body }, operation) {
     for (const part of this.membrane.children) part.geometry.dispose();
     this.membrane.clear();
+    this.edges = null;
     this.size = size;
     this.rest = rest;
     this.triangles = triangles;
+    this.operation = operation;
+    this.arrowScale = operation ? usualArrow / operation.force : arrowScale;
     const positions = new THREE.BufferAttribute(rest.slice(), 3);
     const geometry = new THREE.BufferGeometry();
     geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
     geometry.setAttribute("position", positions);
-    geometry.setAttribute("normal", new THREE.BufferAttribute(normals.slice(), 3));
+    if (normals) geometry.setAttribute("normal", new THREE.BufferAttribute(normals.slice(), 3));
+    else geometry.computeVertexNormals();
     geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(rest.length), 3));
     geometry.boundingSphere = new THREE.Sphere(new THREE.Vector3(), 10);
     const skin = new THREE.MeshStandardMaterial({
@@ -108,15 +124,17 @@ export class Scene {
       edges.setAttribute("position", positions);
       edges.setIndex(edgesOf(triangles));
       const line = new THREE.LineBasicMaterial({ color: 0x1d2530, transparent: true, opacity: 0.16 });
-      this.membrane.add(new THREE.LineSegments(edges, line));
+      this.edges = new THREE.LineSegments(edges, line);
+      this.membrane.add(this.edges);
     }
+    if (body) this.membrane.add(bodyOf(body, operation.body));
     for (const part of this.membrane.children) part.frustumCulled = false;
 
-    // The pointer aims at the membrane at rest.
+    // The pointer aims at the membrane at rest, in an operation as it is.
     const still = new THREE.BufferGeometry();
     still.setIndex(geometry.index);
     still.setAttribute("position", new THREE.BufferAttribute(rest, 3));
-    still.setAttribute("normal", new THREE.BufferAttribute(normals, 3));
+    still.setAttribute("normal", geometry.attributes.normal.clone());
     this.still = new THREE.Mesh(still, new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
 
     for (const part of [this.membrane, this.still]) {
@@ -126,10 +144,12 @@ export class Scene {
     still.computeBoundingSphere();
     const middle = still.boundingSphere.center.clone().divideScalar(size);
     this.controls.target.copy(middle);
-    this.camera.position.copy(middle).add(new THREE.Vector3(1.1, -3.4, 2.2));
+    const from = operation ? new THREE.Vector3(0.4, -2.3, 3.1) : new THREE.Vector3(1.1, -3.4, 2.2);
+    this.camera.position.copy(middle).add(from);
     this.controls.update();
     this.tool.scale.setScalar(radius / size);
     this.tool.visible = false;
+    this.tool.material.depthTest = !operation; // forceps are seen through the flap
   }
 
   rayAt(x, y) {
@@ -144,16 +164,19 @@ export class Scene {
     return caster;
   }
 
-  // The point of the membrane at rest under a point of the window, and its normal [m]; null beside it.
+  // The point of the membrane under a point of the window, and its normal [m], in an operation that of the whole; null
+  // beside it.
   aim(x, y) {
-    const [hit] = this.rayAt(x, y).intersectObject(this.still);
+    const [hit] = this.rayAt(x, y).intersectObject(this.operation ? this.surface : this.still);
     if (!hit) return null;
-    return { point: hit.point.clone().multiplyScalar(this.size), normal: hit.normal.clone().normalize() };
+    const normal = this.operation ? outward : hit.normal;
+    return { point: hit.point.clone().multiplyScalar(this.size), normal: normal.clone().normalize() };
   }
 
-  // The point under a point of the window in the plane through `point` parallel to the screen [m].
+  // The point under a point of the window in the plane through `point` [m], parallel to the screen or, in an operation,
+  // to the membrane.
   onPlane(x, y, point) {
-    const facing = this.camera.getWorldDirection(new THREE.Vector3());
+    const facing = this.operation ? outward : this.camera.getWorldDirection(new THREE.Vector3());
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(facing, point.clone().divideScalar(this.size));
     const hit = this.rayAt(x, y).ray.intersectPlane(plane, new THREE.Vector3());
     return hit ? hit.multiplyScalar(this.size) : point.clone();
@@ -163,7 +186,9 @@ export class Scene {
   show(state, { max }) {
     const { position, normal, color } = this.surface.geometry.attributes;
     position.array.set(state.positions);
-    normal.array.set(state.normals);
+    if (state.triangles) this.tear(state.triangles);
+    if (state.normals) normal.array.set(state.normals);
+    else this.surface.geometry.computeVertexNormals();
     state.values.forEach((value, v) => paint(color.array, v, value / max));
     position.needsUpdate = normal.needsUpdate = color.needsUpdate = true;
     this.mark(this.contact, state.contact);
@@ -173,6 +198,13 @@ export class Scene {
     this.tool.visible = true;
     this.tool.position.fromArray(state.tool).divideScalar(this.size);
     this.point(new THREE.Vector3().fromArray(state.force));
+  }
+
+  // Other triangles from now on.
+  tear(triangles) {
+    this.triangles = triangles;
+    this.surface.geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+    this.edges?.geometry.setIndex(edgesOf(triangles));
   }
 
   // Covers some triangles.
@@ -201,7 +233,7 @@ export class Scene {
 
   // The arrow of the force, from the tool's centre.
   point(force) {
-    const length = Math.min(arrowScale * force.length(), maxArrow);
+    const length = Math.min(this.arrowScale * force.length(), maxArrow);
     this.arrow.visible = length > 0.005;
     if (!this.arrow.visible) return;
     this.arrow.shaft.scale.y = length;
