@@ -161,7 +161,8 @@ class Tearing {
         is_outer_border_[static_cast<std::size_t>(copy)] = is_outer_border_[static_cast<std::size_t>(v)];
     }
     void open_ligaments(const ConstPointsRef<Scalar>& x) noexcept;
-    void let_go(TearTip<Scalar>& tip) noexcept;
+    void let_go(const TearTip<Scalar>& tip) noexcept;
+    void count_failed(const Ligament<Scalar>& ligament) noexcept;
     [[nodiscard]] bool is_opening(Index copy) const noexcept {
         const auto all = ligaments_.items();
         return std::any_of(all.begin(), all.end(), [copy](const auto& ligament) { return ligament.copy == copy; });
@@ -395,7 +396,7 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
     for (auto& ligament : all) {
         ligament.open(norm<Scalar>(point(x, ligament.vertex) - point(x, ligament.copy)));
         if (ligament.failed()) {
-            failed_ += static_cast<double>(ligament.taken());
+            count_failed(ligament);
         } else {
             all[left++] = ligament;
         }
@@ -403,23 +404,32 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
     ligaments_.truncate(left);
 }
 
-// The edge behind the tip fails before its time: what it has not taken, the next one will, but no more than that of an edge.
+// The edge behind the tip fails before its time.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
-void Tearing<Scalar, Criterion>::let_go(TearTip<Scalar>& tip) noexcept {
+void Tearing<Scalar, Criterion>::let_go(const TearTip<Scalar>& tip) noexcept {
     const auto all = ligaments_.items();
     const auto behind =
         std::find_if(all.begin(), all.end(), [&](const auto& ligament) { return ligament.copy == tip.behind[1]; });
-    const auto most = static_cast<Scalar>(criterion_.resistance()) * tip.advanced;
-    failed_ += static_cast<double>(behind->taken());
-    tip.energy_left = std::clamp(behind->energy() - behind->taken(), Scalar(0), most);
+    count_failed(*behind);
     std::move(behind + 1, all.end(), behind);
     ligaments_.truncate(all.size() - 1);
+}
+
+// What an edge has not taken, the next one will, but no more than that of an edge.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+void Tearing<Scalar, Criterion>::count_failed(const Ligament<Scalar>& ligament) noexcept {
+    failed_ += static_cast<double>(ligament.taken());
+    for (auto& tip : tips_.items()) {
+        if (tip.behind[1] != ligament.copy) continue;
+        const auto most = static_cast<Scalar>(criterion_.resistance()) * tip.advanced;
+        tip.energy_left = std::clamp(ligament.energy() - ligament.taken(), Scalar(0), most);
+    }
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 double Tearing<Scalar, Criterion>::dissipated() const noexcept {
     double sum = failed_;
-    for (const auto& ligament : ligaments_.items()) sum += static_cast<double>(ligament.dissipated);
+    for (const auto& ligament : ligaments_.items()) sum += static_cast<double>(ligament.dissipated());
     return sum;
 }
 
@@ -669,16 +679,15 @@ void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index 
         failed_ += static_cast<double>(energy);
         return;
     }
-    constexpr auto yields = Ligament<Scalar>::yields;
+    constexpr auto yields = Scalar(0.98);  // of the membrane's force: it opens at once
     Ligament<Scalar> ligament{v, copy, yields * force};
     const auto [left, right] = tip.behind;
     const auto behind = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
     const Scalar opens = (std::max)(behind, length / 4);  // the edge behind may hardly be open
-    ligament.strength = (std::max)(strength, energy / opens);
+    ligament.strength = (std::max)(yields * strength, energy / opens);
     const Scalar sum = 2 * energy / ligament.strength;
     ligament.failure_opening = (std::min)(sum, opens);
     ligament.plateau = sum - ligament.failure_opening;
-    ligament.strength *= yields;
     if (!ligaments_.try_push_back(ligament)) failed_ += static_cast<double>(energy);
 }
 
