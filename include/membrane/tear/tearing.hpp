@@ -80,7 +80,7 @@ void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
 /// and the next edge takes what is left of its energy. Triangles keep their numbers; other parts `follow` the events.
 ///
 /// A flap may pass through the membrane: there is no contact of the membrane with itself. Elements that are no triangles do
-/// not count in the driving force; a foundation does, with its energy if it has one, as for any even foundation.
+/// not count in the driving force; a foundation does, as if its stiffness per area were the same everywhere.
 ///
 /// Online but for the constructor; cost of a tick: that of the forces of some 60 triangles at each tip.
 template <Real Scalar, TearCriterion<Scalar> Criterion = EnergyRelease>
