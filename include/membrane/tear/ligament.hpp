@@ -44,11 +44,8 @@ struct Ligament {
     /// Energy that it would give back [J].
     [[nodiscard]] Scalar stored(Scalar opening) const noexcept { return tension(opening) * opening / 2; }
 
-    ///@{
-    /// The work of opening it so far, which is lost when it fails, and what it would not give back of that [J].
-    [[nodiscard]] Scalar taken() const noexcept { return work(reached); }
-    [[nodiscard]] Scalar dissipated() const noexcept { return taken() - stored(reached); }
-    ///@}
+    /// That it would not give back of the work of opening it so far [J].
+    [[nodiscard]] Scalar dissipated() const noexcept { return work(reached) - stored(reached); }
 
     /// After a tick, at a separation of `opening`.
     void open(Scalar opening) noexcept {
