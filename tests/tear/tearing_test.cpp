@@ -86,25 +86,26 @@ TEST_CASE("the driving force is the energy that is released, whatever the length
 }
 
 TEST_CASE("what the clamps give is stored, or taken by the tear and by damping", "[tear]") {
-    for (const double damping : {1e-2, 3e-2, 1e-1}) {
-        for (const double turn : {0.0, 17.0, 40.0}) {
-            if (cases_are_slow && turn != 17) continue;
-            CAPTURE(turn, damping);
-            TornStrip<double> strip({.turn = turn * degree, .damping = damping});
-            strip.cut();
-            strip.stretch(0.98 * strip.pure_shear().critical_stretch());
-            for (int tick = 0; tick < 3000 && strip.torn_edges() < 10; ++tick) {
-                strip.tick(2e-4 * strip.pure_shear().critical_stretch());
-            }
-            REQUIRE(strip.torn_edges() >= 10);
-            CAPTURE(strip.balance(), strip.damped / strip.work);
-            CHECK(strip.balance() == Approx(1).epsilon(0.005));
-            CHECK(strip.damped > 0.02 * strip.work);
-            // The last edge may not have opened.
-            const double resistance = 0.01, torn = strip.tear.torn_length();
-            CHECK(strip.tear.dissipated() <= resistance * torn * (1 + 1e-12));
-            CHECK(strip.tear.dissipated() > resistance * (torn - 1.2 * strip.edge) * 0.99);
+    struct Case {
+        double damping, turn;
+    };
+    for (const auto& [damping, turn] : {Case{1e-2, 0}, Case{3e-2, 17}, Case{1e-1, 40}}) {
+        if (cases_are_slow && turn != 17) continue;
+        CAPTURE(turn, damping);
+        TornStrip<double> strip({.turn = turn * degree, .damping = damping});
+        strip.cut();
+        strip.stretch(0.98 * strip.pure_shear().critical_stretch());
+        for (int tick = 0; tick < 3000 && strip.torn_edges() < 6; ++tick) {
+            strip.tick(2e-4 * strip.pure_shear().critical_stretch());
         }
+        REQUIRE(strip.torn_edges() >= 6);
+        CAPTURE(strip.balance(), strip.damped / strip.work);
+        CHECK(strip.balance() == Approx(1).epsilon(0.005));
+        CHECK(strip.damped > 0.02 * strip.work);
+        // The last edge may not have opened.
+        const double resistance = 1000 * strip.thickness, torn = strip.tear.torn_length();
+        CHECK(strip.tear.dissipated() <= resistance * torn * (1 + 1e-12));
+        CHECK(strip.tear.dissipated() > resistance * (torn - 1.2 * strip.edge) * 0.99);
     }
 }
 
