@@ -76,6 +76,37 @@ namespace {
 
 constexpr auto component = "Tearing";
 
+/// The surface of a tear, with the events that it has followed.
+struct TornSurface {
+    const Tear* tear;
+
+    [[nodiscard]] const Surface& surface() const { return tear->surface(); }
+};
+
+/// Refuses what is not of the tear's mesh, or has not followed it.
+void check_state(std::string_view where, const Tear& self, const Positions& x, const Network& network) {
+    check_count(where, "x", x.count, self.vertex_count);
+    check_count(where, "the network", network.vertex_count(), self.vertex_count);
+    check_version(where, "the network", network.version, self.version);
+}
+
+/// What `of(springs)` is, for springs that may tear. @throws also what a law of Python raises
+template <class Of>
+[[nodiscard]] auto of_springs(std::string_view where, const Network& network, Of of) {
+    using Result = decltype(of(std::get<TearableOf<membrane::LinearSpring>>(network.any)));
+    Result result = std::visit(
+        [&]<class Springs>(const Springs& springs) -> Result {
+            if constexpr (membrane::FollowsSplit<Springs>) {
+                return of(springs);
+            } else {
+                refuse(where, "the network must be TearableSprings or a Tissue, got a MassSpringNetwork");
+            }
+        },
+        network.any);
+    network.rethrow();
+    return result;
+}
+
 [[nodiscard]] Events update(Tear& self, MovingPositions x, double dt, const Network& network,
                             const Foundation& foundation, const std::vector<Index>& held) {
     check_fit(component, self.vertex_count, x.count, network, foundation);
