@@ -262,7 +262,7 @@ def test_arguments_of_a_start_are_checked():
         of = () if flaw else (surface,)
         count = strip.mesh.vertex_count
         for vertex in (-1, count):
-            with pytest.raises(membrane.InvalidInput, match=f"^{name}: vertices must be 0 to {count - 1}, got {vertex}"):
+            with pytest.raises(membrane.InvalidInput, match=f"^{name}: vertices must be 0 to {count - 1}, got"):
                 call(*of, vertex, *flaw, x, tissue)
         with pytest.raises(membrane.InvalidInput, match=f"^{name}: x must have {count} vertices, got {count - 1}"):
             call(*of, v, *flaw, x[:-1], tissue)
