@@ -139,8 +139,8 @@ template <class Of>
 template <class Part>
 inline constexpr bool follows = membrane::FollowsSplit<Part> || membrane::FollowsMovedVertex<Part, double>;
 
-/// The version of a part, or null for one that is of no mesh: a friction. Each point that it keeps names its triangle and
-/// corners, and acts at a contact point that has the same ones.
+/// The version of a part, or null for one that is of no mesh: a friction. Each point that it keeps names its triangle
+/// and corners, and acts at a contact point that has the same ones.
 template <class Class>
 [[nodiscard]] SurfaceVersion* version_of(Class& of) {
     if constexpr (requires { of.version; }) {
