@@ -304,26 +304,26 @@ def start():
         state = membrane.border_state(tear.surface, v, x, tissue)
         numbers.extend([*state.along, *state.inward, state.stretch, state.tension, state.energy,
                         membrane.flaw_driving_force(state, 0.3e-3)])
-    for flaw in (1e-9, 0.3e-3):
-        path = tear.start_at(middle, flaw, x, tissue)
-        numbers.extend([len(path), *path])
-        follow_all(tear.cut_along(path, x))
     perforated = False
-    for tick in range(150):
+    for tick in range(80):
         tool = membrane.Tool(position=(2e-3 + 2e-6 * tick, 0, 0.6e-3 - 8e-6 * tick), radius=0.6e-3, time=dt * tick)
         contact = tracker.update(tree, x, tool)
         report = solver.step(x, dt, tissue, foundation, friction.press(tool, contact), tear.ligaments())
-        slit = tear.slit_under(contact, report.reactions[0], 0.05, (0, 1, 0))
+        slit = tear.slit_under(contact, report.reactions[0], 2e-3, (0, 1, 0))
         if not perforated and slit[0] != membrane.no_index:
-            follow_all(tear.cut_along(slit, x))
             perforated = True
+            follow_all(tear.cut_along(slit, x))
+            for flaw in (1e-9, 0.3e-3):
+                path = tear.start_at(middle, flaw, x, tissue)
+                numbers.extend([len(path), *path])
+                follow_all(tear.cut_along(path, x))
         follow_all(tear.update(x, dt, tissue, foundation))
         tree.refit(x, report.moved)
         numbers.extend([*report.reactions[0], *slit, len(friction.points)])
         for point in friction.points:
             numbers.extend(point.weights)
         numbers.extend(tip.energy_left for tip in tear.tips)
-    assert perforated
+    assert perforated and tear.torn_length > 1e-3
     return numpy.concatenate([numbers, x.ravel()])
 
 

@@ -389,22 +389,22 @@ void start() {
         print({state.stretch, state.tension, state.energy});
         std::printf("%.17g\n", membrane::flaw_driving_force(state, 0.3e-3));
     }
-    for (const double flaw : {1e-9, 0.3e-3}) {
-        const auto path = tear.start_at(middle, flaw, x, tissue);
-        std::printf("%zu\n", path.size());
-        for (const Index v : path) std::printf("%d\n", v);
-        follow_all(tear.cut_along(path, x));
-    }
     bool perforated = false;
-    for (int tick = 0; tick < 150; ++tick) {
+    for (int tick = 0; tick < 80; ++tick) {
         const membrane::Tool<double> tool{
             .position = {2e-3 + 2e-6 * tick, 0, 0.6e-3 - 8e-6 * tick}, .radius = 0.6e-3, .time = dt * tick};
         const auto contact = tracker.update(tree, x, tool);
         const auto report = solver.step(x, dt, tissue, foundation, friction.press(tool, contact), tear.ligaments());
-        const auto slit = tear.slit_under(contact, report.reactions[0], 0.05, {0, 1, 0});
+        const auto slit = tear.slit_under(contact, report.reactions[0], 2e-3, {0, 1, 0});
         if (!perforated && slit[0] != membrane::no_index) {
-            follow_all(tear.cut_along(slit, x));
             perforated = true;
+            follow_all(tear.cut_along(slit, x));
+            for (const double flaw : {1e-9, 0.3e-3}) {
+                const auto path = tear.start_at(middle, flaw, x, tissue);
+                std::printf("%zu\n", path.size());
+                for (const Index v : path) std::printf("%d\n", v);
+                follow_all(tear.cut_along(path, x));
+            }
         }
         follow_all(tear.update(x, dt, tissue, foundation));
         tree.refit(x, report.moved);

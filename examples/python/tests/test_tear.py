@@ -281,7 +281,7 @@ def test_arguments_of_a_start_are_checked():
             call(*of, v, *flaw, x, tissue)
     for event in events:
         membrane.follow(event, tissue)
-    assert membrane.border_state(surface, v, x, tissue).stretch > 0 and strip.start(1e-3, v) == []
+    assert membrane.border_state(surface, v, x, tissue).stretch > 0
 
 
 def test_an_error_of_a_law_is_raised_by_a_start():
