@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <span>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -28,6 +30,7 @@ struct TornStripOptions {
     double turn = 0;                  ///< of the grid [rad]
     double toughness = 1000;          ///< [J/m^2]
     bool springs = false;             ///< a network of springs in place of a continuous sheet
+    double damping = 0;               ///< of a vertex, by a body that does not support it [N s/m]
     membrane::TearOptions tear = {};  ///< how it tears
 };
 
@@ -43,12 +46,14 @@ class TornStrip {
 
     static constexpr double edge = 1e-3;
     static constexpr double thickness = 1e-5;
+    static constexpr auto dt = Scalar(1e-3);  ///< [s]
 
     explicit TornStrip(const TornStripOptions& options)
         : options_(options),
           surface(turned_grid<Scalar>(options.columns, options.rows, edge, options.turn)),
           mesh(membrane::with_reserve(surface.mesh(), 100)),
           sheet(springs_of(), membrane::triangular_springs(mesh, material_of())),
+          foundation(mesh, {.stiffness = Scalar(0), .damping = static_cast<Scalar>(options.damping)}),
           tear(mesh, membrane::EnergyRelease{options.toughness, thickness}, options.tear),
           solver(sheet, {.layers = membrane::unlimited, .sweeps = 6, .predict = false}),
           x(mesh.positions()) {
@@ -89,6 +94,7 @@ class TornStrip {
         relax(3000);
         force_ = force();
         work = energy();
+        damped = 0;
     }
 
     /// Holds this vertex where it is, moved by `displacement`, and finds the equilibrium.
@@ -105,7 +111,7 @@ class TornStrip {
         for (const Index v : top) x(1, v) += static_cast<Scalar>(apart);
         relax(20);
         work += (std::exchange(force_, force()) + force()) / 2 * apart;
-        follow(tear.update(x, Scalar(1e-3), sheet, membrane::NoFoundation()));
+        follow(tear.update(x, dt, sheet, foundation));
     }
 
     /// Whether the forces balance, but for a small part of what tears the strip.
@@ -123,7 +129,7 @@ class TornStrip {
         return sum;
     }
     /// Energy stored and dissipated, over the work of the clamps.
-    double balance() const { return (energy() + tear.stored(x) + tear.dissipated()) / work; }
+    double balance() const { return (energy() + tear.stored(x) + tear.dissipated() + damped) / work; }
     double torn_edges() const { return tear.torn_length() / edge; }
     /// Distance of the tip from the line of the notch [edges].
     double off_line() const {
@@ -149,14 +155,24 @@ class TornStrip {
     void relax(int steps) {
         for (int i = 0; i < steps; ++i) {
             solver.wake_all();
-            report = solver.step(x, Scalar(1e-3), sheet, membrane::NoFoundation(), tear.ligaments(), membrane::pin(top),
-                                 membrane::pin(held));
+            const membrane::Points<Scalar> before = x;
+            report = solver.step(x, dt, sheet, foundation, tear.ligaments(), membrane::pin(top), membrane::pin(held));
+            if (options_.damping > 0) add_damping(before);
             if (at_rest()) return;
+        }
+    }
+    void add_damping(const membrane::Points<Scalar>& before) {
+        for (Index v = 0; v < mesh.vertex_count(); ++v) {
+            if (sheet.pinned(v) || std::find(top.begin(), top.end(), v) != top.end()) continue;
+            const auto anchor = membrane::point(foundation.anchors(), v);
+            const auto length = [&](const auto& at) { return norm<Scalar>(membrane::point(at, v) - anchor); };
+            const double longer = static_cast<double>(length(x) - length(before));
+            damped += static_cast<double>(foundation.damping(v) / dt) * longer * longer;
         }
     }
     template <class... Parts>
     void follow(std::span<const membrane::TearEvent<Scalar>> events, Parts&... parts) {
-        for (const auto& event : events) membrane::follow(event, sheet, solver, parts...);
+        for (const auto& event : events) membrane::follow(event, sheet, foundation, solver, parts...);
     }
 
     TornStripOptions options_;
@@ -166,6 +182,7 @@ class TornStrip {
     Surface<Scalar> surface;
     membrane::TriangleMesh<Scalar> mesh;
     Sheet sheet;
+    membrane::VirtualVolumeSprings<Scalar> foundation;
     membrane::Tearing<Scalar> tear;
     membrane::QuasiStaticSolver<Scalar> solver;
     membrane::Points<Scalar> x;
@@ -173,7 +190,7 @@ class TornStrip {
     std::vector<Index> held;  ///< others that are held
     membrane::StepReport<Scalar> report;
     Vector start = Vector::Zero();  ///< of the tear
-    double stretched = 1, work = 0;
+    double stretched = 1, work = 0, damped = 0;
 };
 
 }  // namespace test

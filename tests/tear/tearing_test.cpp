@@ -58,7 +58,8 @@ TEST_CASE("a tear in pure shear begins at the right stretch, on any grid, and ru
         REQUIRE(strip.torn_edges() >= 12);
         CHECK(begins == Approx(strip.pure_shear().critical_stretch()).epsilon(0.03));
         CHECK(off_line <= 0.7);
-        CHECK(strip.balance() == Approx(1).epsilon(0.01));
+        CHECK(strip.balance() < 1.001);
+        CHECK(strip.balance() > 0.95);  // nothing takes what an edge releases as it jumps open
     }
 }
 
@@ -81,6 +82,29 @@ TEST_CASE("the driving force is the energy that is released, whatever the length
         CAPTURE(notch, force[0], force[1]);
         CHECK(force[0] == Approx(strip.pure_shear().energy_density(stretch) * strip.height()).epsilon(0.05));
         CHECK(std::abs(force[1]) < 0.02 * force[0]);
+    }
+}
+
+TEST_CASE("what the clamps give is stored, or taken by the tear and by damping", "[tear]") {
+    for (const double damping : {1e-2, 3e-2, 1e-1}) {
+        for (const double turn : {0.0, 17.0, 40.0}) {
+            if (cases_are_slow && turn != 17) continue;
+            CAPTURE(turn, damping);
+            TornStrip<double> strip({.turn = turn * degree, .damping = damping});
+            strip.cut();
+            strip.stretch(0.98 * strip.pure_shear().critical_stretch());
+            for (int tick = 0; tick < 3000 && strip.torn_edges() < 10; ++tick) {
+                strip.tick(2e-4 * strip.pure_shear().critical_stretch());
+            }
+            REQUIRE(strip.torn_edges() >= 10);
+            CAPTURE(strip.balance(), strip.damped / strip.work);
+            CHECK(strip.balance() == Approx(1).epsilon(0.005));
+            CHECK(strip.damped > 0.02 * strip.work);
+            // The last edge may not have opened.
+            const double resistance = 0.01, torn = strip.tear.torn_length();
+            CHECK(strip.tear.dissipated() <= resistance * torn * (1 + 1e-12));
+            CHECK(strip.tear.dissipated() > resistance * (torn - 1.2 * strip.edge) * 0.99);
+        }
     }
 }
 

@@ -17,19 +17,15 @@ namespace membrane {
 /// energy however coarse mesh and ticks are. If the separation decreases, the force decreases in proportion.
 template <Real Scalar>
 struct Ligament {
-    /// Its strength is below the membrane's force when it begins, so that it opens at once.
-    static constexpr auto yields = Scalar(0.98);
-
     ///@{
     /// The vertices that it joins.
     Index vertex = no_index, copy = no_index;
     ///@}
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< on `vertex` when it begins; the opposite acts on `copy` [N]
-    Scalar strength = 0;                              ///< when it begins, `yields` of the membrane's force then [N]
+    Scalar strength = 0;                              ///< when it begins [N]
     Scalar plateau = 0;                               ///< separation up to which it keeps its strength [m]
     Scalar failure_opening = 0;                       ///< separation at which it fails [m]
     Scalar reached = 0;                               ///< largest separation in earlier ticks [m]
-    Scalar dissipated = 0;                            ///< energy that the membrane has given up to it [J]
 
     /// Whether it holds hardly more, a tenth of its strength: the tip goes on.
     [[nodiscard]] bool failed() const noexcept { return !(first_tension(reached) > strength / 10); }
@@ -43,27 +39,26 @@ struct Ligament {
     [[nodiscard]] Scalar largest_tension() const noexcept { return first_tension(reached); }
 
     /// That it takes until it fails [J].
-    [[nodiscard]] Scalar energy() const noexcept { return strength * (plateau + failure_opening) / 2; }
+    [[nodiscard]] Scalar energy() const noexcept { return work(failure_opening); }
 
     /// Energy that it would give back [J].
     [[nodiscard]] Scalar stored(Scalar opening) const noexcept { return tension(opening) * opening / 2; }
 
-    /// Energy taken so far, with what is stored at the largest separation: once it fails that is lost as well [J].
-    [[nodiscard]] Scalar taken() const noexcept { return dissipated + stored(reached); }
+    /// That it would not give back of the work of opening it so far [J].
+    [[nodiscard]] Scalar dissipated() const noexcept { return work(reached) - stored(reached); }
 
-    /// After a tick, at a separation of `opening`. The membrane's force across the edge has decreased from that before to
-    /// that now, and the mean of both is what it has parted the edge with: also in a tick in which the edge fails, where
-    /// the membrane gives up more than the ligament takes.
+    /// After a tick, at a separation of `opening`.
     void open(Scalar opening) noexcept {
-        if (!(opening > reached)) return;
-        const Scalar before = reached > 0 ? largest_tension() : strength / yields, stored_before = before * reached / 2;
-        const Scalar grown = opening - reached;
-        reached = opening;
-        const Scalar now = largest_tension();
-        dissipated += (before + now) * grown / 2 - (now * reached / 2 - stored_before);
+        if (opening > reached) reached = opening;
     }
 
   private:
+    // The area below the law.
+    [[nodiscard]] Scalar work(Scalar opening) const noexcept {
+        const Scalar end = (std::min)(opening, failure_opening);
+        if (end <= plateau) return strength * end;
+        return strength * plateau + (strength + first_tension(end)) / 2 * (end - plateau);
+    }
     // At a separation that increases.
     [[nodiscard]] Scalar first_tension(Scalar opening) const noexcept {
         if (opening >= failure_opening) return 0;

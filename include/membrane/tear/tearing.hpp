@@ -50,7 +50,6 @@ struct TearTip {
     std::array<Index, 2> behind{no_index, no_index};          ///< the vertex behind it and its copy
     Vector3<Scalar> heading = Vector3<Scalar>::Zero();        ///< direction of its last advance at rest
     Scalar advanced = 0;                                      ///< by its last advance [m]
-    Scalar energy_left = 0;                                   ///< that the next edge takes besides its own [J]
     Vector3<Scalar> driving_force = Vector3<Scalar>::Zero();  ///< by the last update [N]
 };
 
@@ -76,11 +75,11 @@ void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
 /// [Miehe07] says what energy an advance would release, and in which direction most. If the `Criterion` says so, the next
 /// vertex in that direction moves onto it, at rest and now, and the edge to it opens: the tip's vertex becomes two, from a
 /// reserve (`with_reserve`). A `Ligament` takes up the energy of the edge as it opens. The tip goes on when that has
-/// failed. An edge that the load no longer draws apart would hold the tip: at 1.5 times the resistance it fails as well,
-/// and the next edge takes what is left of its energy. Triangles keep their numbers; other parts `follow` the events.
+/// failed. An edge that the load no longer draws apart would hold the tip: at 1.5 times the resistance it fails as well, as
+/// an advance then releases more than the edge takes. Triangles keep their numbers; other parts `follow` the events.
 ///
 /// A flap may pass through the membrane: there is no contact of the membrane with itself. Elements that are no triangles do
-/// not count in the driving force; a foundation does, with its energy if it has one, as for any even foundation.
+/// not count in the driving force; a foundation does, as if its stiffness per area were the same everywhere.
 ///
 /// Online but for the constructor; cost of a tick: that of the forces of some 60 triangles at each tip.
 template <Real Scalar, TearCriterion<Scalar> Criterion = EnergyRelease>
@@ -161,7 +160,7 @@ class Tearing {
         is_outer_border_[static_cast<std::size_t>(copy)] = is_outer_border_[static_cast<std::size_t>(v)];
     }
     void open_ligaments(const ConstPointsRef<Scalar>& x) noexcept;
-    void let_go(TearTip<Scalar>& tip) noexcept;
+    void let_go(const TearTip<Scalar>& tip) noexcept;
     [[nodiscard]] bool is_opening(Index copy) const noexcept {
         const auto all = ligaments_.items();
         return std::any_of(all.begin(), all.end(), [copy](const auto& ligament) { return ligament.copy == copy; });
@@ -284,7 +283,7 @@ template <Real Scalar, TearCriterion<Scalar> Criterion>
 void Tearing<Scalar, Criterion>::add_tip(Index v, Index behind, Index copy) noexcept {
     const auto& rest = surface_.rest_positions();
     const Vector3<Scalar> edge = point(rest, v) - point(rest, behind);
-    tips_.try_push_back({v, {behind, copy}, direction_or_zero(edge), norm(edge), 0});
+    tips_.try_push_back({v, {behind, copy}, direction_or_zero(edge), norm(edge)});
 }
 
 // A tear runs into the border at a vertex. If that is the tip of another one, there is no tip any more; if it is beside
@@ -387,7 +386,7 @@ std::span<const Index> Tearing<Scalar, Criterion>::start_at(Index v, Scalar flaw
     return used_up_ ? std::span<const Index>() : path;
 }
 
-// Makes the separations permanent, and drops what has failed.
+// Makes the separations permanent, and drops what has failed: all its energy is lost.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x) noexcept {
     const auto all = ligaments_.items();
@@ -395,7 +394,7 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
     for (auto& ligament : all) {
         ligament.open(norm<Scalar>(point(x, ligament.vertex) - point(x, ligament.copy)));
         if (ligament.failed()) {
-            failed_ += static_cast<double>(ligament.taken());
+            failed_ += static_cast<double>(ligament.energy());
         } else {
             all[left++] = ligament;
         }
@@ -403,15 +402,13 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
     ligaments_.truncate(left);
 }
 
-// The edge behind the tip fails before its time: what it has not taken, the next one will, but no more than that of an edge.
+// The edge behind the tip fails before its time. The membrane gives up its energy all the same, as the tip advances.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
-void Tearing<Scalar, Criterion>::let_go(TearTip<Scalar>& tip) noexcept {
+void Tearing<Scalar, Criterion>::let_go(const TearTip<Scalar>& tip) noexcept {
     const auto all = ligaments_.items();
     const auto behind =
         std::find_if(all.begin(), all.end(), [&](const auto& ligament) { return ligament.copy == tip.behind[1]; });
-    const auto most = static_cast<Scalar>(criterion_.resistance()) * tip.advanced;
-    failed_ += static_cast<double>(behind->taken());
-    tip.energy_left = std::clamp(behind->energy() - behind->taken(), Scalar(0), most);
+    failed_ += static_cast<double>(behind->energy());
     std::move(behind + 1, all.end(), behind);
     ligaments_.truncate(all.size() - 1);
 }
@@ -419,7 +416,7 @@ void Tearing<Scalar, Criterion>::let_go(TearTip<Scalar>& tip) noexcept {
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 double Tearing<Scalar, Criterion>::dissipated() const noexcept {
     double sum = failed_;
-    for (const auto& ligament : ligaments_.items()) sum += static_cast<double>(ligament.dissipated);
+    for (const auto& ligament : ligaments_.items()) sum += static_cast<double>(ligament.dissipated());
     return sum;
 }
 
@@ -635,7 +632,6 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     tip.heading = direction_or_zero(edge);
     tip.behind = {v, copy};
     tip.advanced = length;
-    tip.energy_left = 0;
     return true;
 }
 
@@ -648,7 +644,7 @@ template <class Network>
 void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index copy, Scalar length,
                                               const ConstPointsRef<Scalar>& x, const Network& network) noexcept {
     const Index v = tip.vertex;
-    const auto energy = static_cast<Scalar>(criterion_.resistance()) * length + tip.energy_left;
+    const auto energy = static_cast<Scalar>(criterion_.resistance()) * length;
     if (!(energy > 0)) return;
     const auto forces_on = [&](Index end, const VertexSplit& split) {
         Vector3<Scalar> sum = Vector3<Scalar>::Zero();
@@ -669,16 +665,15 @@ void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index 
         failed_ += static_cast<double>(energy);
         return;
     }
-    constexpr auto yields = Ligament<Scalar>::yields;
+    constexpr auto yields = Scalar(0.98);  // of the membrane's force: it opens at once
     Ligament<Scalar> ligament{v, copy, yields * force};
     const auto [left, right] = tip.behind;
     const auto behind = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
     const Scalar opens = (std::max)(behind, length / 4);  // the edge behind may hardly be open
-    ligament.strength = (std::max)(strength, energy / opens);
+    ligament.strength = (std::max)(yields * strength, energy / opens);
     const Scalar sum = 2 * energy / ligament.strength;
     ligament.failure_opening = (std::min)(sum, opens);
     ligament.plateau = sum - ligament.failure_opening;
-    ligament.strength *= yields;
     if (!ligaments_.try_push_back(ligament)) failed_ += static_cast<double>(energy);
 }
 
