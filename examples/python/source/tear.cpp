@@ -303,7 +303,6 @@ void bind_torn_surface(py::module_& module) {
         .def_readonly("behind", &Tip::behind, doc("TearTip::behind"))
         .def_readonly("heading", &Tip::heading, doc("TearTip::heading"))
         .def_readonly("advanced", &Tip::advanced, doc("TearTip::advanced"))
-        .def_readonly("energy_left", &Tip::energy_left, doc("TearTip::energy_left"))
         .def_readonly("driving_force", &Tip::driving_force, doc("TearTip::driving_force"));
 }
 

@@ -322,7 +322,7 @@ def start():
         numbers.extend([*report.reactions[0], *slit, len(friction.points)])
         for point in friction.points:
             numbers.extend(point.weights)
-        numbers.extend(tip.energy_left for tip in tear.tips)
+        numbers.extend(tip.advanced for tip in tear.tips)
     assert perforated and tear.torn_length > 1e-3
     return numpy.concatenate([numbers, x.ravel()])
 

@@ -411,7 +411,7 @@ void start() {
         print(report.reactions[0]);
         std::printf("%d %d %d %zu\n", slit[0], slit[1], slit[2], friction.points().size());
         for (const auto& point : friction.points()) print(point.weights);
-        for (const auto& tip : tear.tips()) std::printf("%.17g\n", tip.energy_left);
+        for (const auto& tip : tear.tips()) std::printf("%.17g\n", tip.advanced);
     }
     print_points(x);
 }
