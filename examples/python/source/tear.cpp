@@ -10,6 +10,7 @@ namespace {
 
 using Surface = membrane::TornSurface<double>;
 using Tip = membrane::TearTip<double>;
+using Border = membrane::BorderState<double>;
 using membrane::EnergyRelease;
 using membrane::LargestTension;
 using membrane::TearOptions;
@@ -75,6 +76,37 @@ namespace {
 
 constexpr auto component = "Tearing";
 
+/// The surface of a tear, with the events that it has followed.
+struct TornSurface {
+    const Tear* tear;
+
+    [[nodiscard]] const Surface& surface() const { return tear->surface(); }
+};
+
+/// Refuses what is not of the tear's mesh, or has not followed it.
+void check_state(std::string_view where, const Tear& self, const Positions& x, const Network& network) {
+    check_count(where, "x", x.count, self.vertex_count);
+    check_count(where, "the network", network.vertex_count(), self.vertex_count);
+    check_version(where, "the network", network.version, self.version);
+}
+
+/// What `of(springs)` is, for springs that may tear. @throws also what a law of Python raises
+template <class Of>
+[[nodiscard]] auto of_springs(std::string_view where, const Network& network, Of of) {
+    using Result = decltype(of(std::get<TearableOf<membrane::LinearSpring>>(network.any)));
+    Result result = std::visit(
+        [&]<class Springs>(const Springs& springs) -> Result {
+            if constexpr (membrane::FollowsSplit<Springs>) {
+                return of(springs);
+            } else {
+                refuse(where, "the network must be TearableSprings or a Tissue, got a MassSpringNetwork");
+            }
+        },
+        network.any);
+    network.rethrow();
+    return result;
+}
+
 [[nodiscard]] Events update(Tear& self, MovingPositions x, double dt, const Network& network,
                             const Foundation& foundation, const std::vector<Index>& held) {
     check_fit(component, self.vertex_count, x.count, network, foundation);
@@ -98,6 +130,7 @@ constexpr auto component = "Tearing";
 [[nodiscard]] auto& part_of(Tree& of) { return of.tree; }
 [[nodiscard]] auto& part_of(Tracker& of) { return of.tracker; }
 [[nodiscard]] auto& part_of(Forceps& of) { return of.grasper; }
+[[nodiscard]] auto& part_of(ToolFriction& of) { return of; }
 [[nodiscard]] auto& part_of(Solver& of) { return of.any; }
 [[nodiscard]] auto& part_of(Network& of) { return of.any; }
 [[nodiscard]] auto& part_of(Foundation& of) { return of.any; }
@@ -106,6 +139,17 @@ constexpr auto component = "Tearing";
 template <class Part>
 inline constexpr bool follows = membrane::FollowsSplit<Part> || membrane::FollowsMovedVertex<Part, double>;
 
+/// The version of a part, or null for one that is of no mesh: a friction. Each point that it keeps names its triangle
+/// and corners, and acts at a contact point that has the same ones.
+template <class Class>
+[[nodiscard]] SurfaceVersion* version_of(Class& of) {
+    if constexpr (requires { of.version; }) {
+        return &of.version;
+    } else {
+        return nullptr;
+    }
+}
+
 /// Calls `act(part, version)` for what an object holds.
 template <class Act>
 void with_part(const py::handle& object, Act act) {
@@ -113,7 +157,7 @@ void with_part(const py::handle& object, Act act) {
         throw py::type_error("this part does not follow a tear: " +
                              py::cast<std::string>(py::type::handle_of(object).attr("__name__")));
     };
-    const auto act_if_follows = [&](auto& part, SurfaceVersion& version) {
+    const auto act_if_follows = [&](auto& part, SurfaceVersion* version) {
         if constexpr (follows<std::remove_reference_t<decltype(part)>>) {
             act(part, version);
         } else {
@@ -125,9 +169,9 @@ void with_part(const py::handle& object, Act act) {
         auto& of = object.cast<Class&>();
         auto& part = part_of(of);
         if constexpr (requires { part.index(); }) {
-            std::visit([&](auto& one) { act_if_follows(one, of.version); }, part);
+            std::visit([&](auto& one) { act_if_follows(one, version_of(of)); }, part);
         } else {
-            act_if_follows(part, of.version);
+            act_if_follows(part, version_of(of));
         }
         return true;
     };
@@ -137,33 +181,28 @@ void with_part(const py::handle& object, Act act) {
     const bool found =
         try_classes(std::type_identity<Network>(), std::type_identity<Foundation>(), std::type_identity<Solver>(),
                     std::type_identity<Tree>(), std::type_identity<Tracker>(), std::type_identity<Forceps>(),
-                    std::type_identity<Normals>());
+                    std::type_identity<Normals>(), std::type_identity<ToolFriction>());
     if (!found) refuse_part();
 }
 
 /// All parts, or none: an error leaves each as it was.
 void follow(const Event& event, const py::args& parts) {
     for (std::size_t i = 0; i < parts.size(); ++i) {
-        with_part(parts[i], [&](const auto&, const SurfaceVersion& version) {
-            if (version == event.before()) return;
+        with_part(parts[i], [&](const auto&, const SurfaceVersion* version) {
+            if (version == nullptr || *version == event.before()) return;
             refuse("follow", "part ", i, " must be of the tear's mesh and have followed its ", event.before().events(),
-                   " events before this one, got ", version.events());
+                   " events before this one, got ", version->events());
         });
         for (std::size_t k = 0; k < i; ++k) {
             if (parts[i].is(parts[k])) refuse("follow", "parts must be different, got the same for ", k, " and ", i);
         }
     }
     for (const auto& part : parts) {
-        with_part(part, [&](auto& one, SurfaceVersion& version) {
+        with_part(part, [&](auto& one, SurfaceVersion* version) {
             membrane::follow(event.event(), one);
-            version = event.after();
+            if (version != nullptr) *version = event.after();
         });
     }
-}
-
-void check_vertex(Index v, const Surface& surface) {
-    const auto vertices = static_cast<Index>(surface.rest_positions().cols());
-    if (v < 0 || v >= vertices) refuse("TornSurface", "vertices must be 0 to ", vertices - 1, ", got ", v);
 }
 
 void bind_criteria(py::module_& module) {
@@ -208,42 +247,55 @@ void bind_events(py::module_& module) {
     module.def("follow", &follow, py::arg("event"), doc("follow"));
 }
 
+void check_vertex(std::string_view where, Index v, const Surface& surface) {
+    const auto vertices = static_cast<Index>(surface.rest_positions().cols());
+    if (v < 0 || v >= vertices) refuse(where, "vertices must be 0 to ", vertices - 1, ", got ", v);
+}
+
+/// What `of(surface, v)` is.
+template <class Of>
+[[nodiscard]] auto at_vertex(const TornSurface& self, Index v, Of of) {
+    check_vertex("TornSurface", v, self.surface());
+    return of(self.surface(), v);
+}
+
 void bind_torn_surface(py::module_& module) {
-    py::class_<Surface>(module, "TornSurface", doc("TornSurface"))
+    py::class_<TornSurface>(module, "TornSurface", doc("TornSurface"))
         .def_property_readonly(
-            "triangles", [](const py::object& self) { return view(self.cast<const Surface&>().triangles(), self); },
+            "triangles",
+            [](const py::object& self) { return view(self.cast<const TornSurface&>().surface().triangles(), self); },
             doc("TornSurface::triangles"))
         .def_property_readonly(
             "rest_positions",
-            [](const py::object& self) { return view(self.cast<const Surface&>().rest_positions(), self); },
+            [](const py::object& self) {
+                return view(self.cast<const TornSurface&>().surface().rest_positions(), self);
+            },
             doc("TornSurface::rest_positions"))
-        .def_property_readonly("reserve", &Surface::reserve, doc("TornSurface::reserve"))
+        .def_property_readonly(
+            "reserve", [](const TornSurface& self) { return self.surface().reserve(); }, doc("TornSurface::reserve"))
         .def(
             "has_inner_edge",
-            [](const Surface& self, Index v, Index other) {
-                check_vertex(v, self);
-                return self.has_inner_edge(v, other);
+            [](const TornSurface& self, Index v, Index other) {
+                return at_vertex(self, v, [&](const Surface& of, Index at) { return of.has_inner_edge(at, other); });
             },
             py::arg("v"), py::arg("other"), doc("TornSurface::has_inner_edge"))
         .def(
             "nearest_in_direction",
-            [](const Surface& self, Index v, const Vector& direction) {
-                check_vertex(v, self);
-                return self.nearest_in_direction(v, direction);
+            [](const TornSurface& self, Index v, const Vector& direction) {
+                return at_vertex(self, v,
+                                 [&](const Surface& of, Index at) { return of.nearest_in_direction(at, direction); });
             },
             py::arg("v"), py::arg("direction"), doc("TornSurface::nearest_in_direction"))
         .def(
             "mean_edge",
-            [](const Surface& self, Index v) {
-                check_vertex(v, self);
-                return self.mean_edge(v);
+            [](const TornSurface& self, Index v) {
+                return at_vertex(self, v, [](const Surface& of, Index at) { return of.mean_edge(at); });
             },
             py::arg("v"), doc("TornSurface::mean_edge"))
         .def(
             "rest_normal",
-            [](const Surface& self, Index v) {
-                check_vertex(v, self);
-                return self.rest_normal(v);
+            [](const TornSurface& self, Index v) {
+                return at_vertex(self, v, [](const Surface& of, Index at) { return of.rest_normal(at); });
             },
             py::arg("v"), doc("TornSurface::rest_normal"));
     py::class_<Tip>(module, "TearTip", doc("TearTip"))
@@ -262,7 +314,9 @@ void bind_tear_results(Class& tear) {
                 return self.get([](const auto& one) { return std::vector(one.tips().begin(), one.tips().end()); });
             },
             doc("Tearing::tips"))
-        .def_property_readonly("surface", &Tear::surface, doc("Tearing::surface"))
+        .def_property_readonly(
+            "surface", py::cpp_function([](const Tear& self) { return TornSurface{&self}; }, py::keep_alive<0, 1>()),
+            doc("Tearing::surface"))
         .def_property_readonly(
             "reserve_used_up",
             [](const Tear& self) { return self.get([](const auto& one) { return one.reserve_used_up(); }); },
@@ -280,6 +334,60 @@ void bind_tear_results(Class& tear) {
                 return self.get([&](const auto& one) { return one.stored(x.map()); });
             },
             py::arg("x"), doc("Tearing::stored"));
+}
+
+void bind_border(py::module_& module) {
+    py::class_<Border>(module, "BorderState", doc("BorderState"))
+        .def_readonly("along", &Border::along, doc("BorderState::along"))
+        .def_readonly("inward", &Border::inward, doc("BorderState::inward"))
+        .def_readonly("stretch", &Border::stretch, doc("BorderState::stretch"))
+        .def_readonly("tension", &Border::tension, doc("BorderState::tension"))
+        .def_readonly("energy", &Border::energy, doc("BorderState::energy"));
+    module.def(
+        "border_state",
+        [](const TornSurface& surface, Index v, Positions x, const Network& network) {
+            constexpr auto where = "border_state";
+            check_vertex(where, v, surface.surface());
+            check_state(where, *surface.tear, x, network);
+            return of_springs(where, network, [&](const auto& springs) {
+                return membrane::border_state<double>(surface.surface(), v, x.map(), springs);
+            });
+        },
+        py::arg("surface"), py::arg("v"), py::arg("x"), py::arg("network"), doc("border_state"));
+    module.def("flaw_driving_force", &membrane::flaw_driving_force<double>, py::arg("border"), py::arg("length"),
+               doc("flaw_driving_force"));
+}
+
+template <class Class>
+void bind_starts(Class& tear) {
+    tear.def(
+            "slit_at",
+            [](const Tear& self, Index v, const Vector& direction) {
+                return self.get([&](const auto& one) { return one.slit_at(v, direction); });
+            },
+            py::arg("v"), py::arg("direction"), doc("Tearing::slit_at"))
+        .def(
+            "slit_under",
+            [](const Tear& self, const Contact& contact, const Vector& reaction, double force,
+               const Vector& direction) {
+                check_count(component, "the contact", contact.vertex_count, self.vertex_count);
+                return self.get([&](const auto& one) { return one.slit_under(contact, reaction, force, direction); });
+            },
+            py::arg("contact"), py::arg("reaction"), py::arg("force"), py::arg("direction"), doc("Tearing::slit_under"))
+        .def(
+            "start_at",
+            [](Tear& self, Index v, double flaw, Positions x, const Network& network) {
+                check_vertex(component, v, self.surface());
+                check_state(component, self, x, network);
+                return of_springs(component, network, [&](const auto& springs) {
+                    const auto start = [&](auto& one) {
+                        const auto path = one.start_at(v, flaw, x.map(), springs);
+                        return std::vector<Index>(path.begin(), path.end());
+                    };
+                    return std::visit(start, self.any);
+                });
+            },
+            py::arg("v"), py::arg("flaw"), py::arg("x"), py::arg("network"), doc("Tearing::start_at"));
 }
 
 void bind_tearing(py::module_& module) {
@@ -305,12 +413,7 @@ void bind_tearing(py::module_& module) {
             return std::visit([&](auto& one) { return self.to_follow(one.cut_along(path, x.map())); }, self.any);
         },
         py::arg("path"), py::arg("x"), doc("Tearing::cut_along"));
-    tear.def(
-        "slit_at",
-        [](const Tear& self, Index v, const Vector& direction) {
-            return self.get([&](const auto& one) { return one.slit_at(v, direction); });
-        },
-        py::arg("v"), py::arg("direction"), doc("Tearing::slit_at"));
+    bind_starts(tear);
     def_in_loop(
         tear, "ligaments",
         [](const py::object& self) {
@@ -335,6 +438,7 @@ void bind_tear(py::module_& module) {
     bind_criteria(module);
     bind_events(module);
     bind_torn_surface(module);
+    bind_border(module);
     bind_tearing(module);
 }
 

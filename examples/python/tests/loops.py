@@ -277,6 +277,56 @@ def tear():
         tear_disc(mesh, membrane.TearableSprings(mesh, taut), membrane.LargestTension(strength=15))])
 
 
+def start():
+    """A stretched strip tears from a flaw of its border, and where a tool perforates it that drags it by friction."""
+    whole = membrane.sheet(width=8e-3, height=4e-3, columns=16, rows=8)
+    along, across = whole.positions[:, 0], whole.positions[:, 1]
+    middle = numpy.flatnonzero((numpy.abs(along) < 1e-6) & (across < -1.9e-3))[-1].item()  # of a side
+    mesh = membrane.with_reserve(whole, 60)
+    clamps = numpy.flatnonzero(numpy.abs(along) > 3.9e-3).astype(numpy.int32)
+    network = membrane.MassSpringNetwork(mesh, stiffness=20.0, pinned=clamps)
+    tissue = membrane.Tissue(membrane.TearableSprings(mesh, network))
+    foundation = membrane.VirtualVolumeSprings(mesh, stiffness=1e-3)
+    solver = membrane.QuasiStaticSolver(tissue, layers=12, sweeps=4)
+    tree, tracker = membrane.AabbTree(mesh), membrane.ContactTracker(mesh)
+    friction = membrane.ToolFriction(coefficient=0.4)
+    tear = membrane.Tearing(mesh, membrane.EnergyRelease(toughness=200, thickness=1e-5))
+    x = mesh.positions * (1.3, 1, 1)
+    tree.refit(x)
+    numbers: list[float] = []
+
+    def follow_all(events):
+        for event in events:
+            membrane.follow(event, tissue, foundation, solver, tree, tracker, friction)
+        numbers.append(len(events))
+
+    for v in membrane.border(whole):
+        state = membrane.border_state(tear.surface, v, x, tissue)
+        numbers.extend([*state.along, *state.inward, state.stretch, state.tension, state.energy,
+                        membrane.flaw_driving_force(state, 0.3e-3)])
+    perforated = False
+    for tick in range(80):
+        tool = membrane.Tool(position=(2e-3 + 2e-6 * tick, 0, 0.6e-3 - 8e-6 * tick), radius=0.6e-3, time=dt * tick)
+        contact = tracker.update(tree, x, tool)
+        report = solver.step(x, dt, tissue, foundation, friction.press(tool, contact), tear.ligaments())
+        slit = tear.slit_under(contact, report.reactions[0], 2e-3, (0, 1, 0))
+        if not perforated and slit[0] != membrane.no_index:
+            perforated = True
+            follow_all(tear.cut_along(slit, x))
+            for flaw in (1e-9, 0.3e-3):
+                path = tear.start_at(middle, flaw, x, tissue)
+                numbers.extend([len(path), *path])
+                follow_all(tear.cut_along(path, x))
+        follow_all(tear.update(x, dt, tissue, foundation))
+        tree.refit(x, report.moved)
+        numbers.extend([*report.reactions[0], *slit, len(friction.points)])
+        for point in friction.points:
+            numbers.extend(point.weights)
+        numbers.extend(tip.advanced for tip in tear.tips)
+    assert perforated and tear.torn_length > 1e-3
+    return numpy.concatenate([numbers, x.ravel()])
+
+
 def time_ticks(ticks):
     """The loop of the README for this number of ticks: the nanoseconds of each."""
     mesh = membrane.icosphere(radius=10e-3, subdivisions=3)

@@ -4,6 +4,7 @@
 // compare.
 // same_loop time TICKS: the nanoseconds of each tick of the first loop, for overhead.py.
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string_view>
@@ -355,6 +356,66 @@ void tear() {
     tear_disc(mesh, membrane::TearableSprings(mesh, taut), membrane::LargestTension{.strength = 15});
 }
 
+/// A stretched strip tears from a flaw of its border, and where a tool perforates it that drags it by friction.
+void start() {
+    const auto whole = membrane::sheet<double>({.width = 8e-3, .height = 4e-3, .columns = 16, .rows = 8});
+    std::vector<membrane::Index> clamps;
+    Index middle = 0;  // of a side
+    for (Index v = 0; v < whole.vertex_count(); ++v) {
+        const auto at = membrane::point(whole.positions(), v);
+        if (std::abs(at.x()) > 3.9e-3) clamps.push_back(v);
+        if (std::abs(at.x()) < 1e-6 && at.y() < -1.9e-3) middle = v;
+    }
+    const auto mesh = membrane::with_reserve(whole, 60);
+    auto tissue = membrane::Tissue(membrane::TearableSprings(
+        mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 20.0, .pinned = clamps})));
+    auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 1e-3});
+    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 12, .sweeps = 4});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto friction = membrane::ToolFriction<double>({.coefficient = 0.4});
+    auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 200, .thickness = 1e-5});
+    auto x = mesh.positions();
+    x.row(0) *= 1.3;
+    tree.refit(x);
+    const auto follow_all = [&](const auto& events) {
+        for (const auto& event : events) follow(event, tissue, foundation, solver, tree, tracker, friction);
+        std::printf("%zu\n", events.size());
+    };
+    for (const Index v : membrane::border(whole)) {
+        const auto state = membrane::border_state<double>(tear.surface(), v, x, tissue);
+        print(state.along);
+        print(state.inward);
+        print({state.stretch, state.tension, state.energy});
+        std::printf("%.17g\n", membrane::flaw_driving_force(state, 0.3e-3));
+    }
+    bool perforated = false;
+    for (int tick = 0; tick < 80; ++tick) {
+        const membrane::Tool<double> tool{
+            .position = {2e-3 + 2e-6 * tick, 0, 0.6e-3 - 8e-6 * tick}, .radius = 0.6e-3, .time = dt * tick};
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, tissue, foundation, friction.press(tool, contact), tear.ligaments());
+        const auto slit = tear.slit_under(contact, report.reactions[0], 2e-3, {0, 1, 0});
+        if (!perforated && slit[0] != membrane::no_index) {
+            perforated = true;
+            follow_all(tear.cut_along(slit, x));
+            for (const double flaw : {1e-9, 0.3e-3}) {
+                const auto path = tear.start_at(middle, flaw, x, tissue);
+                std::printf("%zu\n", path.size());
+                for (const Index v : path) std::printf("%d\n", v);
+                follow_all(tear.cut_along(path, x));
+            }
+        }
+        follow_all(tear.update(x, dt, tissue, foundation));
+        tree.refit(x, report.moved);
+        print(report.reactions[0]);
+        std::printf("%d %d %d %zu\n", slit[0], slit[1], slit[2], friction.points().size());
+        for (const auto& point : friction.points()) print(point.weights);
+        for (const auto& tip : tear.tips()) std::printf("%.17g\n", tip.advanced);
+    }
+    print_points(x);
+}
+
 /// The loop of the README for `ticks` ticks: a tool goes in and out.
 void time_ticks(int ticks) {
     const auto mesh = membrane::icosphere<double>({.radius = 10e-3, .subdivisions = 3});
@@ -389,9 +450,8 @@ void time_ticks(int ticks) {
 int main(int argc, char** argv) {
     const std::string_view name = argc > 1 ? argv[1] : "";
     const std::pair<std::string_view, void (*)()> scenes[] = {
-        {"sphere", sphere},       {"cap", cap},           {"offline", offline},
-        {"published", published}, {"law", law},           {"accuracy", accuracy},
-        {"peel", peel},           {"friction", friction}, {"tear", tear}};
+        {"sphere", sphere},     {"cap", cap},   {"offline", offline},   {"published", published}, {"law", law},
+        {"accuracy", accuracy}, {"peel", peel}, {"friction", friction}, {"tear", tear},           {"start", start}};
     for (const auto& [scene, run] : scenes) {
         if (name == scene) return run(), 0;
     }

@@ -181,6 +181,152 @@ def test_the_tear_takes_less_energy_than_the_membrane_gives_up():
     assert 0 < taken < before - disc.springs.energy(disc.x)
 
 
+class Strip:
+    """A strip between clamps, stretched along x by 1.3."""
+
+    def __init__(self, reserve=60, toughness=200.0):
+        whole = membrane.sheet(width=8e-3, height=4e-3, columns=16, rows=8)
+        clamps = numpy.flatnonzero(numpy.abs(whole.positions[:, 0]) > 3.9e-3).astype(numpy.int32)
+        self.mesh = membrane.with_reserve(whole, reserve)
+        self.network = membrane.MassSpringNetwork(self.mesh, stiffness=20.0, pinned=clamps)
+        self.tissue = membrane.Tissue(membrane.TearableSprings(self.mesh, self.network))
+        self.tear = membrane.Tearing(self.mesh, membrane.EnergyRelease(toughness=toughness, thickness=1e-5))
+        self.x = self.mesh.positions * (1.3, 1, 1)
+
+    def at(self, x, y):
+        """The vertex that is nearest at rest."""
+        vertices = self.mesh.vertex_count - self.tear.surface.reserve
+        return int(numpy.argmin(((self.mesh.positions[:vertices] - (x, y, 0))**2).sum(axis=1)))
+
+    def start(self, flaw, v=None):
+        return self.tear.start_at(self.at(0, -2e-3) if v is None else v, flaw, self.x, self.tissue)
+
+
+def test_the_state_of_a_border():
+    strip = Strip()
+    state = membrane.border_state(strip.tear.surface, strip.at(0, -2e-3), strip.x, strip.tissue)
+    assert state.along == pytest.approx((1, 0, 0)) and state.inward == pytest.approx((0, 1, 0))
+    assert state.stretch == pytest.approx(1.3) and state.tension > 0 and state.energy > 0
+    force = membrane.flaw_driving_force(state, 0.3e-3)
+    assert force == pytest.approx(2 * 1.1215**2 * numpy.pi / 1.3**0.5 * state.energy * 0.3e-3, rel=1e-12)
+    inside = membrane.border_state(strip.tear.surface, strip.at(0, 0), strip.x, strip.tissue)
+    assert not inside.along.any() and not inside.inward.any() and inside.energy == 0
+    slack = membrane.border_state(strip.tear.surface, strip.at(0, -2e-3), strip.mesh.positions, strip.tissue)
+    assert membrane.flaw_driving_force(slack, 0.3e-3) == 0
+
+
+def test_a_tear_starts_where_a_flaw_releases_enough():
+    strip = Strip()
+    v = strip.at(0, -2e-3)
+    state = membrane.border_state(strip.tear.surface, v, strip.x, strip.tissue)
+    critical = 200.0 * 1e-5 / membrane.flaw_driving_force(state, 1.0)  # [m]
+    assert strip.start(0.99 * critical) == []
+    path = strip.start(1.01 * critical)
+    rest = strip.mesh.positions
+    assert path[0] == v and 2.02 * critical <= rest[path[-1], 1] - rest[v, 1] < 2.02 * critical + 0.75e-3
+    for nothing in (0, -1e-3, numpy.inf, numpy.nan):
+        assert strip.start(nothing) == []
+    assert strip.start(1e-3, strip.at(0, 0)) == [] and strip.start(1e-3, strip.at(-4e-3, -2e-3)) == []
+    events = strip.tear.cut_along(path, strip.x)
+    assert len(events) == len(path) - 1 and [tip.vertex for tip in strip.tear.tips] == [path[-1]]
+    short = Strip(reserve=1)
+    assert short.start(1e-3) == [] and short.tear.reserve_used_up
+
+
+def test_a_slit_under_a_tool_is_that_at_the_corner_nearest_to_the_contact():
+    strip = Strip()
+    tool = membrane.Tool(position=(2e-3, 0, 0.5e-3), radius=0.6e-3)
+    tree, tracker = membrane.AabbTree(strip.mesh), membrane.ContactTracker(strip.mesh)
+    tree.refit(strip.x)
+    contact = tracker.update(tree, strip.x, tool)
+    assert contact.touching
+    nearest = contact.corners[int(numpy.argmax(contact.barycentric))]
+    reaction = 0.02 * contact.normal
+    for direction in ((1, 0, 0), (0, 1, 0)):
+        slit = strip.tear.slit_under(contact, reaction, 0.0199, direction)
+        assert slit == strip.tear.slit_at(nearest, direction) and slit[1] == nearest
+    none = [membrane.no_index] * 3
+    assert strip.tear.slit_under(contact, reaction, 0.0201, (1, 0, 0)) == none
+    assert strip.tear.slit_under(contact, -reaction, 0.0199, (1, 0, 0)) == none
+    assert strip.tear.slit_under(contact, (numpy.nan, 0, 0), 0.0, (1, 0, 0)) == none
+    away = tracker.update(tree, strip.x, membrane.Tool(position=(0, 0, 1), radius=0.6e-3))
+    assert strip.tear.slit_under(away, reaction, 0.0, (1, 0, 0)) == none
+
+
+def test_arguments_of_a_start_are_checked():
+    strip, other = Strip(), Torn()
+    surface, x, tissue, v = strip.tear.surface, strip.x, strip.tissue, strip.at(0, -2e-3)
+    calls = (("Tearing", strip.tear.start_at, (1e-3,)), ("border_state", membrane.border_state, ()))
+    for name, call, flaw in calls:
+        of = () if flaw else (surface,)
+        count = strip.mesh.vertex_count
+        for vertex in (-1, count):
+            with pytest.raises(membrane.InvalidInput, match=f"^{name}: vertices must be 0 to {count - 1}, got"):
+                call(*of, vertex, *flaw, x, tissue)
+        with pytest.raises(membrane.InvalidInput, match=f"^{name}: x must have {count} vertices, got {count - 1}"):
+            call(*of, v, *flaw, x[:-1], tissue)
+        with pytest.raises(membrane.InvalidInput, match=f"^{name}: the network must have {count} vertices, got 317"):
+            call(*of, v, *flaw, x, other.springs)
+        with pytest.raises(membrane.InvalidInput, match=f"^{name}: the network must be TearableSprings or a Tissue"):
+            call(*of, v, *flaw, x, strip.network)
+    contact = membrane.ContactTracker(other.mesh).update(membrane.AabbTree(other.mesh), other.x, membrane.Tool())
+    with pytest.raises(membrane.InvalidInput, match="^Tearing: the contact must have .* got 317"):
+        strip.tear.slit_under(contact, (0, 0, 1), 0.5, (1, 0, 0))
+    events = strip.tear.cut_along(strip.start(1e-3), x)
+    assert len(events) > 1
+    for name, call, flaw in calls:
+        of = () if flaw else (surface,)
+        with pytest.raises(membrane.InvalidInput, match=f"^{name}: the network must have followed the same .* got 0"):
+            call(*of, v, *flaw, x, tissue)
+    for event in events:
+        membrane.follow(event, tissue)
+    assert membrane.border_state(surface, v, x, tissue).stretch > 0
+
+
+def test_an_error_of_a_law_is_raised_by_a_start():
+    broken = []
+
+    def law(k, r, l):
+        if broken:
+            raise RuntimeError("what is a spring?")
+        return k * (l - r), k, k * (l - r)**2 / 2
+
+    disc = Torn(membrane.PythonSpring(law))
+    v = membrane.border(membrane.disc(radius=5e-3, rings=8))[0]
+    assert membrane.border_state(disc.tear.surface, v, disc.x, disc.springs).tension > 0
+    broken.append(True)
+    with pytest.raises(RuntimeError, match="what is a spring"):
+        membrane.border_state(disc.tear.surface, v, disc.x, disc.springs)
+
+
+def test_a_friction_follows_a_tear():
+    """Where a vertex under the tool becomes two, each point keeps its place: on the triangle that has the copy now."""
+    strip = Strip()
+    tree, tracker = membrane.AabbTree(strip.mesh), membrane.ContactTracker(strip.mesh)
+    solver = membrane.QuasiStaticSolver(strip.tissue, layers=membrane.unlimited, sweeps=8)
+    friction, missed = membrane.ToolFriction(coefficient=0.4), membrane.ToolFriction(coefficient=0.4)
+    tree.refit(strip.x)
+    tool = membrane.Tool(position=(0, 0, 0.4e-3), radius=0.6e-3)
+    for each in (missed, friction):
+        press = each.press(tool, tracker.update(tree, strip.x, tool))
+        solver.step(strip.x, 1e-3, strip.tissue, membrane.NoFoundation(), press)
+        tree.refit(strip.x)
+        assert each.points
+    before = strip.tear.surface.triangles.copy()
+    path = strip.tear.slit_at(friction.points[0].corners[0], (1, 0, 0))
+    event, = strip.tear.cut_along(path, strip.x)
+    with pytest.raises(membrane.InvalidInput, match="parts must be different, got the same for 0 and 1"):
+        membrane.follow(event, friction, friction)
+    membrane.follow(event, friction, strip.tissue, solver, tree, tracker)
+    triangles = strip.tear.surface.triangles
+    for each, expected in ((friction, triangles), (missed, before)):
+        assert all(point.corners == expected[point.triangle].tolist() for point in each.points)
+    touched = [point.triangle for point in friction.points]
+    assert set(touched) & set(event.split.triangles.tolist())  # else there was nothing to follow
+    with pytest.raises(membrane.InvalidInput, match="part 1 must be of the tear's mesh"):
+        membrane.follow(event, friction, strip.tissue)
+
+
 def test_springs_after_a_tear():
     """Each spring of a torn surface is one of its edges; the forces of all sum up to zero."""
     disc = torn()
