@@ -137,7 +137,7 @@ void damping(Page& page, const Effort& effort) {
     double lost = 0;
     for (const int rows : effort.rows) {
         Shear shear = strip_of(rows, effort.edges / 2);
-        shear.damping = 3e-2 * 20 / rows;
+        shear.damping = 1e-2 * 20 / rows;
         const ShearRun found = run(shear, effort.edges / 2);
         lost = std::max(lost, std::abs(found.lost) / found.given * 100);
         page.print("| %d | %.1f %% | %.1f %% | %.1f %% |\n", rows, 100 * found.dissipated / found.given,
