@@ -50,6 +50,17 @@ def torn():
     return disc
 
 
+def law_until(broken):
+    """A linear spring, which raises an error once something is in `broken`."""
+
+    def law(k, r, l):
+        if broken:
+            raise RuntimeError("what is a spring?")
+        return k * (l - r), k, k * (l - r)**2 / 2
+
+    return law
+
+
 def test_a_cut_doubles_its_inner_vertices():
     disc = Torn()
     whole = disc.mesh.triangles.copy()
@@ -285,13 +296,7 @@ def test_arguments_of_a_start_are_checked():
 
 def test_an_error_of_a_law_is_raised_by_a_start():
     broken = []
-
-    def law(k, r, l):
-        if broken:
-            raise RuntimeError("what is a spring?")
-        return k * (l - r), k, k * (l - r)**2 / 2
-
-    disc = Torn(membrane.PythonSpring(law))
+    disc = Torn(membrane.PythonSpring(law_until(broken)))
     v = membrane.border(membrane.disc(radius=5e-3, rings=8))[0]
     assert membrane.border_state(disc.tear.surface, v, disc.x, disc.springs).tension > 0
     broken.append(True)
@@ -342,13 +347,7 @@ def test_springs_after_a_tear():
 
 def test_an_error_of_a_law_is_raised_by_the_tear():
     broken = []
-
-    def law(k, r, l):
-        if broken:
-            raise RuntimeError("what is a spring?")
-        return k * (l - r), k, k * (l - r)**2 / 2
-
-    disc = Torn(membrane.PythonSpring(law))
+    disc = Torn(membrane.PythonSpring(law_until(broken)))
     disc.follow(disc.cut())
     assert disc.tick().status == membrane.StepStatus.advanced
     broken.append(True)
