@@ -636,7 +636,7 @@ TEST_CASE_METHOD(Touched, "pages: friction") {
     const auto report = solver.step(x, dt, network, foundation, friction.press(tool, contact));
     // [/friction]
     CHECK(report.total_reaction().norm() > 0);
-    CHECK_FALSE(friction.points().empty());
+    CHECK_FALSE(friction.vertices().empty());
 }
 
 TEST_CASE("pages: tear") {

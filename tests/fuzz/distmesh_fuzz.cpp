@@ -67,7 +67,10 @@ void examine(Bytes bytes) {
     if (switches.on(1)) bounds.low[bytes.index(3)] = switches.on(2) ? bytes.wild<double>() : bytes.number(-1.3, 1.3);
     DistMeshOptions options{
         .edge_length = bytes.number(0.2, 1), .bounds = bounds, .iterations = bytes.index(8), .spacing = 0.15};
-    if (switches.on(3)) options.edge_length = std::fabs(bytes.wild<double>()) < 0.2 ? 0.2 : bytes.wild<double>();
+    if (switches.on(3)) {
+        const double wild = bytes.wild<double>();
+        options.edge_length = std::fabs(wild) < 0.2 ? 0.2 : wild;  // not too many vertices
+    }
     if (!(bounds.low.minCoeff() >= -1.3))
         options.spacing = bytes.wild<double>() > 0.15 ? 1e3 : 0;  // few cells, or none
     try {

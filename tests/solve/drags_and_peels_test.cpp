@@ -128,8 +128,8 @@ struct Loop {
         REQUIRE(adhesion.dissipated() >= dissipated);
         dissipated = adhesion.dissipated();
         const S rounding = 1000 * std::numeric_limits<S>::epsilon();
-        for (const auto& point : friction.points()) {
-            REQUIRE(norm(point.force) <= (1 + rounding) * S(coefficient) * point.pressure);
+        for (const auto& v : friction.vertices()) {
+            REQUIRE(norm(v.force) <= (1 + rounding) * S(coefficient) * norm(v.normal_force));
         }
     }
     [[nodiscard]] std::vector<std::byte> saved() {

@@ -552,6 +552,35 @@ TEMPLATE_TEST_CASE("a bad time step is refused, and nothing has moved", "[solver
     }
 }
 
+TEMPLATE_TEST_CASE("a step whose residual force is beyond the range of numbers is refused, and nothing has moved",
+                   "[solver][bad]", double, float) {
+    using S = TestType;
+    const Sphere<S> sphere;
+    const VirtualVolumeSprings<S> damped(sphere.mesh, {.stiffness = S(8), .damping = S(0.02)});
+    int refused = 0;
+    for (S dt = (std::numeric_limits<S>::min)(); dt < S(1e-3); dt *= 10) {
+        CAPTURE(dt);
+        QuasiStaticSolver solver(sphere.network);
+        AabbTree<S> tree(sphere.mesh);
+        ContactTracker<S> tracker(sphere.mesh);
+        Points<S> x = sphere.mesh.positions();
+        for (int i = 1; i <= 5; ++i) {
+            const Points<S> before = x;
+            const Tool<S> tool{.position = S(1 - 0.02 * i) * point(sphere.mesh.positions(), 5), .radius = S(0.05)};
+            const auto report = solver.step(x, dt, sphere.network, damped, press(tool, tracker.update(tree, x, tool)));
+            tree.refit(x);
+            REQUIRE(std::isfinite(report.residual));
+            REQUIRE(is_finite(report.reactions[0]));
+            REQUIRE(is_finite(x));
+            if (report.status == StepStatus::advanced) continue;
+            REQUIRE(report.status == StepStatus::unstable);
+            REQUIRE(x == before);
+            ++refused;
+        }
+    }
+    CHECK(refused > 0);
+}
+
 TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has moved", "[solver][bad]", double,
                    float) {
     using S = TestType;

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <tuple>
 #include <type_traits>
@@ -33,6 +34,8 @@ struct Settings {
     double friction = 0.3;
     Index rings = 12, sweeps = 20;
     Vector3<double> axis = Vector3<double>::Zero();  // of a shaft [m]
+    double radius = 2e-3;                            // of the ball [m]
+    double stretch = 1;                              // of the membrane in its frame
 };
 
 /// A ball, or a shaft, on a disc whose foundation resists along the surface, too.
@@ -40,7 +43,7 @@ template <Real S>
 struct Drag : test::SoftDisc<S> {
     using test::SoftDisc<S>::mesh, test::SoftDisc<S>::network, test::SoftDisc<S>::foundation;
 
-    static constexpr double radius = 2e-3, depth = 0.05e-3;  // of the ball; pressed in [m]
+    static constexpr double depth = 0.05e-3;  // to which the ball is pressed in [m]
 
     Settings settings;
     QuasiStaticSolver<S> solver{network, {.layers = unlimited, .sweeps = settings.sweeps}};
@@ -48,14 +51,14 @@ struct Drag : test::SoftDisc<S> {
     ContactTracker<S> tracker{mesh};
     ToolFriction<S> friction{{.coefficient = settings.friction}};
     Points<S> x = mesh.positions();
-    Tool<S> tool{.axis = settings.axis.cast<S>(), .radius = S(radius)};
+    Tool<S> tool{.axis = settings.axis.cast<S>(), .radius = S(settings.radius)};
     StepReport<S> report;
 
-    explicit Drag(const Settings& with) : test::SoftDisc<S>(with.rings), settings(with) {}
+    explicit Drag(const Settings& with) : test::SoftDisc<S>(with.rings, with.stretch), settings(with) {}
 
     /// The ball's lowest point goes to `at` along the disc, `deep` below it [m]. Returns its force on the hand [N].
     Vector3<double> move_to(const Vector3<double>& at, double deep = depth) {
-        tool.position = Vector3<double>(at[0], at[1], radius - deep).cast<S>();
+        tool.position = Vector3<double>(at[0], at[1], settings.radius - deep).cast<S>();
         const auto contact = tracker.update(tree, x, tool);
         report = solver.step(x, S(1e-3), network, foundation, friction.press(tool, contact));
         REQUIRE(report.status == StepStatus::advanced);
@@ -67,21 +70,22 @@ struct Drag : test::SoftDisc<S> {
         for (int i = 0; i <= 50; ++i) move_to({0, 0, 0}, depth * i / 50);
         for (int i = 0; i < 50; ++i) move_to({0, 0, 0});
     }
-    /// Every point's friction is along the surface, and within its cone.
+    /// Every vertex's friction is along the surface, and within its cone.
     void check_cones() const {
         const double rounding = 100 * std::numeric_limits<S>::epsilon();
-        for (const auto& point : friction.points()) {
-            const double largest = settings.friction * static_cast<double>(point.pressure);
-            REQUIRE(static_cast<double>(norm(point.force)) <= (1 + rounding) * largest);
-            REQUIRE(std::abs(static_cast<double>(dot(point.force, point.normal))) <= rounding * largest);
+        for (const auto& v : friction.vertices()) {
+            const auto normal_force = static_cast<double>(norm(v.normal_force));
+            const double largest = settings.friction * normal_force;
+            REQUIRE(static_cast<double>(norm(v.force)) <= (1 + rounding) * largest);
+            REQUIRE(std::abs(static_cast<double>(dot(v.force, v.normal_force))) <= rounding * largest * normal_force);
         }
     }
-    /// Of all points, the sums of the magnitudes of friction and normal forces.
-    [[nodiscard]] double ratio_at_points() const {
+    /// Of all vertices, the sums of the magnitudes of friction and normal forces.
+    [[nodiscard]] double ratio_at_vertices() const {
         double tangential = 0, normal = 0;
-        for (const auto& point : friction.points()) {
-            tangential += static_cast<double>(norm(point.force));
-            normal += static_cast<double>(point.pressure);
+        for (const auto& v : friction.vertices()) {
+            tangential += static_cast<double>(norm(v.force));
+            normal += static_cast<double>(norm(v.normal_force));
         }
         return tangential / normal;
     }
@@ -121,13 +125,11 @@ struct TornDrag {
     void follow_events() {
         for (const auto& event : surface.events()) follow(event, network, foundation, solver, tree, tracker, friction);
     }
-    [[nodiscard]] Vector3<S> rest_place(const StickingPoint<S>& point) const {
-        return point_at(triangle_at(surface.rest_positions(), surface.corners(point.triangle)), point.weights);
-    }
-    /// Distance along the surface of a point's place from where the tool holds it [m].
-    [[nodiscard]] S off(const StickingPoint<S>& point) const {
-        const Vector3<S> off = point_at(triangle_at(x, point.corners), point.weights) - tool.position - point.offset;
-        return norm<S>(off - dot(off, point.normal) * point.normal);
+    /// Distance along the surface of a vertex from where the tool holds it [m].
+    [[nodiscard]] S off(const StickingVertex<S>& v) const {
+        const Vector3<S> off = point(x, v.vertex) - tool.position - v.offset,
+                         normal = direction_or_zero(v.normal_force);
+        return norm<S>(off - dot(off, normal) * normal);
     }
 };
 
@@ -153,7 +155,7 @@ TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and 
         drag.press_in();
         const Vector3<double> direction(0.8, 0.6, 0);
         Vector3<double> sum = Vector3<double>::Zero();
-        double at_points = 0;
+        double at_vertices = 0;
         int count = 0;
         for (int i = 1; i <= 1000; i += cases_are_slow ? 10 : 1) {
             const auto force = drag.move_to(1e-6 * i * direction);
@@ -161,37 +163,36 @@ TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and 
             if (i < 300) continue;
             REQUIRE(drag.friction.slips());
             sum += force;
-            at_points += drag.ratio_at_points();
+            at_vertices += drag.ratio_at_vertices();
             ++count;
         }
         // The facets push the ball by some per cent to and fro.
-        CHECK(at_points / count == Approx(coefficient).epsilon(0.01));
+        CHECK(at_vertices / count == Approx(coefficient).epsilon(0.01));
         CHECK(along_disc(sum) / sum[2] == Approx(coefficient).epsilon(0.02));
         CHECK(-dot(sum, direction) / along_disc(sum) > std::cos(0.02));
     }
 }
 
 TEMPLATE_TEST_CASE("below that it sticks: the membrane moves with the tool", "[friction]", double, float) {
+    constexpr bool is_float = std::is_same_v<TestType, float>;  // in which the vertices of the rim slip to and fro
     Drag<TestType> drag({.friction = 0.6});
     drag.press_in();
     const auto offsets = [&] {
         std::vector<Vector3<double>> all;
-        for (const auto& point : drag.friction.points()) {
-            const auto& v = point.corners;
-            const Triangle<TestType> triangle{membrane::point(drag.x, v[0]), membrane::point(drag.x, v[1]),
-                                              membrane::point(drag.x, v[2])};
-            const Vector3<TestType> offset = point_at(triangle, point.weights) - drag.tool.position;
+        for (const auto& v : drag.friction.vertices()) {
+            const Vector3<TestType> offset = membrane::point(drag.x, v.vertex) - drag.tool.position;
             all.push_back(offset.template cast<double>());
         }
         return all;
     };
     const auto before = offsets();
-    std::vector<bool> has_slipped(before.size(), false);  // as points at the rim do, where the normal force is small
+    std::vector<bool> has_slipped(before.size(), false);  // as vertices at the rim do, where the normal force is small
     const auto note_slips = [&] {
         for (std::size_t k = 0; k < has_slipped.size(); ++k) {
-            const auto& point = drag.friction.points()[k];
-            has_slipped[k] = has_slipped[k] || static_cast<double>(norm(point.force)) >=
-                                                   0.999 * drag.settings.friction * static_cast<double>(point.pressure);
+            const auto& v = drag.friction.vertices()[k];
+            has_slipped[k] =
+                has_slipped[k] || static_cast<double>(norm(v.force)) >=
+                                      0.999 * drag.settings.friction * static_cast<double>(norm(v.normal_force));
         }
     };
     const double force_before = along_disc(drag.move_to({0, 0, 0}));
@@ -200,21 +201,21 @@ TEMPLATE_TEST_CASE("below that it sticks: the membrane moves with the tool", "[f
         Vector3<double> force = Vector3<double>::Zero();
         for (int wait = 0; wait < 30; ++wait) {
             force = drag.move_to({0.2e-6 * i, 0, 0});
-            REQUIRE(drag.friction.points().size() == before.size());
+            REQUIRE(drag.friction.vertices().size() == before.size());
             note_slips();
         }
         forces.push_back(-force[0]);
         drag.check_cones();
         const auto now = offsets();
         for (std::size_t k = 0; k < now.size(); ++k) {
-            const Vector3<double> off = now[k] - before[k],
-                                  normal = drag.friction.points()[k].normal.template cast<double>();
-            if (!has_slipped[k]) REQUIRE(norm<double>(off - dot(off, normal) * normal) < 0.01e-6);
+            const Vector3<double> off = now[k] - before[k];
+            const Vector3<double> normal =
+                drag.friction.vertices()[k].normal_force.template cast<double>().normalized();
+            if (!has_slipped[k]) REQUIRE(norm<double>(off - dot(off, normal) * normal) < (is_float ? 50e-9 : 2e-9));
         }
     }
-    constexpr bool is_float = std::is_same_v<TestType, float>;  // in which the points of the rim slip to and fro
     if (!is_float) CHECK(std::count(has_slipped.begin(), has_slipped.end(), false) >= 3);
-    // More and more of the rim slips: the force increases by less and less, towards that of all points slipping.
+    // More and more of the rim slips: the force increases by less and less, towards that of all vertices slipping.
     const double whole = 0.6 * drag.move_to({2e-6, 0, 0})[2];
     for (std::size_t i = 1; i < forces.size(); ++i) {
         CHECK(forces[i] > forces[i - 1]);
@@ -228,18 +229,29 @@ TEMPLATE_TEST_CASE("below that it sticks: the membrane moves with the tool", "[f
 }
 
 TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[friction]", double, float) {
-    Drag<TestType> drag({.friction = 0.3, .sweeps = 5});
+    constexpr bool is_float = std::is_same_v<TestType, float>;
+    // At coefficients from 0.6 on, friction compresses the membrane as far as it has been stretched. A flat ball touches
+    // 37 vertices, a round one 7.
+    const auto settings = GENERATE(Settings{.friction = 0.1, .sweeps = 5}, Settings{.friction = 0.3, .sweeps = 5},
+                                   Settings{.friction = 0.6, .sweeps = 5, .stretch = 1.1},
+                                   Settings{.friction = 1.0, .sweeps = 5, .stretch = 1.1},
+                                   Settings{.friction = 1.0, .sweeps = 20, .stretch = 1.1},
+                                   Settings{.friction = 1.0, .sweeps = 20, .radius = 20e-3, .stretch = 1.2});
+    CAPTURE(settings.friction, settings.sweeps, settings.radius);
+    Drag<TestType> drag(settings);
     drag.press_in();
     for (int i = 1; i <= 30; ++i) drag.move_to({1e-6 * i, 0, 0});
     const Vector3<double> held(3e-5, 0, 0);
-    for (int i = 0; i < 300; ++i) drag.move_to(held);
+    for (int i = 0; i < 1000; ++i) drag.move_to(held);
     const auto before = drag.x;
     const auto force = drag.move_to(held);
     CHECK(along_disc(force) > 0.1 * force[2]);
     for (int i = 0; i < (cases_are_slow ? 300 : 10'000); ++i) drag.move_to(held);
-    // What the vertex updates leave out at the force tolerance.
-    CHECK((drag.x - before).cwiseAbs().maxCoeff() < (std::is_same_v<TestType, float> ? 1e-9 : 1e-10));
-    CHECK(norm<double>(drag.move_to(held) - force) < 1e-3 * along_disc(force));
+    // What the vertex updates leave out at the force tolerance: in float 2 uN, on springs of 43 N/m, wherever the forces
+    // of many vertices are at their limit.
+    const bool is_at_limit = is_float && settings.friction > 0.5;
+    CHECK((drag.x - before).cwiseAbs().maxCoeff() < (is_at_limit ? 1e-7 : is_float ? 1e-9 : 1e-10));
+    CHECK(norm<double>(drag.move_to(held) - force) < (is_at_limit ? 1e-2 : 1e-3) * along_disc(force));
 }
 
 TEST_CASE("the forces of a frictional contact balance those of the membrane", "[friction]") {
@@ -340,36 +352,52 @@ TEST_CASE("friction is restored from a snapshot, and runs on to the same bits", 
     CHECK(stroke(50) == first);
     CHECK(drag.x == x);
     drag.friction.reset();
-    CHECK(drag.friction.points().empty());
+    CHECK(drag.friction.vertices().empty());
     CHECK_FALSE(drag.friction.slips());
 }
 
-TEMPLATE_TEST_CASE("a held place stays the same place of the tissue as vertices split and move at rest",
+TEMPLATE_TEST_CASE("vertices that become two share their friction, and one that moves at rest is held anew",
                    "[friction][tear]", double, float) {
+    using S = TestType;
     int parted = 0, reshaped = 0;
     for (int seed = 1; seed <= cases(40); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        TornDrag<TestType> drag{10e-3, 0.2e-3, TestType(20)};
-        drag.drag_to(TestType(1e-3) * random.unit_vector<TestType>(), 5);
-        REQUIRE(drag.friction.points().size() > 3);
+        TornDrag<S> drag{10e-3, 0.2e-3, S(20)};
+        drag.drag_to(S(1e-3) * random.unit_vector<S>(), 5);
+        REQUIRE(drag.friction.vertices().size() > 3);
         for (int n = 0; n < 100; ++n) {
-            const std::vector<StickingPoint<TestType>> before(drag.friction.points().begin(),
-                                                              drag.friction.points().end());
-            std::vector<Vector3<TestType>> places;
-            for (const auto& point : before) places.push_back(drag.rest_place(point));
+            const std::vector<StickingVertex<S>> before(drag.friction.vertices().begin(),
+                                                        drag.friction.vertices().end());
             test::change_at_random(random, drag.surface, drag.x, true);
             drag.follow_events();
-            for (std::size_t i = 0; i < before.size(); ++i) {
-                const auto& point = drag.friction.points()[i];
-                REQUIRE(point.triangle == before[i].triangle);
-                REQUIRE(point.corners == drag.surface.corners(point.triangle));
-                const TestType rounding = 100 * std::numeric_limits<TestType>::epsilon();
-                REQUIRE(norm<TestType>(drag.rest_place(point) - places[i]) < rounding * TestType(5e-3));
-                REQUIRE(point.force == before[i].force);
-                REQUIRE(point.offset == before[i].offset);
-                parted += point.corners != before[i].corners;
-                reshaped += point.weights != before[i].weights;
+            std::vector<Index> origin(static_cast<std::size_t>(drag.mesh.vertex_count())), moved;
+            std::iota(origin.begin(), origin.end(), 0);
+            for (const auto& event : drag.surface.events()) {
+                if (event.moved.vertex != no_index) moved.push_back(event.moved.vertex);
+                if (event.split.vertex == no_index) continue;
+                origin[static_cast<std::size_t>(event.split.copy)] =
+                    origin[static_cast<std::size_t>(event.split.vertex)];
+            }
+            const auto now = drag.friction.vertices();
+            REQUIRE(std::is_sorted(now.begin(), now.end(),
+                                   [](const auto& a, const auto& b) { return a.vertex < b.vertex; }));
+            for (const auto& held : before) {
+                Vector3<S> force = Vector3<S>::Zero(), normal_force = Vector3<S>::Zero();
+                for (const auto& v : now) {
+                    if (origin[static_cast<std::size_t>(v.vertex)] != held.vertex) continue;
+                    const bool is_anew =
+                        std::count(moved.begin(), moved.end(), held.vertex) > 0 || !is_finite(held.offset);
+                    REQUIRE(is_finite(v.offset) != is_anew);
+                    if (!is_anew) REQUIRE(v.offset == held.offset);
+                    force += v.force;
+                    normal_force += v.normal_force;
+                    parted += v.vertex != held.vertex;
+                    reshaped += is_anew;
+                }
+                const S rounding = 10 * std::numeric_limits<S>::epsilon();
+                REQUIRE(norm<S>(force - held.force) <= rounding * norm(held.force));
+                REQUIRE(norm<S>(normal_force - held.normal_force) <= rounding * norm(held.normal_force));
             }
         }
     }
@@ -377,32 +405,57 @@ TEMPLATE_TEST_CASE("a held place stays the same place of the tissue as vertices 
     CHECK(reshaped > cases(40));
 }
 
-TEMPLATE_TEST_CASE("places that are held stay where they are on the tool as the membrane tears under it",
-                   "[friction][tear]", double, float) {
-    TornDrag<TestType> drag{2e-3, 0.05e-3, TestType(2)};
+TEMPLATE_TEST_CASE("vertices stay where they are on the tool as the membrane tears under it", "[friction][tear]",
+                   double, float) {
+    using S = TestType;
+    TornDrag<S> drag{2e-3, 0.05e-3, S(2)};
     drag.drag_to({0, 0, 0}, 50);
-    drag.drag_to({TestType(0.5e-6), 0, 0}, 100);
-    const std::vector<StickingPoint<TestType>> before(drag.friction.points().begin(), drag.friction.points().end());
+    drag.drag_to({S(0.5e-6), 0, 0}, 100);
+    const std::vector<StickingVertex<S>> before(drag.friction.vertices().begin(), drag.friction.vertices().end());
     drag.surface.begin();
-    PointsRef<TestType> x = drag.x;
+    PointsRef<S> x = drag.x;
     const auto along = drag.surface.nearest_in_direction(0, {0, 1, 0}),
                back = drag.surface.nearest_in_direction(0, {0, -1, 0});
     const Index copy = drag.surface.split(x, 0, along, back);
     REQUIRE(copy != no_index);
     drag.follow_events();
-    drag.drag_to({TestType(0.5e-6), 0, 0}, 200);
+    drag.drag_to({S(0.5e-6), 0, 0}, 200);
     int held = 0, parted = 0;
-    for (const auto& point : drag.friction.points()) {
+    for (const auto& v : drag.friction.vertices()) {
+        const auto is_same_place = [&](const Vector3<S>& offset) {
+            const Vector3<S> off = v.offset - offset, normal = direction_or_zero(v.normal_force);
+            return norm<S>(off - dot(off, normal) * normal) < S(1e-9);
+        };
         const bool is_held = std::any_of(before.begin(), before.end(), [&](const auto& other) {
-            return other.triangle == point.triangle && other.weights == point.weights && other.offset == point.offset;
+            return other.vertex == (v.vertex == copy ? 0 : v.vertex) && is_same_place(other.offset);
         });
         if (!is_held) continue;
-        CHECK(drag.off(point) < TestType(0.01e-6));
+        CHECK(drag.off(v) < S(0.01e-6));
         ++held;
-        parted += std::count(point.corners.begin(), point.corners.end(), copy) > 0;
+        parted += v.vertex == copy;
     }
     CHECK(held >= 3);
-    CHECK(parted >= 1);
+    CHECK(parted == 1);
+}
+
+TEMPLATE_TEST_CASE("a vertex that moves at rest keeps its friction", "[friction][tear]", double, float) {
+    using S = TestType;
+    TornDrag<S> drag{10e-3, 0.2e-3, S(20)};
+    drag.drag_to({S(1e-6), 0, 0}, 200);
+    const auto force_on = [&](Index vertex) {
+        for (const auto& v : drag.friction.vertices()) {
+            if (v.vertex == vertex) return v.force;
+        }
+        return Vector3<S>(Vector3<S>::Zero());
+    };
+    const Vector3<S> before = force_on(0);
+    REQUIRE(norm(before) > 0);
+    drag.surface.begin();
+    PointsRef<S> x = drag.x;
+    REQUIRE(drag.surface.move_vertex(x, 0, {S(1e-9), 0, 0}, S(0.35)));
+    drag.follow_events();
+    drag.drag_to({S(1e-6), 0, 0}, 0);
+    CHECK(norm<S>(force_on(0) - before) < S(0.01) * norm(before));
 }
 
 TEST_CASE("nonsense from a device is refused, and friction goes on", "[friction]") {
@@ -461,6 +514,5 @@ TEST_CASE("friction refuses options out of range", "[friction]") {
     };
     CHECK(refused({.coefficient = -1}) == "ToolFriction: coefficient must be finite and not negative [1], got -1");
     CHECK(refused({.coefficient = 11}) == "ToolFriction: coefficient must be at most 10, got 11");
-    CHECK(refused({.coefficient = 0.1, .max_contact_points = 0}) ==
-          "ToolFriction: max_contact_points must be at least 1, got 0");
+    CHECK(refused({.coefficient = 0.1, .max_vertices = 0}) == "ToolFriction: max_vertices must be at least 1, got 0");
 }

@@ -94,32 +94,28 @@ void bind_constraints(py::module_& module) {
 }
 
 void bind_friction(py::module_& module) {
-    using Point = membrane::StickingPoint<double>;
-    py::class_<Point>(module, "StickingPoint", doc("StickingPoint"))
-        .def_readonly("triangle", &Point::triangle, doc("StickingPoint::triangle"))
-        .def_readonly("feature", &Point::feature, doc("StickingPoint::feature"))
-        .def_readonly("corners", &Point::corners, doc("StickingPoint::corners"))
-        .def_readonly("weights", &Point::weights, doc("StickingPoint::weights"))
-        .def_readonly("along", &Point::along, doc("StickingPoint::along"))
-        .def_readonly("offset", &Point::offset, doc("StickingPoint::offset"))
-        .def_readonly("force", &Point::force, doc("StickingPoint::force"))
-        .def_readonly("sticking_force", &Point::sticking_force, doc("StickingPoint::sticking_force"))
-        .def_readonly("pressure", &Point::pressure, doc("StickingPoint::pressure"))
-        .def_readonly("normal", &Point::normal, doc("StickingPoint::normal"));
+    using Vertex = membrane::StickingVertex<double>;
+    py::class_<Vertex>(module, "StickingVertex", doc("StickingVertex"))
+        .def_readonly("vertex", &Vertex::vertex, doc("StickingVertex::vertex"))
+        .def_readonly("along", &Vertex::along, doc("StickingVertex::along"))
+        .def_readonly("offset", &Vertex::offset, doc("StickingVertex::offset"))
+        .def_readonly("force", &Vertex::force, doc("StickingVertex::force"))
+        .def_readonly("sticking_force", &Vertex::sticking_force, doc("StickingVertex::sticking_force"))
+        .def_readonly("normal_force", &Vertex::normal_force, doc("StickingVertex::normal_force"));
     using Options = membrane::ToolFrictionOptions;
     auto friction = py::class_<ToolFriction>(module, "ToolFriction", doc("ToolFriction"));
     const std::string text = std::string(doc("ToolFriction::ToolFriction")) +
                              "\n\ncoefficient: " + doc("ToolFrictionOptions::coefficient") +
-                             "\nmax_contact_points: " + doc("ToolFrictionOptions::max_contact_points") + "\n";
+                             "\nmax_vertices: " + doc("ToolFrictionOptions::max_vertices") + "\n";
     friction
-        .def(py::init([](double coefficient, Index max_contact_points) {
-                 return ToolFriction({.coefficient = coefficient, .max_contact_points = max_contact_points});
+        .def(py::init([](double coefficient, Index max_vertices) {
+                 return ToolFriction({.coefficient = coefficient, .max_vertices = max_vertices});
              }),
-             py::kw_only(), py::arg("coefficient"), py::arg("max_contact_points") = Options{}.max_contact_points,
-             text.c_str())
+             py::kw_only(), py::arg("coefficient"), py::arg("max_vertices") = Options{}.max_vertices, text.c_str())
         .def_property_readonly(
-            "points", [](const ToolFriction& self) { return std::vector(self.points().begin(), self.points().end()); },
-            doc("ToolFriction::points"))
+            "vertices",
+            [](const ToolFriction& self) { return std::vector(self.vertices().begin(), self.vertices().end()); },
+            doc("ToolFriction::vertices"))
         .def_property_readonly("slips", &ToolFriction::slips, doc("ToolFriction::slips"))
         .def("reset", &ToolFriction::reset, doc("ToolFriction::reset"));
     def_in_loop(

@@ -221,8 +221,8 @@ def friction():
         device.write(report.total_reaction())
         numbers += [report.reactions[0].copy(), numpy.array([friction.slips])]
     numbers.append(x.ravel())
-    for point in friction.points:
-        numbers += [point.weights, point.offset, point.force, numpy.array([point.triangle, point.pressure])]
+    for v in friction.vertices:
+        numbers += [v.offset, v.force, v.normal_force, numpy.array([v.vertex])]
     return numpy.concatenate(numbers)
 
 
@@ -319,9 +319,9 @@ def start():
                 follow_all(tear.cut_along(path, x))
         follow_all(tear.update(x, dt, tissue, foundation))
         tree.refit(x, report.moved)
-        numbers.extend([*report.reactions[0], *slit, len(friction.points)])
-        for point in friction.points:
-            numbers.extend(point.weights)
+        numbers.extend([*report.reactions[0], *slit, len(friction.vertices)])
+        for v in friction.vertices:
+            numbers.extend(v.force)
         numbers.extend(tip.advanced for tip in tear.tips)
     assert perforated and tear.torn_length > 1e-3
     return numpy.concatenate([numbers, x.ravel()])

@@ -293,11 +293,11 @@ void friction() {
         std::printf("%d\n", friction.slips());
     }
     print_points(x);
-    for (const auto& point : friction.points()) {
-        print(point.weights);
-        print(point.offset);
-        print(point.force);
-        std::printf("%d %.17g\n", point.triangle, point.pressure);
+    for (const auto& v : friction.vertices()) {
+        print(v.offset);
+        print(v.force);
+        print(v.normal_force);
+        std::printf("%d\n", v.vertex);
     }
 }
 
@@ -409,8 +409,8 @@ void start() {
         follow_all(tear.update(x, dt, tissue, foundation));
         tree.refit(x, report.moved);
         print(report.reactions[0]);
-        std::printf("%d %d %d %zu\n", slit[0], slit[1], slit[2], friction.points().size());
-        for (const auto& point : friction.points()) print(point.weights);
+        std::printf("%d %d %d %zu\n", slit[0], slit[1], slit[2], friction.vertices().size());
+        for (const auto& v : friction.vertices()) print(v.force);
         for (const auto& tip : tear.tips()) std::printf("%.17g\n", tip.advanced);
     }
     print_points(x);

@@ -305,7 +305,7 @@ def test_an_error_of_a_law_is_raised_by_a_start():
 
 
 def test_a_friction_follows_a_tear():
-    """Where a vertex under the tool becomes two, each point keeps its place: on the triangle that has the copy now."""
+    """Where a vertex under the tool becomes two, the copy is held at the same place, by its share of the force."""
     strip = Strip()
     tree, tracker = membrane.AabbTree(strip.mesh), membrane.ContactTracker(strip.mesh)
     solver = membrane.QuasiStaticSolver(strip.tissue, layers=membrane.unlimited, sweeps=8)
@@ -316,18 +316,19 @@ def test_a_friction_follows_a_tear():
         press = each.press(tool, tracker.update(tree, strip.x, tool))
         solver.step(strip.x, 1e-3, strip.tissue, membrane.NoFoundation(), press)
         tree.refit(strip.x)
-        assert each.points
-    before = strip.tear.surface.triangles.copy()
-    path = strip.tear.slit_at(friction.points[0].corners[0], (1, 0, 0))
+        assert each.vertices
+    pressed = max(friction.vertices, key=lambda v: numpy.linalg.norm(v.normal_force))
+    path = strip.tear.slit_at(pressed.vertex, (1, 0, 0))
     event, = strip.tear.cut_along(path, strip.x)
     with pytest.raises(membrane.InvalidInput, match="parts must be different, got the same for 0 and 1"):
         membrane.follow(event, friction, friction)
     membrane.follow(event, friction, strip.tissue, solver, tree, tracker)
-    triangles = strip.tear.surface.triangles
-    for each, expected in ((friction, triangles), (missed, before)):
-        assert all(point.corners == expected[point.triangle].tolist() for point in each.points)
-    touched = [point.triangle for point in friction.points]
-    assert set(touched) & set(event.split.triangles.tolist())  # else there was nothing to follow
+    after = {v.vertex: v for v in friction.vertices}
+    halves = [after[event.split.vertex], after[event.split.copy]]
+    assert event.split.vertex == pressed.vertex
+    assert all((half.offset == pressed.offset).all() for half in halves)
+    numpy.testing.assert_allclose(sum(half.normal_force for half in halves), pressed.normal_force, rtol=1e-12)
+    assert event.split.copy not in [v.vertex for v in missed.vertices]
     with pytest.raises(membrane.InvalidInput, match="part 1 must be of the tear's mesh"):
         membrane.follow(event, friction, strip.tissue)
 
@@ -440,7 +441,7 @@ def test_a_friction_acts_once_in_a_step():
     press = friction.press(tool, contact)
     with pytest.raises(membrane.InvalidInput, match="friction of its own, got the same for 0 and 2"):
         solver.step(x, 1e-3, network, membrane.NoFoundation(), press, membrane.pin([5]), friction.press(tool, contact))
-    assert friction.points == [] and not friction.slips
+    assert friction.vertices == [] and not friction.slips
     del friction
     gc.collect()  # the constraint keeps it
     report = solver.step(x, 1e-3, network, membrane.NoFoundation(), press)

@@ -253,7 +253,9 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
         state_.restore(start);  // not finite at the start positions either: the input is invalid
         report_.status = sweeps.evaluate_residuals() ? StepStatus::unstable : StepStatus::invalid_input;
     }
-    if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
+    if (report_.status == StepStatus::advanced && !(is_finite(report_.residual) && acting.react(reactions_))) {
+        report_.status = StepStatus::unstable;
+    }
     if (report_.status != StepStatus::advanced) return refuse_step(report_.status);
     acting.end();
     resume_ = sweeps.resume;
@@ -351,6 +353,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus statu
     if (status == StepStatus::unstable) state_.reset_points();  // a force of the last step may have diverged
     predictor_.reset();
     reactions_.fill(Vector3<Scalar>::Zero());
+    report_.residual = 0;
     report_.status = status;
     return report_;
 }

@@ -59,7 +59,7 @@ struct StepReport {
     /// The deadline ended the step early: without it more vertex updates would have been made, even if none moved a
     /// vertex.
     bool out_of_time = false;
-    Scalar residual = 0;                         ///< largest residual force on a free active vertex at the end [N]
+    Scalar residual = 0;                         ///< largest residual force on a free active vertex [N]; 0 if refused
     Index vertex_updates = 0;                    ///< including evaluations of forces without an update
     std::span<const Index> moved;                ///< vertices whose position changed
     std::span<const Vector3<Scalar>> reactions;  ///< for each constraint, in order, the membrane's force on it [N]

@@ -13,7 +13,6 @@
 #include <membrane/core/check.hpp>
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/solve/tool_contact.hpp>
-#include <membrane/surface/triangle.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
 /// Coulomb friction between a tool and the membrane: the tool drags the tissue along.
@@ -25,26 +24,22 @@ namespace membrane {
 
 /// Options of `ToolFriction`.
 struct ToolFrictionOptions {
-    double coefficient;               ///< of Coulomb friction: largest ratio of tangential to normal force, at most 10
-    Index max_contact_points = 4096;  ///< capacity, see `SolverOptions`; points beyond it have no friction
+    double coefficient;         ///< of Coulomb friction: largest ratio of tangential to normal force, at most 10
+    Index max_vertices = 4096;  ///< capacity: corners of contact points; beyond it they have no friction
 
     /// @throws InvalidInput if a number is out of its range
     void check() const;
 };
 
-/// The place of the membrane that a contact point holds, and the friction force there.
+/// A vertex of the membrane that the tool holds, and the friction force on it.
 template <Real Scalar>
-struct StickingPoint {
-    Index triangle;                   ///< of the contact point
-    int feature;                      ///< of the tool, as of the contact point
-    std::array<Index, 3> corners;     ///< of the triangle
-    Vector3<Scalar> weights;          ///< barycentric, of the place on the membrane
-    Scalar along;                     ///< of the place on the tool: fraction of the axis
-    Vector3<Scalar> offset;           ///< from there to the place on the membrane [m]
-    Vector3<Scalar> force;            ///< of friction on the membrane [N]
-    Vector3<Scalar> sticking_force;   ///< that would keep the place, by the last pass [N]
-    Scalar pressure = 0;              ///< the normal force [N]
-    Vector3<Scalar> normal{0, 0, 1};  ///< of the contact point
+struct StickingVertex {
+    Index vertex;                    ///< a corner of a contact point
+    Scalar along;                    ///< of its place on the tool: fraction of the axis
+    Vector3<Scalar> offset;          ///< from there to the vertex [m]; not finite until it is held anew, see `reshape`
+    Vector3<Scalar> force;           ///< of friction on the vertex [N]
+    Vector3<Scalar> sticking_force;  ///< that would hold it, by the last pass [N]
+    Vector3<Scalar> normal_force;    ///< of the contact points on the vertex, by their weights [N]
 };
 
 template <Real Scalar>
@@ -78,27 +73,32 @@ struct FrictionalContact {
     ///@}
 };
 
-/// Friction of one tool, and what it keeps from tick to tick. Each contact point holds a place of the membrane: a force
-/// along the surface keeps it where it is on the tool, as long as that takes at most `coefficient` times the normal
-/// force of the point; else the place slips, against that force: the exact cone. The forces are found within the step,
-/// with all others, by projected Gauss-Seidel. Under a tool at rest the membrane does not creep: places are kept, and
-/// not displacements. With a coefficient near 1 or above it may: normal and friction forces of neighbouring points may
-/// alternate, so that a step does not converge. A contact point that moves on to another triangle takes hold anew.
+/// Friction of one tool, and what it keeps from tick to tick. Each corner of a contact point is a vertex that the tool
+/// holds: a force along the surface keeps it where it is on the tool, as long as that takes at most `coefficient` times
+/// the normal force on the vertex; else it slips, against that force: the exact cone. The forces are found within the
+/// step, with all others, by projected Gauss-Seidel. Triangles in contact share vertices, and how a normal
+/// force is divided among their contact points is not unique; its sum on a vertex is. Hence friction of vertices.
 ///
-/// The tool does not rotate: a shaft that turns drags as if it were shifted. Fixed corners take no friction. `ContactFriction` adds friction to the
-/// hand's force alone; with this part the reaction has it. `equilibrium` and error bounds do not know it.
+/// Under a tool at rest the membrane does not creep: places are kept, and not displacements. It may where friction
+/// compresses the membrane beyond its buckling load: wrinkles under the tool have no equilibrium that a step converges
+/// to. Coefficients of 1 do that, unless the membrane is stretched or resists bending.
+///
+/// The tool does not rotate: a shaft that turns drags as if it were shifted. A vertex that comes into contact is held
+/// from then on. Fixed vertices take no friction. `ContactFriction` adds friction to the hand's force alone; with this
+/// part the reaction has it. `equilibrium` and error bounds do not know it.
 ///
 /// A step that is refused leaves it unchanged, to the bit.
 ///
-/// Online, but for the constructor. Cost: linear in the contact points, in each sweep.
+/// Online, but for the constructor. Cost: n log n in each sweep, for n contact points.
 template <Real Scalar>
 class ToolFriction {
   public:
     /// Allocates. @throws InvalidInput if an option is out of its range
     explicit ToolFriction(const ToolFrictionOptions& options)
         : coefficient_((options.check(), static_cast<Scalar>(options.coefficient))),
-          points_(static_cast<std::size_t>(options.max_contact_points)),
-          kept_(points_) {}
+          vertices_(static_cast<std::size_t>(options.max_vertices)),
+          kept_(vertices_),
+          corners_(3 * vertices_.capacity()) {}
 
     /// The tool presses at its contact, as by `membrane::press`, with friction. In one step at most once; must outlive
     /// the step.
@@ -107,43 +107,38 @@ class ToolFriction {
         return {membrane::press(tool, contact, grasp), this};
     }
 
-    /// The contact points of the last step, with their friction.
-    [[nodiscard]] std::span<const StickingPoint<Scalar>> points() const noexcept { return kept_.items(); }
+    /// The vertices in contact in the last step, with their friction, in increasing order.
+    [[nodiscard]] std::span<const StickingVertex<Scalar>> vertices() const noexcept { return kept_.items(); }
 
-    /// Whether a point with a normal force slips in the last step.
+    /// Whether a vertex with a normal force slips in the last step.
     [[nodiscard]] bool slips() const noexcept {
-        return std::any_of(points().begin(), points().end(),
-                           [this](const Point& point) { return point.pressure > 0 && is_at_limit(point); });
+        return std::any_of(vertices().begin(), vertices().end(),
+                           [this](const Vertex& v) { return squared_norm(v.normal_force) > 0 && is_at_limit(v); });
     }
 
     ///@{
-    /// A vertex becomes two; a vertex moves at rest. A point holds the same place of the membrane. Online. Cost: contact
-    /// points times the triangles around the vertex.
-    void split(const VertexSplit& split) noexcept {
-        for (Point& point : kept_.items()) {
-            if (split.takes(point.triangle)) split.replace_in(point.corners);
-        }
+    /// A vertex becomes two, which are held at the same place and share the forces; a vertex moves at rest, and is held
+    /// where it is at the next step, by the same force. Online. Cost: linear in the vertices in contact.
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept {
+        constexpr Scalar anew = std::numeric_limits<Scalar>::quiet_NaN();
+        if (auto* const v = find(kept_.items(), moved.vertex); v != nullptr) v->offset = {anew, anew, anew};
     }
-    void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}
 
     /// Forgets all places. Cost: O(1).
-    void reset() noexcept {
-        kept_.clear();
-        tool_ = {};
-        has_tool_ = false;
-    }
+    void reset() noexcept { kept_.clear(); }
 
     /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.kept_, self.tool_, self.has_tool_);
+        visit(self.kept_);
     }
 
   private:
     friend FrictionalContact<Scalar>;
     using Context = ConstraintContext<Scalar>;
-    using Point = StickingPoint<Scalar>;
+    using Vertex = StickingVertex<Scalar>;
 
     void begin(Context& context, const Tool<Scalar>& tool) noexcept;
     bool solve(Context& context, const Tool<Scalar>& tool) noexcept;
@@ -151,128 +146,142 @@ class ToolFriction {
     [[nodiscard]] Vector3<Scalar> reaction() const noexcept;
     void end(const Context& context, const Tool<Scalar>& tool) noexcept;
 
-    void read_normal_forces(Context& context) noexcept;
-    [[nodiscard]] const Point* kept(const ContactPoint<Scalar>& point, std::size_t& next) const noexcept;
-    [[nodiscard]] Scalar stick(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept;
-    [[nodiscard]] Vector3<Scalar> limited(const Vector3<Scalar>& force, const Point& point) const noexcept;
-    [[nodiscard]] bool is_at_limit(const Point& point) const noexcept {
+    void list_corners(const Context& context) noexcept;
+    void read_normal_forces(const Context& context) noexcept;
+    [[nodiscard]] static auto not_less(std::span<Vertex> vertices, Index v) noexcept {
+        return std::lower_bound(vertices.begin(), vertices.end(), v,
+                                [](const Vertex& one, Index other) { return one.vertex < other; });
+    }
+    [[nodiscard]] static Vertex* find(std::span<Vertex> vertices, Index v) noexcept {
+        const auto found = not_less(vertices, v);
+        return found != vertices.end() && found->vertex == v ? &*found : nullptr;
+    }
+    [[nodiscard]] Scalar stick(Context& context, const Tool<Scalar>& tool, Vertex& v) const noexcept;
+    [[nodiscard]] static Vector3<Scalar> tangential(const Vector3<Scalar>& vector, const Vertex& v) noexcept {
+        const Vector3<Scalar> normal = direction_or_zero(v.normal_force);
+        return vector - dot(vector, normal) * normal;
+    }
+    [[nodiscard]] Vector3<Scalar> limited(const Vector3<Scalar>& force, const Vertex& v) const noexcept;
+    [[nodiscard]] bool is_at_limit(const Vertex& v) const noexcept {
         constexpr Scalar rounding = Scalar(64) * std::numeric_limits<Scalar>::epsilon();
-        return norm(point.force) >= coefficient_ * point.pressure * (1 - rounding);
+        return norm(v.force) >= coefficient_ * norm(v.normal_force) * (1 - rounding);
     }
-    [[nodiscard]] static Vector3<Scalar> place(const Context& context, const Point& point) noexcept {
-        return point_at(triangle_of(context, point.corners), point.weights);
+    [[nodiscard]] static Vector3<Scalar> on_tool(const Tool<Scalar>& tool, const Vertex& v) noexcept {
+        return tool.position + v.along * tool.axis;
     }
-    [[nodiscard]] static Vector3<Scalar> on_tool(const Tool<Scalar>& tool, const Point& point) noexcept {
-        return tool.position + point.along * tool.axis;
-    }
-    // Lets the point hold its place, at `position`, by `tool`.
-    static void hold(Point& point, const Vector3<Scalar>& position, const Tool<Scalar>& tool) noexcept;
+    // Lets `tool` hold the vertex at `position`.
+    static void hold(Vertex& v, const Vector3<Scalar>& position, const Tool<Scalar>& tool) noexcept;
 
     Scalar coefficient_;
-    FixedVector<Point> points_, kept_;  // of this step, in the order of the contact points; of the last one
-    Tool<Scalar> tool_;                 // in the last step
-    bool has_tool_ = false;
+    FixedVector<Vertex> vertices_, kept_;  // of this step; of the last one
+    FixedVector<Index> corners_;           // of the contact points, each once
 };
 
 inline void ToolFrictionOptions::check() const {
     constexpr std::string_view component = "ToolFriction";
     detail::check_option(component, coefficient, "coefficient", "1");
     if (coefficient > 10) refuse(component, "coefficient must be at most 10, got ", coefficient);
-    if (max_contact_points < 1) {
-        refuse(component, "max_contact_points must be at least 1, got ", max_contact_points);
-    }
+    if (max_vertices < 1) refuse(component, "max_vertices must be at least 1, got ", max_vertices);
 }
 
-// Finds the places that the contact points of this step hold, and applies their forces of the last step.
+template <Real Scalar>
+void ToolFriction<Scalar>::split(const VertexSplit& split) noexcept {
+    auto* const v = find(kept_.items(), split.vertex);
+    if (v == nullptr) return;
+    Vertex copy = *v;
+    copy.vertex = split.copy;
+    const auto share = static_cast<Scalar>(split.area_share);
+    for (auto force : {&Vertex::force, &Vertex::sticking_force, &Vertex::normal_force}) {
+        copy.*force = share * (v->*force);
+        v->*force -= copy.*force;
+    }
+    if (!kept_.try_push_back(copy)) return;
+    const auto all = kept_.items();
+    std::rotate(not_less(all.first(all.size() - 1), copy.vertex), all.end() - 1, all.end());
+}
+
+template <Real Scalar>
+void ToolFriction<Scalar>::list_corners(const Context& context) noexcept {
+    corners_.clear();
+    for (const auto& point : context.points()) {
+        for (const Index v : point.corners) {
+            if (!corners_.try_push_back(v)) break;
+        }
+    }
+    const auto all = corners_.items();
+    std::sort(all.begin(), all.end());
+    corners_.truncate(static_cast<std::size_t>(std::unique(all.begin(), all.end()) - all.begin()));
+}
+
+// Holds the vertices of this step, and applies their forces of the last step.
 template <Real Scalar>
 void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noexcept {
-    points_.clear();
-    const auto contacts = std::as_const(context).points();
-    std::size_t next = 0;  // of the points that are kept, in nearly the same order
-    for (const auto& contact : contacts) {
-        Point point;
-        if (const auto* before = kept(contact, next); before != nullptr) {
-            point = *before;
-        } else {
-            point.triangle = contact.triangle;
-            point.feature = contact.feature;
-            point.corners = contact.corners;
-            point.weights = contact.weights;
-            point.force = Vector3<Scalar>::Zero();
-            const auto& v = contact.corners;
-            const Triangle<Scalar> start{context.start(v[0]), context.start(v[1]), context.start(v[2])};
-            hold(point, point_at(start, point.weights), has_tool_ ? tool_ : tool);
-        }
-        point.pressure = norm(contact.force);
-        point.normal = contact.normal;
-        point.force = point.sticking_force = limited(point.force, point);
-        if (!points_.try_push_back(point)) break;
-        add_point_force(context, point.corners, point.weights, point.force);
+    list_corners(context);
+    vertices_.clear();
+    for (const Index corner : corners_.items()) {
+        const auto* const before = find(kept_.items(), corner);
+        const bool is_kept = before != nullptr && is_finite(before->force);
+        Vertex v = is_kept ? *before : Vertex{.vertex = corner, .along = 0, .offset = {}, .force = {0, 0, 0}};
+        if (!is_kept || !is_finite(v.offset)) hold(v, context.start(corner), tool);
+        if (!vertices_.try_push_back(v)) break;
+    }
+    read_normal_forces(context);
+    for (Vertex& v : vertices_.items()) {
+        v.force = v.sticking_force = limited(v.force, v);
+        context.add_force(v.vertex, v.force);
     }
 }
 
-// The point of the last step with this triangle and feature, or null; searches from `next` on.
 template <Real Scalar>
-auto ToolFriction<Scalar>::kept(const ContactPoint<Scalar>& point, std::size_t& next) const noexcept -> const Point* {
-    const auto all = kept_.items();
-    const auto same = [&](const Point& other) {
-        return other.triangle == point.triangle && other.feature == point.feature && other.corners == point.corners;
-    };
-    const auto from = all.begin() + static_cast<std::ptrdiff_t>(next);
-    auto found = std::find_if(from, all.end(), same);
-    if (found == all.end()) {
-        found = std::find_if(all.begin(), from, same);
-        if (found == from) return nullptr;
-    }
-    next = static_cast<std::size_t>(found - all.begin()) + 1;
-    return is_finite(found->force) && is_finite(found->offset) ? &*found : nullptr;
-}
-
-template <Real Scalar>
-void ToolFriction<Scalar>::hold(Point& point, const Vector3<Scalar>& position, const Tool<Scalar>& tool) noexcept {
+void ToolFriction<Scalar>::hold(Vertex& v, const Vector3<Scalar>& position, const Tool<Scalar>& tool) noexcept {
     const Scalar square = squared_norm<Scalar>(tool.axis);
     const Scalar along = square > 0 ? dot<Scalar>(position - tool.position, tool.axis) / square : Scalar(0);
-    point.along = std::clamp(along, Scalar(0), Scalar(1));
-    point.offset = position - on_tool(tool, point);
+    v.along = std::clamp(along, Scalar(0), Scalar(1));
+    v.offset = position - on_tool(tool, v);
 }
 
-// Normal forces and normals by the last pass over the contact points.
+// By the last pass over the contact points.
 template <Real Scalar>
-void ToolFriction<Scalar>::read_normal_forces(Context& context) noexcept {
-    auto& state = context.state();
-    const auto first = static_cast<Index>(state.point_ranges[context.constraint()].begin);
+void ToolFriction<Scalar>::read_normal_forces(const Context& context) noexcept {
+    for (Vertex& v : vertices_.items()) v.normal_force = Vector3<Scalar>::Zero();
+    const auto& state = context.state();
     for (const auto& pack : state.pack_ranges[context.constraint()].of(state.packs.items())) {
         for (std::size_t i = 0; i < pack.size; ++i) {
-            const auto at = static_cast<std::size_t>(pack.point[i] - first);
-            if (at >= points_.size()) continue;
-            Point& point = points_.items()[at];
-            point.pressure = pack.load.force[i];
-            point.normal = {pack.load.normal[0][i], pack.load.normal[1][i], pack.load.normal[2][i]};
+            const auto& normal = pack.load.normal;
+            const Vector3<Scalar> force =
+                -pack.load.force[i] * Vector3<Scalar>(normal[0][i], normal[1][i], normal[2][i]);
+            for (std::size_t k = 0; k < 3; ++k) {
+                auto* const v = find(vertices_.items(), pack.corner[k][i] / numbers_in_point);
+                if (v == nullptr) continue;
+                v->normal_force += pack.load.weights[static_cast<Eigen::Index>(k)][i] * force;
+            }
         }
     }
 }
 
-// Without the part along the normal, and within the cone.
+// The tangential part, within the cone.
 template <Real Scalar>
-Vector3<Scalar> ToolFriction<Scalar>::limited(const Vector3<Scalar>& force, const Point& point) const noexcept {
-    const Vector3<Scalar> tangential = force - dot(force, point.normal) * point.normal;
-    const Scalar size = norm(tangential), largest = coefficient_ * point.pressure;
-    return size > largest ? (largest / size) * tangential : tangential;
+Vector3<Scalar> ToolFriction<Scalar>::limited(const Vector3<Scalar>& force, const Vertex& v) const noexcept {
+    const Vector3<Scalar> along = tangential(force, v);
+    const Scalar size = norm(along), largest = coefficient_ * norm(v.normal_force);
+    return size > largest ? (largest / size) * along : along;
 }
 
-// Changes the force of a point by its slip over the compliance in that direction, and moves the corners by their
-// response. Returns the change [N], zero if the response is negligible.
+// Changes the force on a vertex by its slip over the compliance in that direction, and moves it by its response.
+// Returns the change [N], zero if the response is negligible.
 template <Real Scalar>
-Scalar ToolFriction<Scalar>::stick(Context& context, const Tool<Scalar>& tool, Point& point) const noexcept {
-    const Vector3<Scalar> now = place(context, point), off = now - on_tool(tool, point) - point.offset;
-    const Vector3<Scalar> slip = off - dot(off, point.normal) * point.normal;
+Scalar ToolFriction<Scalar>::stick(Context& context, const Tool<Scalar>& tool, Vertex& v) const noexcept {
+    const Vector3<Scalar> now = context.position(v.vertex);
+    const Vector3<Scalar> slip = tangential(now - on_tool(tool, v) - v.offset, v);
     const Vector3<Scalar> along = direction_or_zero(slip);
-    const Scalar compliance = dot(along, response_of<Scalar>(context, point, along));
-    point.sticking_force = compliance > 0 ? point.force - (1 / compliance) * slip : point.force;
-    const Vector3<Scalar> change = limited(point.sticking_force, point) - point.force;
+    const Scalar compliance = dot(along, context.response(v.vertex, along));
+    v.sticking_force = compliance > 0 ? v.force - (1 / compliance) * slip : v.force;
+    const Vector3<Scalar> change = limited(v.sticking_force, v) - v.force;
     const Scalar size = norm(change);
     if (!(size > context.force_tolerance()) || !(size * compliance > detail::rounding_at(now))) return 0;
-    membrane::change_force<Scalar>(context, point, change);
+    v.force += change;
+    context.add_force(v.vertex, change);
+    context.move(v.vertex, context.response(v.vertex, change));
     return size;
 }
 
@@ -284,7 +293,7 @@ bool ToolFriction<Scalar>::solve(Context& context, const Tool<Scalar>& tool) noe
     Scalar first = 0;
     for (int pass = 0; pass < max_passes; ++pass) {
         Scalar largest = 0;
-        for (auto& point : points_.items()) largest = (std::max)(largest, stick(context, tool, point));
+        for (Vertex& v : vertices_.items()) largest = (std::max)(largest, stick(context, tool, v));
         if (pass == 0) first = largest;
         if (!(largest > first / 2)) break;
     }
@@ -295,11 +304,11 @@ bool ToolFriction<Scalar>::solve(Context& context, const Tool<Scalar>& tool) noe
 template <Real Scalar>
 void ToolFriction<Scalar>::limit(Context& context) noexcept {
     read_normal_forces(context);
-    for (auto& point : points_.items()) {
-        const Vector3<Scalar> now = limited(point.sticking_force, point);
-        if (now == point.force) continue;
-        add_point_force<Scalar>(context, point.corners, point.weights, now - point.force);
-        point.force = now;
+    for (Vertex& v : vertices_.items()) {
+        const Vector3<Scalar> now = limited(v.sticking_force, v);
+        if (now == v.force) continue;
+        context.add_force(v.vertex, now - v.force);
+        v.force = now;
     }
 }
 
@@ -307,48 +316,27 @@ void ToolFriction<Scalar>::limit(Context& context) noexcept {
 template <Real Scalar>
 Vector3<Scalar> ToolFriction<Scalar>::reaction() const noexcept {
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
-    for (const auto& point : points_.items()) sum -= point.force;
+    for (const Vertex& v : vertices_.items()) sum -= v.force;
     return sum;
 }
 
-// Keeps the points of a step that has advanced. Those that slip, or do not press, hold what is in contact now.
+// Keeps the vertices of a step that has advanced. Those that slip, or are not pressed, are held where they are now. As
+// long as holding a vertex would take hardly more than its limit, its slip is reversible: if not, each small change of
+// the normal forces of a tool at rest would let go of some friction.
 template <Real Scalar>
 void ToolFriction<Scalar>::end(const Context& context, const Tool<Scalar>& tool) noexcept {
-    const auto contacts = context.points();
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-        Point& point = points_.items()[i];
-        if (!is_at_limit(point)) continue;
-        point.weights = contacts[i].weights;
-        hold(point, place(context, point), tool);
-    }
-    std::swap(points_, kept_);
-    tool_ = tool;
-    has_tool_ = true;
-}
-
-namespace detail {
-
-/// The weights of the point of the triangle's plane that is nearest to `q`; negative beyond a side.
-template <Real Scalar>
-[[nodiscard]] Vector3<Scalar> weights_in_plane(const Triangle<Scalar>& triangle, const Vector3<Scalar>& q) noexcept {
-    const Vector3<Scalar> ab = triangle.b - triangle.a, ac = triangle.c - triangle.a, aq = q - triangle.a;
-    const Vector3<Scalar> twice = cross(ab, ac), normal = direction_or_zero(twice);
-    const Scalar b = dot(cross(aq, ac), normal) / norm(twice), c = dot(cross(ab, aq), normal) / norm(twice);
-    return {1 - b - c, b, c};
-}
-
-}  // namespace detail
-
-// The place may be beyond a side of its triangle from then on: as far as the membrane is smooth, the same place.
-template <Real Scalar>
-void ToolFriction<Scalar>::reshape(const MovedVertex<Scalar>& moved) noexcept {
-    const auto at = [](const std::array<Vector3<Scalar>, 3>& x) { return Triangle<Scalar>{x[0], x[1], x[2]}; };
-    for (Point& point : kept_.items()) {
-        for (const auto& one : moved.triangles) {
-            if (one.triangle != point.triangle) continue;
-            point.weights = detail::weights_in_plane(at(one.after), point_at(at(one.before), point.weights));
+    constexpr auto reversible = Scalar(1.01);
+    for (Vertex& v : vertices_.items()) {
+        const Scalar largest = reversible * coefficient_ * norm(v.normal_force);
+        const bool holds = largest > 0 && norm(tangential(v.sticking_force, v)) <= largest;
+        const Vector3<Scalar> now = context.position(v.vertex), off = now - on_tool(tool, v) - v.offset;
+        if (holds) {
+            v.offset += off - tangential(off, v);  // it holds along the surface only
+        } else {
+            hold(v, now, tool);
         }
     }
+    std::swap(vertices_, kept_);
 }
 
 static_assert(Constraint<FrictionalContact<double>, double> && Constraint<FrictionalContact<float>, float>);
