@@ -49,6 +49,10 @@
 #include <membrane/haptics/recording_file.hpp>
 // [/recording]
 
+// [tear_reset]
+#include <membrane/core/initial_state.hpp>
+// [/tear_reset]
+
 // [snapshot]
 #include <membrane/core/snapshot.hpp>
 // [/snapshot]
@@ -662,6 +666,28 @@ TEST_CASE("pages: tear") {
     // [/tear]
     CHECK(report.status == membrane::StepStatus::advanced);
     CHECK(tear.tips().size() == 2);
+}
+
+TEST_CASE("pages: tear_reset") {
+    const auto mesh = membrane::with_reserve(membrane::disc<double>({.radius = 0.005, .rings = 8}), 50);
+    const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 20.0});
+    auto tissue = membrane::Tissue(membrane::TearableSprings(mesh, network));
+    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = 12});
+    auto tree = membrane::AabbTree(mesh);
+    auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 1.4e3, .thickness = 12e-6});
+    auto x = mesh.positions();
+    // [tear_reset]
+    const membrane::InitialState whole(tear, tissue, solver, tree, x);  // before the loop: all that a tear changes
+    const auto sew_up = [&] {                                           // between two ticks
+        if (!whole.reset(tear, tissue, solver, tree, x)) return false;
+        tree.refit(x);
+        return true;
+    };
+    // [/tear_reset]
+    for (const auto& event : tear.cut_along(tear.slit_at(0, {1, 0, 0}), x)) follow(event, tissue, solver, tree);
+    REQUIRE(tear.surface().triangles() != mesh.triangles());
+    REQUIRE(sew_up());
+    CHECK(tear.surface().triangles() == mesh.triangles());
 }
 
 TEST_CASE("pages: tear_starts") {

@@ -18,12 +18,14 @@
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
 
+#include <membrane/core/initial_state.hpp>
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/haptics/contact_friction.hpp>
 #include <membrane/haptics/force_limits.hpp>
@@ -385,16 +387,13 @@ class Torn : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
          const Foundation& foundation, const membrane::EnergyRelease& criterion, const Variant<Scalar>& variant)
         : Base(name, mesh, network, foundation, variant, membrane::AnyExecutor()), tear_(mesh, criterion) {
         this->x_.template topRows<2>() *= Scalar(1.05);
-        visit_parts([&](auto&... parts) {
-            whole_.resize(membrane::snapshot_capacity(parts...));
-            whole_.resize(membrane::save_snapshot(whole_, parts...));
-        });
+        visit_parts([&](auto&... parts) { whole_.emplace(parts...); });
     }
 
     void tick() {
         if (tear_.reserve_used_up()) {
             visit_parts([&](auto&... parts) {
-                if (!membrane::restore_snapshot(whole_, parts...)) std::abort();
+                if (!whole_->reset(parts...)) std::abort();
             });
             this->tree_.refit(this->x_);
         }
@@ -433,7 +432,7 @@ class Torn : public Loop<Scalar, Network, Foundation, membrane::BlockStep> {
     }
 
     membrane::Tearing<Scalar> tear_;
-    std::vector<std::byte> whole_;
+    std::optional<membrane::InitialState> whole_;
     int tick_ = 0;
 };
 
