@@ -1,9 +1,9 @@
 # Run in the folder of the tables of `bench/run tear`.
-set terminal svg size 900,760 font 'Helvetica,Arial,sans-serif,12' background '#ffffff'
+set terminal svg size 900,1140 font 'Helvetica,Arial,sans-serif,12' background '#ffffff'
 set output 'tear.svg'
 set datafile separator tab
 set datafile columnheaders
-set multiplot layout 2,2 title 'Tears on meshes of several sizes and directions' font ',15'
+set multiplot layout 3,2 title 'Tears on meshes of several sizes and directions' font ',15'
 set grid lc '#d8d8d8' lw 0.7
 set border 3 lc '#444444'
 set xtics nomirror
@@ -28,6 +28,25 @@ set yrange [0:1.6]
 plot 0.7 dt 2 lc '#999999' notitle, \
      for [i = 1:words(meshes)] 'tear_grids.tsv' using 2:(only(3, i)) with linespoints pt 7 ps 0.5 lc rgb colour(i) \
          title word(meshes, i) . ' edges high'
+
+legs = system("awk 'NR > 1 && NF && !seen[$1]++ { printf \"%s \", $1 }' tear_trousers.tsv")
+of_leg(c, i) = column(1) == real(word(legs, i)) ? column(c) : NaN
+first_of_leg(c, i) = column(2) == 0 ? of_leg(c, i) : NaN
+
+set title 'Trousers, a grid of 0 degrees'
+set xlabel 'displacement of a hand [edges]'
+set ylabel 'force over the closed form'
+set yrange [0:2]
+plot 1 dt 2 lc '#999999' notitle, \
+     for [i = 1:words(legs)] 'tear_trousers.tsv' using 3:(first_of_leg(4, i)) with lines lc rgb colour(i) lw 0.8 \
+         title word(legs, i) . ' edges over a leg'
+
+set title 'Trousers, mean force on grids of all directions'
+set xlabel 'direction of the grid [degrees]'
+set yrange [0.8:1.4]
+plot 0.95 dt 2 lc '#999999' notitle, 1.05 dt 2 lc '#999999' notitle, \
+     for [i = 1:words(legs)] 'tear_trouser_means.tsv' using 2:(of_leg(3, i)) with linespoints pt 7 ps 0.5 \
+         lc rgb colour(i) title word(legs, i) . ' edges over a leg'
 
 set title 'Force per length at which it begins'
 set xlabel 'edge [mm]'

@@ -34,12 +34,12 @@ struct ToolFrictionOptions {
 /// A vertex of the membrane that the tool holds, and the friction force on it.
 template <Real Scalar>
 struct StickingVertex {
-    Index vertex;                    ///< a corner of a contact point
-    Scalar along;                    ///< of its place on the tool: fraction of the axis
-    Vector3<Scalar> offset;          ///< from there to the vertex [m]; not finite until it is held anew, see `reshape`
-    Vector3<Scalar> force;           ///< of friction on the vertex [N]
-    Vector3<Scalar> sticking_force;  ///< that would hold it, by the last pass [N]
-    Vector3<Scalar> normal_force;    ///< of the contact points on the vertex, by their weights [N]
+    Index vertex = no_index;                                   ///< a corner of a contact point
+    Scalar along = 0;                                          ///< of its place on the tool: fraction of the axis
+    Vector3<Scalar> offset = Vector3<Scalar>::Zero();          ///< from there to the vertex [m], see `reshape`
+    Vector3<Scalar> force = Vector3<Scalar>::Zero();           ///< of friction on the vertex [N]
+    Vector3<Scalar> sticking_force = Vector3<Scalar>::Zero();  ///< that would hold it, by the last pass [N]
+    Vector3<Scalar> normal_force = Vector3<Scalar>::Zero();    ///< of the contact points on it, by their weights [N]
 };
 
 template <Real Scalar>
@@ -118,7 +118,8 @@ class ToolFriction {
 
     ///@{
     /// A vertex becomes two, which are held at the same place and share the forces; a vertex moves at rest, and is held
-    /// where it is at the next step, by the same force. Online. Cost: linear in the vertices in contact.
+    /// where it is at the next step, by the same force; until then its offset is not finite. Online. Cost: linear in the
+    /// vertices in contact.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept {
         constexpr Scalar anew = std::numeric_limits<Scalar>::quiet_NaN();
@@ -221,7 +222,7 @@ void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noe
     for (const Index corner : corners_.items()) {
         const auto* const before = find(kept_.items(), corner);
         const bool is_kept = before != nullptr && is_finite(before->force);
-        Vertex v = is_kept ? *before : Vertex{.vertex = corner, .along = 0, .offset = {}, .force = {0, 0, 0}};
+        Vertex v = is_kept ? *before : Vertex{.vertex = corner};
         if (!is_kept || !is_finite(v.offset)) hold(v, context.start(corner), tool);
         if (!vertices_.try_push_back(v)) break;
     }
