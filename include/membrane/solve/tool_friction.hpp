@@ -73,11 +73,11 @@ struct FrictionalContact {
     ///@}
 };
 
-/// Friction of one tool, and what it keeps from tick to tick. Each corner of a contact point is a vertex that the tool
-/// holds: a force along the surface keeps it where it is on the tool, as long as that takes at most `coefficient` times
-/// the normal force on the vertex; else it slips, against that force: the exact cone. The forces are found within the
-/// step, with all others, by projected Gauss-Seidel. Triangles in contact share vertices, and how a normal
-/// force is divided among their contact points is not unique; its sum on a vertex is. Hence friction of vertices.
+/// Friction of one tool, and what it keeps from tick to tick. The tool holds the corners of its contact points: a force
+/// along the surface keeps each vertex where it is on the tool, as long as that takes at most `coefficient` times the
+/// normal force on the vertex; else it slips, against that force: the exact cone. The forces are found within the step,
+/// with all others, by projected Gauss-Seidel. Friction acts on vertices and not at contact points, since triangles in
+/// contact share vertices: the normal force on a vertex is unique, its division among the contact points is not.
 ///
 /// Under a tool at rest the membrane does not creep: places are kept, and not displacements. It may where friction
 /// compresses the membrane beyond its buckling load: wrinkles under the tool have no equilibrium that a step converges
