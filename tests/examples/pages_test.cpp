@@ -677,7 +677,7 @@ TEST_CASE("pages: tear_reset") {
     auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 1.4e3, .thickness = 12e-6});
     auto x = mesh.positions();
     // [tear_reset]
-    const membrane::InitialState whole(tear, tissue, solver, tree, x);  // before the loop: all that a tear changes
+    const membrane::InitialState whole(tear, tissue, solver, tree, x);  // all that follows a tear, and x
     const auto sew_up = [&] {                                           // between two ticks
         if (!whole.reset(tear, tissue, solver, tree, x)) return false;
         tree.refit(x);

@@ -334,6 +334,32 @@ TEST_CASE("on a body that moves with the tool a frictional contact is at rest", 
     }
 }
 
+TEST_CASE("vertices that become fixed under the tool lose their friction, and are held anew when free", "[friction]") {
+    Drag<double> drag({.friction = 0.6, .rings = 10, .stretch = 1.1});
+    drag.press_in();
+    for (int i = 1; i <= 20; ++i) drag.move_to({1e-6 * i, 0, 0});
+    const std::vector<Index> middle{0, 1, 2, 3, 4, 5, 6};
+    const auto is_held = [&](Index v) {
+        const auto all = drag.friction.vertices();
+        return std::any_of(all.begin(), all.end(), [&](const auto& one) { return one.vertex == v; });
+    };
+    REQUIRE(std::all_of(middle.begin(), middle.end(), is_held));
+    for (int i = 0; i < 50; ++i) {
+        drag.tool.position[0] -= 1e-6;
+        const auto contact = drag.tracker.update(drag.tree, drag.x, drag.tool);
+        drag.report = drag.solver.step(drag.x, 1e-3, drag.network, drag.foundation,
+                                       drag.friction.press(drag.tool, contact), pin(middle));
+        REQUIRE(drag.report.status == StepStatus::advanced);
+        drag.tree.refit(drag.x, drag.report.moved);
+        REQUIRE(std::none_of(middle.begin(), middle.end(), is_held));
+        drag.check_cones();
+    }
+    // Against the motion to the left.
+    for (int i = 0; i < 20; ++i) drag.move_to({-30e-6 - 1e-6 * i, 0, 0});
+    CHECK(std::all_of(middle.begin(), middle.end(), is_held));
+    CHECK(drag.report.total_reaction()[0] > 0.1 * drag.report.total_reaction()[2]);
+}
+
 TEST_CASE("friction is restored from a snapshot, and runs on to the same bits", "[friction]") {
     Drag<double> drag({.friction = 0.4});
     drag.press_in();

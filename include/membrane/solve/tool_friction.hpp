@@ -25,7 +25,7 @@ namespace membrane {
 /// Options of `ToolFriction`.
 struct ToolFrictionOptions {
     double coefficient;         ///< of Coulomb friction: largest ratio of tangential to normal force, at most 10
-    Index max_vertices = 4096;  ///< capacity: corners of contact points; beyond it they have no friction
+    Index max_vertices = 4096;  ///< capacity: corners of contact points; of more, those last in order have no friction
 
     /// @throws InvalidInput if a number is out of its range
     void check() const;
@@ -100,14 +100,14 @@ class ToolFriction {
           kept_(vertices_),
           corners_(3 * vertices_.capacity()) {}
 
-    /// The tool presses at its contact, as by `membrane::press`, with friction. In one step at most once; must outlive
-    /// the step.
+    /// The tool presses at its contact, as by `membrane::press`, with friction. Forceps that hold a grasp do not press,
+    /// and forget all places. In one step at most once; must outlive the step.
     [[nodiscard]] FrictionalContact<Scalar> press(const Tool<Scalar>& tool, const Contact<Scalar>& contact,
                                                   const Grasp<Scalar>& grasp = {}) noexcept {
         return {membrane::press(tool, contact, grasp), this};
     }
 
-    /// The vertices in contact in the last step, with their friction, in increasing order.
+    /// The vertices in contact in the last step that are not fixed, with their friction, in increasing order.
     [[nodiscard]] std::span<const StickingVertex<Scalar>> vertices() const noexcept { return kept_.items(); }
 
     /// Whether a vertex with a normal force slips in the last step.
@@ -117,9 +117,9 @@ class ToolFriction {
     }
 
     ///@{
-    /// A vertex becomes two, which are held at the same place and share the forces; a vertex moves at rest, and is held
-    /// where it is at the next step, by the same force; until then its offset is not finite. Online. Cost: linear in the
-    /// vertices in contact.
+    /// A vertex becomes two, which are held at the same place and share the forces; beyond the capacity the copy is not
+    /// held. A vertex moves at rest, and is held where it is at the next step, by the same force; until then its offset
+    /// is not finite. Online. Cost: linear in the vertices in contact.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept {
         constexpr Scalar anew = std::numeric_limits<Scalar>::quiet_NaN();
@@ -220,6 +220,7 @@ void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noe
     list_corners(context);
     vertices_.clear();
     for (const Index corner : corners_.items()) {
+        if (context.fixed(corner)) continue;
         const auto* const before = find(kept_.items(), corner);
         const bool is_kept = before != nullptr && is_finite(before->force);
         Vertex v = is_kept ? *before : Vertex{.vertex = corner};

@@ -34,8 +34,9 @@ namespace membrane {
 ///
 /// A motion carries the membrane, pinned vertices included: the offset of each vertex from its anchor is kept and
 /// rotated with the pose. The state of other parts (contact, grasp, forces, displacements) is transformed with the pose
-/// at their next call. So a rigid motion of body, membrane and tool together has no effect, up to rounding. Vertices
-/// are woken only if the motion of the anchors is not rigid.
+/// at their next call. So a rigid motion of body, membrane and tool together has no effect, up to rounding; but a
+/// tool with friction (`ToolFriction`) does not rotate: a body that turns with it slips. Vertices are woken only if the
+/// motion of the anchors is not rigid.
 ///
 /// A body with rigid motion only, as an eye in its orbit, does not need this class if positions need not be in the
 /// world: with `to_body_frame(tool, frame)` the membrane stays in the frame of the body, at no cost. Loads with a fixed
