@@ -238,6 +238,7 @@ TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[frictio
                                    Settings{.friction = 1.0, .sweeps = 20, .stretch = 1.1},
                                    Settings{.friction = 1.0, .sweeps = 20, .radius = 20e-3, .stretch = 1.2});
     CAPTURE(settings.friction, settings.sweeps, settings.radius);
+    if (cases_are_slow && settings.radius > 10e-3) return;  // a minute
     Drag<TestType> drag(settings);
     drag.press_in();
     for (int i = 1; i <= 30; ++i) drag.move_to({1e-6 * i, 0, 0});
@@ -467,7 +468,7 @@ TEMPLATE_TEST_CASE("vertices stay where they are on the tool as the membrane tea
 TEMPLATE_TEST_CASE("a vertex that moves at rest keeps its friction", "[friction][tear]", double, float) {
     using S = TestType;
     TornDrag<S> drag{10e-3, 0.2e-3, S(20)};
-    drag.drag_to({S(1e-6), 0, 0}, 200);
+    drag.drag_to({S(1e-6), 0, 0}, 50);
     const auto force_on = [&](Index vertex) {
         for (const auto& v : drag.friction.vertices()) {
             if (v.vertex == vertex) return v.force;
