@@ -468,7 +468,7 @@ TEMPLATE_TEST_CASE("vertices stay where they are on the tool as the membrane tea
 TEMPLATE_TEST_CASE("a vertex that moves at rest keeps its friction", "[friction][tear]", double, float) {
     using S = TestType;
     TornDrag<S> drag{10e-3, 0.2e-3, S(20)};
-    drag.drag_to({S(1e-6), 0, 0}, 50);
+    drag.drag_to({S(1e-6), 0, 0}, 100);
     const auto force_on = [&](Index vertex) {
         for (const auto& v : drag.friction.vertices()) {
             if (v.vertex == vertex) return v.force;
