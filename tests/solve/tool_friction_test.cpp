@@ -468,7 +468,7 @@ TEMPLATE_TEST_CASE("vertices stay where they are on the tool as the membrane tea
 TEMPLATE_TEST_CASE("a vertex that moves at rest keeps its friction", "[friction][tear]", double, float) {
     using S = TestType;
     TornDrag<S> drag{10e-3, 0.2e-3, S(20)};
-    drag.drag_to({S(1e-6), 0, 0}, 100);
+    drag.drag_to({S(20e-6), 0, 0}, 60);
     const auto force_on = [&](Index vertex) {
         for (const auto& v : drag.friction.vertices()) {
             if (v.vertex == vertex) return v.force;
@@ -476,13 +476,14 @@ TEMPLATE_TEST_CASE("a vertex that moves at rest keeps its friction", "[friction]
         return Vector3<S>(Vector3<S>::Zero());
     };
     const Vector3<S> before = force_on(0);
-    REQUIRE(norm(before) > 0);
+    REQUIRE(norm(before) > S(10e-6));
     drag.surface.begin();
     PointsRef<S> x = drag.x;
     REQUIRE(drag.surface.move_vertex(x, 0, {S(1e-9), 0, 0}, S(0.35)));
     drag.follow_events();
-    drag.drag_to({S(1e-6), 0, 0}, 0);
-    CHECK(norm<S>(force_on(0) - before) < S(0.01) * norm(before));
+    drag.drag_to({S(20e-6), 0, 0}, 0);
+    const S bar = std::is_same_v<S, float> ? S(0.05) : S(1e-3);  // residual forces of 2 uN in float
+    CHECK(norm<S>(force_on(0) - before) < bar * norm(before));
 }
 
 TEST_CASE("nonsense from a device is refused, and friction goes on", "[friction]") {
