@@ -11,41 +11,41 @@ set ytics nomirror
 set key top left reverse Left spacing 1.1 samplen 2 font ',10'
 colours = '#1a1a1a #2471a3 #c0392b'
 colour(i) = word(colours, i)
-meshes = system("awk 'NR > 1 && NF && !seen[$1]++ { printf \"%s \", $1 }' tear_grids.tsv")
-only(c, i) = column(1) == real(word(meshes, i)) ? column(c) : NaN
+distinct(table) = system("awk 'NR > 1 && NF && !seen[$1]++ { printf \"%s \", $1 }' " . table)
+only(c, name) = column(1) == real(name) ? column(c) : NaN
+meshes = distinct('tear_grids.tsv')
 
 set title 'Paths in pure shear, grids of all directions'
 set xlabel 'edges'
 set ylabel 'edges'
 set yrange [-2:2]
 plot 0.7 dt 2 lc '#999999' notitle, -0.7 dt 2 lc '#999999' notitle, \
-     for [i = 1:words(meshes)] 'tear_paths.tsv' using 3:(only(4, i)) with lines lc rgb colour(i) lw 0.8 \
+     for [i = 1:words(meshes)] 'tear_paths.tsv' using 3:(only(4, word(meshes, i))) with lines lc rgb colour(i) lw 0.8 \
          title word(meshes, i) . ' edges high'
 
 set title 'Largest distance from the line'
 set xlabel 'direction of the grid [degrees]'
 set yrange [0:1.6]
 plot 0.7 dt 2 lc '#999999' notitle, \
-     for [i = 1:words(meshes)] 'tear_grids.tsv' using 2:(only(3, i)) with linespoints pt 7 ps 0.5 lc rgb colour(i) \
-         title word(meshes, i) . ' edges high'
+     for [i = 1:words(meshes)] 'tear_grids.tsv' using 2:(only(3, word(meshes, i))) with linespoints pt 7 ps 0.5 \
+         lc rgb colour(i) title word(meshes, i) . ' edges high'
 
-legs = system("awk 'NR > 1 && NF && !seen[$1]++ { printf \"%s \", $1 }' tear_trousers.tsv")
-of_leg(c, i) = column(1) == real(word(legs, i)) ? column(c) : NaN
-first_of_leg(c, i) = column(2) == 0 ? of_leg(c, i) : NaN
+legs = distinct('tear_trousers.tsv')
+only_first(c, name) = column(2) == 0 ? only(c, name) : NaN
 
 set title 'Trousers, a grid of 0 degrees'
 set xlabel 'displacement of a hand [edges]'
 set ylabel 'force over the closed form'
 set yrange [0:2]
 plot 1 dt 2 lc '#999999' notitle, \
-     for [i = 1:words(legs)] 'tear_trousers.tsv' using 3:(first_of_leg(4, i)) with lines lc rgb colour(i) lw 0.8 \
-         title word(legs, i) . ' edges over a leg'
+     for [i = 1:words(legs)] 'tear_trousers.tsv' using 3:(only_first(4, word(legs, i))) with lines \
+         lc rgb colour(i) lw 0.8 title word(legs, i) . ' edges over a leg'
 
 set title 'Trousers, mean force on grids of all directions'
 set xlabel 'direction of the grid [degrees]'
 set yrange [0.8:1.4]
 plot 0.95 dt 2 lc '#999999' notitle, 1.05 dt 2 lc '#999999' notitle, \
-     for [i = 1:words(legs)] 'tear_trouser_means.tsv' using 2:(of_leg(3, i)) with linespoints pt 7 ps 0.5 \
+     for [i = 1:words(legs)] 'tear_trouser_means.tsv' using 2:(only(3, word(legs, i))) with linespoints pt 7 ps 0.5 \
          lc rgb colour(i) title word(legs, i) . ' edges over a leg'
 
 set title 'Force per length at which it begins'

@@ -79,9 +79,9 @@ void press_in(ConstraintContext<Scalar>& context, const std::array<Index, 3>& co
     }
 }
 
-/// Response of the point to `force` [m]. A point has `corners`, `weights` and, to be changed, a `force`.
-template <Real Scalar, class Point>
-[[nodiscard]] Vector3<Scalar> response_of(const ConstraintContext<Scalar>& context, const Point& point,
+/// Response of the point to `force` [m].
+template <Real Scalar>
+[[nodiscard]] Vector3<Scalar> response_of(const ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
                                           const Vector3<Scalar>& force) noexcept {
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
     for (std::size_t k = 0; k < 3; ++k) {
@@ -122,8 +122,9 @@ template <Real Scalar>
 }
 
 /// Adds `force` [N] to the force of a point, and moves its corners by their response.
-template <Real Scalar, class Point>
-void change_force(ConstraintContext<Scalar>& context, Point& point, const Vector3<Scalar>& force) noexcept {
+template <Real Scalar>
+void change_force(ConstraintContext<Scalar>& context, ContactPoint<Scalar>& point,
+                  const Vector3<Scalar>& force) noexcept {
     point.force += force;
     for (std::size_t k = 0; k < 3; ++k) {
         const Vector3<Scalar> part = point.weights[static_cast<Eigen::Index>(k)] * force;

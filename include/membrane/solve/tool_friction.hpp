@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -242,7 +241,7 @@ void ToolFriction<Scalar>::hold(Vertex& v, const Vector3<Scalar>& position, cons
     v.offset = position - on_tool(tool, v);
 }
 
-// By the last pass over the contact points.
+// By the last pass over the contact points: they change in `begin` and `enforce` of the contact only.
 template <Real Scalar>
 void ToolFriction<Scalar>::read_normal_forces(const Context& context) noexcept {
     for (Vertex& v : vertices_.items()) v.normal_force = Vector3<Scalar>::Zero();
@@ -291,7 +290,6 @@ Scalar ToolFriction<Scalar>::stick(Context& context, const Tool<Scalar>& tool, V
 template <Real Scalar>
 bool ToolFriction<Scalar>::solve(Context& context, const Tool<Scalar>& tool) noexcept {
     constexpr int max_passes = 4;
-    read_normal_forces(context);
     Scalar first = 0;
     for (int pass = 0; pass < max_passes; ++pass) {
         Scalar largest = 0;
