@@ -96,7 +96,7 @@ class TornSheet {
         for (int i = 0; i < edges; ++i) {
             const Vector at = membrane::point(rest, path.back()) - start;
             const Vector aside = dot(at, direction) * direction - at;
-            path.push_back(tear.surface().nearest_in_direction(path.back(), direction + (0.5 / edge) * aside));
+            path.push_back(tear.surface().nearest_in_direction(path.back(), direction + (1 / edge) * aside));
         }
         const auto events = tear.cut_along(path, x);
         if (events.empty()) throw std::runtime_error("the sheet cannot be cut there");

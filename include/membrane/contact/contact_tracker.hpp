@@ -56,8 +56,9 @@ struct TrackerOptions {
 /// capsule that has slid off a border may lie on both sides. Until it is clear, only the passage of its ends is
 /// detected.
 ///
-/// The rest surface is the mesh, or the anchors of a moving body, even where the membrane is torn. Depth is measured against it. If the tool is outside
-/// the rest surface and the membrane lies farther out, there is no contact: a contact must not pull.
+/// The rest surface is the mesh, or the anchors of a moving body, even where the membrane is torn. Depth is measured
+/// against it. If the tool is outside the rest surface and the membrane lies farther out, there is no contact: a contact
+/// must not pull.
 template <Real Scalar>
 class ContactTracker {
   public:

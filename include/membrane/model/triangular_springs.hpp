@@ -91,8 +91,8 @@ template <Number Scalar>
     return i + j == 1 ? k.xy : i + j == 2 ? k.xz : k.yz;
 }
 
-/// K of a triangle with these corners, for the Lame constants of the sheet [N/m]. With n_i the gradient of barycentric coordinate i, the strain is -1/4 of the sum
-/// of d_k (n_i n_j^T + n_j n_i^T), k opposite of the edge from i to j.
+/// K of a triangle with these corners, for the Lame constants of the sheet [N/m]. With n_i the gradient of barycentric
+/// coordinate i, the strain is -1/4 of the sum of d_k (n_i n_j^T + n_j n_i^T), k opposite of the edge from i to j.
 [[nodiscard]] inline Symmetric3<double> stiffness_of(const Corners<double, 3>& x, double lame, double shear) noexcept {
     const std::array<Vector3<double>, 3> edges{x[2] - x[1], x[0] - x[2], x[1] - x[0]};
     const double area = norm<double>(cross(edges[0], edges[1])) / 2;

@@ -99,7 +99,8 @@ class QuasiStaticSolver {
 
     ///@{
     /// The membrane has torn, and the network has followed: the copy goes on as the vertex; a vertex has moved at rest.
-    /// Both wake, and the vertices around them; beyond the layers the membrane stays as it is until `wake_all`. Online. Cost: that of the contact points of the last step.
+    /// Both wake, and the vertices around them; beyond the layers the membrane stays as it is until `wake_all`. Online.
+    /// Cost: that of the contact points of the last step.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}

@@ -150,6 +150,10 @@ class Tearing {
     }
 
   private:
+    struct PatchValues {
+        Scalar weight;   // in the driving force, 0 to 1
+        Scalar density;  // of the foundation's energy [J/m^2]
+    };
     [[nodiscard]] bool is_path(std::span<const Index> path) const noexcept;
     void add_tip(Index v, Index behind, Index copy) noexcept;
     [[nodiscard]] bool is_beside_tip(Index v) const noexcept;
@@ -168,12 +172,15 @@ class Tearing {
     [[nodiscard]] bool has_changed_around(Index v) const noexcept;
     [[nodiscard]] Scalar patch_radius_at(Index tip) const noexcept;
     void list_patch(Index v, Scalar radius) noexcept;
+    void weigh_patch(Index tip, Scalar radius, std::span<const Index> held) noexcept;
     template <class Network, class Volume>
     [[nodiscard]] Vector3<Scalar> driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
                                                    const Network& network, const Volume& volume,
                                                    std::span<const Index> held) noexcept;
-    template <class Volume, class Weight>
-    [[nodiscard]] Vector3<Scalar> foundation_force(const Weight& weight, const ConstPointsRef<Scalar>& x, Scalar dt,
+    template <class Volume>
+    void find_densities(const ConstPointsRef<Scalar>& x, const Volume& volume) noexcept;
+    template <class Volume>
+    [[nodiscard]] Vector3<Scalar> foundation_force(const ConstPointsRef<Scalar>& x, Scalar dt,
                                                    const Volume& volume) const noexcept;
     template <class Network>
     void find_tension(TipState<Scalar>& state, Index tip, const ConstPointsRef<Scalar>& x,
@@ -195,6 +202,7 @@ class Tearing {
     bool used_up_ = false;
     std::vector<unsigned char> is_outer_border_;  // vertices on the border of the membrane before it tore
     IndexSet patch_vertices_, patch_;             // around a tip; triangles
+    std::vector<PatchValues> patch_values_;       // of all vertices: those of the patch are valid
     FixedVector<Index> path_;                     // of a start
 };
 
@@ -224,6 +232,7 @@ Tearing<Scalar, Criterion>::Tearing(const TriangleMesh<Scalar>& mesh, const Crit
       is_outer_border_(static_cast<std::size_t>(mesh.vertex_count())),
       patch_vertices_(mesh.vertex_count()),
       patch_(mesh.triangle_count()),
+      patch_values_(is_outer_border_.size()),
       path_(33) {
     if constexpr (requires { criterion.check(); }) criterion.check();
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
@@ -508,63 +517,75 @@ Scalar Tearing<Scalar, Criterion>::patch_radius_at(Index tip) const noexcept {
 }
 
 // The configurational force of the patch: of all its vertices, those nearer to the tip in full, those farther away less.
-// That of a vertex on the membrane's own border does not count: the tear does not move it.
+// A foundation's anchors move with the rest positions, and its energy is in proportion to the area.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network, class Volume>
 Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
                                                              const Network& network, const Volume& volume,
                                                              std::span<const Index> held) noexcept {
-    const auto& rest = surface_.rest_positions();
     const Scalar radius = patch_radius_at(tip);
-    const auto weight = [&](Index v) {
-        const auto distance = norm<Scalar>(point(rest, v) - point(rest, tip));
-        if (is_outer_border_[static_cast<std::size_t>(v)] != 0) return Scalar(0);
-        if (v != tip && std::find(held.begin(), held.end(), v) != held.end()) return Scalar(0);
-        return std::clamp(2 - 2 * distance / radius, Scalar(0), Scalar(1));
-    };
-    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
     list_patch(tip, radius);
+    weigh_patch(tip, radius, held);
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    if constexpr (!std::same_as<Volume, NoFoundation>) sum -= foundation_force(x, dt, volume);
+    if constexpr (requires { volume.energy(tip, point(x, tip)); }) find_densities(x, volume);
     for (const Index f : patch_.items()) {
         const auto corners = surface_.corners(f);
-        const std::array<Scalar, 3> weights{weight(corners[0]), weight(corners[1]), weight(corners[2])};
+        std::array<Scalar, 3> weights;
+        Scalar density = 0;
+        for (std::size_t k = 0; k < 3; ++k) {
+            const PatchValues& values = patch_values_[static_cast<std::size_t>(corners[k])];
+            weights[k] = values.weight;
+            density += values.density;
+        }
         if (weights[0] == weights[1] && weights[1] == weights[2]) continue;  // the three forces add up to zero
-        const RestTriangle<Scalar> shape(surface_.corners_at(rest, f));
+        const RestTriangle<Scalar> shape(surface_.corners_at(surface_.rest_positions(), f));
         const auto now = surface_.corners_at(x, f);
-        const auto response = network.triangle_response(f, corners, x);
+        auto response = network.triangle_response(f, corners, x);
+        response.energy += shape.area * density;
         for (std::size_t k = 0; k < 3; ++k) sum += weights[k] * configurational_force(shape, now, response, k);
     }
-    if constexpr (!std::same_as<Volume, NoFoundation>) sum += foundation_force(weight, x, dt, volume);
     const Vector3<Scalar> normal = surface_.rest_normal(tip);
     return sum - dot(sum, normal) * normal;
 }
 
-// The part of a foundation in it. Its anchors move with the rest positions, and its energy is in proportion to the area.
+// The weight of a vertex on the membrane's own border is zero: the tear does not move it.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
-template <class Volume, class Weight>
-Vector3<Scalar> Tearing<Scalar, Criterion>::foundation_force(const Weight& weight, const ConstPointsRef<Scalar>& x,
-                                                             Scalar dt, const Volume& volume) const noexcept {
+void Tearing<Scalar, Criterion>::weigh_patch(Index tip, Scalar radius, std::span<const Index> held) noexcept {
+    const auto& rest = surface_.rest_positions();
+    for (const Index v : patch_vertices_.items()) {
+        const bool is_held = v != tip && std::find(held.begin(), held.end(), v) != held.end();
+        const bool counts = is_outer_border_[static_cast<std::size_t>(v)] == 0 && !is_held;
+        const auto distance = norm<Scalar>(point(rest, v) - point(rest, tip));
+        patch_values_[static_cast<std::size_t>(v)] = {
+            counts ? std::clamp(2 - 2 * distance / radius, Scalar(0), Scalar(1)) : Scalar(0), 0};
+    }
+}
+
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Volume>
+void Tearing<Scalar, Criterion>::find_densities(const ConstPointsRef<Scalar>& x, const Volume& volume) noexcept {
+    for (const Index v : patch_vertices_.items()) {
+        const auto energy = volume.energy(v, point(x, v));
+        if (energy > 0) patch_values_[static_cast<std::size_t>(v)].density = energy / surface_.area_around(v);
+    }
+}
+
+// The weighted forces of a foundation, turned as at rest.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+template <class Volume>
+Vector3<Scalar> Tearing<Scalar, Criterion>::foundation_force(const ConstPointsRef<Scalar>& x, Scalar dt,
+                                                             const Volume& volume) const noexcept {
     Vector3<Scalar> sum = Vector3<Scalar>::Zero();
     for (const Index v : patch_vertices_.items()) {
+        const Scalar weight = patch_values_[static_cast<std::size_t>(v)].weight;
+        if (!(weight > 0)) continue;
         const Vector3<Scalar> at = point(x, v);
-        if (const Scalar part = weight(v); part > 0) {
-            Vector3<Scalar> force = volume.force_on(v, at, at, dt).force;
-            if constexpr (requires { volume.body(); }) {
-                const RigidFrame<Scalar> turn{.rotation = volume.body().rotation_at(v)};
-                force = turn.vector_to_body(force);
-            }
-            sum -= part * force;
+        Vector3<Scalar> force = volume.force_on(v, at, at, dt).force;
+        if constexpr (requires { volume.body(); }) {
+            force = RigidFrame<Scalar>{.rotation = volume.body().rotation_at(v)}.vector_to_body(force);
         }
-        if constexpr (requires { volume.energy(v, at); }) {
-            Scalar area = 0;
-            Vector3<Scalar> growth = Vector3<Scalar>::Zero();  // of the area, per weighted displacement at rest
-            for (const Index f : surface_.adjacency().triangles_of(v)) {
-                const RestTriangle<Scalar> shape(surface_.corners_at(surface_.rest_positions(), f));
-                const auto corners = surface_.corners(f);
-                area += shape.area;
-                for (std::size_t k = 0; k < 3; ++k) growth += weight(corners[k]) * shape.area * shape.gradient[k];
-            }
-            if (area > 0) sum -= volume.energy(v, at) / area * growth;
-        }
+        sum += weight * force;
     }
     return sum;
 }

@@ -63,6 +63,9 @@ class TornSurface {
     /// Mean length of the edges at `v` at rest [m].
     [[nodiscard]] Scalar mean_edge(Index v) const noexcept;
 
+    /// Area of the triangles around `v` at rest [m^2].
+    [[nodiscard]] Scalar area_around(Index v) const noexcept;
+
     /// A unit vector along the normals of the triangles around `v` at rest.
     [[nodiscard]] Vector3<Scalar> rest_normal(Index v) const noexcept;
 
@@ -163,6 +166,13 @@ Scalar TornSurface<Scalar>::mean_edge(Index v) const noexcept {
     const auto around = adjacency_.triangles_of(v);
     for (const Index f : around) sum += norm<Scalar>(point(rest_, corner(f, corner_of(f, v) + 1)) - point(rest_, v));
     return around.empty() ? Scalar(0) : sum / static_cast<Scalar>(around.size());
+}
+
+template <Real Scalar>
+Scalar TornSurface<Scalar>::area_around(Index v) const noexcept {
+    Scalar sum = 0;
+    for (const Index f : adjacency_.triangles_of(v)) sum += RestTriangle<Scalar>(corners_at(rest_, f)).area;
+    return sum;
 }
 
 template <Real Scalar>
