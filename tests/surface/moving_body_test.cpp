@@ -232,6 +232,22 @@ TEMPLATE_TEST_CASE("a number that is not finite is refused, and nothing has move
     check_unmoved();
 }
 
+TEMPLATE_TEST_CASE("where no return has a finite velocity, a pose returns the body", "[body][bad]", double, float) {
+    using S = TestType;
+    const auto mesh = some_mesh<S>(0);
+    MovingBody<S> body(mesh);
+    Points<S> x = mesh.positions();
+    RigidFrame<S> far;
+    far.origin[1] = std::numeric_limits<S>::max();
+    REQUIRE(body.move_to(far, x));
+    const Points<S> before = x, anchors = body.anchors();
+    CHECK_FALSE(body.move_to(mesh.positions(), S(1e-3), x));
+    CHECK(same_bits(x, before));
+    CHECK(same_bits(body.anchors(), anchors));
+    CHECK(body.move_to(RigidFrame<S>(), x));
+    CHECK(same_bits(body.anchors(), mesh.positions()));
+}
+
 TEST_CASE("a tear does not part the body: a copy has the anchor and the normal of its vertex", "[body][tear]") {
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);

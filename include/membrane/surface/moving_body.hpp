@@ -59,8 +59,8 @@ class MovingBody {
     [[nodiscard]] bool move_to(const RigidFrame<Scalar>& pose, PointsRef<Scalar> x) noexcept;
 
     /// Moves a body of any motion: its anchors are now at `anchors` (3 x V [m]), after a motion of `dt` [s]. The pose
-    /// is the least-squares fit, by quaternions [Horn87]. The anchor given for a copy of a vertex is not used. Cost: O(F).
-    /// @pre as many anchors as vertices (asserted)
+    /// is the least-squares fit, by quaternions [Horn87]. A motion whose velocity is not finite is refused as well. The
+    /// anchor given for a copy of a vertex is not used. Cost: O(F). @pre as many anchors as vertices (asserted)
     [[nodiscard]] bool move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept;
 
     /// Present anchors, 3 x V [m].
