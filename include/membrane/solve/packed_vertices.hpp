@@ -20,7 +20,7 @@
 
 /// Updates of vertices in SIMD lanes, one vertex in each.
 ///
-///     packed.assign(queue.vertices(), queue.colour_ends(), network);         // if the queue has changed
+///     packed.assign(from_queue, queue.colour_ends(), network);               // if these have changed
 ///     packed.append(active.vertices(), active.from_queue(), active.colour_ends(), network);
 ///     packed.begin_step(scene);
 ///     for (std::size_t p = 0, end; p < packed.count(); p = end) {
@@ -67,7 +67,7 @@ class PackedVertices {
     template <ElasticNetwork<Scalar> Network>
     explicit PackedVertices(const Network& network, Index capacity = unlimited);
 
-    /// Replaces all vertices by these, in groups that end at `ends`. Online. Cost: their springs.
+    /// Replaces all vertices by these, in groups that end at `ends` or with the last of them. Online. Cost: their springs.
     template <class Network>
     void assign(std::span<const Index> vertices, std::span<const std::size_t> ends, const Network& network) noexcept;
 
@@ -77,6 +77,8 @@ class PackedVertices {
     void append(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
                 const Network& network) noexcept;
 
+    /// Number of vertices that the last `assign` was given.
+    [[nodiscard]] std::size_t assigned() const noexcept { return given_; }
     /// Number of vertices.
     [[nodiscard]] std::size_t size() const noexcept { return members_.size(); }
     /// Number of packs.
@@ -244,6 +246,7 @@ class PackedVertices {
     FixedVector<Index> needed_;
     std::vector<unsigned char> is_needed_;
     Extent assigned_;
+    std::size_t given_ = 0;
     bool is_whole_ = false;  // all assigned vertices fit
 };
 
@@ -274,6 +277,7 @@ template <class Network>
 void PackedVertices<Scalar>::assign(std::span<const Index> vertices, std::span<const std::size_t> ends,
                                     const Network& network) noexcept {
     truncate({});
+    given_ = vertices.size();
     is_whole_ = pack(vertices, 0, ends, network);
     assigned_ = {members_.size(), packs_.size(), slot_count_, needed_.size()};
 }
@@ -291,7 +295,8 @@ template <Real Scalar>
 template <class Network>
 bool PackedVertices<Scalar>::pack(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
                                   const Network& network) noexcept {
-    for (const std::size_t end : ends) {
+    for (const std::size_t group_end : ends) {
+        const std::size_t end = (std::min)(group_end, vertices.size());
         while (begin < end) {
             const std::size_t size = (std::min)(lanes, end - begin);
             if (!append_pack(vertices.subspan(begin, size), network)) return false;

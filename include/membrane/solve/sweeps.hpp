@@ -113,12 +113,14 @@ struct Sweeps {
   private:
     [[nodiscard]] bool advances() const noexcept { return report.status == StepStatus::advanced; }
 
-    // Packs vertices if the whole queue is active and no constraint adds a force beyond layer 0.
+    // Packs vertices if no constraint adds a force beyond layer 0.
     void pack() noexcept {
-        const auto& queue = active.queue();
-        if (active.take_new_queue()) packed.assign(queue.vertices(), queue.colour_ends(), scene.network);
-        if (active.from_queue() != queue.vertices().size() || forces_beyond_contact()) return;
-        packed.append(active.vertices(), active.from_queue(), active.colour_ends(), scene.network);
+        const auto from_queue = active.vertices().first(active.from_queue());
+        if (active.take_new_queue() || packed.assigned() != from_queue.size()) {
+            packed.assign(from_queue, active.queue().colour_ends(), scene.network);
+        }
+        if (forces_beyond_contact()) return;
+        packed.append(active.vertices(), from_queue.size(), active.colour_ends(), scene.network);
         for (const Index v : packed.needed()) scene.state.load(v, scene.start, scene.network);
         packed.begin_step(scene);
         in_packs = packed.size();
