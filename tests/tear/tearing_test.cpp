@@ -184,8 +184,8 @@ TEST_CASE("an edge that the load does not draw apart does not hold the tip", "[t
     }
     CHECK(!strip.held.empty());
     CHECK(strip.torn_edges() >= 3);
-    CHECK(largest > 1.45);
-    CHECK(largest < 2);
+    CHECK(largest > 1.9);  // it has taken next to nothing: an advance has to pay for two edges
+    CHECK(largest < 2.1);
 }
 
 // It keeps to the edges of a turned grid.

@@ -41,6 +41,9 @@ struct Ligament {
     /// That it takes until it fails [J].
     [[nodiscard]] Scalar energy() const noexcept { return work(failure_opening); }
 
+    /// The part of it that opening has taken so far, 0 to 1.
+    [[nodiscard]] Scalar part_taken() const noexcept { return work(reached) / energy(); }
+
     /// Energy that it would give back [J].
     [[nodiscard]] Scalar stored(Scalar opening) const noexcept { return tension(opening) * opening / 2; }
 
