@@ -84,12 +84,11 @@ class Page {
 
 /// How much is run.
 struct Effort {
-    std::vector<int> rows;        ///< edges over the height of a strip
-    std::vector<int> widths;      ///< of a leg [edges]
-    std::vector<double> strains;  ///< of a leg
-    int directions;               ///< of grids
-    double edges;                 ///< of advance
-    int ticks;                    ///< for times
+    std::vector<int> rows;    ///< edges over the height of a strip
+    std::vector<int> widths;  ///< of a leg [edges]
+    int directions;           ///< of grids
+    double edges;             ///< of advance
+    int ticks;                ///< for times
 };
 
 constexpr double none = std::numeric_limits<double>::quiet_NaN();
@@ -244,34 +243,32 @@ void plot_trousers(const std::vector<TrouserRun>& runs, int width, std::ofstream
 
 void trouser_test(Page& page, const Effort& effort) {
     page.print(
-        "\n### Trousers, grids of %d directions\n\n| stretch of the legs | edges over the width of a leg | force over "
-        "the closed form: mean | least and largest mean of a grid | least and largest of any tick | energy that "
-        "nothing "
-        "has taken | off the line [edges] |\n|---|---|---|---|---|---|---|\n",
+        "\n### Trousers, grids of %d directions\n\n| edges over the width of a leg | force over the closed form: mean "
+        "| "
+        "least and largest mean of a grid | least and largest of any tick | energy that nothing has taken | off the "
+        "line "
+        "[edges] |\n|---|---|---|---|---|---|\n",
         effort.directions);
     auto curves = page.table("trousers", "width\tturn\tdrawn\tforce");
     auto means = page.table("trouser_means", "width\tturn\tmean\tlow\thigh");
-    for (const double strain : effort.strains) {
-        double all = 0, bottom = 10, top = 0;
-        for (const int width : effort.widths) {
-            double sum = 0, lost = 0, off = 0, least = 10, largest = 0, low = 10, high = 0;
-            const auto runs = trouser_runs({.width = width, .strain = strain}, effort);
-            if (strain == effort.strains[0]) plot_trousers(runs, width, curves, means);
-            for (const TrouserRun& found : runs) {
-                sum += found.mean / effort.directions, lost += found.lost / effort.directions;
-                off = std::max(off, found.off_line);
-                least = std::min(least, found.mean), largest = std::max(largest, found.mean);
-                low = std::min(low, found.low), high = std::max(high, found.high);
-            }
-            page.print("| %g %% | %d | %.3f | %.3f to %.3f | %.2f to %.2f | %.0f %% | %.2f |\n", 100 * strain, width,
-                       sum, least, largest, low, high, 100 * lost, off);
-            all += sum / static_cast<double>(effort.widths.size());
-            bottom = std::min(bottom, least), top = std::max(top, largest);
+    double all = 0, bottom = 10, top = 0;
+    for (const int width : effort.widths) {
+        double sum = 0, lost = 0, off = 0, least = 10, largest = 0, low = 10, high = 0;
+        const auto runs = trouser_runs({.width = width}, effort);
+        plot_trousers(runs, width, curves, means);
+        for (const TrouserRun& found : runs) {
+            sum += found.mean / effort.directions, lost += found.lost / effort.directions;
+            off = std::max(off, found.off_line);
+            least = std::min(least, found.mean), largest = std::max(largest, found.mean);
+            low = std::min(low, found.low), high = std::max(high, found.high);
         }
-        const std::string name = "trousers, legs stretched by " + std::to_string(std::lround(100 * strain)) + " %: ";
-        page.add({name + "mean force, from the closed form", percent(all), 5, "%"});
-        page.add({name + "spread of the means of all meshes and grids", 100 * (top - bottom) / all, 10, "%"});
+        page.print("| %d | %.3f | %.3f to %.3f | %.2f to %.2f | %.0f %% | %.2f |\n", width, sum, least, largest, low,
+                   high, 100 * lost, off);
+        all += sum / static_cast<double>(effort.widths.size());
+        bottom = std::min(bottom, least), top = std::max(top, largest);
     }
+    page.add({"trousers: mean force, from the closed form", percent(all), 5, "%"});
+    page.add({"trousers: spread of the means of all meshes and grids", 100 * (top - bottom) / all, 10, "%"});
 }
 
 void centre(Page& page, const Effort& effort) {
@@ -346,15 +343,14 @@ int main(int argc, char** argv) {
         if (argc < 2) throw std::runtime_error("tear FOLDER [--short] [PART...]");
         Effort effort{.rows = {10, 20, 40},
                       .widths = {4, 6, 8},
-                      .strains = {0.02, 0.05},
+
                       .directions = 20,
                       .edges = 20,
                       .ticks = 1200};
         std::vector<std::string> names;
         for (int i = 2; i < argc; ++i) {
             if (std::strcmp(argv[i], "--short") == 0) {
-                effort = {
-                    .rows = {10, 14}, .widths = {4}, .strains = {0.02}, .directions = 3, .edges = 6, .ticks = 200};
+                effort = {.rows = {10, 14}, .widths = {4}, .directions = 3, .edges = 6, .ticks = 200};
             } else {
                 names.emplace_back(argv[i]);
             }
