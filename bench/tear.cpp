@@ -7,7 +7,6 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
-#include <future>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -216,31 +215,6 @@ void criteria(Page& page, const Effort& effort) {
     page.add({"the same: `LargestTension`", spread(by_tension), none, "%"});
 }
 
-// On grids of all directions, 0 to 60 degrees, at once.
-std::vector<TrouserRun> trouser_runs(Trousers scene, const Effort& effort) {
-    std::vector<std::future<TrouserRun>> running;
-    for (int i = 0; i < effort.directions; ++i) {
-        scene.turn = 60.0 * i / (effort.directions - 1) * degree;
-        running.push_back(std::async(std::launch::async, [=] { return run(scene, effort.edges); }));
-    }
-    std::vector<TrouserRun> result;
-    for (auto& one : running) result.push_back(one.get());
-    return result;
-}
-
-void plot_trousers(const std::vector<TrouserRun>& runs, int width, std::ofstream& curves, std::ofstream& means) {
-    for (std::size_t i = 0; i < runs.size(); ++i) {
-        const TrouserRun& found = runs[i];
-        const double turn = 60.0 * static_cast<double>(i) / static_cast<double>(runs.size() - 1);
-        means << width << '\t' << turn << '\t' << found.mean << '\t' << found.low << '\t' << found.high << '\n';
-        for (std::size_t k = 0; k < found.curve.size(); k += 4) {
-            const auto& [drawn, force] = found.curve[k];
-            curves << width << '\t' << turn << '\t' << drawn << '\t' << force << '\n';
-        }
-        curves << "\n\n";
-    }
-}
-
 void trouser_test(Page& page, const Effort& effort) {
     page.print(
         "\n### Trousers, grids of %d directions\n\n| edges over the width of a leg | force over the closed form: mean "
@@ -254,13 +228,19 @@ void trouser_test(Page& page, const Effort& effort) {
     double all = 0, bottom = 10, top = 0;
     for (const int width : effort.widths) {
         double sum = 0, lost = 0, off = 0, least = 10, largest = 0, low = 10, high = 0;
-        const auto runs = trouser_runs({.width = width}, effort);
-        plot_trousers(runs, width, curves, means);
-        for (const TrouserRun& found : runs) {
+        for (int i = 0; i < effort.directions; ++i) {
+            const double turn = 60.0 * i / (effort.directions - 1);
+            const TrouserRun found = run(Trousers{.width = width, .turn = turn * degree}, effort.edges);
             sum += found.mean / effort.directions, lost += found.lost / effort.directions;
             off = std::max(off, found.off_line);
             least = std::min(least, found.mean), largest = std::max(largest, found.mean);
             low = std::min(low, found.low), high = std::max(high, found.high);
+            means << width << '\t' << turn << '\t' << found.mean << '\t' << found.low << '\t' << found.high << '\n';
+            for (std::size_t k = 0; k < found.curve.size(); k += 4) {
+                const auto& [drawn, force] = found.curve[k];
+                curves << width << '\t' << turn << '\t' << drawn << '\t' << force << '\n';
+            }
+            curves << "\n\n";
         }
         page.print("| %d | %.3f | %.3f to %.3f | %.2f to %.2f | %.0f %% | %.2f |\n", width, sum, least, largest, low,
                    high, 100 * lost, off);
@@ -341,12 +321,7 @@ constexpr Part parts[]{{"shear", shear},   {"damping", damping},   {"grids", gri
 int main(int argc, char** argv) {
     try {
         if (argc < 2) throw std::runtime_error("tear FOLDER [--short] [PART...]");
-        Effort effort{.rows = {10, 20, 40},
-                      .widths = {4, 6, 8},
-
-                      .directions = 20,
-                      .edges = 20,
-                      .ticks = 1200};
+        Effort effort{.rows = {10, 20, 40}, .widths = {4, 6, 8}, .directions = 20, .edges = 20, .ticks = 1200};
         std::vector<std::string> names;
         for (int i = 2; i < argc; ++i) {
             if (std::strcmp(argv[i], "--short") == 0) {

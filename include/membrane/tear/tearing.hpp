@@ -165,7 +165,7 @@ class Tearing {
         is_outer_border_[static_cast<std::size_t>(copy)] = is_outer_border_[static_cast<std::size_t>(v)];
     }
     void open_ligaments(const ConstPointsRef<Scalar>& x) noexcept;
-    void let_go(const TearTip<Scalar>& tip) noexcept;
+    void let_go(const Ligament<Scalar>& behind) noexcept;
     [[nodiscard]] const Ligament<Scalar>* ligament_behind(const TearTip<Scalar>& tip) const noexcept {
         const auto all = ligaments_.items();
         const auto joins = [&](const auto& ligament) { return ligament.copy == tip.behind[1]; };
@@ -416,11 +416,11 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
 
 // The edge behind the tip fails before its time. The membrane gives up what it has left to take as the tip advances.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
-void Tearing<Scalar, Criterion>::let_go(const TearTip<Scalar>& tip) noexcept {
+void Tearing<Scalar, Criterion>::let_go(const Ligament<Scalar>& behind) noexcept {
     const auto all = ligaments_.items();
-    const auto behind = all.begin() + (ligament_behind(tip) - all.data());
-    failed_ += static_cast<double>(behind->energy());
-    std::move(behind + 1, all.end(), behind);
+    failed_ += static_cast<double>(behind.energy());
+    const auto at = all.begin() + (&behind - all.data());
+    std::move(at + 1, all.end(), at);
     ligaments_.truncate(all.size() - 1);
 }
 
@@ -458,7 +458,7 @@ auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Ne
             // An advance must also pay for what that one has left; and in quick ticks nothing is at equilibrium.
             constexpr auto least = Scalar(1.25);
             state.driving_force /= (std::max)(least, 2 - behind->part_taken());
-            if (criterion_.opens(state)) let_go(tip);
+            if (criterion_.opens(state)) let_go(*behind);
             continue;
         }
         find_tension(state, tip.vertex, x, network);
