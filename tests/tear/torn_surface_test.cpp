@@ -29,7 +29,7 @@ template <Real Scalar>
 double area_of(const TornSurface<Scalar>& surface) {
     double sum = 0;
     for (Index f = 0; f < surface.triangles().cols(); ++f) {
-        sum += static_cast<double>(RestTriangle<Scalar>(surface.corners_at(surface.rest_positions(), f)).area);
+        sum += static_cast<double>(surface.rest_area(f));
     }
     return sum;
 }

@@ -6,6 +6,7 @@
 #include <span>
 
 #include <membrane/model/tissue.hpp>
+#include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_adjacency.hpp>
 
 /// The energy that a membrane releases as a tear advances.
@@ -30,19 +31,26 @@ struct RestTriangle {
     }
 };
 
-/// The configurational force of a triangle on a corner: minus the derivative of its energy by the corner's rest position,
-/// with all present positions kept [N]. For a homogeneous material of energy density W, deformation gradient F and first
-/// Piola-Kirchhoff stress P it is -(W I - F^T P) times the gradient of the corner's barycentric coordinate, integrated
-/// [Miehe07]: with the corner's force f, and F^T f, this needs energy and forces alone.
+/// The configurational forces of a triangle on its corners, times `weights`, in sum: that on a corner is minus the
+/// derivative of the triangle's energy by the corner's position at rest, with all present positions kept [N]. For a
+/// homogeneous material of energy density W, deformation gradient F and first Piola-Kirchhoff stress P the sum is
+/// -(W I - F^T P) times the gradient of the weights at rest, integrated [Miehe07]: with the corners' forces f, and F^T f,
+/// this needs energy and forces alone.
 template <Real Scalar>
-[[nodiscard]] Vector3<Scalar> configurational_force(const RestTriangle<Scalar>& rest,
+[[nodiscard]] Vector3<Scalar> configurational_force(const std::array<Vector3<Scalar>, 3>& rest,
                                                     const std::array<Vector3<Scalar>, 3>& x,
-                                                    const TriangleResponse<Scalar>& response, std::size_t i) noexcept {
-    Vector3<Scalar> pulled_back = Vector3<Scalar>::Zero();
-    for (std::size_t k = 1; k < 3; ++k) {
-        pulled_back += dot<Scalar>(x[k] - x[0], response.force[i]) * rest.gradient[k];
+                                                    const TriangleResponse<Scalar>& response,
+                                                    const std::array<Scalar, 3>& weights) noexcept {
+    const Vector3<Scalar> force =
+        weights[0] * response.force[0] + weights[1] * response.force[1] + weights[2] * response.force[2];
+    const Vector3<Scalar> area = area_vector<Scalar>({rest[0], rest[1], rest[2]});
+    // A barycentric coordinate has the gradient area x opposite edge / (2 area^2).
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    for (std::size_t k = 0; k < 3; ++k) {
+        const Vector3<Scalar> opposite = rest[(k + 2) % 3] - rest[(k + 1) % 3];
+        sum += (response.energy * weights[k] + dot<Scalar>(x[k] - x[0], force)) * opposite;
     }
-    return -(response.energy * rest.gradient[i] + pulled_back);
+    return -1 / (2 * squared_norm(area)) * cross(area, sum);
 }
 
 /// The largest principal tension of a triangle, per width at rest [N/m]: T^T T, T its first Piola-Kirchhoff stress.

@@ -542,11 +542,10 @@ Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const Co
             density += values.density;
         }
         if (weights[0] == weights[1] && weights[1] == weights[2]) continue;  // the three forces add up to zero
-        const RestTriangle<Scalar> shape(surface_.corners_at(surface_.rest_positions(), f));
-        const auto now = surface_.corners_at(x, f);
         auto response = network.triangle_response(f, corners, x);
-        response.energy += shape.area * density;
-        for (std::size_t k = 0; k < 3; ++k) sum += weights[k] * configurational_force(shape, now, response, k);
+        if (density > 0) response.energy += surface_.rest_area(f) * density;
+        const auto at_rest = surface_.corners_at(surface_.rest_positions(), f);
+        sum += configurational_force(at_rest, surface_.corners_at(x, f), response, weights);
     }
     const Vector3<Scalar> normal = surface_.rest_normal(tip);
     return sum - dot(sum, normal) * normal;

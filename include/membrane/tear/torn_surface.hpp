@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <membrane/core/fixed_vector.hpp>
+#include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_adjacency.hpp>
 #include <membrane/tear/crack_driving_force.hpp>
 
@@ -63,8 +64,11 @@ class TornSurface {
     /// Mean length of the edges at `v` at rest [m].
     [[nodiscard]] Scalar mean_edge(Index v) const noexcept;
 
-    /// Area of the triangles around `v` at rest [m^2].
+    ///@{
+    /// Area of triangle `f`, and of the triangles around `v`, at rest [m^2].
+    [[nodiscard]] Scalar rest_area(Index f) const noexcept { return norm(area_vector(triangle_at(rest_, corners(f)))); }
     [[nodiscard]] Scalar area_around(Index v) const noexcept;
+    ///@}
 
     /// A unit vector along the normals of the triangles around `v` at rest.
     [[nodiscard]] Vector3<Scalar> rest_normal(Index v) const noexcept;
@@ -171,7 +175,7 @@ Scalar TornSurface<Scalar>::mean_edge(Index v) const noexcept {
 template <Real Scalar>
 Scalar TornSurface<Scalar>::area_around(Index v) const noexcept {
     Scalar sum = 0;
-    for (const Index f : adjacency_.triangles_of(v)) sum += RestTriangle<Scalar>(corners_at(rest_, f)).area;
+    for (const Index f : adjacency_.triangles_of(v)) sum += rest_area(f);
     return sum;
 }
 
@@ -278,7 +282,7 @@ Index TornSurface<Scalar>::split(PointsRef<Scalar>& x, Index v, Index out, Index
                       std::as_const(parted_corners_).items().subspan(first), 0};
     double area = 0, taken = 0;
     for (const Index f : around) {
-        const auto own = static_cast<double>(RestTriangle<Scalar>(corners_at(rest_, f)).area);
+        const auto own = static_cast<double>(rest_area(f));
         area += own;
         if (split.takes(f)) taken += own;
     }
