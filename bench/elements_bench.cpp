@@ -16,8 +16,8 @@
 #include "support/scene.hpp"
 #include "support/slide.hpp"
 
-// A step of springs and of tissues with more and more kinds of elements: a ball slides, 0.5 mm deep, over a clamped disc of
-// 469 vertices on a soft layer.
+// A step of springs and of tissues with more and more kinds of elements: a ball slides, 0.5 mm deep, over a clamped
+// disc of 469 vertices on a soft layer.
 
 namespace {
 

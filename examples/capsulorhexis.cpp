@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// Continuous curvilinear capsulorhexis: forceps guide a tear in the lens capsule round, until it meets its beginning. Force
-// beside that of surgeons, energies, how round the opening is, tension.
+// Continuous curvilinear capsulorhexis: forceps guide a tear in the lens capsule round, until it meets its beginning.
+// Force beside that of surgeons, energies, how round the opening is, tension.
 #include <chrono>
 #include <cstdio>
 #include <filesystem>

@@ -6,8 +6,8 @@
 
 #include <membrane/membrane.hpp>
 
-// The loop of README on 642 vertices, with a tool of 2 mm that slides at 50 mm/s, 1 mm deep: prints the median time of a
-// tick [us]. bench/builds compiles it with several options.
+// The loop of README on 642 vertices, with a tool of 2 mm that slides at 50 mm/s, 1 mm deep: prints the median time of
+// a tick [us]. bench/builds compiles it with several options.
 int main() {
     using Clock = std::chrono::steady_clock;
     const auto mesh = membrane::icosphere<double>({.radius = 0.01, .subdivisions = 3});

@@ -96,8 +96,8 @@ struct TickCost {
 /// The bound on vertex updates of a disc that tears: some more than the whole one needs.
 inline constexpr Index update_bound = 1500;
 
-/// Of a whole disc, one that is cut, one that tears, the same with bounded updates, and with steps near convergence. They
-/// tick in turns: load of the machine affects all of them.
+/// Of a whole disc, one that is cut, one that tears, the same with bounded updates, and with steps near convergence.
+/// They tick in turns: load of the machine affects all of them.
 [[nodiscard]] inline std::vector<TickCost> cost_of_ticks(int ticks) {
     std::vector<DrawnDisc> discs{{false, 1.0},
                                  {true, 1e9},

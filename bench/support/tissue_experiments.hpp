@@ -30,7 +30,8 @@ inline const Eye human_cornea{.radius = 7.8e-3, .rim = 5.855e-3, .thickness = 0.
 // [Leung14] radius and thickness; E of the same animal's cornea [Munoz21]; the border is assumed.
 inline const Eye pig_sclera{.radius = 7.86e-3, .rim = 6.8e-3, .thickness = 1.03e-3, .young_modulus = 0.188e6};
 
-/// Eyes with one constant changed: to the ends of its published deviation, to that of other eyes, or in what is assumed.
+/// Eyes with one constant changed: to the ends of its published deviation, to that of other eyes, or in what is
+/// assumed.
 [[nodiscard]] inline std::vector<Eye> pig_cornea_variants() {
     const Eye& eye = pig_cornea;
     return {eye.hinged(),

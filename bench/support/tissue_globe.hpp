@@ -77,8 +77,8 @@ inline constexpr double sclera_area = 16.3e-4;
     return found;
 }
 
-/// Enucleated human eyes, the author's equation for measurements: (cube root of pressure - that of 10 mmHg) / k, k = 0.03
-/// mmHg^(1/3)/ul [VanDerWerff81]. "Over a wide range" of pressures; the one here is assumed.
+/// Enucleated human eyes, the author's equation for measurements: (cube root of pressure - that of 10 mmHg) / k,
+/// k = 0.03 mmHg^(1/3)/ul [VanDerWerff81]. "Over a wide range" of pressures; the one here is assumed.
 [[nodiscard]] inline double measured_growth(double pressure) { return (std::cbrt(pressure) - std::cbrt(10.0)) / 0.03; }
 
 inline const std::vector<double> globe_pressures{12.5, 15, 17.5, 20, 22.5, 25, 27.5, 30, 32.5, 35, 37.5, 40};  // [mmHg]
@@ -89,8 +89,9 @@ inline const std::vector<double> globe_pressures{12.5, 15, 17.5, 20, 22.5, 25, 2
 }
 
 /// Collagen of all directions in a matrix, under equal stretches. Constants C1, C3 [MPa] and C4: the matrix has the
-/// energy C1 (I1 - 3), and a fibre the true stress C3 (exp(C4 (stretch - 1)) - 1), half of which acts in each direction.
-/// The fibres are exponential springs along the edges and the diagonal of the square, three springs' worth to each axis.
+/// energy C1 (I1 - 3), and a fibre the true stress C3 (exp(C4 (stretch - 1)) - 1), half of which acts in each
+/// direction. The fibres are exponential springs along the edges and the diagonal of the square, three springs' worth
+/// to each axis.
 [[nodiscard]] inline Pair springs_in_matrix(std::span<const double> constants, const Pair& stretch) {
     const Mesh square = unit_square();
     const membrane::Material matrix{.young_modulus = 6e6 * constants[0], .poisson_ratio = 0.5, .thickness = 1};

@@ -51,8 +51,8 @@ struct Answer {
 /// the vendor's kinds of errors:
 ///   - motors too warm, too much force or speed: the device recovers by itself. The force is zero at once and while the
 ///     error lasts; then it rises in 0.1 s.
-///   - any other, such as a lost connection, or an exception of the callback: the run ends, without force, and `trouble`
-///     describes the error.
+///   - any other, such as a lost connection, or an exception of the callback: the run ends, without force, and
+///     `trouble` describes the error.
 /// The device's own frame is x to the right, y up, z towards the user. One device for each program: the vendor's
 /// scheduler supports no more. Until the callback returns the device holds its force: it must return within 1 ms.
 ///

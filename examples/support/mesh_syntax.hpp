@@ -4,7 +4,8 @@
 #include <string>
 #include <string_view>
 
-/// Checks of mesh files for what tinyobjloader (OBJ) and assimp (others) hang on, misread, or accept though it is wrong.
+/// Checks of mesh files for what tinyobjloader (OBJ) and assimp (others) hang on, misread, or accept though it is
+/// wrong.
 namespace examples {
 
 /// The file for the library, from one with these bytes; of a text only what describes vertices and triangles.

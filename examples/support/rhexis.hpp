@@ -179,8 +179,8 @@ inline std::vector<membrane::Index> RhexisScene::cut(const membrane::TornSurface
     return path;
 }
 
-/// Whether the leading tip has met the beginning of the tear, and the last edge has opened. One at the tip near the axis
-/// may be opening still.
+/// Whether the leading tip has met the beginning of the tear, and the last edge has opened. One at the tip near the
+/// axis may be opening still.
 [[nodiscard]] inline bool is_round(const Tear& tear) {
     if (tear.tips().size() > 1) return false;
     const auto opening = tear.ligaments().ligaments;

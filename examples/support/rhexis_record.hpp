@@ -19,8 +19,8 @@
 /// What a capsulorhexis took: force, energies, the opening, pictures.
 namespace examples {
 
-/// The membrane with its tension as colour, the ball under it, and the forceps with the force on them. What has come off
-/// is taken away.
+/// The membrane with its tension as colour, the ball under it, and the forceps with the force on them. What has come
+/// off is taken away.
 [[nodiscard]] inline Picture picture_of(const RhexisScene& scene, const Capsulorhexis& operation,
                                         const Forceps& forceps, const Vector& felt) {
     const auto& surface = operation.tear().surface();

@@ -5,12 +5,12 @@
 
 #include <membrane/membrane.hpp>
 
-/// The usual types of the loop, for float and double, are compiled once, by the library `membrane::instantiated`, instead
-/// of in each file that uses them. `membrane/membrane.hpp` includes this where MEMBRANE_INSTANTIATED is defined, as it is
-/// in targets that link the library. Other types (own laws, own foundations) are compiled as ever.
+/// The usual types of the loop, for float and double, are compiled once, by the library `membrane::instantiated`,
+/// instead of in each file that uses them. `membrane/membrane.hpp` includes this where MEMBRANE_INSTANTIATED is
+/// defined, as it is in targets that link the library. Other types (own laws, own foundations) are compiled as ever.
 ///
-/// The library and the files that use it must be compiled for the same instruction set (-march, -mavx2): otherwise they do
-/// not link.
+/// The library and the files that use it must be compiled for the same instruction set (-march, -mavx2): otherwise they
+/// do not link.
 
 // The arguments are types and keywords, which take no parentheses.
 // NOLINTBEGIN(bugprone-macro-parentheses)

@@ -16,8 +16,9 @@
 #include "support/random.hpp"
 #include "support/sparse_newton.hpp"
 
-// Searches that try to break a certificate: states change at random, and those are kept that are certified and nearer to
-// where a proof would fail, by a bound that is used up, a membrane about to buckle, or a tool about to lose its contact.
+// Searches that try to break a certificate: states change at random, and those are kept that are certified and nearer
+// to where a proof would fail, by a bound that is used up, a membrane about to buckle, or a tool about to lose its
+// contact.
 
 using namespace membrane;
 using test::Random;

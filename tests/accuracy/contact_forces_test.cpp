@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// How the force of a tool is distributed over the membrane: the contact points of a solver at rest against those of Newton's
-// method.
+// How the force of a tool is distributed over the membrane: the contact points of a solver at rest against those of
+// Newton's method.
 #include <algorithm>
 #include <cmath>
 #include <span>

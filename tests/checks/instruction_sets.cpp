@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A user's program of units for several instruction sets, in parts: -D MAKE, -D STEP (both with -D UNIT=NAME), -D ALL_MAIN,
-// -D CROSSING_MAIN (with -D UNIT), -D GIVE, -D TAKE_MAIN. The linker takes `Scene`'s own functions from any unit that has them.
+// A user's program of units for several instruction sets, in parts: -D MAKE, -D STEP (both with -D UNIT=NAME),
+// -D ALL_MAIN, -D CROSSING_MAIN (with -D UNIT), -D GIVE, -D TAKE_MAIN. The linker takes `Scene`'s own functions from
+// any unit that has them.
 #include <cmath>
 #include <cstdio>
 #include <memory>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Cost of a part that a scene leaves out. Each pair of functions computes the same for every vertex of a sphere: ours leaves
-// a part out by the library's means (no foundation, volume springs without damping, a law of whose result only the tension
-// is used), the other has no such part. The last one is a loop written by hand. `left_out` counts their instructions; here
-// their results must have the same bits.
+// Cost of a part that a scene leaves out. Each pair of functions computes the same for every vertex of a sphere: ours
+// leaves a part out by the library's means (no foundation, volume springs without damping, a law of whose result only
+// the tension is used), the other has no such part. The last one is a loop written by hand. `left_out` counts their
+// instructions; here their results must have the same bits.
 #include <algorithm>
 #include <cmath>
 #include <concepts>

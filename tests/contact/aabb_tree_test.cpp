@@ -84,7 +84,8 @@ struct Scene {
     /// Near the surface or far away, but not so near that roundings decide.
     Vector3<S> query_beside(Random& random) const { return query(random) + size * random.vector<S>(S(-0.2), S(0.2)); }
 
-    /// How far roundings may move the nearest point of a triangle, over epsilon: the longest edge squared over the height.
+    /// How far roundings may move the nearest point of a triangle, over epsilon: the longest edge squared over the
+    /// height.
     double sensitivity(Index f) const {
         const auto t = triangle(f);
         const double longest = std::max({norm<S>(t.b - t.a), norm<S>(t.c - t.b), norm<S>(t.a - t.c)});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 //
-// What README and chapters show beside the examples, as a user's program: nothing of the library's is known by its bare name.
+// What README and chapters show beside the examples, as a user's program: nothing of the library's is known by its bare
+// name.
 #include <algorithm>
 #include <array>
 #include <chrono>

@@ -13,8 +13,8 @@
 #include "bytes.hpp"
 
 // Bytes that drive a whole scene: two tools that press and grasp, loads, pins and targets on a body that moves, under
-// any options, budgets and deadlines, with wild numbers now and then. Each step is refused by name, with the positions as
-// they were, or advances to finite positions and reactions; one whose input was always tame advances.
+// any options, budgets and deadlines, with wild numbers now and then. Each step is refused by name, with the positions
+// as they were, or advances to finite positions and reactions; one whose input was always tame advances.
 
 using namespace membrane;
 using test::Bytes;

@@ -56,8 +56,8 @@ struct Capsule {
     explicit Capsule(const TriangleMesh<double>& surface) : mesh(surface) {}
 };
 
-/// How long what is left of a dent takes to be a part of 1 / e, from `begin` to `end` [s] after the membrane is let go at
-/// `x`: seen at the vertex that was farthest from rest.
+/// How long what is left of a dent takes to be a part of 1 / e, from `begin` to `end` [s] after the membrane is let go
+/// at `x`: seen at the vertex that was farthest from rest.
 double recovery(const Capsule& capsule, Points<double> x, double begin, double end, double dt) {
     QuasiStaticSolver solver(capsule.network, {.layers = unlimited, .sweeps = 100, .force_tolerance = 1e-11});
     Eigen::Index seen = 0;

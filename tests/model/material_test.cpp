@@ -38,7 +38,8 @@ TEST_CASE("moduli are those of Hooke's law", "[material]") {
         const Eigen::Vector3d pressed = soft.inverse() * Eigen::Vector3d(0, 0, 1 / thickness);
         const FoundationLayer layer{.young_modulus = modulus, .poisson_ratio = nu, .thickness = thickness};
         REQUIRE(layer.normal_stiffness() == Approx(pressed.z()));
-        // Sheared by one length for each length of height: the same as stretched and pressed by half of that at 45 degrees.
+        // Sheared by one length for each length of height: the same as stretched and pressed by half of that at 45
+        // degrees.
         const Eigen::Vector3d sheared = soft.inverse() * Eigen::Vector3d(0.5, -0.5, 0);
         REQUIRE(layer.tangential_stiffness() == Approx(sheared.x() / thickness));
 

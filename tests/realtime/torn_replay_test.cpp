@@ -31,8 +31,8 @@ using test::Random;
 
 namespace {
 
-/// A hand that presses a disc at one place after the other and drags it; now and then its forceps close and draw up. One
-/// in a hundred ticks is nonsense.
+/// A hand that presses a disc at one place after the other and drags it; now and then its forceps close and draw up.
+/// One in a hundred ticks is nonsense.
 template <Real S>
 class Hand {
   public:

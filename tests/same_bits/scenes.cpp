@@ -6,9 +6,9 @@
 //     scenes [--ticks 1000] [--threads 1] --record FILE
 //     scenes --replay FILE
 //
-// One line for each: scene, scalar, ticks, hash. `--record` instead writes a recording of a hand, with a snapshot in the
-// middle; `--replay` replays one, prints its ticks, whether the snapshot is one of this machine, and how many forces
-// differ, and returns 1 if one does. The program itself calls no mathematical function but the square root,
+// One line for each: scene, scalar, ticks, hash. `--record` instead writes a recording of a hand, with a snapshot in
+// the middle; `--replay` replays one, prints its ticks, whether the snapshot is one of this machine, and how many
+// forces differ, and returns 1 if one does. The program itself calls no mathematical function but the square root,
 // whose result IEEE 754 determines.
 #include <algorithm>
 #include <array>

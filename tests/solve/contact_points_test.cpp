@@ -71,7 +71,8 @@ Tool<S> random_tool(Random& random, bool is_capsule) {
     return tool;
 }
 
-/// Presses with each point by 1 N where it is now: `act(pack, lane, point, nearest)`, the last by one triangle after another.
+/// Presses with each point by 1 N where it is now: `act(pack, lane, point, nearest)`, the last by one triangle after
+/// another.
 template <class S, class Act>
 void for_each_located(Patch<S>& patch, Act act) {
     for (auto& pack : patch.state.packs.items()) {

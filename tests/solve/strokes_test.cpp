@@ -14,8 +14,8 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 
-// A tool presses into a sphere of 10 mm, slides along it and leaves: spheres, shafts and points, shallow and deep, slow and
-// fast, on coarse and fine meshes, with the default effort and with half of it.
+// A tool presses into a sphere of 10 mm, slides along it and leaves: spheres, shafts and points, shallow and deep, slow
+// and fast, on coarse and fine meshes, with the default effort and with half of it.
 
 using namespace membrane;
 

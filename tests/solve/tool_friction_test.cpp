@@ -234,8 +234,8 @@ TEMPLATE_TEST_CASE("below that it sticks: the membrane moves with the tool", "[f
 
 TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[friction]", double, float) {
     constexpr bool is_float = std::is_same_v<TestType, float>;
-    // At coefficients from 0.6 on, friction compresses the membrane as far as it has been stretched. A flat ball touches
-    // 37 vertices, a round one 7.
+    // At coefficients from 0.6 on, friction compresses the membrane as far as it has been stretched. A flat ball
+    // touches 37 vertices, a round one 7.
     const auto settings = GENERATE(Settings{.friction = 0.1, .sweeps = 5}, Settings{.friction = 0.3, .sweeps = 5},
                                    Settings{.friction = 0.6, .sweeps = 5, .stretch = 1.1},
                                    Settings{.friction = 1.0, .sweeps = 5, .stretch = 1.1},
@@ -252,8 +252,8 @@ TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[frictio
     const auto force = drag.move_to(held);
     CHECK(along_disc(force) > 0.1 * force[2]);
     for (int i = 0; i < (cases_are_slow ? 300 : 10'000); ++i) drag.move_to(held);
-    // What the vertex updates leave out at the force tolerance: in float 2 uN, on springs of 43 N/m, wherever the forces
-    // of many vertices are at their limit.
+    // What the vertex updates leave out at the force tolerance: in float 2 uN, on springs of 43 N/m, wherever the
+    // forces of many vertices are at their limit.
     const bool is_at_limit = is_float && settings.friction > 0.5;
     CHECK((drag.x - before).cwiseAbs().maxCoeff() < (is_at_limit ? 1e-7 : is_float ? 1e-9 : 1e-10));
     CHECK(norm<double>(drag.move_to(held) - force) < (is_at_limit ? 1e-2 : 1e-3) * along_disc(force));

@@ -47,8 +47,8 @@ void check_element(const E& element, const membrane::Corners<double, E::corner_c
     }
 }
 
-/// What an element's force, Hessian and remainder say of its energy, over displacements of up to twice its range. Returns
-/// for how many they said something.
+/// What an element's force, Hessian and remainder say of its energy, over displacements of up to twice its range.
+/// Returns for how many they said something.
 template <class E>
 int check_remainder(const E& element, const membrane::Corners<double, E::corner_count>& x, double size, double energy,
                     Random& random) {

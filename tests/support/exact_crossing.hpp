@@ -17,9 +17,9 @@
 namespace test {
 
 /// Signed volumes decide: sums of six products of three differences each. With one rounding for each difference and
-/// product and at most three for the sums, eight in all, a computed one is off by at most 6 * 8 * epsilon / 2 = 24 epsilon
-/// times the largest components of the three differences. Nothing is divided: no bound grows as the segment becomes
-/// parallel to the plane or to an edge.
+/// product and at most three for the sums, eight in all, a computed one is off by at most 6 * 8 * epsilon / 2 = 24
+/// epsilon times the largest components of the three differences. Nothing is divided: no bound grows as the segment
+/// becomes parallel to the plane or to an edge.
 class ExactCrossing {
     using Long = long double;
 
@@ -45,8 +45,8 @@ class ExactCrossing {
         return fraction >= 0 && fraction <= 1 && on_plane(fraction) && (met() || inside(fraction));
     }
 
-    /// Whether the point at this fraction is beyond the plane by more than roundings, so that a triangle that is met must
-    /// be hit before. What may count as parallel is not.
+    /// Whether the point at this fraction is beyond the plane by more than roundings, so that a triangle that is met
+    /// must be hit before. What may count as parallel is not.
     bool is_before(Long fraction) const {
         return !may_be_parallel() && fraction * climb_ - before_ > rounding * slack_of(size_ + fraction * length_);
     }
@@ -80,8 +80,9 @@ class ExactCrossing {
                climb_ - before_ >= -(allowed + rounding) * slack_of(length_ + size_);
     }
 
-    /// Whether a segment that may count as parallel is, at this fraction, on the inner side of all edges: sums of twelve
-    /// products of four differences, with eleven roundings each, and one difference of up to twice the size: 132 epsilon.
+    /// Whether a segment that may count as parallel is, at this fraction, on the inner side of all edges: sums of
+    /// twelve products of four differences, with eleven roundings each, and one difference of up to twice the size: 132
+    /// epsilon.
     bool inside(Long fraction) const {
         if (!may_be_parallel()) return false;
         for (std::size_t k = 0; k < 3; ++k) {

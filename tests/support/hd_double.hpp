@@ -70,8 +70,8 @@ class HdDouble {
 
     // What is to go wrong.
 
-    /// `error` at a call of `call` in tick `tick` or later, after so many of these; of several there, the last is on top
-    /// of the stack.
+    /// `error` at a call of `call` in tick `tick` or later, after so many of these; of several there, the last is on
+    /// top of the stack.
     void fail(std::string_view call, long tick, HDerror error, int after = 0) {
         faults_.push_back({call, tick, error, after});
     }

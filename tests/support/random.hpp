@@ -8,7 +8,8 @@
 
 #include <membrane/core/types.hpp>
 
-/// Seeded random numbers, vectors, rotations and meshes: the same everywhere (the standard's own distributions are not).
+/// Seeded random numbers, vectors, rotations and meshes: the same everywhere (the standard's own distributions are
+/// not).
 ///
 ///     test::Random random(seed);
 ///     const auto q = random.vector<double>(-1, 1);

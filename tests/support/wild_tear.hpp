@@ -21,7 +21,8 @@
 #include "support/orders.hpp"
 #include "support/random_tear.hpp"
 
-/// A stretched disc on a foundation or adhering to its body, that is cut, pulled, grasped, pressed and dragged at random.
+/// A stretched disc on a foundation or adhering to its body, that is cut, pulled, grasped, pressed and dragged at
+/// random.
 ///
 ///     test::WildTear<double> loop(seed);
 ///     for (int tick = 0; tick < 500; ++tick) loop.tick();

@@ -110,8 +110,8 @@ TEST_CASE("what the clamps give is stored, or taken by the tear and by damping",
     }
 }
 
-// Closed form at small strain: with C = E t / (1 - nu^2) and kappa^2 = stiffness per area / C, the clamp at y = h moved by U,
-// a whole strip stores C kappa U^2 coth(kappa h) / 2 per length, one that is torn at a distance d from that clamp
+// Closed form at small strain: with C = E t / (1 - nu^2) and kappa^2 = stiffness per area / C, the clamp at y = h moved
+// by U, a whole strip stores C kappa U^2 coth(kappa h) / 2 per length, one that is torn at a distance d from that clamp
 // C kappa U^2 tanh(kappa d) / 2.
 TEST_CASE("the driving force counts the energy of a foundation", "[tear]") {
     for (const double kappa_h : {0.25, 1.0, 2.0, 3.0}) {

@@ -125,8 +125,8 @@ template <class Object>
 
 }  // namespace detail
 
-/// A method, as `scope.def(name, function, extra...)`. `function` captures nothing. Pointers and optional arguments, its
-/// last, have the default None.
+/// A method, as `scope.def(name, function, extra...)`. `function` captures nothing. Pointers and optional arguments,
+/// its last, have the default None.
 template <py::return_value_policy policy = py::return_value_policy::automatic, class Class, class Function>
 void def_in_loop(Class& scope, const char* name, Function function, const auto&... extra) {
     scope.def(name, function, policy, extra...);

@@ -69,8 +69,8 @@ class EquilibriumScene {
 
     // For `describe`.
 
-    /// A pinned vertex stays at its start, regardless of its target. If several terms prescribe a vertex, the target of the
-    /// last one counts. A tool without contact is ignored.
+    /// A pinned vertex stays at its start, regardless of its target. If several terms prescribe a vertex, the target of
+    /// the last one counts. A tool without contact is ignored.
     void add(const ConstraintTerm& term);
 
     ///@{

@@ -133,8 +133,8 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
 /// foundation, each step solved to the end from the exact positions of the tick before. Against these references the
 /// error of a setting is that of its solver alone. A tick is left out if its step was refused or its residual exceeds
 /// 1e-6 of the largest force so far.
-/// @throws InvalidInput as `equilibria`. Offline. Cost: usually 30 to 400 sweeps over all vertices in each tick, at most
-/// 4,000.
+/// @throws InvalidInput as `equilibria`. Offline. Cost: usually 30 to 400 sweeps over all vertices in each tick, at
+/// most 4,000.
 template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume,
           CheckedLoadHistory<Scalar> History>
 [[nodiscard]] std::vector<ReferenceTick> exact_steps(const TriangleMesh<Scalar>& mesh, const Network& network,

@@ -64,10 +64,10 @@ class AabbTree {
     /// @pre `x` has as many points as the mesh, and `moved` holds indices of these (asserted)
     void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept { boxes_.refit(x, moved); }
 
-    /// A vertex becomes two, at one position until the next refit. Boxes keep their triangles: a flap that moves far away
-    /// makes those that have triangles on either side of a tear larger. The memory is there if the mesh of the tree has
-    /// vertices without triangles: that of a leaf for all corners of its triangles. Online. Cost: the leaves around the
-    /// vertex.
+    /// A vertex becomes two, at one position until the next refit. Boxes keep their triangles: a flap that moves far
+    /// away makes those that have triangles on either side of a tear larger. The memory is there if the mesh of the
+    /// tree has vertices without triangles: that of a leaf for all corners of its triangles. Online. Cost: the leaves
+    /// around the vertex.
     void split(const VertexSplit& split) noexcept { boxes_.split(split); }
 
     /// A vertex has moved as a tear has moved it: the next refit includes it. Online. Cost: the leaves around it.
@@ -80,8 +80,8 @@ class AabbTree {
     [[nodiscard]] SurfacePoint<Scalar> closest_point(const ConstPointsRef<Scalar>& x,
                                                      const Vector3<Scalar>& q) const noexcept;
 
-    /// The first intersection of the segment with the surface, from either side, as exact as `first_hit` of a triangle. If
-    /// it meets several triangles at the same point, returns the one of lowest index.
+    /// The first intersection of the segment with the surface, from either side, as exact as `first_hit` of a triangle.
+    /// If it meets several triangles at the same point, returns the one of lowest index.
     [[nodiscard]] SurfaceHit<Scalar> first_hit(const ConstPointsRef<Scalar>& x, const Vector3<Scalar>& from,
                                                const Vector3<Scalar>& to) const noexcept;
 
@@ -107,7 +107,8 @@ class AabbTree {
     /// @pre 0 <= `node` < `statistics().nodes` (asserted)
     [[nodiscard]] Aabb<Scalar> box(Index node) const noexcept { return boxes_.box(node); }
 
-    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles. Then refit the tree.
+    /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles. Then refit the
+    /// tree.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.boxes_);

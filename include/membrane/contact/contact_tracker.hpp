@@ -57,8 +57,8 @@ struct TrackerOptions {
 /// detected.
 ///
 /// The rest surface is the mesh, or the anchors of a moving body, even where the membrane is torn. Depth is measured
-/// against it. If the tool is outside the rest surface and the membrane lies farther out, there is no contact: a contact
-/// must not pull.
+/// against it. If the tool is outside the rest surface and the membrane lies farther out, there is no contact: a
+/// contact must not pull.
 template <Real Scalar>
 class ContactTracker {
   public:

@@ -93,7 +93,8 @@ class Grasper {
         slipped_ = 0;
     }
 
-    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`; of a mesh with a reserve, the rest surface as well.
+    /// Visits what is kept from tick to tick, see `core/snapshot.hpp`; of a mesh with a reserve, the rest surface as
+    /// well.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if (self.has_reserve_) visit(self.origins_);

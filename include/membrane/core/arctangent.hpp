@@ -15,8 +15,8 @@ namespace membrane {
 
 namespace detail {
 
-/// (arctan(x) / x - 1) / x^2 as a polynomial in x^2, by Remez' exchange for |x| <= tan(pi / 8): arctan has relative errors
-/// of at most 2e-18 and 7e-10.
+/// (arctan(x) / x - 1) / x^2 as a polynomial in x^2, by Remez' exchange for |x| <= tan(pi / 8): arctan has relative
+/// errors of at most 2e-18 and 7e-10.
 template <Real Scalar>
 inline constexpr auto arctangent_series =
     std::to_array<Scalar>({-0.333333333333331991, 0.199999999999540809, -0.142857142802484131, 0.111111107861338341,
@@ -44,8 +44,8 @@ template <Number N>
 }  // namespace detail
 
 /// `std::atan2(y, x)` [rad], to four epsilons; zero at the origin, NaN unless both are finite. It has the same bits on
-/// every machine, which the standard library does not promise: by sums, products, one division and comparisons. Faster if
-/// all angles are below pi / 8.
+/// every machine, which the standard library does not promise: by sums, products, one division and comparisons. Faster
+/// if all angles are below pi / 8.
 template <Number N>
 [[nodiscard]] MEMBRANE_INLINE N arctangent(const N& y, const N& x) noexcept {
     using std::abs;

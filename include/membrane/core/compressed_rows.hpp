@@ -48,8 +48,9 @@ class CompressedRows {
     [[nodiscard]] std::span<const Item> items() const noexcept { return items_; }
 
     ///@{
-    /// Online, for rows that change. Row `from` is divided: the items for which `goes(item)` become row `to`, which must be
-    /// empty; both keep their order. Row `from` keeps the memory of its first `capacity` items, which may be more than it has.
+    /// Online, for rows that change. Row `from` is divided: the items for which `goes(item)` become row `to`, which
+    /// must be empty; both keep their order. Row `from` keeps the memory of its first `capacity` items, which may be
+    /// more than it has.
     template <class Goes>
     void split(Index from, Index to, Goes goes, std::size_t capacity = 0) noexcept;
     /// Row `to` shows the items of row `from`.

@@ -68,9 +68,9 @@ inline namespace MEMBRANE_INSTRUCTION_SET MEMBRANE_ABI_TAG {}
 
 namespace detail {
 
-/// `number`, before it is put into a lane. For WebAssembly, clang before 16 reads a number from memory into all lanes by
-/// one instruction, and moves this behind stores and calls that change the number there. After an `asm` the number is
-/// in a register.
+/// `number`, before it is put into a lane. For WebAssembly, clang before 16 reads a number from memory into all lanes
+/// by one instruction, and moves this behind stores and calls that change the number there. After an `asm` the number
+/// is in a register.
 template <Real Scalar>
 [[nodiscard]] MEMBRANE_INLINE Scalar for_lane(Scalar number) noexcept {
 #if defined(__wasm_simd128__) && defined(__clang__) && __clang_major__ < 16

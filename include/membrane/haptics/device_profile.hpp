@@ -29,9 +29,9 @@ struct DeviceProfile {
 
 /// Compare a profile with the data sheet of your device. Peak forces and stiffnesses agree with the settings of CHAI3D
 /// (`CPhantomDevices.cpp`, `CDeltaDevices.cpp` in github.com/chai3d/chai3d), but for one stiffness: that of the
-/// Geomagic Touch is 400 N/m there, and 700 N/m for the Omni. Continuous forces, back-drive friction and resolutions are
-/// of no source that can be checked. Damping is published only for the PHANToM 1.0 [Diolaiti06], the predecessor of the
-/// Premium.
+/// Geomagic Touch is 400 N/m there, and 700 N/m for the Omni. Continuous forces, back-drive friction and resolutions
+/// are of no source that can be checked. Damping is published only for the PHANToM 1.0 [Diolaiti06], the predecessor of
+/// the Premium.
 namespace devices {
 
 /// 3D Systems Touch, formerly Geomagic Touch and SensAble PHANTOM Omni.

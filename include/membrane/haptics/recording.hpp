@@ -63,7 +63,8 @@ struct SnapshotMemory {
 template <Real Scalar>
 class Recorder {
   public:
-    /// Capacity for `max_ticks`, 120 bytes each in `double`, and for `snapshots`; every page is touched at construction.
+    /// Capacity for `max_ticks`, 120 bytes each in `double`, and for `snapshots`; every page is touched at
+    /// construction.
     /// @throws InvalidInput if `max_ticks` is 0 or `vertex_count` is negative
     explicit Recorder(std::size_t max_ticks, Index vertex_count, const SnapshotMemory& snapshots = {})
         : ticks_(max_ticks), vertex_count_(vertex_count), snapshots_(snapshots.count) {
@@ -81,8 +82,8 @@ class Recorder {
         }
     }
 
-    /// Keeps the state of the components before the next tick. Returns false if the memory for snapshots or ticks is used
-    /// up. Online. Cost: `save_snapshot`.
+    /// Keeps the state of the components before the next tick. Returns false if the memory for snapshots or ticks is
+    /// used up. Online. Cost: `save_snapshot`.
     template <class... Components>
     bool add_snapshot(const Components&... components) noexcept {
         if (snapshot_count_ == snapshots_.size() || size_ == ticks_.size()) return false;

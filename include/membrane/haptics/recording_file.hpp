@@ -25,10 +25,10 @@
 ///
 /// The file is little-endian on every machine: 8 bytes of magic; version, bytes of a number (4 or 8), vertices (4 bytes
 /// each); ticks (8 bytes); checksum. Then for each tick: 14 numbers (position, axis, radius, velocity, time, force;
-/// IEEE 754), a byte that is 1 while grasping, checksum. In version 2, which a recording with snapshots has, their number
-/// and a checksum follow, then for each: tick, bytes (8 bytes each), the state as it is in memory, checksum. A checksum
-/// is the CRC-32 of everything before it except checksums, so it also detects lost or reordered ticks. A state is
-/// restored only where numbers have the same order of bytes.
+/// IEEE 754), a byte that is 1 while grasping, checksum. In version 2, which a recording with snapshots has, their
+/// number and a checksum follow, then for each: tick, bytes (8 bytes each), the state as it is in memory, checksum. A
+/// checksum is the CRC-32 of everything before it except checksums, so it also detects lost or reordered ticks. A state
+/// is restored only where numbers have the same order of bytes.
 namespace membrane {
 
 /// Version of the format: 1 without, 2 with snapshots.

@@ -57,8 +57,8 @@ class RestContact {
     }
 
     ///@{
-    /// A vertex becomes two; a vertex moves at rest. The surface at rest does not part, but where it is torn a tool may be
-    /// behind it: from then on it counts as open. Online.
+    /// A vertex becomes two; a vertex moves at rest. The surface at rest does not part, but where it is torn a tool may
+    /// be behind it: from then on it counts as open. Online.
     void split(const VertexSplit& /*split*/) noexcept { torn_ = true; }
     void reshape(const MovedVertex<Scalar>& moved) noexcept {
         at_rest_.col(moved.vertex) = moved.rest;

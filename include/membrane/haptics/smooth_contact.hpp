@@ -53,8 +53,8 @@ class SmoothContact {
     }
 
     ///@{
-    /// A vertex becomes two; a vertex moves at rest. The surface without the tool does not part: the normal is continuous
-    /// over a tear. Online.
+    /// A vertex becomes two; a vertex moves at rest. The surface without the tool does not part: the normal is
+    /// continuous over a tear. Online.
     void split(const VertexSplit& /*split*/) noexcept {}
     void reshape(const MovedVertex<Scalar>& moved) noexcept { at_rest_.col(moved.vertex) = moved.rest; }
     ///@}

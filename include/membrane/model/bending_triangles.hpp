@@ -39,12 +39,12 @@ struct BendingOptions {
 /// the same slope, so that constant moments are in equilibrium on any mesh.
 ///
 /// The energy is |r|^2 / 2, r linear in the heights of the outer nine corners over the plane of the triangle, whose
-/// normal is the only nonlinear term. The Hessian leaves out the term that vanishes at rest. Neighbours may be folded by
-/// up to a quarter of a turn; beyond, the force decreases again.
+/// normal is the only nonlinear term. The Hessian leaves out the term that vanishes at rest. Neighbours may be folded
+/// by up to a quarter of a turn; beyond, the force decreases again.
 template <Number Scalar>
 struct BendingTriangle {
-    /// Three of the triangle; number 3 + k is the apex beyond the side from corner k to the next, 6 + 2 k and 7 + 2 k are
-    /// those beyond the apex' sides to corner k and to the next. Where there is none, any vertex with weight 0.
+    /// Three of the triangle; number 3 + k is the apex beyond the side from corner k to the next, 6 + 2 k and 7 + 2 k
+    /// are those beyond the apex' sides to corner k and to the next. Where there is none, any vertex with weight 0.
     static constexpr std::size_t corner_count = 12;
     static constexpr std::array<std::array<std::size_t, 2>, 21> edges{
         {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {1, 4}, {2, 4},  {2, 5},  {0, 5},  {0, 6}, {3, 6},
@@ -84,11 +84,11 @@ struct BendingTriangle {
 
 /// One for each triangle of `mesh`, whose shape is the rest shape. A border bends freely. A border between clamped
 /// vertices keeps its tangent in space. A triangle of three clamped vertices does not bend, and the sheet leaves it in
-/// its plane: a rigid patch moves the tangent at its rim. A triangle of three held vertices that are not all clamped, as
-/// along a pinned rim, would hold the tangent: it is left out, with a border around it; so is one without area. Smooth
-/// deflections converge in second order on regular and irregular meshes.
-/// @throws InvalidInput for a rigidity that is not finite, or negative, a Poisson ratio out of its range, or a held vertex
-/// that is none. O(F log F).
+/// its plane: a rigid patch moves the tangent at its rim. A triangle of three held vertices that are not all clamped,
+/// as along a pinned rim, would hold the tangent: it is left out, with a border around it; so is one without area.
+/// Smooth deflections converge in second order on regular and irregular meshes.
+/// @throws InvalidInput for a rigidity that is not finite, or negative, a Poisson ratio out of its range, or a held
+/// vertex that is none. O(F log F).
 template <Real Scalar>
 [[nodiscard]] Elements<Scalar, BendingTriangle<Scalar>> bending_triangles(const TriangleMesh<Scalar>& mesh,
                                                                           const BendingOptions& options);
@@ -107,7 +107,8 @@ class TrianglePlane {
         normal = per_area_ * across;
     }
 
-    /// Gradient of barycentric coordinate `i` [1/m]: its inverse length is the corner's distance from the opposite side.
+    /// Gradient of barycentric coordinate `i` [1/m]: its inverse length is the corner's distance from the opposite
+    /// side.
     [[nodiscard]] MEMBRANE_INLINE Vector3<N> gradient(const Corners<N, 12>& x, std::size_t i) const noexcept {
         return per_area_ * cross<N>(normal, x[(i + 2) % 3] - x[(i + 1) % 3]);
     }
@@ -146,9 +147,9 @@ template <Number N, Number Scalar>
 
 }  // namespace detail
 
-// A corner of the triangle turns the plane about the opposite side, at a distance h. A displacement of length d <= h / 4
-// at a right angle to the side, c of it along the normal, turns by an angle a, |sin a| <= d / h; then
-// 1 - cos a = sin^2 a / (1 + cos a) <= 0.51 (d / h)^2, and with the new distance h', |sin a - c / h| =
+// A corner of the triangle turns the plane about the opposite side, at a distance h. A displacement of length d <= h /
+// 4 at a right angle to the side, c of it along the normal, turns by an angle a, |sin a| <= d / h; then 1 - cos a =
+// sin^2 a / (1 + cos a) <= 0.51 (d / h)^2, and with the new distance h', |sin a - c / h| =
 // |c| |h - h'| / (h h') <= 0.8 (d / h)^2, for |h - h'| is at most the part in the plane and 2/3 c^2 / h. By the turn,
 // r + rest becomes (r + rest) cos a + h r' sin a, r' its derivative by c.
 template <Number Scalar>

@@ -38,8 +38,8 @@ static_assert(std::is_default_constructible_v<CohesionOptions<float>>);
 static_assert(std::is_default_constructible_v<CohesionOptions<double>>);
 
 /// The spring of one vertex of `CohesiveSprings`, for the length of a tick. Its separation is the displacement from the
-/// anchor as a part of the one where it fails: the root of the sum of squares of opening / failure opening and sliding /
-/// failure sliding.
+/// anchor as a part of the one where it fails: the root of the sum of squares of opening / failure opening and sliding
+/// / failure sliding.
 template <Number Scalar>
 struct CohesiveSpring {
     Vector3<Scalar> anchor = Vector3<Scalar>::Zero();  ///< [m]
@@ -52,8 +52,8 @@ struct CohesiveSpring {
     Scalar reached = 1;    ///< largest separation in earlier ticks, at least s
 
     ///@{
-    /// Force and stiffness bound at `position`. The bound makes a quadratic that is nowhere below the energy if normal and
-    /// tangential energy are equal: beyond s the stress decreases with the separation.
+    /// Force and stiffness bound at `position`. The bound makes a quadratic that is nowhere below the energy if normal
+    /// and tangential energy are equal: beyond s the stress decreases with the separation.
     [[nodiscard]] VertexForce<Scalar> force_on(const Vector3<Scalar>& position) const noexcept {
         const Displacement at(*this, position);
         const auto [along, across] = stiffnesses(at);
@@ -132,9 +132,9 @@ struct CohesiveSpring {
 /// [Geubelle98]. Drawn along the normal, the stress increases by the stiffness K up to the strength S, then decreases
 /// linearly to zero at the opening 2 G / S; the area below is the energy G. What is drawn back before that keeps the
 /// reduced stiffness. Along the surface the same holds with the tangential constants, whose stiffness is such that both
-/// begin to be damaged at the same part of the failure displacement; in between, opening and sliding add up as a root of
-/// squares, and the energies in proportion. Pressed down, a vertex is supported by K, also after its spring has failed:
-/// by the plane through its anchor, which is the body only as far as that is flat.
+/// begin to be damaged at the same part of the failure displacement; in between, opening and sliding add up as a root
+/// of squares, and the energies in proportion. Pressed down, a vertex is supported by K, also after its spring has
+/// failed: by the plane through its anchor, which is the body only as far as that is flat.
 ///
 /// The damage depends on the positions within the tick: a step that converges is an equilibrium with the law itself.
 /// `update` makes it permanent. Without it the springs heal.
@@ -171,8 +171,8 @@ class CohesiveSprings {
     }
 
     ///@{
-    /// Damages the springs of the vertices `moved` by their separation at `x`, on a body that has moved by `body`. Online.
-    /// Cost: O(moved).
+    /// Damages the springs of the vertices `moved` by their separation at `x`, on a body that has moved by `body`.
+    /// Online. Cost: O(moved).
     void update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
     void update(const MovingBody<Scalar>& body, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
     ///@}
@@ -190,7 +190,8 @@ class CohesiveSprings {
     void reset() noexcept;
 
     ///@{
-    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it. Online.
+    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it.
+    /// Online.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept { anchors_.col(moved.vertex) = moved.rest; }
     ///@}

@@ -23,9 +23,9 @@ struct VertexForce {
     Scalar stiffness = 0;                             ///< stiffness bound: no eigenvalue of the Hessian is larger [N/m]
 };
 
-/// What the energy of elements may exceed its quadratic expansion by. With their Hessian H it is, for a displacement d of
-/// length s, s^2 <= 1 / per_range, at most E - force . d + second s^2 + (sqrt(d . H d / 2) + sqrt(fourth) s^2)^2. This form
-/// is that of energies quadratic in a strain which is not linear in d.
+/// What the energy of elements may exceed its quadratic expansion by. With their Hessian H it is, for a displacement d
+/// of length s, s^2 <= 1 / per_range, at most E - force . d + second s^2 + (sqrt(d . H d / 2) + sqrt(fourth) s^2)^2.
+/// This form is that of energies quadratic in a strain which is not linear in d.
 template <Number Scalar>
 struct EnergyRemainder {
     Scalar second = 0;     ///< [N/m]
@@ -39,7 +39,8 @@ struct EnergyRemainder {
         return *this;
     }
 
-    /// The bound beyond E - force . d + d . H d / 2, or infinity. `square` is s^2, `quadratic` at least d . H d / 2 [J].
+    /// The bound beyond E - force . d + d . H d / 2, or infinity. `square` is s^2, `quadratic` at least d . H d / 2
+    /// [J].
     [[nodiscard]] MEMBRANE_INLINE Scalar at(const Scalar& square, const Scalar& quadratic) const noexcept {
         const Scalar beyond = square * (second + 2 * root_of<Scalar>(fourth * quadratic) + square * fourth);
         constexpr auto unknown = std::numeric_limits<Each<Scalar>>::infinity();

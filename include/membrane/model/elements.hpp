@@ -64,16 +64,16 @@ using Corners = std::array<Vector3<Scalar>, count>;
 ///
 /// Optional, so that a membrane may tear:
 /// - `E::triangles`: the triples of corners that are triangles of the mesh, if there is more than one.
-/// - `reshaped(before, after)`: the element of the same material whose triangle has other corners at rest; or `E::is_load`,
-///   if its energy does not depend on the shape at rest.
+/// - `reshaped(before, after)`: the element of the same material whose triangle has other corners at rest; or
+///   `E::is_load`, if its energy does not depend on the shape at rest.
 ///
 /// Optional, for speed, and satisfied by the elements of this library:
 /// - `CornerForce::remainder`: with it most updates need no evaluation of the energy.
-/// - `E` is `E<Scalar>`, its members are `Scalar`s, and it takes `Lanes` as constants and as positions: several elements
-///   of one kind at once, each with the same bits as alone. With all constants zero it has neither force nor energy, also
-///   where all corners coincide: lanes without an element have such a one.
-/// - `E::orders` and `in_order(i)`: in the order `orders[i]` of the corners, with the constants `in_order(i)`, the element
-///   is the same. Corners that come to the same place are evaluated together.
+/// - `E` is `E<Scalar>`, its members are `Scalar`s, and it takes `Lanes` as constants and as positions: several
+///   elements of one kind at once, each with the same bits as alone. With all constants zero it has neither force nor
+///   energy, also where all corners coincide: lanes without an element have such a one.
+/// - `E::orders` and `in_order(i)`: in the order `orders[i]` of the corners, with the constants `in_order(i)`, the
+///   element is the same. Corners that come to the same place are evaluated together.
 template <class E>
 concept Element = std::copyable<E> && requires(const E& element, const Corners<double, E::corner_count>& x,
                                                const Corners<float, E::corner_count>& y, std::size_t i) {
@@ -314,8 +314,8 @@ class Elements {
     void add_response(const std::array<Index, 3>& corners, const ConstPointsRef<Scalar>& x,
                       TriangleResponse<Scalar>& sum) const noexcept;
 
-    /// A vertex becomes two. An element keeps to its triangles; one of two triangles that part acts no more. Online. Cost:
-    /// that of listing the elements around the vertex.
+    /// A vertex becomes two. An element keeps to its triangles; one of two triangles that part acts no more. Online.
+    /// Cost: that of listing the elements around the vertex.
     void split(const VertexSplit& split) noexcept;
 
     /// Triangles change their shape at rest: their elements are `reshaped`, if they can be. Online.

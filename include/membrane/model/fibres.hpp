@@ -37,8 +37,8 @@ struct FibreMaterial {
     /// The fibres' strain at the limit, `stretch_limit`^2 - 1.
     [[nodiscard]] double strain_limit() const noexcept { return stretch_limit * stretch_limit - 1; }
 
-    /// @throws InvalidInput for a number out of its range, or if stiffening times the square of `strain_limit()` exceeds
-    /// 20
+    /// @throws InvalidInput for a number out of its range, or if stiffening times the square of `strain_limit()`
+    /// exceeds 20
     void check() const;
 };
 

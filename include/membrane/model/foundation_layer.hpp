@@ -129,7 +129,8 @@ class FoundationSprings {
     }
 
     ///@{
-    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it. Online.
+    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it.
+    /// Online.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept { anchors_.col(moved.vertex) = moved.rest; }
     ///@}

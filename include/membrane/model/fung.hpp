@@ -35,10 +35,10 @@ struct FungOptions {
 };
 
 /// A linear triangle of an incompressible isotropic sheet in plane stress whose stiffness grows exponentially
-/// [Demiray72], in two dimensions what [Fung67] found in one: it stores area thickness mu / (2 b) (exp(b (I1 - 3)) - 1).
-/// At small strain it is a `NeoHookeanTriangle`; its stiffness is e times that where I1 - 3 is 1 / b. Beyond the limit
-/// of `FungOptions` the energy continues as its second-order Taylor polynomial in I1. Calls exp: results may differ in
-/// the last bits from one mathematics library to another.
+/// [Demiray72], in two dimensions what [Fung67] found in one: it stores area thickness mu / (2 b) (exp(b (I1 - 3)) -
+/// 1). At small strain it is a `NeoHookeanTriangle`; its stiffness is e times that where I1 - 3 is 1 / b. Beyond the
+/// limit of `FungOptions` the energy continues as its second-order Taylor polynomial in I1. Calls exp: results may
+/// differ in the last bits from one mathematics library to another.
 ///
 /// Finite if no edge is longer than 1e5 times the lengths at rest in float, 1e60 times in double.
 template <Number Scalar>

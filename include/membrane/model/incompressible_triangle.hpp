@@ -318,8 +318,9 @@ InvariantChange<N> IncompressibleTriangle<Scalar>::invariant_change(const Corner
 }
 
 // Only 1 / J^2 is not quadratic. The displacement d adds w = e x d to the normal n of length J. The third derivative of
-// 1 / |n|^2 along w is at most 24 |n.w| |w|^2 / |n|^6. While |w| <= J / 8, |n| stays above 7/8 J, and what the expansion
-// leaves out is at most 8.92 |n.w| |w|^2 / J^6 + 2.23 |w|^4 / J^6. The Hessian contributes d.Hd / 2 >= 3 (n.w)^2 / J^6.
+// 1 / |n|^2 along w is at most 24 |n.w| |w|^2 / |n|^6. While |w| <= J / 8, |n| stays above 7/8 J, and what the
+// expansion leaves out is at most 8.92 |n.w| |w|^2 / J^6 + 2.23 |w|^4 / J^6. The Hessian contributes d.Hd / 2 >= 3
+// (n.w)^2 / J^6.
 template <Number Scalar>
 template <Number N>
 EnergyRemainder<N> IncompressibleTriangle<Scalar>::invariant_remainder(const Corners<N, 3>& x,

@@ -16,7 +16,7 @@
 
 /// Springs of a membrane that may tear.
 ///
-///     const auto mesh = membrane::with_reserve(sheet, 400);                             // for 400 vertices that double
+///     const auto mesh = membrane::with_reserve(sheet, 400);  // for 400 vertices that double
 ///     auto springs = membrane::TearableSprings(mesh, membrane::MassSpringNetwork(mesh, law, options));
 namespace membrane {
 
@@ -55,8 +55,9 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
     [[nodiscard]] std::size_t capacity(Index v) const noexcept { return static_cast<std::size_t>(capacity_[at(v)]); }
 
     ///@{
-    /// A vertex becomes two; a vertex moves at rest: its springs have their rest lengths in proportion to the edges, and
-    /// their stiffnesses in proportion to area over squared length. Online. Cost: that of the springs around the vertex.
+    /// A vertex becomes two; a vertex moves at rest: its springs have their rest lengths in proportion to the edges,
+    /// and their stiffnesses in proportion to area over squared length. Online. Cost: that of the springs around the
+    /// vertex.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}

@@ -86,8 +86,8 @@ class Tissue {
     void reshape(const MovedVertex<Scalar>& moved) noexcept requires FollowsSplit<Springs>;
     ///@}
 
-    /// Of `TearableSprings`: the energy [J] of triangle `f` with these corners, and its forces on them [N]: of springs, and
-    /// of elements of a material that are triangles.
+    /// Of `TearableSprings`: the energy [J] of triangle `f` with these corners, and its forces on them [N]: of springs,
+    /// and of elements of a material that are triangles.
     [[nodiscard]] TriangleResponse<Scalar> triangle_response(Index f, const std::array<Index, 3>& corners,
                                                              const ConstPointsRef<Scalar>& x) const noexcept requires
         FollowsSplit<Springs>;

@@ -19,8 +19,8 @@
 /// The foundation: it supports the membrane on the body under it.
 ///
 ///     const auto foundation = membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});
-///     solver.step(x, dt, network, foundation, press(tool, contact));               // the body stands still
-///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));  // it moves, see `moving_foundation.hpp`
+///     solver.step(x, dt, network, foundation, press(tool, contact));            // the body stands still
+///     solver.step(x, dt, network, on(body, foundation), press(tool, contact));  // see `moving_foundation.hpp`
 namespace membrane {
 
 /// Constants of the volume springs: one value for all vertices, or one for each vertex.
@@ -199,7 +199,8 @@ class VirtualVolumeSprings {
     }
 
     ///@{
-    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it. Online.
+    /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it.
+    /// Online.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept { anchors_.col(moved.vertex) = moved.rest; }
     ///@}

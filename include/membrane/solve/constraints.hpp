@@ -22,8 +22,8 @@ namespace membrane {
 
 /// A constraint on the membrane for one step. `begin` seeds all vertices where its force enters, and moves attached
 /// points to their targets. `enforce` restores the constraint, and returns whether it was violated. It is called after
-/// each update of layer 0. If there is time, it is also called at the end of the step, unless nothing has changed since a
-/// call that found no violation. `reaction` is the force of the membrane on the constraint [N]. Optional members:
+/// each update of layer 0. If there is time, it is also called at the end of the step, unless nothing has changed since
+/// a call that found no violation. `reaction` is the force of the membrane on the constraint [N]. Optional members:
 /// `driving_input(): DrivingInput<Scalar>`, from which the next steps are extrapolated; `prescribe(context)`, which
 /// prescribes vertices and is called before any `begin`; `end(context)`, called after all reactions of a step that
 /// advanced, and not of one that is refused: for what a constraint keeps from step to step.

@@ -55,8 +55,8 @@ class PackedElements {
     template <class Network>
     [[nodiscard]] bool append(std::span<const Index> vertices, const Begins& own, const Network& network) noexcept;
 
-    /// Calls `act(element, x, place)` for the elements of pack `p`: constants and corners are of one element in each lane,
-    /// corner number `place` is the vertex, `here`.
+    /// Calls `act(element, x, place)` for the elements of pack `p`: constants and corners are of one element in each
+    /// lane, corner number `place` is the vertex, `here`.
     template <class Network, class Act>
     void for_each(std::size_t p, const Vector3<Wide>& here, const PaddedPoint<Scalar>* rows, const Network& network,
                   const Act& act) const noexcept;
@@ -73,7 +73,8 @@ class PackedElements {
     template <class E>
     static constexpr std::size_t blocks = sizeof(Slot<E>) / sizeof(Block);
 
-    // Calls `act(elements, place, group)` for each kind and each place of a vertex in it; place and group are constants.
+    // Calls `act(elements, place, group)` for each kind and each place of a vertex in it; place and group are
+    // constants.
     template <class Network, class Act>
     static void for_each_group(const Network& network, const Act& act) noexcept;
     template <class E>

@@ -67,7 +67,8 @@ class PackedVertices {
     template <ElasticNetwork<Scalar> Network>
     explicit PackedVertices(const Network& network, Index capacity = unlimited);
 
-    /// Replaces all vertices by these, in groups that end at `ends` or with the last of them. Online. Cost: their springs.
+    /// Replaces all vertices by these, in groups that end at `ends` or with the last of them. Online. Cost: their
+    /// springs.
     template <class Network>
     void assign(std::span<const Index> vertices, std::span<const std::size_t> ends, const Network& network) noexcept;
 

@@ -16,8 +16,8 @@
 namespace membrane {
 
 /// Vertices in the order of a breadth-first search from the seeds, [Liu07] 2.2: the seeds are layer 0, layer k holds
-/// the vertices at k springs or edges of elements from the nearest seed, until `group` merges layers. Within a layer the
-/// order is breadth-first, or by groups.
+/// the vertices at k springs or edges of elements from the nearest seed, until `group` merges layers. Within a layer
+/// the order is breadth-first, or by groups.
 class PropagationQueue {
   public:
     /// An empty queue. Cost: O(V) memory.

@@ -43,8 +43,8 @@ namespace membrane {
 /// direction in the world (`DeadLoad`) do not rotate with a body, and force policies that store a position in the world
 /// (`ContactFriction`) do not move with it; with `to_body_frame` they do.
 ///
-/// A membrane that tears does not tear the body: a vertex and its copy have one anchor and one normal. The last vertices
-/// of the mesh, if they have no triangles, do not count in the pose.
+/// A membrane that tears does not tear the body: a vertex and its copy have one anchor and one normal. The last
+/// vertices of the mesh, if they have no triangles, do not count in the pose.
 template <Real Scalar>
 class MovingBody {
   public:

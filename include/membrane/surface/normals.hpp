@@ -59,8 +59,8 @@ class VertexNormals {
     /// 3 x V, unit length.
     [[nodiscard]] const Points<Scalar>& values() const noexcept { return values_; }
 
-    /// A vertex becomes two, with one normal until both are updated. The normal at rest of both stays. Online. Cost: the
-    /// triangles around the vertex and its neighbours.
+    /// A vertex becomes two, with one normal until both are updated. The normal at rest of both stays. Online. Cost:
+    /// the triangles around the vertex and its neighbours.
     void split(const VertexSplit& split) noexcept;
 
     /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles around each vertex.

@@ -80,8 +80,8 @@ struct Midpoint {
 };
 
 /// The mesh with each edge halved and each triangle split into four. Its first vertices are those of `mesh`; then comes
-/// one for each edge from a to b, at `between(a, b)` [m]: `Midpoint` keeps the shape of the mesh, a user-defined function
-/// puts the vertex on the surface or the border that the mesh approximates.
+/// one for each edge from a to b, at `between(a, b)` [m]: `Midpoint` keeps the shape of the mesh, a user-defined
+/// function puts the vertex on the surface or the border that the mesh approximates.
 /// @throws InvalidInput for a position that is not finite. O(F log F).
 template <Real Scalar, class Between = Midpoint>
 [[nodiscard]] TriangleMesh<Scalar> refined(const TriangleMesh<Scalar>& mesh, Between between = {});

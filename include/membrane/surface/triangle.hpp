@@ -63,10 +63,10 @@ template <Number N>
 template <Number N>
 [[nodiscard]] Vector3<N> point_at(const Triangle<N>& triangle, const Vector3<N>& barycentric) noexcept;
 
-/// The point of the triangle nearest to `q`; several triangles at once give the same bits. Accurate to some epsilon times
-/// edge^2 / height, for the longest edge and the height above it. A triangle whose height is below sqrt(epsilon) of its
-/// edges counts as its three edges, which moves the point by at most that height. If a triangle is not finite, or the
-/// square of its area overflows, its distance is infinite.
+/// The point of the triangle nearest to `q`; several triangles at once give the same bits. Accurate to some epsilon
+/// times edge^2 / height, for the longest edge and the height above it. A triangle whose height is below sqrt(epsilon)
+/// of its edges counts as its three edges, which moves the point by at most that height. If a triangle is not finite,
+/// or the square of its area overflows, its distance is infinite.
 template <Number N>
 [[nodiscard]] TrianglePoint<N> closest_point(const Triangle<N>& triangle, const Vector3<N>& q) noexcept;
 
@@ -88,13 +88,14 @@ template <Real Scalar>
 /// to it.
 ///
 /// Watertight: a possible hit within the rounding errors is a hit, so that no segment passes between two triangles with
-/// a common edge. For triangles that are not thin these errors are some 100 epsilon times the size of the triangle, or its
-/// distance from `from` if that is larger: the point at the fraction is as near to the plane, and an edge is missed by at
-/// most as much over the sine of its angle to the segment. So a segment almost in the plane may be off along the plane by
-/// far more than a rounding. The weights are those of the point of the triangle nearest to that at the fraction.
+/// a common edge. For triangles that are not thin these errors are some 100 epsilon times the size of the triangle, or
+/// its distance from `from` if that is larger: the point at the fraction is as near to the plane, and an edge is missed
+/// by at most as much over the sine of its angle to the segment. So a segment almost in the plane may be off along the
+/// plane by far more than a rounding. The weights are those of the point of the triangle nearest to that at the
+/// fraction.
 ///
-/// A segment in the plane of the triangle enters at an edge, or starts inside. A triangle without area is never hit: its
-/// neighbours are.
+/// A segment in the plane of the triangle enters at an edge, or starts inside. A triangle without area is never hit:
+/// its neighbours are.
 template <Real Scalar>
 [[nodiscard]] std::optional<SegmentHit<Scalar>> first_hit(const Triangle<Scalar>& triangle, const Vector3<Scalar>& from,
                                                           const Vector3<Scalar>& to) noexcept;

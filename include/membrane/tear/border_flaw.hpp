@@ -25,16 +25,17 @@ struct BorderState {
     Scalar energy = 0;                                 ///< of that tension, per area [J/m^2]
 };
 
-/// The state of the border at vertex `v`, as the mean of the triangles around it. Of their energy it has the share of the
-/// tension along the border in the squared tensions: all of it where no force acts across the border. Online.
+/// The state of the border at vertex `v`, as the mean of the triangles around it. Of their energy it has the share of
+/// the tension along the border in the squared tensions: all of it where no force acts across the border. Online.
 template <Real Scalar, class Network>
 [[nodiscard]] BorderState<Scalar> border_state(const TornSurface<Scalar>& surface, Index v,
                                                const ConstPointsRef<Scalar>& x, const Network& network) noexcept;
 
-/// The energy that an advance of a flaw releases, per length [N]: a cut of this `length` [m] into a straight border under
-/// tension. 2 k W c for the energy W per area and the length c [Rivlin53], with k = 1.1215^2 pi / sqrt(stretch): that of an
-/// edge crack in linear elasticity [Tada00], decreasing with the stretch as in [Lindley72]. At stretches of 1.2 to 2 a cut
-/// in a sheet of rubber-like tissue releases 10 to 30 % less. It is 0 where the border is slack or in compression.
+/// The energy that an advance of a flaw releases, per length [N]: a cut of this `length` [m] into a straight border
+/// under tension. 2 k W c for the energy W per area and the length c [Rivlin53], with k = 1.1215^2 pi / sqrt(stretch):
+/// that of an edge crack in linear elasticity [Tada00], decreasing with the stretch as in [Lindley72]. At stretches of
+/// 1.2 to 2 a cut in a sheet of rubber-like tissue releases 10 to 30 % less. It is 0 where the border is slack or in
+/// compression.
 template <Real Scalar>
 [[nodiscard]] Scalar flaw_driving_force(const BorderState<Scalar>& border, Scalar length) noexcept {
     if (!(border.tension > 0 && border.stretch > 0)) return 0;

@@ -34,8 +34,8 @@ struct RestTriangle {
 /// The configurational forces of a triangle on its corners, times `weights`, in sum: that on a corner is minus the
 /// derivative of the triangle's energy by the corner's position at rest, with all present positions kept [N]. For a
 /// homogeneous material of energy density W, deformation gradient F and first Piola-Kirchhoff stress P the sum is
-/// -(W I - F^T P) times the gradient of the weights at rest, integrated [Miehe07]: with the corners' forces f, and F^T f,
-/// this needs energy and forces alone.
+/// -(W I - F^T P) times the gradient of the weights at rest, integrated [Miehe07]: with the corners' forces f, and F^T
+/// f, this needs energy and forces alone.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> configurational_force(const std::array<Vector3<Scalar>, 3>& rest,
                                                     const std::array<Vector3<Scalar>, 3>& x,

@@ -11,10 +11,11 @@
 /// The force across an edge that is opening.
 namespace membrane {
 
-/// What still joins the two vertices into which a tear has parted one: a force against their separation that is `strength`
-/// up to the separation `plateau` and decreases linearly to zero at `failure_opening`; the area below is what the edge
-/// takes to open: a cohesive law that is rigid at first [Camacho96]. A tear so advances without a jump, and takes that
-/// energy however coarse mesh and ticks are. If the separation decreases, the force decreases in proportion.
+/// What still joins the two vertices into which a tear has parted one: a force against their separation that is
+/// `strength` up to the separation `plateau` and decreases linearly to zero at `failure_opening`; the area below is
+/// what the edge takes to open: a cohesive law that is rigid at first [Camacho96]. A tear so advances without a jump,
+/// and takes that energy however coarse mesh and ticks are. If the separation decreases, the force decreases in
+/// proportion.
 template <Real Scalar>
 struct Ligament {
     ///@{
@@ -97,7 +98,8 @@ void LigamentForces<Scalar>::begin(ConstraintContext<Scalar>& context) const noe
     }
 }
 
-// With the response S of the separation u, and c = u / tension, the force f on the vertex solves c f = -(u + S (f - f_0)).
+// With the response S of the separation u, and c = u / tension, the force f on the vertex solves c f = -(u + S (f -
+// f_0)).
 template <Real Scalar>
 bool LigamentForces<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
     bool changed = false;

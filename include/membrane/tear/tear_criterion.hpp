@@ -22,8 +22,8 @@ struct TipState {
     Vector3<Scalar> heading;            ///< the direction of the last advance, a unit vector
 };
 
-/// When a tear advances. `opens(tip)`: whether it does now; `direction(tip)`: where to, not necessarily a unit vector, 0:
-/// nowhere; `resistance()`: the energy that a length takes [J/m], which the opening edge takes up as it opens.
+/// When a tear advances. `opens(tip)`: whether it does now; `direction(tip)`: where to, not necessarily a unit vector,
+/// 0: nowhere; `resistance()`: the energy that a length takes [J/m], which the opening edge takes up as it opens.
 template <class Criterion, class Scalar>
 concept TearCriterion = Real<Scalar> && std::copyable<Criterion> &&
     requires(const Criterion& criterion, const TipState<Scalar>& tip) {
@@ -36,8 +36,8 @@ concept TearCriterion = Real<Scalar> && std::copyable<Criterion> &&
 };
 
 /// Griffith's criterion [Griffith21]: a tear advances if that releases at least the energy that the new surface takes.
-/// Whatever the mesh, it needs the same force. Direction: that of the configurational force, in which an advance releases
-/// most [Miehe07].
+/// Whatever the mesh, it needs the same force. Direction: that of the configurational force, in which an advance
+/// releases most [Miehe07].
 struct EnergyRelease {
     double toughness;  ///< [J/m^2]
     double thickness;  ///< of the membrane [m]
@@ -62,9 +62,9 @@ struct EnergyRelease {
     ///@}
 };
 
-/// For comparison: a tear advances across the largest tension at its tip, where that exceeds a strength. The tension at a
-/// tip increases without bound as the triangles become smaller, and so the force that such a tear needs depends on the
-/// mesh. It takes no energy.
+/// For comparison: a tear advances across the largest tension at its tip, where that exceeds a strength. The tension at
+/// a tip increases without bound as the triangles become smaller, and so the force that such a tear needs depends on
+/// the mesh. It takes no energy.
 struct LargestTension {
     double strength;  ///< force per width [N/m]
 

@@ -28,7 +28,8 @@
 ///     for (const auto& event : tear.cut_along(path, x)) follow(event, tissue, foundation, solver, tree, tracker);
 ///     ...
 ///     const auto report = solver.step(x, dt, tissue, foundation, pull(tool, grasp), tear.ligaments());
-///     for (const auto& event : tear.update(x, dt, tissue, foundation)) follow(event, tissue, foundation, solver, tree);
+///     const auto events = tear.update(x, dt, tissue, foundation);
+///     for (const auto& event : events) follow(event, tissue, foundation, solver, tree, tracker);
 ///     tree.refit(x, report.moved);
 namespace membrane {
 
@@ -72,15 +73,16 @@ void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
 /// Tears of one membrane, along the edges of its triangles.
 ///
 /// A cut starts them; each of its ends within the membrane is a tip. In each tick the configurational force at a tip
-/// [Miehe07] says what energy an advance would release, and in which direction most. If the `Criterion` says so, the next
-/// vertex in that direction moves onto it, at rest and now, and the edge to it opens: the tip's vertex becomes two, from a
-/// reserve (`with_reserve`). A `Ligament` takes up the energy of the edge as it opens. The tip goes on when that has
-/// failed. An edge that the load no longer draws apart would hold the tip: it fails as well if an advance would release
-/// what the edge has left to take and what the next one takes, or 1.25 times the latter if that is more. Triangles
-/// keep their numbers; other parts `follow` the events.
+/// [Miehe07] says what energy an advance would release, and in which direction most. If the `Criterion` says so, the
+/// next vertex in that direction moves onto it, at rest and now, and the edge to it opens: the tip's vertex becomes
+/// two, from a reserve (`with_reserve`). A `Ligament` takes up the energy of the edge as it opens. The tip goes on when
+/// that has failed. An edge that the load no longer draws apart would hold the tip: it fails as well if an advance
+/// would release what the edge has left to take and what the next one takes, or 1.25 times the latter if that is more.
+/// Triangles keep their numbers; other parts `follow` the events.
 ///
-/// A flap may pass through the membrane: there is no contact of the membrane with itself. Elements that are no triangles do
-/// not count in the driving force; a foundation does, as if its stiffness per area were the same everywhere.
+/// A flap may pass through the membrane: there is no contact of the membrane with itself. Elements that are no
+/// triangles do not count in the driving force; a foundation does, as if its stiffness per area were the same
+/// everywhere.
 ///
 /// Online but for the constructor; cost of a tick: that of the forces of some 60 triangles at each tip.
 template <Real Scalar, TearCriterion<Scalar> Criterion = EnergyRelease>
@@ -91,29 +93,30 @@ class Tearing {
     /// Vertices of `mesh` without triangles are the reserve. @throws InvalidInput for options out of their range
     explicit Tearing(const TriangleMesh<Scalar>& mesh, const Criterion& criterion, const TearOptions& options = {});
 
-    /// Cuts along the edges between these vertices, each joined to the next by an edge with two triangles; those between
-    /// the ends are not on a border. Nothing is cut, and there is no event, if `path` is not so, or if the reserve is too
-    /// small. Ends that are not on a border become tips, up to the capacity.
+    /// Cuts along the edges between these vertices, each joined to the next by an edge with two triangles; those
+    /// between the ends are not on a border. Nothing is cut, and there is no event, if `path` is not so, or if the
+    /// reserve is too small. Ends that are not on a border become tips, up to the capacity.
     [[nodiscard]] Events cut_along(std::span<const Index> path, PointsRef<Scalar> x) noexcept;
 
-    /// The path of two edges through `v`, as nearly as possible along `direction` at rest: where a sharp tool perforates
-    /// the membrane. All are `no_index` if there is none.
+    /// The path of two edges through `v`, as nearly as possible along `direction` at rest: where a sharp tool
+    /// perforates the membrane. All are `no_index` if there is none.
     [[nodiscard]] std::array<Index, 3> slit_at(Index v, const Vector3<Scalar>& direction) const noexcept;
 
     /// The path where a sharp tool perforates, for `cut_along`: the slit at the vertex of the contact triangle that is
-    /// nearest to the contact point, along `direction`, if the membrane's force on the tool along the contact's normal is
-    /// `force` [N] or more. All are `no_index` if the tool does not perforate there. `reaction`: of the step under this
-    /// contact.
+    /// nearest to the contact point, along `direction`, if the membrane's force on the tool along the contact's normal
+    /// is `force` [N] or more. All are `no_index` if the tool does not perforate there. `reaction`: of the step under
+    /// this contact.
     [[nodiscard]] std::array<Index, 3> slit_under(const Contact<Scalar>& contact, const Vector3<Scalar>& reaction,
                                                   Scalar force, const Vector3<Scalar>& direction) const noexcept;
 
-    /// The path of a tear that starts at vertex `v` of the membrane's border, for `cut_along`; empty if none starts. A border
-    /// tears from a flaw, a cut that may be too small for the mesh, of length `flaw` [m]: if the criterion opens a tip with
-    /// the flaw's driving force (see `border_flaw.hpp`). The path goes inward, at right angles to the border, and is twice
-    /// as long as the flaw or longer by less than an edge, so that the tear goes on; it ends at a border, and has 32 edges
-    /// at most. None starts at a pinned vertex, beside a tip, if positions or `flaw` are not finite and positive, or if the
-    /// reserve or the capacity for tips is too small. As of any cut, the energy of its edges is not in `dissipated`.
-    /// Valid until the next call. @pre the network has followed all events. Cost: the triangles around the path.
+    /// The path of a tear that starts at vertex `v` of the membrane's border, for `cut_along`; empty if none starts. A
+    /// border tears from a flaw, a cut that may be too small for the mesh, of length `flaw` [m]: if the criterion opens
+    /// a tip with the flaw's driving force (see `border_flaw.hpp`). The path goes inward, at right angles to the
+    /// border, and is twice as long as the flaw or longer by less than an edge, so that the tear goes on; it ends at a
+    /// border, and has 32 edges at most. None starts at a pinned vertex, beside a tip, if positions or `flaw` are not
+    /// finite and positive, or if the reserve or the capacity for tips is too small. As of any cut, the energy of its
+    /// edges is not in `dissipated`. Valid until the next call. @pre the network has followed all events. Cost: the
+    /// triangles around the path.
     template <class Network>
     [[nodiscard]] std::span<const Index> start_at(Index v, Scalar flaw, const ConstPointsRef<Scalar>& x,
                                                   const Network& network) noexcept;
@@ -121,8 +124,8 @@ class Tearing {
     /// The forces across opening edges: a constraint of the step.
     [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items()}; }
 
-    /// After a step of `dt` [s]: edges open, tips advance. `held`: the few vertices on which tools act, as the corners of a
-    /// triangle in forceps; their forces are none of a tear.
+    /// After a step of `dt` [s]: edges open, tips advance. `held`: the few vertices on which tools act, as the corners
+    /// of a triangle in forceps; their forces are none of a tear.
     template <class Network, class Volume>
     [[nodiscard]] Events update(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                 std::span<const Index> held = {}) noexcept;
@@ -519,8 +522,8 @@ Scalar Tearing<Scalar, Criterion>::patch_radius_at(Index tip) const noexcept {
     return radius;
 }
 
-// The configurational force of the patch: of all its vertices, those nearer to the tip in full, those farther away less.
-// A foundation's anchors move with the rest positions, and its energy is in proportion to the area.
+// The configurational force of the patch: of all its vertices, those nearer to the tip in full, those farther away
+// less. A foundation's anchors move with the rest positions, and its energy is in proportion to the area.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network, class Volume>
 Vector3<Scalar> Tearing<Scalar, Criterion>::driving_force_at(Index tip, const ConstPointsRef<Scalar>& x, Scalar dt,
@@ -658,10 +661,10 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     return true;
 }
 
-// It begins with the force that the membrane has transmitted through the vertex, and ends with the opening that the edge
-// behind has now, as in a virtual crack closure [Rybicki77]. A force that decreases linearly has half their product as its
-// energy. Where the sides part without stretch, as the legs of a torn strip, more: it first keeps its strength, and if that
-// is not enough, it is stronger.
+// It begins with the force that the membrane has transmitted through the vertex, and ends with the opening that the
+// edge behind has now, as in a virtual crack closure [Rybicki77]. A force that decreases linearly has half their
+// product as its energy. Where the sides part without stretch, as the legs of a torn strip, more: it first keeps its
+// strength, and if that is not enough, it is stronger.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network>
 void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index copy, Scalar length,

@@ -17,8 +17,8 @@
 /// The surface of a membrane that tears: triangles, rest positions, and the vertices left to double others.
 namespace membrane {
 
-/// One change of the surface, which all parts follow: a vertex may first move at rest, then one becomes two. Valid until
-/// the surface changes again.
+/// One change of the surface, which all parts follow: a vertex may first move at rest, then one becomes two. Valid
+/// until the surface changes again.
 template <Real Scalar>
 struct TearEvent {
     MovedVertex<Scalar> moved;  ///< `vertex` is `no_index`: none has moved
@@ -57,8 +57,8 @@ class TornSurface {
     /// Whether an edge joins `v` to `other`, with a triangle on either side.
     [[nodiscard]] bool has_inner_edge(Index v, Index other) const noexcept;
 
-    /// The vertex next to `v` over an edge with two triangles whose direction at rest is nearest to `direction`, less than
-    /// 60 degrees from it; or `no_index`.
+    /// The vertex next to `v` over an edge with two triangles whose direction at rest is nearest to `direction`, less
+    /// than 60 degrees from it; or `no_index`.
     [[nodiscard]] Index nearest_in_direction(Index v, const Vector3<Scalar>& direction) const noexcept;
 
     /// Mean length of the edges at `v` at rest [m].
@@ -79,13 +79,13 @@ class TornSurface {
     void begin() noexcept;
     ///@}
 
-    /// Moves `v` at rest toward `place`, as far as no angle of its triangles becomes less than `min_angle` [rad], and in
-    /// `x` to the same point of the membrane. False if it cannot move.
+    /// Moves `v` at rest toward `place`, as far as no angle of its triangles becomes less than `min_angle` [rad], and
+    /// in `x` to the same point of the membrane. False if it cannot move.
     bool move_vertex(PointsRef<Scalar>& x, Index v, const Vector3<Scalar>& place, Scalar min_angle) noexcept;
 
-    /// Doubles `v`: the triangles on the left of its edge to `out` get a copy, as far as the edge to `back` or to the next
-    /// border. Returns the copy, or `no_index` if nothing can part. An end of such an edge that is on a border must be
-    /// split next, or it joins two fans of triangles; `back` is for a vertex that is not on a border.
+    /// Doubles `v`: the triangles on the left of its edge to `out` get a copy, as far as the edge to `back` or to the
+    /// next border. Returns the copy, or `no_index` if nothing can part. An end of such an edge that is on a border
+    /// must be split next, or it joins two fans of triangles; `back` is for a vertex that is not on a border.
     Index split(PointsRef<Scalar>& x, Index v, Index out, Index back = no_index) noexcept;
 
     /// Visits what a tear changes, see `core/snapshot.hpp`.

@@ -8,10 +8,11 @@
 // wrong: ElasticNetwork: viscosity(Index) const noexcept must return Scalar
 // wrong: ElasticNetwork: neighbours(Index) const must give a range of something with .other, an Index
 // wrong: ElasticNetwork: force_on(Index, const ConstPointsRef<Scalar>&) const noexcept must return VertexForce<Scalar>
-// wrong: ElasticNetwork: majoriser(Index, const ConstPointsRef<Scalar>&) const noexcept must return EnergyMajoriser<Scalar>
-// wrong: ElasticNetwork: hessian(Index, const ConstPointsRef<Scalar>&) const noexcept must return Symmetric3<Scalar>
-// wrong: ElasticNetwork: energy_change(Index, const Vector3<Scalar>&, const ConstPointsRef<Scalar>&) const noexcept must
-// wrong: ElasticNetwork: force_tolerance() const noexcept must return Scalar
+// wrong: ElasticNetwork: majoriser(Index, const ConstPointsRef<Scalar>&) const noexcept must return
+// EnergyMajoriser<Scalar> wrong: ElasticNetwork: hessian(Index, const ConstPointsRef<Scalar>&) const noexcept must
+// return Symmetric3<Scalar> wrong: ElasticNetwork: energy_change(Index, const Vector3<Scalar>&, const
+// ConstPointsRef<Scalar>&) const noexcept must wrong: ElasticNetwork: force_tolerance() const noexcept must return
+// Scalar
 #include <type_traits>
 
 #include <membrane/model/elastic_network.hpp>

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // wrong: Element: must be copyable
 // wrong: Element: must have static constexpr corner_count, the number of its corners
-// wrong: Element: force_on(const Corners<double, corner_count>&, std::size_t) const noexcept must return CornerForce<double>
-// wrong: Element: force_on(const Corners<float, corner_count>&, std::size_t) const noexcept must return CornerForce<float>
-// wrong: Element: energy(const Corners<double, corner_count>&) const noexcept must return double
-// wrong: Element: energy_change(const Corners<double, corner_count>&, std::size_t, const Vector3<double>&) const noexcept must
-// wrong: Element: energy_change(const Corners<float, corner_count>&, std::size_t, const Vector3<float>&) const noexcept must
-// wrong: Element: hessian_block(const Corners<double, corner_count>&, std::size_t, std::size_t) const must return
+// wrong: Element: force_on(const Corners<double, corner_count>&, std::size_t) const noexcept must return
+// CornerForce<double> wrong: Element: force_on(const Corners<float, corner_count>&, std::size_t) const noexcept must
+// return CornerForce<float> wrong: Element: energy(const Corners<double, corner_count>&) const noexcept must return
+// double wrong: Element: energy_change(const Corners<double, corner_count>&, std::size_t, const Vector3<double>&) const
+// noexcept must wrong: Element: energy_change(const Corners<float, corner_count>&, std::size_t, const Vector3<float>&)
+// const noexcept must wrong: Element: hessian_block(const Corners<double, corner_count>&, std::size_t, std::size_t)
+// const must return
 #include <membrane/model/elements.hpp>
 
 template <class Scalar>

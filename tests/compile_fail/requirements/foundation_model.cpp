@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
-// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
-// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
-// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
-// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
+// wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>& start, Scalar dt)
+// const noexcept must wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const Vector3<Scalar>&
+// start, Scalar dt) const noexcept must wrong: FoundationModel: force_on(Index, const Vector3<Scalar>& position, const
+// Vector3<Scalar>& start, Scalar dt) const noexcept must wrong: FoundationModel: force_on(Index, const Vector3<Scalar>&
+// position, const Vector3<Scalar>& start, Scalar dt) const noexcept must
 #include <type_traits>
 
 #include <membrane/solve/quasi_static.hpp>
