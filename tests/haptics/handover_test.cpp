@@ -14,11 +14,13 @@
 #include <vector>
 
 #include <membrane/contact/tool.hpp>
+#include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/random.hpp"
+#include "support/random_tear.hpp"
 #include "support/refusal.hpp"
 
 using namespace membrane;
@@ -149,6 +151,48 @@ TEMPLATE_TEST_CASE("all that has moved since the last read is read, and hardly m
     }
 }
 
+TEMPLATE_TEST_CASE("what a tear changes is read as well: copies, moved vertices, corners of triangles", "[handover]",
+                   double, float) {
+    using S = TestType;
+    const auto mesh = with_reserve(disc<S>({.radius = 1, .rings = 5}), 30);
+    const TornSurface<S> whole(mesh);
+    int splits = 0, resets = 0;
+    for (int seed = 1; seed <= cases(50, 1000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        auto surface = whole;
+        Points<S> x = mesh.positions(), shown = x;
+        Triangles indices = mesh.triangles();
+        MovedPoints<S> moved(mesh.vertex_count(), mesh.triangle_count());
+        const double busy = random.number(0.05, 0.95);
+        for (int i = 0; i < 200; ++i) {
+            if (random.chance(busy)) {
+                test::change_at_random(random, surface, x, true);
+                for (const auto& event : surface.events()) follow(event, moved);
+                splits += static_cast<int>(surface.events().size());
+                const Index v = random.index(mesh.vertex_count());
+                x.col(v) = random.template vector<S>();
+                if (random.chance(0.02)) {
+                    surface = whole;
+                    x = mesh.positions();
+                    moved.replace_all(surface.triangles());
+                    ++resets;
+                }
+                moved.publish({&v, 1}, x, 0);
+                continue;
+            }
+            const auto news = moved.read();
+            for (const Index v : news.moved) shown.col(v) = news.x.col(v);
+            for (const Index f : news.triangles) indices.col(f) = news.corners.col(f);
+            REQUIRE(test::same_bits(shown, x));
+            REQUIRE(indices == surface.triangles());
+            REQUIRE(moved.read().triangles.empty());
+        }
+    }
+    CHECK(splits > 20);
+    CHECK(resets > 0);
+}
+
 TEST_CASE("what moved long before does not pile up, at whatever rate it is read", "[handover]") {
     for (int every = 1; every <= 40; ++every) {
         CAPTURE(every);
@@ -198,6 +242,8 @@ TEST_CASE("a membrane of no vertices is not published", "[handover][bad]") {
     const std::string text = "MovedPoints: there must be at least 1 vertex, got ";
     CHECK(test::refusal([] { MovedPoints<double> none(0); }) == text + "0");
     CHECK(test::refusal([] { MovedPoints<float> none(-3); }) == text + "-3");
+    CHECK(test::refusal([] { MovedPoints<float> none(1, -2); }) ==
+          "MovedPoints: there must be 0 triangles or more, got -2");
     STATIC_REQUIRE(noexcept(std::declval<MovedPoints<double>&>().read()));
     STATIC_REQUIRE(noexcept(std::declval<MovedPoints<double>&>().publish(
         std::declval<std::span<const Index>>(), std::declval<const ConstPointsRef<double>&>(), 0.0)));

@@ -14,8 +14,11 @@
 #include <membrane/haptics/units.hpp>
 #include <membrane/haptics/virtual_coupling.hpp>
 #include <membrane/membrane.hpp>
+#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/moving_foundation.hpp>
 #include <membrane/solve/explicit_euler.hpp>
+#include <membrane/solve/tool_friction.hpp>
+#include <membrane/tear/tearing.hpp>
 
 #include "support/catch.hpp"
 
@@ -32,6 +35,8 @@ template <class Function>
 constexpr bool is_noexcept = false;
 template <class Result, class Class, class... Arguments>
 constexpr bool is_noexcept<Result (Class::*)(Arguments...) noexcept> = true;
+template <class Result, class Class, class... Arguments>
+constexpr bool is_noexcept<Result (Class::*)(Arguments...) const noexcept> = true;
 
 }  // namespace
 
@@ -193,6 +198,33 @@ TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept
     SUCCEED();
 }
 
+TEMPLATE_TEST_CASE("a membrane tears, peels and is dragged without exceptions", "[noexcept]", double, float) {
+    using S = TestType;
+    using Springs = TearableSprings<S, LinearSpring>;
+    using Foundation = CohesiveSprings<S>;
+    static_assert(is_noexcept<decltype(&Tearing<S>::cut_along)>);
+    static_assert(is_noexcept<decltype(&Tearing<S>::template start_at<Springs>)>);
+    static_assert(is_noexcept<decltype(&Tearing<S>::template update<Springs, Foundation>)>);
+    static_assert(is_noexcept<decltype(&Tearing<S>::stored)>);
+    static_cast<void>([](Tearing<S>& tear, Springs& springs, Foundation& foundation, const TearEvent<S>& event,
+                         const ConstPointsRef<S>& x, std::span<const Index> moved, const Contact<S>& contact,
+                         const Vector3<S>& p, S s) {
+        static_assert(noexcept(foundation.update(x, moved)));
+        static_assert(noexcept(tear.slit_at(0, p))&& noexcept(tear.slit_under(contact, p, s, p)));
+        static_assert(noexcept(tear.dissipated())&& noexcept(tear.ligaments())&& noexcept(tear.tips()));
+        static_assert(noexcept(follow(event, springs, foundation))&& noexcept(foundation.dissipated()));
+    });
+    static_cast<void>([](QuasiStaticSolver<S>& solver, AabbTree<S>& tree, ContactTracker<S>& tracker,
+                         Grasper<S>& grasper, VertexNormals<S>& normals, SmoothContact<S>& smooth,
+                         MovedPoints<S>& moved, ToolFriction<S>& friction, const TearEvent<S>& event,
+                         const Tool<S>& tool, const Contact<S>& contact, const Grasp<S>& grasp) {
+        static_assert(noexcept(follow(event, solver, tree, tracker, grasper, normals, smooth, moved, friction)));
+        static_assert(noexcept(friction.press(tool, contact))&& noexcept(friction.press(tool, contact, grasp)));
+        static_assert(noexcept(friction.vertices())&& noexcept(friction.reset()));
+    });
+    SUCCEED();
+}
+
 TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", double, float) {
     using S = TestType;
     static_cast<void>([](SimulatedHand<S>& hand, ScriptedDevice<S, SimulatedHand<S>>& device, const Vector3<S>& p) {
@@ -203,6 +235,7 @@ TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", doub
     static_cast<void>([](MovedPoints<S>& moved, Latest<Tool<S>>& pose, std::span<const Index> vertices,
                          const ConstPointsRef<S>& x, const Tool<S>& tool) {
         static_assert(noexcept(moved.publish(vertices, x, 0.0))&& noexcept(moved.read()));
+        static_assert(is_noexcept<decltype(&MovedPoints<S>::replace_all)>);
         static_assert(noexcept(pose.publish(tool, 0.0))&& noexcept(pose.read())&& noexcept(pose.read().age(0.0)));
     });
     static_cast<void>([](const DeviceScale& scale, const Millimetres& place, const MillimetresPerSecond& speed,

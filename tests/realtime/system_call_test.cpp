@@ -13,6 +13,7 @@
 #include "support/child_process.hpp"
 #include "support/haptic_loop.hpp"
 #include "support/system_call_guard.hpp"
+#include "support/torn_loop.hpp"
 #include "support/whole_loop.hpp"
 
 namespace {
@@ -64,6 +65,18 @@ TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand do not call t
     const auto child = without_system_calls([&] {
         for (int i = 0; i < cases(6'000, 500'000); ++i) loop.tick(i % 2'000 < 1'000 ? test::Fault() : faults.next());
         if (!loop.x.allFinite() || !loop.drawn_right || loop.solves == 0) std::abort();
+    });
+    CHECK(child.signal == 0);
+    CHECK(child.code == 0);
+}
+
+TEMPLATE_TEST_CASE("the loop of a membrane that tears off its body does not call the system", "[system_call]", double,
+                   float) {
+    test::TearingHand<TestType> hand(12);
+    test::TornLoop<TestType> loop;
+    const auto child = without_system_calls([&] {
+        for (int i = 0; i < cases(3'000, 100'000); ++i) loop.tick(hand.next());
+        if (!loop.x.allFinite() || !loop.drawn_right || (loop.splits == 0 && !cases_are_slow)) std::abort();
     });
     CHECK(child.signal == 0);
     CHECK(child.code == 0);

@@ -254,6 +254,35 @@ TEST_CASE("a slit is a path of two edges along a direction", "[tear]") {
     CHECK(tear.slit_at(-1, {1, 0, 0})[1] == no_index);
 }
 
+TEMPLATE_TEST_CASE("the next report lists what a tear has placed, also where nothing moves", "[tear]", double, float) {
+    using S = TestType;
+    const auto mesh = with_reserve(disc<S>({.radius = 1, .rings = 6}), 20);
+    auto springs =
+        TearableSprings(mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = S(1), .pinned = border(mesh)}));
+    Tearing<S> tear(mesh, EnergyRelease{1, 1});
+    QuasiStaticSolver<S> solver(springs);
+    Points<S> x = mesh.positions();
+    std::vector<Index> path{0};
+    while (path.size() < 7) path.push_back(tear.surface().nearest_in_direction(path.back(), {1, 0, 0}));
+    std::vector<Index> placed;
+    for (const auto& event : tear.cut_along(path, x)) {
+        follow(event, springs, solver);
+        placed.push_back(event.split.copy);
+    }
+    REQUIRE(placed.size() == 6);
+    CHECK(springs.pinned(placed.back()));
+    CHECK(solver.step(x, S(-1), springs, NoFoundation{}).moved.empty());  // refused: they are in a later one
+    auto report = solver.step(x, S(1e-3), springs, NoFoundation{});
+    const std::vector<Index> moved(report.moved.begin(), report.moved.end());
+    CHECK_THAT(moved, Catch::UnorderedEquals(placed));
+    CHECK(solver.step(x, S(1e-3), springs, NoFoundation{}).moved.empty());
+
+    const Index pinned = path.back();
+    solver.reshape(MovedVertex<S>{pinned, point(x, pinned), {}});
+    report = solver.step(x, S(1e-3), springs, NoFoundation{});
+    CHECK(std::vector<Index>(report.moved.begin(), report.moved.end()) == std::vector<Index>{pinned});
+}
+
 TEST_CASE("a snapshot holds the tear: ticks go on with the same bits, and before the tear it is whole", "[tear]") {
     TornStrip<double> strip({.columns = 24, .rows = 12, .notch = 8});
     const InitialState whole(strip.sheet, strip.tear, strip.solver, strip.x);

@@ -2,12 +2,16 @@
 #pragma once
 
 #include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/triple_buffer.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Two loops that share one membrane, a haptic loop and a drawing loop: each has its own positions and its own thread,
 /// and neither waits for the other.
@@ -20,6 +24,7 @@
 ///
 ///     const auto news = moved.read();                                             // drawing loop, each frame
 ///     for (const auto v : news.moved) shown.col(v) = news.x.col(v);
+///     for (const auto f : news.triangles) indices.col(f) = news.corners.col(f);   // of a membrane that tears
 ///     normals.update(shown, news.moved);
 ///     pose.publish(tool, now());
 ///
@@ -72,66 +77,108 @@ class Latest {
     std::uint64_t published_ = 0;  // used by the writer only
 };
 
-/// The moved vertices and their positions.
+/// The moved vertices and their positions; of a membrane that tears, the changed triangles and their corners.
 template <Real Scalar>
 struct MovedSnapshot : Stamp {
     /// All vertices moved since the reader's last snapshot, and possibly some moved between that and the previous one.
     /// Empty if there was no publish since.
     std::span<const Index> moved;
-    const Points<Scalar>& x;  ///< 3 x V [m]; valid at the moved vertices only
+    const Points<Scalar>& x;           ///< 3 x V [m]; valid at the moved vertices only
+    std::span<const Index> triangles;  ///< with other corners, as `moved`
+    const Triangles& corners;          ///< 3 x F; valid at these triangles only
 };
 
 /// Vertices that one thread moves, for one other thread that reads less often: all vertices moved since its last read,
 /// not the whole mesh. A reader that starts with the writer's first positions and copies the vertices of each snapshot
-/// has the writer's positions of that snapshot, bit for bit.
+/// has the writer's positions of that snapshot, bit for bit. If the membrane tears, it is a part that follows the
+/// events, and hands over the triangles that get other corners likewise.
 ///
 /// Wait-free, no allocation: a publish copies each moved vertex twice, and those of the previous publish at most once
-/// more; a read exchanges one atomic number. Memory per vertex: three slots of 3 numbers and 8 bytes, plus 8 bytes.
+/// more; a read exchanges one atomic number. Memory per vertex: three slots of 3 numbers and 8 bytes, plus 16 bytes;
+/// per triangle: 88 bytes.
 ///
 /// Why no vertex is lost and no slot fills up: README.md in this folder.
 template <Real Scalar>
 class MovedPoints {
   public:
-    /// @throws InvalidInput if `vertex_count` is below 1
-    explicit MovedPoints(Index vertex_count) : slots_(Slot(vertex_count)), before_(checked(vertex_count)) {}
+    /// For a membrane that tears, the mesh has `triangle_count` triangles.
+    /// @throws InvalidInput if `vertex_count` is below 1, or `triangle_count` below 0
+    explicit MovedPoints(Index vertex_count, Index triangle_count = 0)
+        : slots_(Slot(checked(vertex_count, triangle_count), triangle_count)),
+          now_(vertex_count, triangle_count),
+          before_(now_),
+          corners_(Triangles::Zero(3, triangle_count)) {}
 
-    /// Called by the writer: `moved` are all vertices moved since the last publish. @pre `x` is 3 x V [m], `moved` in 0
-    /// .. V - 1 (asserted)
+    /// Called by the writer: `moved` are all vertices moved since the last publish, but for those that a tear has
+    /// moved.
+    /// @pre `x` is 3 x V [m], `moved` in 0 .. V - 1 (asserted)
     void publish(std::span<const Index> moved, const ConstPointsRef<Scalar>& x, double time) noexcept;
+
+    ///@{
+    /// Called by the writer: the membrane has torn. The next publish hands over the position of the copy, or of the
+    /// vertex that a tear has moved, and the corners. @pre there are as many triangles (asserted)
+    void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept { now_.vertices.insert(moved.vertex); }
+    ///@}
+
+    /// Called by the writer: the membrane is another one, as after a reset. The next publish hands over all positions,
+    /// and these corners of all triangles. Cost: O(V + F). @pre `triangles` is 3 x F (asserted)
+    void replace_all(const Triangles& triangles) noexcept;
 
     /// Called by the reader; valid until its next `read`.
     [[nodiscard]] MovedSnapshot<Scalar> read() noexcept {
         const bool newer = slots_.acquire();
         const Slot& slot = slots_.front();
-        return {slot.stamp, newer ? slot.moved.items() : std::span<const Index>(), slot.x};
+        const auto none = std::span<const Index>();
+        return {slot.stamp, newer ? slot.changed.vertices.items() : none, slot.x,
+                newer ? slot.changed.triangles.items() : none, slot.corners};
     }
 
   private:
-    struct Slot {
-        explicit Slot(Index vertex_count)
-            : moved(checked(vertex_count)),
-              x(Points<Scalar>::Zero(3, vertex_count)) {}  // written, so that its pages exist
+    struct Changed {
+        Changed(Index vertex_count, Index triangle_count) : vertices(vertex_count), triangles(triangle_count) {}
+        void clear() noexcept {
+            vertices.clear();
+            triangles.clear();
+        }
 
-        void add(std::span<const Index> vertices, const ConstPointsRef<Scalar>& from) noexcept {
-            for (const Index v : vertices) {
-                moved.insert(v);
-                x.col(v) = from.col(v);
+        IndexSet vertices, triangles;
+    };
+    struct Slot {
+        Slot(Index vertex_count, Index triangle_count)
+            : changed(vertex_count, triangle_count),
+              x(Points<Scalar>::Zero(3, vertex_count)),  // written, so that its pages exist
+              corners(Triangles::Zero(3, triangle_count)) {}
+
+        void add(const Changed& from, const ConstPointsRef<Scalar>& positions, const Triangles& triangles) noexcept {
+            for (const Index v : from.vertices.items()) {
+                changed.vertices.insert(v);
+                x.col(v) = positions.col(v);
+            }
+            for (const Index f : from.triangles.items()) {
+                changed.triangles.insert(f);
+                corners.col(f) = triangles.col(f);
             }
         }
 
         Stamp stamp;
-        IndexSet moved;
+        Changed changed;
         Points<Scalar> x;
+        Triangles corners;
     };
 
-    static Index checked(Index vertex_count) {
-        if (vertex_count < 1) refuse("MovedPoints", "there must be at least 1 vertex, got ", vertex_count);
+    static Index checked(Index vertex_count, Index triangle_count) {
+        constexpr std::string_view component = "MovedPoints";
+        if (vertex_count < 1) refuse(component, "there must be at least 1 vertex, got ", vertex_count);
+        if (triangle_count < 0) refuse(component, "there must be 0 triangles or more, got ", triangle_count);
         return vertex_count;
     }
 
     TripleBuffer<Slot> slots_;
     // Used by the writer only:
-    IndexSet before_;     // moved in the previous publish
+    Changed now_;         // since the previous publish
+    Changed before_;      // in the previous publish
+    Triangles corners_;   // of the changed triangles
     bool taken_ = false;  // whether the previous publish found the slot before it taken by the reader
     std::uint64_t published_ = 0;
 };
@@ -139,16 +186,37 @@ class MovedPoints {
 template <Real Scalar>
 void MovedPoints<Scalar>::publish(std::span<const Index> moved, const ConstPointsRef<Scalar>& x, double time) noexcept {
     MEMBRANE_ASSERT(x.cols() == slots_.back().x.cols());
-    slots_.back().add(moved, x);
+    for (const Index v : moved) now_.vertices.insert(v);
+    slots_.back().add(now_, x, corners_);
     slots_.back().stamp = {++published_, time};
     const bool taken = slots_.publish();
     Slot& next = slots_.back();
-    if (taken || taken_) next.moved.clear();
-    if (!taken && taken_) next.add(before_.items(), x);
-    next.add(moved, x);
-    before_.clear();
-    for (const Index v : moved) before_.insert(v);
+    if (taken || taken_) next.changed.clear();
+    if (!taken && taken_) next.add(before_, x, corners_);
+    next.add(now_, x, corners_);
+    std::swap(before_, now_);
+    now_.clear();
     taken_ = taken;
+}
+
+template <Real Scalar>
+void MovedPoints<Scalar>::split(const VertexSplit& split) noexcept {
+    now_.vertices.insert(split.copy);
+    for (std::size_t i = 0; i < split.triangles.size(); ++i) {
+        const Index f = split.triangles[i];
+        auto corners = split.corners[i];
+        split.replace_in(corners);
+        now_.triangles.insert(f);
+        for (std::size_t k = 0; k < 3; ++k) corners_(static_cast<Eigen::Index>(k), f) = corners[k];
+    }
+}
+
+template <Real Scalar>
+void MovedPoints<Scalar>::replace_all(const Triangles& triangles) noexcept {
+    MEMBRANE_ASSERT(triangles.cols() == corners_.cols());
+    for (Index v = 0; v < slots_.back().x.cols(); ++v) now_.vertices.insert(v);
+    for (Index f = 0; f < triangles.cols(); ++f) now_.triangles.insert(f);
+    corners_ = triangles;
 }
 
 }  // namespace membrane

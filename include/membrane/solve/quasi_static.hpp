@@ -99,8 +99,8 @@ class QuasiStaticSolver {
 
     ///@{
     /// The membrane has torn, and the network has followed: the copy goes on as the vertex; a vertex has moved at rest.
-    /// Both wake, and the vertices around them; beyond the layers the membrane stays as it is until `wake_all`. Online.
-    /// Cost: that of the contact points of the last step.
+    /// Both wake, and the vertices around them; beyond the layers the membrane stays as it is until `wake_all`. The
+    /// next report lists both as moved. Online. Cost: that of the contact points of the last step.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}
@@ -111,7 +111,7 @@ class QuasiStaticSolver {
     /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.active_, self.state_, self.predictor_, self.last_prescribed_, self.woken_, self.moved_,
+        visit(self.active_, self.state_, self.predictor_, self.last_prescribed_, self.woken_, self.placed_, self.moved_,
               self.last_displacements_, self.complete_, self.pose_, self.deformations_, self.resume_, self.costs_);
         if constexpr (Visit::restores) self.report_ = {};
     }
@@ -166,6 +166,7 @@ class QuasiStaticSolver {
     StepState<Scalar> state_;
     IndexSet last_prescribed_;
     IndexSet woken_;                     // since the last step
+    IndexSet placed_;                    // by a tear, since the last step that advanced
     FixedVector<Index> moved_;           // in the last step that advanced
     Points<Scalar> last_displacements_;  // of `moved_` [m]
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
@@ -210,7 +211,8 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       packed_(network, detail::max_in_lanes<Scalar, Rule, Network>(options)),
       state_(network.vertex_count(), options.max_contact_points),
       last_prescribed_(network.vertex_count()),
-      woken_(network.vertex_count()),
+      woken_(last_prescribed_),
+      placed_(last_prescribed_),
       moved_(static_cast<std::size_t>(network.vertex_count())),
       last_displacements_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
     detail::define_made<QuasiStaticSolver>();
@@ -340,6 +342,13 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
         if (options_.predict) last_displacements_.col(v) = now - before;
         set_point(x, v, now);
     }
+    for (const Index v : placed_.items()) {
+        const auto moved = std::as_const(moved_).items();
+        if (std::find(moved.begin(), moved.end(), v) != moved.end()) continue;
+        moved_.try_push_back(v);
+        if (options_.predict) last_displacements_.col(v).setZero();
+    }
+    placed_.clear();
     report_.moved = moved_.items();
     const auto is_balanced = [&](Index v) {
         return state_.is_fixed(v) || state_.unbalanced_force(v) <= state_.force_tolerance;
@@ -379,6 +388,7 @@ void QuasiStaticSolver<Scalar, Rule>::split(const VertexSplit& split) noexcept {
     active_.network_changed();
     for (const auto& corners : split.corners) wake(corners);
     wake({&split.copy, 1});
+    placed_.insert(split.copy);
     if (options_.predict) last_displacements_.col(split.copy) = last_displacements_.col(split.vertex);
     const auto moved = moved_.items();
     if (std::find(moved.begin(), moved.end(), split.vertex) != moved.end()) moved_.try_push_back(split.copy);
@@ -388,6 +398,7 @@ template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::reshape(const MovedVertex<Scalar>& moved) noexcept {
     active_.network_changed();
     for (const auto& triangle : moved.triangles) wake(triangle.corners);
+    placed_.insert(moved.vertex);
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
@@ -398,6 +409,7 @@ void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     complete_ = false;
     last_prescribed_.clear();
     woken_.clear();
+    placed_.clear();
     pose_ = {};
     deformations_ = 0;
     resume_ = 0;

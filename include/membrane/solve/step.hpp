@@ -61,7 +61,7 @@ struct StepReport {
     bool out_of_time = false;
     Scalar residual = 0;                         ///< largest residual force on a free active vertex [N]; 0 if refused
     Index vertex_updates = 0;                    ///< including evaluations of forces without an update
-    std::span<const Index> moved;                ///< vertices whose position changed
+    std::span<const Index> moved;                ///< vertices whose position changed, or that a tear has placed since
     std::span<const Vector3<Scalar>> reactions;  ///< for each constraint, in order, the membrane's force on it [N]
 
     /// The membrane's force on all constraints together [N].
