@@ -111,7 +111,7 @@ struct TornLoop {
         drawn_right = drawn_right && same_bits(shown, x) && indices == tear.surface().triangles();
     }
 
-    /// After a restart from a snapshot.
+    /// After a snapshot has been restored.
     void refresh() {
         tree.refit(x);
         normals.update(x);
