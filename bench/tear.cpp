@@ -155,7 +155,7 @@ void grids(Page& page, const Effort& effort) {
         effort.directions);
     auto paths = page.table("paths", "rows\tturn\tx\ty");
     auto distances = page.table("grids", "rows\tturn\toff\tbegins");
-    double worst = 0, late = 0;
+    double worst = 0, late = 0, along_edges = 0;
     for (const int rows : effort.rows) {
         double sum = 0, largest = 0, at = 0, least = 2, most = 0;
         for (int i = 0; i < effort.directions; ++i) {
@@ -167,6 +167,10 @@ void grids(Page& page, const Effort& effort) {
             sum += found.off_line;
             if (found.off_line > largest) largest = found.off_line, at = turn;
             least = std::min(least, begins), most = std::max(most, begins);
+            if (rows == effort.rows[1]) {
+                shear.move_vertices = false;
+                along_edges = std::max(along_edges, run(shear, effort.edges).off_line);
+            }
             distances << rows << '\t' << turn << '\t' << found.off_line << '\t' << begins << '\n';
             for (const auto& [x, y] : found.path) paths << rows << '\t' << turn << '\t' << x << '\t' << y << '\n';
             paths << "\n\n";
@@ -177,6 +181,7 @@ void grids(Page& page, const Effort& effort) {
         late = std::max({late, percent(least), percent(most)});
     }
     page.add({"turned grids: distance from a straight line", worst, 0.7, "edges"});
+    page.add({"the same along the edges that the grid has, without moved vertices", along_edges, none, "edges"});
     page.add({"turned grids: stretch at which it begins, from the right one", late, 3, "%"});
 }
 

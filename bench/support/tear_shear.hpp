@@ -22,6 +22,7 @@ struct Shear {
     int rows = 20, columns = 40, notch = 12;  ///< height, length and notch [edges]
     double turn = 0;                          ///< of the grid [rad]
     double damping = 0;                       ///< of a vertex [N s/m]
+    bool move_vertices = true;                ///< onto the tear's direction
 
     static constexpr double height = 20e-3;  ///< [m]
     static constexpr test::PureShear closed_form{torn_material, toughness, height};
@@ -37,7 +38,8 @@ struct Shear {
             {.hands = {vertices_where(mesh, [&](const Vector& at) { return at[1] - middle < -half; }),
                        vertices_where(mesh, [&](const Vector& at) { return at[1] - middle > half; })},
              .tolerance = 3e-4 * resistance,
-             .damping = damping},
+             .damping = damping,
+             .tear = {.move_vertices = move_vertices}},
             criterion);
         strip.cut({0, height / 2, 0}, {1, 0, 0}, notch);
         return strip;

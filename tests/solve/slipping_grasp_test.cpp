@@ -91,6 +91,25 @@ TEMPLATE_TEST_CASE("jaws hold up to their force, then the tissue slips at that f
     CHECK_FALSE(limited.slips);
 }
 
+TEMPLATE_TEST_CASE("what the hand gives is stored in the tissue, or taken by slip in the jaws", "[grasper][friction]",
+                   double, float) {
+    HeldDisc<TestType> pull({.holding_force = 2e-3});
+    const double before = pull.stored(pull.x);
+    Vector3<double> last = pull.move_to(pull.height(0)), at = pull.height(0);
+    double work = 0;
+    for (int i = 1; i <= 600; ++i) {
+        const Vector3<double> to = pull.height(2e-6 * i);
+        const auto force = pull.move_to(to);
+        work -= dot<double>(to - at, force + last) / 2;
+        last = force;
+        at = to;
+    }
+    CHECK(pull.grasper.dissipated() > work / 4);
+    CHECK(pull.grasper.dissipated() + pull.stored(pull.x) - before == Approx(work).epsilon(0.01));
+    pull.grasper.reset();
+    CHECK(pull.grasper.dissipated() == 0);
+}
+
 TEST_CASE("tissue that has slipped by the jaws' length is free until they open and close", "[grasper][friction]") {
     HeldDisc<double> pull({.holding_force = 2e-3, .jaw_length = 0.2e-3});
     double up = 0;

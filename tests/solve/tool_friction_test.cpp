@@ -287,6 +287,31 @@ TEST_CASE("the forces of a frictional contact balance those of the membrane", "[
     }
 }
 
+TEMPLATE_TEST_CASE("what the hand gives is stored in membrane and foundation, or taken by slip", "[friction]", double,
+                   float) {
+    const double coefficient = GENERATE(0.1, 0.3, 0.6);
+    CAPTURE(coefficient);
+    Drag<TestType> drag({.friction = coefficient, .rings = 20});
+    double work = 0;
+    Vector3<double> last = Vector3<double>::Zero(), at = drag.tool.position.template cast<double>();
+    const auto move = [&](const Vector3<double>& to, double deep) {
+        const auto force = drag.move_to(to, deep);
+        const auto now = drag.tool.position.template cast<double>();
+        work -= dot<double>(now - at, force + last) / 2;
+        last = force;
+        at = now;
+    };
+    drag.move_to({0, 0, 0}, 0);
+    at = drag.tool.position.template cast<double>();
+    const double before = drag.stored(drag.x);
+    for (int i = 1; i <= 50; ++i) move({0, 0, 0}, drag.depth * i / 50);
+    for (int i = 1; i <= 400; ++i) move(1e-6 * i * Vector3<double>(0.8, 0.6, 0), drag.depth);
+    for (int i = 50; i >= 0; --i) move(4e-4 * Vector3<double>(0.8, 0.6, 0), drag.depth * i / 50);
+    CHECK(drag.friction.dissipated() + drag.stored(drag.x) - before == Approx(work).epsilon(0.01));
+    drag.friction.reset();
+    CHECK(drag.friction.dissipated() == 0);
+}
+
 TEST_CASE("without a coefficient the contact is that without friction, to the bit", "[friction]") {
     Drag<double> drag({.friction = 0}), plain({.friction = 0});
     Random random(1);

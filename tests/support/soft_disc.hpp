@@ -30,6 +30,20 @@ struct SoftDisc {
 
     explicit SoftDisc(membrane::Index with_rings, double with_stretch = 1) : rings(with_rings), stretch(with_stretch) {}
 
+    /// Energy of springs and foundation [J].
+    [[nodiscard]] double stored(const membrane::Points<S>& x) const {
+        double sum = 0;
+        for (const auto& spring : network.springs()) {
+            const membrane::Vector3<S> along = membrane::point(x, spring.second) - membrane::point(x, spring.first);
+            const double stretch_by = static_cast<double>(norm(along)) - static_cast<double>(spring.rest_length);
+            sum += static_cast<double>(spring.stiffness) * stretch_by * stretch_by / 2;
+        }
+        for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) {
+            sum += static_cast<double>(foundation.energy(v, membrane::point(x, v)));
+        }
+        return sum;
+    }
+
     [[nodiscard]] std::vector<S> relaxed_lengths() const {
         const membrane::MassSpringNetwork relaxed(mesh, membrane::LinearSpring{}, {.stiffness = 1});
         std::vector<S> all;

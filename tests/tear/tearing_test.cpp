@@ -254,6 +254,39 @@ TEST_CASE("a slit is a path of two edges along a direction", "[tear]") {
     CHECK(tear.slit_at(-1, {1, 0, 0})[1] == no_index);
 }
 
+TEST_CASE("positions in a buffer for drawing tear as those in a matrix, to the bit", "[tear]") {
+    const auto mesh = with_reserve(disc<float>({.radius = 1, .rings = 8}), 40);
+    const auto tear_in = [&](PointsRef<float> x) {
+        auto springs =
+            TearableSprings(mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 1.0F, .pinned = border(mesh)}));
+        Tearing<float> tear(mesh, EnergyRelease{0.02, 1});
+        QuasiStaticSolver<float> solver(springs, {.layers = unlimited});
+        x = 1.1F * mesh.positions();
+        for (const auto& event : tear.cut_along(tear.slit_at(0, {1, 0, 0}), x)) follow(event, springs, solver);
+        const Index held = tear.tips()[0].behind[0];
+        const Vector3<float> from = point(x, held);
+        for (int i = 0; i < 200; ++i) {
+            const Vector3<float> to = from + 0.005F * static_cast<float>(i) * Vector3<float>(0, 0.6F, 0.8F);
+            const auto report = solver.step(x, 1e-3F, springs, NoFoundation{}, pull(held, to), tear.ligaments());
+            REQUIRE(report.status == StepStatus::advanced);
+            const auto events = tear.update(x, 1e-3F, springs, NoFoundation{}, {&held, 1});
+            for (const auto& event : events) follow(event, springs, solver);
+        }
+        return tear.torn_length();
+    };
+    struct Vertex {
+        float position[3], normal[3], colour[2];
+    };
+    std::vector<Vertex> buffer(static_cast<std::size_t>(mesh.vertex_count()));
+    using Strided = Eigen::Map<Points<float>, 0, Eigen::OuterStride<>>;
+    Strided in_buffer(buffer[0].position, 3, mesh.vertex_count(), Eigen::OuterStride<>(sizeof(Vertex) / sizeof(float)));
+    Points<float> matrix = mesh.positions();
+    const double torn = tear_in(matrix);
+    CHECK(torn > 0.3);
+    CHECK(tear_in(in_buffer) == torn);
+    CHECK(Points<float>(in_buffer) == matrix);
+}
+
 TEMPLATE_TEST_CASE("the next report lists what a tear has placed, also where nothing moves", "[tear]", double, float) {
     using S = TestType;
     const auto mesh = with_reserve(disc<S>({.radius = 1, .rings = 6}), 20);

@@ -165,6 +165,8 @@ void bind_tracking(py::module_& module) {
             return self.grasper.slip(x.map(), tool, reaction);
         },
         py::arg("x"), py::arg("tool"), py::arg("reaction"), doc("Grasper::slip"));
+    grasper.def_property_readonly(
+        "dissipated", [](const Forceps& self) { return self.grasper.dissipated(); }, doc("Grasper::dissipated"));
     grasper.def(
         "reset", [](Forceps& self) { self.grasper.reset(); }, doc("Grasper::reset"));
 }

@@ -117,6 +117,7 @@ void bind_friction(py::module_& module) {
             [](const ToolFriction& self) { return std::vector(self.vertices().begin(), self.vertices().end()); },
             doc("ToolFriction::vertices"))
         .def_property_readonly("slips", &ToolFriction::slips, doc("ToolFriction::slips"))
+        .def_property_readonly("dissipated", &ToolFriction::dissipated, doc("ToolFriction::dissipated"))
         .def("reset", &ToolFriction::reset, doc("ToolFriction::reset"));
     def_in_loop(
         friction, "press",

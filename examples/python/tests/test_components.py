@@ -394,6 +394,7 @@ def test_tissue_slips_out_of_forceps():
         held.append(numpy.linalg.norm(report.reactions[0]))
     assert slipped > 10
     assert max(held) == pytest.approx(0.02)
+    assert grasper.dissipated == pytest.approx(0.02 * 1e-3, rel=0.1)
     assert not grasper.update(contact, x, tool).holding
 
 

@@ -76,6 +76,9 @@ class Grasper {
     /// Jaws of any force: not needed. Online.
     bool slip(const ConstPointsRef<Scalar>& x, const Tool<Scalar>& tool, const Vector3<Scalar>& reaction) noexcept;
 
+    /// Energy that slip through the jaws has taken so far: their force times its distance [J].
+    [[nodiscard]] double dissipated() const noexcept { return dissipated_; }
+
     ///@{
     /// A vertex becomes two; a vertex moves at rest. The held point stays the same point of the tissue. Online.
     void split(const VertexSplit& split) noexcept {
@@ -91,6 +94,7 @@ class Grasper {
         pose_ = {};
         closed_ = false;
         slipped_ = 0;
+        dissipated_ = 0;
     }
 
     /// Visits what is kept from tick to tick, see `core/snapshot.hpp`; of a mesh with a reserve, the rest surface as
@@ -98,7 +102,7 @@ class Grasper {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if (self.has_reserve_) visit(self.origins_);
-        visit(self.grasp_, self.pose_, self.closed_, self.slipped_);
+        visit(self.grasp_, self.pose_, self.closed_, self.slipped_, self.dissipated_);
     }
 
   private:
@@ -108,6 +112,7 @@ class Grasper {
     RigidFrame<Scalar> pose_;  // of the body at the last update
     bool closed_ = false;
     Scalar slipped_ = 0;  // since the jaws closed [m]
+    double dissipated_ = 0;
     bool has_reserve_;
 };
 
@@ -146,7 +151,9 @@ bool Grasper<Scalar>::slip(const ConstPointsRef<Scalar>& x, const Tool<Scalar>& 
     if (!grasp_.holding() || !(norm(reaction) >= (1 - rounding) * grasp_.holding_force) || !is_valid(tool))
         return false;
     const Vector3<Scalar> now = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
-    slipped_ += norm<Scalar>(now - grasp_.offset);
+    const Vector3<Scalar> by = now - grasp_.offset;
+    slipped_ += norm(by);
+    dissipated_ += (std::max)(0.0, static_cast<double>(dot(by, reaction)));
     grasp_.offset = now;
     if (slipped_ >= static_cast<Scalar>(options_.jaw_length)) grasp_ = {};
     return true;

@@ -126,13 +126,19 @@ class ToolFriction {
     }
     ///@}
 
-    /// Forgets all places. Cost: O(1).
-    void reset() noexcept { kept_.clear(); }
+    /// Energy that slip has taken so far: friction times the distance that each vertex has slipped on the tool [J].
+    [[nodiscard]] double dissipated() const noexcept { return dissipated_; }
+
+    /// As new. Cost: O(1).
+    void reset() noexcept {
+        kept_.clear();
+        dissipated_ = 0;
+    }
 
     /// Visits what is kept from tick to tick, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.kept_);
+        visit(self.kept_, self.dissipated_);
     }
 
   private:
@@ -175,6 +181,7 @@ class ToolFriction {
     Scalar coefficient_;
     FixedVector<Vertex> vertices_, kept_;  // of this step; of the last one
     FixedVector<Index> corners_;           // of the contact points, each once
+    double dissipated_ = 0;
 };
 
 inline void ToolFrictionOptions::check() const {
@@ -333,6 +340,7 @@ void ToolFriction<Scalar>::end(const Context& context, const Tool<Scalar>& tool)
         if (holds) {
             v.offset += off - tangential(off, v);  // it holds along the surface only
         } else {
+            dissipated_ += (std::max)(0.0, -static_cast<double>(dot<Scalar>(v.force, off)));
             hold(v, now, tool);
         }
     }
