@@ -84,6 +84,7 @@ class TornStrip {
             path.push_back(tear.surface().nearest_in_direction(path.back(), Vector(1, static_cast<Scalar>(off), 0)));
         }
         follow(tear.cut_along(path, x), parts...);
+        cut_path = path;
         start = membrane::point(tear.surface().rest_positions(), path.back());
     }
 
@@ -188,6 +189,7 @@ class TornStrip {
     membrane::Points<Scalar> x;
     std::vector<Index> top;   ///< vertices of the upper clamp
     std::vector<Index> held;  ///< others that are held
+    std::vector<Index> cut_path;
     membrane::StepReport<Scalar> report;
     Vector start = Vector::Zero();  ///< of the tear
     double stretched = 1, work = 0, damped = 0;
