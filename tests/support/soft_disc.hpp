@@ -32,12 +32,7 @@ struct SoftDisc {
 
     /// Energy of springs and foundation [J].
     [[nodiscard]] double stored(const membrane::Points<S>& x) const {
-        double sum = 0;
-        for (const auto& spring : network.springs()) {
-            const membrane::Vector3<S> along = membrane::point(x, spring.second) - membrane::point(x, spring.first);
-            const double stretch_by = static_cast<double>(norm(along)) - static_cast<double>(spring.rest_length);
-            sum += static_cast<double>(spring.stiffness) * stretch_by * stretch_by / 2;
-        }
+        auto sum = static_cast<double>(network.energy(x));
         for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) {
             sum += static_cast<double>(foundation.energy(v, membrane::point(x, v)));
         }

@@ -156,6 +156,10 @@ class QuasiStaticSolver {
     }
     template <class Network>
     void write_back(PointsRef<Scalar>& x, const Network& network, bool constraints_changed) noexcept;
+    [[nodiscard]] bool has_moved(Index v) const noexcept {
+        const auto moved = moved_.items();
+        return std::find(moved.begin(), moved.end(), v) != moved.end();
+    }
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status) noexcept;
 
     [[no_unique_address]] Rule rule_;
@@ -343,8 +347,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
         set_point(x, v, now);
     }
     for (const Index v : placed_.items()) {
-        const auto moved = std::as_const(moved_).items();
-        if (std::find(moved.begin(), moved.end(), v) != moved.end()) continue;
+        if (has_moved(v)) continue;
         moved_.try_push_back(v);
         if (options_.predict) last_displacements_.col(v).setZero();
     }
@@ -390,8 +393,7 @@ void QuasiStaticSolver<Scalar, Rule>::split(const VertexSplit& split) noexcept {
     wake({&split.copy, 1});
     placed_.insert(split.copy);
     if (options_.predict) last_displacements_.col(split.copy) = last_displacements_.col(split.vertex);
-    const auto moved = moved_.items();
-    if (std::find(moved.begin(), moved.end(), split.vertex) != moved.end()) moved_.try_push_back(split.copy);
+    if (has_moved(split.vertex)) moved_.try_push_back(split.copy);
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
