@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include <membrane/contact/aabb_tree.hpp>
@@ -100,12 +101,16 @@ TEMPLATE_TEST_CASE("the driving force is what two equilibria, before and after a
         struct State {
             double energy, tip, force;
         };
+        Vector3<TestType> forceps;  // at the same place in all of them
         const auto at = [&](int edges) {
             TornStrip<TestType> strip({.columns = scene.columns, .notch = edges, .springs = scene.springs});
             strip.cut();
             strip.stretch(scene.stretch);
-            if (scene.drawn > 0)
-                strip.hold(strip.cut_path[static_cast<std::size_t>(scene.notch - 6)], {0, 0, TestType(scene.drawn)});
+            if (scene.drawn > 0) {
+                const Index v = strip.cut_path[static_cast<std::size_t>(scene.notch - 6)];
+                if (edges < scene.notch) forceps = point(strip.x, v) + Vector3<TestType>(0, 0, TestType(scene.drawn));
+                strip.hold(v, forceps - point(strip.x, v));
+            }
             strip.tick(0);
             const auto& tip = strip.tear.tips()[0];
             return State{strip.energy(), static_cast<double>(strip.tear.surface().rest_positions()(0, tip.vertex)),
@@ -114,8 +119,7 @@ TEMPLATE_TEST_CASE("the driving force is what two equilibria, before and after a
         const State before = at(scene.notch - 1), now = at(scene.notch), after = at(scene.notch + 1);
         const double released = (before.energy - after.energy) / (after.tip - before.tip);
         const double force = (before.force + 4 * now.force + after.force) / 6;  // Simpson's rule
-        // A flap that is drawn up bends sharply at the tip: 6 to 7 % less, and 5 % where edges are half as long.
-        CHECK(force == Approx(released).epsilon(scene.drawn > 0 ? 0.1 : 0.03));
+        CHECK(force == Approx(released).epsilon(std::is_same_v<TestType, double> ? 0.02 : 0.08));
     }
 }
 
