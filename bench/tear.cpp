@@ -16,7 +16,7 @@
 #include "support/tear_centre.hpp"
 #include "support/tear_shear.hpp"
 #include "support/tear_speed.hpp"
-#include "support/tear_trousers.hpp"
+#include "support/trousers.hpp"
 
 // tear FOLDER [--short] [PART...]: tears beside closed forms, over meshes and directions of their grids, and what they
 // cost. Writes Markdown tables to tear.md, and a .tsv for each plot, to FOLDER.
@@ -138,8 +138,7 @@ void damping(Page& page, const Effort& effort) {
     double lost = 0;
     for (const int rows : effort.rows) {
         Shear shear = strip_of(rows, effort.edges / 2);
-        shear.damping =
-            1.5 * bench::torn_material.young_modulus * bench::torn_material.thickness * bench::TornSheet<>::dt;
+        shear.damping = 1.5 * torn_material.young_modulus * torn_material.thickness * TornSheet<double>::dt;
         const ShearRun found = run(shear, effort.edges / 2);
         lost = std::max(lost, std::abs(found.lost) / found.given * 100);
         page.print("| %d | %.1f %% | %.1f %% | %.1f %% |\n", rows, 100 * found.dissipated / found.given,
@@ -235,7 +234,8 @@ void trouser_test(Page& page, const Effort& effort) {
         double sum = 0, lost = 0, off = 0, least = 10, largest = 0, low = 10, high = 0;
         for (int i = 0; i < effort.directions; ++i) {
             const double turn = 60.0 * i / (effort.directions - 1);
-            const TrouserRun found = run(Trousers{.width = width, .turn = turn * degree}, effort.edges);
+            const test::TrouserRun found =
+                test::tear_trousers<double>({.width = width, .turn = turn * degree}, effort.edges);
             sum += found.mean / effort.directions, lost += found.lost / effort.directions;
             off = std::max(off, found.off_line);
             least = std::min(least, found.mean), largest = std::max(largest, found.mean);

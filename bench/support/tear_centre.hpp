@@ -21,14 +21,14 @@ struct Centre {
     [[nodiscard]] Vector direction() const { return {std::cos(turn), std::sin(turn), 0}; }
 
     template <class Criterion>
-    [[nodiscard]] TornSheet<Criterion> cut(const Criterion& criterion) const {
+    [[nodiscard]] TornSheet<double, Criterion> cut(const Criterion& criterion) const {
         const auto mesh = test::turned_grid<double>(rows, rows, edge(), turn).mesh();
         const auto is_border = [&](const Vector& at) {
             const double gap = std::min({at[0], at[1], side - at[0], side - at[1]});
             return gap < edge() / 2;
         };
         TornSheetOptions options{.hands = {}, .fixed = vertices_where(mesh, is_border), .tolerance = 1e-4 * resistance};
-        TornSheet<Criterion> sheet(membrane::with_reserve(mesh, 2 * rows), options, criterion);
+        TornSheet<double, Criterion> sheet(membrane::with_reserve(mesh, 2 * rows), options, criterion);
         const int edges = rows * 3 / 10;
         sheet.cut(Vector(side / 2, side / 2, 0) - edges / 2.0 * edge() * direction(), direction(), edges);
         sheet.x.topRows(2) = stretch * sheet.tear.surface().rest_positions().topRows(2);

@@ -14,6 +14,13 @@
 /// A strip in pure shear: clamps along both long sides move apart, and a notch from a short side tears on.
 namespace bench::tears {
 
+using membrane::Index;
+using test::torn_material;
+using test::TornSheet;
+using test::TornSheetOptions;
+using test::vertices_where;
+using Vector = membrane::Vector3<double>;
+
 inline constexpr double degree = std::numbers::pi / 180;
 inline constexpr double toughness = 1000;                                  // [J/m^2]
 inline constexpr double resistance = toughness * torn_material.thickness;  // [J/m]
@@ -30,10 +37,10 @@ struct Shear {
     [[nodiscard]] double edge() const { return height / rows; }
 
     template <class Criterion>
-    [[nodiscard]] TornSheet<Criterion> notched(const Criterion& criterion) const {
+    [[nodiscard]] TornSheet<double, Criterion> notched(const Criterion& criterion) const {
         const auto mesh = test::turned_grid<double>(columns, rows, edge(), turn).mesh();
         const double middle = height / 2, half = middle - edge() / 2;
-        TornSheet<Criterion> strip(
+        TornSheet<double, Criterion> strip(
             membrane::with_reserve(mesh, 2 * columns),
             {.hands = {vertices_where(mesh, [&](const Vector& at) { return at[1] - middle < -half; }),
                        vertices_where(mesh, [&](const Vector& at) { return at[1] - middle > half; })},
@@ -45,7 +52,7 @@ struct Shear {
         return strip;
     }
     template <class Criterion>
-    static void stretch(TornSheet<Criterion>& strip, double to) {
+    static void stretch(TornSheet<double, Criterion>& strip, double to) {
         strip.x.row(1) = to * strip.tear.surface().rest_positions().row(1);
         strip.start();
     }

@@ -14,7 +14,7 @@
 #include <membrane/surface/shapes.hpp>
 #include <membrane/tear/tearing.hpp>
 
-#include "support/torn_sheet.hpp"
+#include "support/tear_shear.hpp"
 
 /// What a tear costs in a tick.
 namespace bench::tears {

@@ -19,7 +19,7 @@
 namespace examples {
 
 const membrane::Material capsule = membrane::materials::lens_capsule().typical;
-constexpr double capsule_toughness = 1.4e3;  // of the amnion: that of the capsule is not known [J/m^2]
+constexpr double capsule_toughness = 1.4e3;  // of the amnion [Koh19]: that of the capsule is not known [J/m^2]
 constexpr double capsule_lift = 12;          // of the pull over the surface [degrees]
 constexpr double stiffer = 30;  // in bending than the capsule: else the flap crumples, as finely as its triangles
 

@@ -23,6 +23,7 @@
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
+#include "support/torn_sheet.hpp"
 #include "support/torn_strip.hpp"
 
 using namespace membrane;
@@ -51,17 +52,19 @@ double tear(TornStrip<Scalar>& strip, double edges, double& off_line) {
 
 // Closed form: a strip in pure shear releases its energy density times its height.
 TEST_CASE("a tear in pure shear begins at the right stretch, on any grid, and runs straight", "[tear]") {
-    for (const double turn : {0.0, 10.0, 20.0, 30.0, 45.0}) {
+    const int directions = cases(5, 20);
+    for (int i = 0; i < directions; ++i) {
+        const double turn = 60.0 * i / (std::max)(directions - 1, 1);
         CAPTURE(turn);
-        TornStrip<double> strip({.turn = turn * degree});
+        TornStrip<double> strip({.columns = 48, .turn = turn * degree});
         double off_line = 0;
-        const double begins = tear(strip, 12, off_line);
+        const double begins = tear(strip, 20, off_line);
         CAPTURE(begins, strip.pure_shear().critical_stretch(), off_line, strip.balance());
-        REQUIRE(strip.torn_edges() >= 12);
+        REQUIRE(strip.torn_edges() >= 20);
         CHECK(begins == Approx(strip.pure_shear().critical_stretch()).epsilon(0.03));
         CHECK(off_line <= 0.7);
         CHECK(strip.balance() < 1.001);
-        CHECK(strip.balance() > 0.95);  // nothing takes what an edge releases as it jumps open
+        CHECK(strip.balance() > 0.82);  // nothing takes what an edge releases as it jumps open
     }
 }
 
@@ -73,9 +76,10 @@ TEST_CASE("a tear in pure shear begins at the right stretch in single precision"
     CHECK(off_line <= 0.7);
 }
 
-TEST_CASE("the driving force is the energy that is released, whatever the length of the tear", "[tear]") {
+TEMPLATE_TEST_CASE("the driving force is the energy that is released, whatever the length of the tear", "[tear]",
+                   double, float) {
     for (const int notch : {12, 16, 20}) {
-        TornStrip<double> strip({.notch = notch});
+        TornStrip<TestType> strip({.notch = notch});
         strip.cut();
         const double stretch = 1.2;
         strip.stretch(stretch);
@@ -123,14 +127,14 @@ TEMPLATE_TEST_CASE("the driving force is what two equilibria, before and after a
     }
 }
 
-TEST_CASE("what the clamps give is stored, or taken by the tear and by damping", "[tear]") {
+TEMPLATE_TEST_CASE("what the clamps give is stored, or taken by the tear and by damping", "[tear]", double, float) {
     struct Case {
         double damping, turn;
     };
     for (const auto& [damping, turn] : {Case{1e-2, 0}, Case{3e-2, 17}, Case{1e-1, 40}}) {
         if (cases_are_slow && turn != 17) continue;
         CAPTURE(turn, damping);
-        TornStrip<double> strip({.turn = turn * degree, .damping = damping});
+        TornStrip<TestType> strip({.turn = turn * degree, .damping = damping});
         strip.cut();
         strip.stretch(0.98 * strip.pure_shear().critical_stretch());
         for (int tick = 0; tick < 3000 && strip.torn_edges() < 6; ++tick) {
@@ -138,7 +142,7 @@ TEST_CASE("what the clamps give is stored, or taken by the tear and by damping",
         }
         REQUIRE(strip.torn_edges() >= 6);
         CAPTURE(strip.balance(), strip.damped / strip.work);
-        CHECK(strip.balance() == Approx(1).epsilon(0.005));
+        CHECK(strip.balance() == Approx(1).epsilon(std::is_same_v<TestType, double> ? 0.005 : 0.02));
         CHECK(strip.damped > 0.02 * strip.work);
         // The last edge may not have opened.
         const double resistance = 1000 * strip.thickness, torn = strip.tear.torn_length();
@@ -233,27 +237,58 @@ TEST_CASE("without moved vertices the grid steers the tear", "[tear]") {
     CHECK(off_line > 0.7);
 }
 
-TEST_CASE("both ends of a cut within a stretched sheet go on alike, along it", "[tear]") {
-    TornStrip<double> strip({.columns = 30, .rows = 30, .turn = 0});
-    const auto& rest = strip.tear.surface().rest_positions();
-    Index at = 0;
-    for (Index v = 0; v < strip.surface.vertex_count(); ++v) {
-        const auto off = [&](Index w) { return (rest.col(w) - Eigen::Vector3d(11e-3, 15e-3, 0)).norm(); };
-        if (off(v) < off(at)) at = v;
+TEMPLATE_TEST_CASE("both ends of a cut in a sheet stretched in both directions go on alike, along it", "[tear]", double,
+                   float) {
+    using Vector = Vector3<TestType>;
+    const int rows = 24, edges = 8;
+    const double edge = 1e-3, thickness = test::torn_material.thickness;
+    const auto at_rest = [&](double turn, double toughness) {
+        const auto mesh = test::turned_grid<TestType>(rows, rows, edge, turn).mesh();
+        const auto is_fixed = [&](const auto& at) {
+            const auto end = static_cast<TestType>(rows * edge);
+            return at[0] == 0 || at[1] == 0 || at[0] == end || at[1] == end;
+        };
+        test::TornSheetOptions options{.hands = {}, .fixed = test::vertices_where(mesh, is_fixed), .tolerance = 1e-6};
+        test::TornSheet<TestType> sheet(with_reserve(mesh, 20), options, EnergyRelease{toughness, thickness});
+        const Vector3<double> along(std::cos(turn), std::sin(turn), 0);
+        const Vector3<double> start = Vector3<double>(rows, rows, 0) * (edge / 2) - edges / 2.0 * edge * along;
+        sheet.cut(start.cast<TestType>(), along.cast<TestType>(), edges);
+        sheet.x *= TestType(1.3);
+        sheet.start();
+        return sheet;
+    };
+    for (const double turn : {0.0, 20 * degree, 45 * degree}) {
+        CAPTURE(turn);
+        const Vector along = Vector3<double>(std::cos(turn), std::sin(turn), 0).template cast<TestType>();
+        const Vector aside(-along[1], along[0], 0);
+        auto held = at_rest(turn, 1e9);
+        held.update();
+        const auto tips = held.tear.tips();
+        REQUIRE(tips.size() == 2);
+        for (const auto& tip : tips) {
+            const Vector force = tip.driving_force;
+            CHECK(std::abs(std::atan2(dot(force, aside), std::abs(dot(force, along)))) < 3 * degree);
+        }
+        const auto force = static_cast<double>(norm(tips[0].driving_force));
+        CHECK(dot(tips[0].driving_force, tips[1].driving_force) < 0);
+        CHECK(static_cast<double>(norm(tips[1].driving_force)) == Approx(force).epsilon(0.05));
+
+        auto torn = at_rest(turn, 0.9 * force / thickness);
+        const auto tip = [&](std::size_t i) {
+            return point(torn.tear.surface().rest_positions(), torn.tear.tips()[i].vertex);
+        };
+        const std::array<Vector, 2> start{tip(0), tip(1)};
+        for (int tick = 0; tick < 200 && torn.tear.torn_length() < 5.5 * edge; ++tick) {
+            torn.tick({Vector::Zero(), Vector::Zero()});
+            REQUIRE(torn.tear.tips().size() == 2);
+        }
+        REQUIRE(torn.tear.torn_length() >= 5.5 * edge);
+        for (std::size_t i = 0; i < 2; ++i) {
+            const Vector off = (1 / TestType(edge)) * (tip(i) - start[i]);
+            CHECK(std::abs(dot(off, aside)) < std::tan(3 * degree) * norm(off));
+            CHECK(norm(off) > 1.5);
+        }
     }
-    std::vector<Index> path{at};
-    while (path.size() < 9) path.push_back(strip.tear.surface().nearest_in_direction(path.back(), {1, 0, 0}));
-    for (const auto& event : strip.tear.cut_along(path, strip.x)) follow(event, strip.sheet, strip.solver);
-    REQUIRE(strip.tear.tips().size() == 2);
-    strip.stretch(1.3);
-    strip.tick(0);
-    const auto tips = strip.tear.tips();
-    for (const auto& tip : tips) {
-        CHECK(std::abs(std::atan2(tip.driving_force[1], std::abs(tip.driving_force[0]))) < 3 * degree);
-    }
-    CHECK(tips[0].driving_force[0] < 0);
-    CHECK(tips[1].driving_force[0] > 0);
-    CHECK(norm(tips[0].driving_force) == Approx(norm(tips[1].driving_force)).epsilon(0.05));
 }
 
 TEST_CASE("a path that cannot be cut changes nothing", "[tear]") {

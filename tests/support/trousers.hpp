@@ -5,10 +5,13 @@
 #include <cmath>
 #include <vector>
 
-#include "support/tear_shear.hpp"
+#include "support/torn_sheet.hpp"
 
 /// Trouser test: a strip is cut along its middle, one leg is drawn up, the other down, and the cut tears on.
-namespace bench::tears {
+///
+///     const auto found = test::tear_trousers<double>({.width = 4}, 12);
+///     CHECK(found.mean == Approx(1).epsilon(0.05));
+namespace test {
 
 struct Trousers {
     int width = 6;         ///< of a leg [edges]
@@ -54,13 +57,15 @@ namespace detail {
 // 1 for the vertices of the leg at y > middle, -1 for those of the other one, 0 beyond `end`.
 template <class Sheet>
 [[nodiscard]] std::vector<int> legs_of(const Sheet& sheet, double middle, double end) {
+    using membrane::Index;
     const auto& rest = sheet.tear.surface().rest_positions();
     const auto& triangles = sheet.tear.surface().triangles();
     std::vector<int> side(static_cast<std::size_t>(rest.cols()), 0);
     const auto of = [&](Index v) -> int& { return side[static_cast<std::size_t>(v)]; };
-    const double edge = sheet.tear.surface().mean_edge(0);
+    const auto edge = static_cast<double>(sheet.tear.surface().mean_edge(0));
     for (Index v = 0; v < rest.cols(); ++v) {
-        if (rest(0, v) == 0 && std::abs(rest(1, v) - middle) > edge / 2) of(v) = rest(1, v) > middle ? 1 : -1;
+        const auto aside = static_cast<double>(rest(1, v)) - middle;
+        if (rest(0, v) == 0 && std::abs(aside) > edge / 2) of(v) = aside > 0 ? 1 : -1;
     }
     for (bool changes = true; changes;) {
         changes = false;
@@ -83,17 +88,24 @@ template <class Sheet>
 
 /// The legs stand upright, unstretched at first. A hand holds all of a leg but the part next to the tip, which is one
 /// and a half times as long as wide, and takes hold anew as the tear runs on.
+template <membrane::Real Scalar>
 class TrouserTest {
+    using Index = membrane::Index;
+    using Vector = membrane::Vector3<double>;
+    using Sheet = TornSheet<Scalar>;
+
   public:
     explicit TrouserTest(const Trousers& scene) : scene_(scene), sheet(whole(scene)) {
         const double edge = scene.edge();
-        sheet.cut({0, Trousers::leg_width, 0}, {1, 0, 0}, 2 * scene.width);
+        sheet.cut({0, static_cast<Scalar>(Trousers::leg_width), 0}, {1, 0, 0}, 2 * scene.width);
         const auto& rest = sheet.tear.surface().rest_positions();
         const double end = tip()[0];
         const auto legs = detail::legs_of(sheet, Trousers::leg_width, end);
         for (Index v = 0; v < rest.cols(); ++v) {
             const int leg = legs[static_cast<std::size_t>(v)];
-            if (leg != 0) sheet.x.col(v) << end, rest(1, v), leg * (end - rest(0, v));
+            if (leg == 0) continue;
+            const auto up = static_cast<Scalar>(leg) * (static_cast<Scalar>(end) - rest(0, v));
+            sheet.x.col(v) << static_cast<Scalar>(end), rest(1, v), up;
         }
         at_ = end;
         hold();
@@ -106,26 +118,29 @@ class TrouserTest {
         const double step = part * scene_.edge(), torn = sheet.tear.torn_length();
         const double along = std::clamp(tip()[0] - at_, 0.0, 1.2 * step);
         at_ += along;
-        sheet.tick({Vector(along, 0, step), Vector(along, 0, -step)});
+        const Vector up(along, 0, step), down(along, 0, -step);
+        sheet.tick({up.cast<Scalar>(), down.cast<Scalar>()});
         if (sheet.tear.torn_length() != torn) hold();
     }
 
     /// Of a hand, upward [N].
-    [[nodiscard]] double force() const { return (sheet.forces[0][2] - sheet.forces[1][2]) / 2; }
+    [[nodiscard]] double force() const { return static_cast<double>(sheet.forces[0][2] - sheet.forces[1][2]) / 2; }
     [[nodiscard]] Vector tip() const {
-        return membrane::point(sheet.tear.surface().rest_positions(), sheet.tear.tips()[0].vertex);
+        return membrane::point(sheet.tear.surface().rest_positions(), sheet.tear.tips()[0].vertex)
+            .template cast<double>();
     }
     /// Distance of the tip from the line of the cut [edges].
     [[nodiscard]] double off_line() const { return std::abs(tip()[1] / scene_.edge() - line_); }
 
   private:
-    static TornSheet<> whole(const Trousers& scene) {
+    static Sheet whole(const Trousers& scene) {
         const double edge = scene.edge();
         const int columns = 3 * scene.width + 26;
-        const auto mesh = test::turned_grid<double>(columns, 2 * scene.width, edge, scene.turn).mesh();
+        const auto mesh = turned_grid<Scalar>(columns, 2 * scene.width, edge, scene.turn).mesh();
         TornSheetOptions options{
             .hands = {},
-            .fixed = vertices_where(mesh, [&](const Vector& at) { return at[0] > (columns - 0.5) * edge; }),
+            .fixed = vertices_where(
+                mesh, [&](const auto& at) { return at[0] > static_cast<Scalar>((columns - 0.5) * edge); }),
             .tolerance = 1e-4 * scene.resistance(),
             .sweeps = 10,
             .steps = 10};
@@ -139,7 +154,8 @@ class TrouserTest {
         for (auto& hand : sheet.hands) hand.clear();
         for (Index v = 0; v < rest.cols(); ++v) {
             const int leg = legs[static_cast<std::size_t>(v)];
-            if (leg != 0 && rest(0, v) < end - 1.5 * Trousers::leg_width) sheet.hands[leg > 0 ? 0 : 1].push_back(v);
+            if (leg == 0 || !(static_cast<double>(rest(0, v)) < end - 1.5 * Trousers::leg_width)) continue;
+            sheet.hands[leg > 0 ? 0 : 1].push_back(v);
         }
     }
 
@@ -147,12 +163,13 @@ class TrouserTest {
     double at_ = 0, line_ = 0;
 
   public:
-    TornSheet<> sheet;
+    Sheet sheet;
 };
 
 /// Tears on; steady is what comes after the first quarter.
-[[nodiscard]] inline TrouserRun run(const Trousers& scene, double edges, double part = 1.0 / 60) {
-    TrouserTest test(scene);
+template <membrane::Real Scalar>
+[[nodiscard]] TrouserRun tear_trousers(const Trousers& scene, double edges, double part = 1.0 / 60) {
+    TrouserTest<Scalar> test(scene);
     const auto& tear = test.sheet.tear;
     const double expected = scene.expected_force(), step = part * scene.edge();
     double drawn = 0, torn = 0, sum = 0, first_work = 0;
@@ -182,4 +199,4 @@ class TrouserTest {
     return result;
 }
 
-}  // namespace bench::tears
+}  // namespace test

@@ -22,63 +22,64 @@
 
 /// A flat sheet that two hands tear, and the energy that they give.
 ///
-///     bench::TornSheet sheet(mesh, {.hands = {bottom, top}, .tolerance = 1e-6}, membrane::EnergyRelease{1e3, 1e-5});
+///     test::TornSheet sheet(mesh, {.hands = {bottom, top}, .tolerance = 1e-6}, membrane::EnergyRelease{1e3, 1e-5});
 ///     sheet.cut({0, 10e-3, 0}, {1, 0, 0}, 12);
-///     while (sheet.tear.torn_length() < 5e-3) sheet.tick({Vector(0, 0, 0), Vector(0, 1e-5, 0)});
-namespace bench {
-
-using membrane::Index;
-using Vector = membrane::Vector3<double>;
+///     while (sheet.tear.torn_length() < 5e-3) sheet.tick({Vector3<double>(0, 0, 0), Vector3<double>(0, 1e-5, 0)});
+namespace test {
 
 inline constexpr membrane::Material torn_material{.young_modulus = 1e6, .poisson_ratio = 0.3, .thickness = 1e-5};
 
 struct TornSheetOptions {
-    std::array<std::vector<Index>, 2> hands;      ///< the vertices that each holds
-    std::vector<Index> fixed = {};                ///< vertices that never move
-    double tolerance;                             ///< residual force that counts as none [N]
-    double damping = 0;                           ///< of each vertex, by a body that does not support it [N s/m]
-    Index sweeps = 6;                             ///< of a step
-    Index steps = 20;                             ///< of a tick, at most
-    membrane::TearOptions tear = {};              ///< how it tears
-    membrane::Material material = torn_material;  ///< of the sheet
+    std::array<std::vector<membrane::Index>, 2> hands;  ///< the vertices that each holds
+    std::vector<membrane::Index> fixed = {};            ///< vertices that never move
+    double tolerance;                                   ///< residual force that counts as none [N]
+    double damping = 0;                                 ///< of each vertex, by a body that does not support it [N s/m]
+    membrane::Index sweeps = 6;                         ///< of a step
+    membrane::Index steps = 20;                         ///< of a tick, at most
+    membrane::TearOptions tear = {};                    ///< how it tears
+    membrane::Material material = torn_material;        ///< of the sheet
 };
 
 /// The vertices of a mesh without a reserve at which `is_in(position at rest)`.
-template <class IsIn>
-[[nodiscard]] std::vector<Index> vertices_where(const membrane::TriangleMesh<double>& mesh, const IsIn& is_in) {
-    std::vector<Index> result;
-    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+template <membrane::Real Scalar, class IsIn>
+[[nodiscard]] std::vector<membrane::Index> vertices_where(const membrane::TriangleMesh<Scalar>& mesh,
+                                                          const IsIn& is_in) {
+    std::vector<membrane::Index> result;
+    for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) {
         if (is_in(membrane::point(mesh.positions(), v))) result.push_back(v);
     }
     return result;
 }
 
 /// The energy that all elements of a tissue store [J].
-template <class Tissue>
-[[nodiscard]] double stored_in(const Tissue& tissue, const membrane::Points<double>& x) {
+template <class Tissue, class Positions>
+[[nodiscard]] double stored_in(const Tissue& tissue, const Positions& x) {
     double sum = 0;
-    tissue.for_each_element([&](const auto& instance) { sum += instance.element.energy(instance.where(x)); });
+    tissue.for_each_element(
+        [&](const auto& instance) { sum += static_cast<double>(instance.element.energy(instance.where(x))); });
     return sum;
 }
 
 /// Triangular springs and `Others`, elements that follow a tear.
-template <class Criterion = membrane::EnergyRelease, class... Others>
+template <membrane::Real Scalar, class Criterion = membrane::EnergyRelease, class... Others>
 class TornSheet {
-    using Springs = membrane::TearableSprings<double, membrane::LinearSpring>;
-    using Triangles = membrane::Elements<double, membrane::TriangularSpring<double>>;
+    using Springs = membrane::TearableSprings<Scalar, membrane::LinearSpring>;
+    using Triangles = membrane::Elements<Scalar, membrane::TriangularSpring<Scalar>>;
 
   public:
+    using Index = membrane::Index;
+    using Vector = membrane::Vector3<Scalar>;
     using Tissue = membrane::Tissue<Springs, Triangles, Others...>;
-    static constexpr double dt = 1e-3;  ///< [s]
+    static constexpr auto dt = Scalar(1e-3);  ///< [s]
 
     /// `reserved` is a mesh with a reserve, of which `others` are too.
-    TornSheet(const membrane::TriangleMesh<double>& reserved, const TornSheetOptions& options,
+    TornSheet(const membrane::TriangleMesh<Scalar>& reserved, const TornSheetOptions& options,
               const Criterion& criterion, Others... others)
         : options_(options),
           hands(options.hands),
           mesh(reserved),
           tissue(no_springs(mesh, options.fixed), membrane::triangular_springs(mesh, options.material), others...),
-          foundation(mesh, {.stiffness = 0.0, .damping = options.damping}),
+          foundation(mesh, {.stiffness = Scalar(0), .damping = static_cast<Scalar>(options.damping)}),
           tear(mesh, criterion, options.tear),
           solver(tissue, {.layers = membrane::unlimited, .sweeps = options.sweeps, .predict = false}),
           x(mesh.positions()) {}
@@ -86,13 +87,13 @@ class TornSheet {
     /// Cuts from the vertex nearest to `from` as nearly as possible along a line.
     void cut(const Vector& from, const Vector& direction, int edges) {
         const auto& rest = tear.surface().rest_positions();
-        const auto off = [&](Index v) { return norm<double>(membrane::point(rest, v) - from); };
+        const auto off = [&](Index v) { return norm<Scalar>(membrane::point(rest, v) - from); };
         std::vector<Index> path{0};
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             if (off(v) < off(path[0])) path[0] = v;
         }
         const Vector start = membrane::point(rest, path[0]);
-        const double edge = tear.surface().mean_edge(path[0]);
+        const Scalar edge = tear.surface().mean_edge(path[0]);
         for (int i = 0; i < edges; ++i) {
             const Vector at = membrane::point(rest, path.back()) - start;
             const Vector aside = dot(at, direction) * direction - at;
@@ -113,11 +114,12 @@ class TornSheet {
     /// The hands move; the membrane follows, up to the tolerance or the number of steps; and what tears then.
     void tick(const std::array<Vector, 2>& displacements) {
         for (std::size_t i = 0; i < 2; ++i) {
-            for (const Index v : hands[i]) x.col(v) += Eigen::Vector3d(displacements[i]);
+            for (const Index v : hands[i]) x.col(v) += Eigen::Matrix<Scalar, 3, 1>(displacements[i]);
         }
         const auto before = forces;
         relax(options_.steps);
-        for (std::size_t i = 0; i < 2; ++i) work += dot<double>((before[i] + forces[i]) / 2, displacements[i]);
+        for (std::size_t i = 0; i < 2; ++i)
+            work += static_cast<double>(dot<Scalar>((before[i] + forces[i]) / 2, displacements[i]));
         update();
     }
 
@@ -125,7 +127,7 @@ class TornSheet {
     void update() { follow(tear.update(x, dt, tissue, foundation)); }
 
     /// Whether the forces balance.
-    [[nodiscard]] bool at_rest() const { return report.residual < options_.tolerance; }
+    [[nodiscard]] bool at_rest() const { return static_cast<double>(report.residual) < options_.tolerance; }
 
     /// In the membrane and in opening edges [J].
     [[nodiscard]] double stored() const { return stored_in(tissue, x) + tear.stored(x); }
@@ -134,18 +136,18 @@ class TornSheet {
     [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped; }
 
   private:
-    static Springs no_springs(const membrane::TriangleMesh<double>& mesh, const std::vector<Index>& pinned) {
-        return Springs(
-            mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, {.stiffness = 0.0, .pinned = pinned}));
+    static Springs no_springs(const membrane::TriangleMesh<Scalar>& mesh, const std::vector<Index>& pinned) {
+        return Springs(mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
+                                                         {.stiffness = Scalar(0), .pinned = pinned}));
     }
     // Without damping only the equilibrium matters: steps extrapolate the last ones, as long as the residual force
     // decreases [Nesterov83].
     void relax(int steps) {
-        membrane::Points<double> last = x;
-        double residual = std::numeric_limits<double>::infinity();
+        membrane::Points<Scalar> last = x;
+        Scalar residual = std::numeric_limits<Scalar>::infinity();
         for (int i = 0, in_turn = 0; i < steps; ++i) {
             solver.wake_all();
-            const membrane::Points<double> before = x;
+            const membrane::Points<Scalar> before = x;
             report = solver.step(x, dt, tissue, foundation, membrane::pin(hands[0]), membrane::pin(hands[1]),
                                  tear.ligaments());
             if (report.status != membrane::StepStatus::advanced) throw std::runtime_error("a step was refused");
@@ -153,21 +155,21 @@ class TornSheet {
             if (at_rest() || i + 1 == steps) break;
             if (options_.damping > 0) continue;
             in_turn = report.residual < std::exchange(residual, report.residual) ? in_turn + 1 : 0;
-            const membrane::Points<double> now = x;
-            x += in_turn / (in_turn + 3.0) * (now - last);
+            const membrane::Points<Scalar> now = x;
+            x += static_cast<Scalar>(in_turn / (in_turn + 3.0)) * (now - last);
             last = now;
         }
         for (std::size_t i = 0; i < 2; ++i) forces[i] = -report.reactions[i];
     }
-    void add_damping(const membrane::Points<double>& before) {
+    void add_damping(const membrane::Points<Scalar>& before) {
         for (const Index v : report.moved) {
             const Vector anchor = membrane::point(foundation.anchors(), v);
-            const double moved =
-                norm<double>(membrane::point(x, v) - anchor) - norm<double>(membrane::point(before, v) - anchor);
-            damped += foundation.damping(v) / dt * moved * moved;
+            const auto length = [&](const auto& at) { return norm<Scalar>(membrane::point(at, v) - anchor); };
+            const auto longer = static_cast<double>(length(x) - length(before));
+            damped += static_cast<double>(foundation.damping(v) / dt) * longer * longer;
         }
     }
-    void follow(std::span<const membrane::TearEvent<double>> events) {
+    void follow(std::span<const membrane::TearEvent<Scalar>> events) {
         for (const auto& event : events) membrane::follow(event, tissue, foundation, solver);
     }
 
@@ -175,15 +177,15 @@ class TornSheet {
 
   public:
     std::array<std::vector<Index>, 2> hands;  ///< the vertices that each holds
-    membrane::TriangleMesh<double> mesh;
+    membrane::TriangleMesh<Scalar> mesh;
     Tissue tissue;
-    membrane::VirtualVolumeSprings<double> foundation;
-    membrane::Tearing<double, Criterion> tear;
-    membrane::QuasiStaticSolver<double> solver;
-    membrane::Points<double> x;
-    membrane::StepReport<double> report;
+    membrane::VirtualVolumeSprings<Scalar> foundation;
+    membrane::Tearing<Scalar, Criterion> tear;
+    membrane::QuasiStaticSolver<Scalar> solver;
+    membrane::Points<Scalar> x;
+    membrane::StepReport<Scalar> report;
     std::array<Vector, 2> forces{};  ///< of the hands [N]
     double work = 0, damped = 0;     ///< of the hands; taken by damping [J]
 };
 
-}  // namespace bench
+}  // namespace test
