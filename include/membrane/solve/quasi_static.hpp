@@ -100,7 +100,8 @@ class QuasiStaticSolver {
     ///@{
     /// The membrane has torn, and the network has followed: the copy goes on as the vertex; a vertex has moved at rest.
     /// Both wake, and the vertices around them; beyond the layers the membrane stays as it is until `wake_all`. The
-    /// next report lists both as moved. Online. Cost: that of the contact points of the last step.
+    /// next report lists both as moved. Online. Cost: that of the contact points of the last step. @pre the solver's
+    /// network follows tears (asserted)
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}
@@ -216,7 +217,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       state_(network.vertex_count(), options.max_contact_points),
       last_prescribed_(network.vertex_count()),
       woken_(last_prescribed_),
-      placed_(last_prescribed_),
+      placed_(FollowsSplit<Network> ? network.vertex_count() : 0),  // no memory where nothing tears
       moved_(static_cast<std::size_t>(network.vertex_count())),
       last_displacements_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
     detail::define_made<QuasiStaticSolver>();
