@@ -146,7 +146,9 @@ class Scene {
         }
         if (!is_number) require(report.status != StepStatus::advanced);
         const bool is_full = report.status == StepStatus::too_many_contact_points && options_.max_contact_points < 64;
-        if (is_tame_ && !is_wild) require(report.status == StepStatus::advanced || is_full);
+        // From a wild place a tool sweeps whatever is between.
+        if (is_tame_ && !is_wild && !was_wild_) require(report.status == StepStatus::advanced || is_full);
+        was_wild_ = is_wild;
     }
 
     TriangleMesh<S> mesh_;
@@ -161,7 +163,7 @@ class Scene {
     MovingBody<S> body_{mesh_};
     std::array<Tool<S>, 2> tools_{Tool<S>{.position = {0, 0, S(1.1)}}, Tool<S>{.position = {0, S(1.1), 0}}};
     Points<S> x_ = mesh_.positions();
-    bool is_tame_ = true;
+    bool is_tame_ = true, was_wild_ = false;
 };
 
 template <Real S>

@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Core>
@@ -229,6 +230,26 @@ Vector3<S> exact_place(const GuardedLoop<S>& loop, Random& random) {
 }
 
 }  // namespace
+
+TEMPLATE_TEST_CASE("a tool that is at the end of the range for a tick presses again two ticks later", "[extremes][bad]",
+                   double, float) {
+    using S = TestType;
+    for (const Vector3<S>& axis : {Vector3<S>(0, 0, 0), Vector3<S>(1, 0, 0)}) {
+        for (const S far : {std::numeric_limits<S>::max(), std::numeric_limits<S>::lowest()}) {
+            const auto mesh = unit_sphere<S>(1);
+            GuardedLoop<S> loop(mesh, {.stiffness = S(40)}, {.stiffness = S(8)}, {.layers = 4, .sweeps = 1});
+            loop.traps = test::FloatingPointTraps::only_division;  // squares of such a distance are infinite
+            Tool<S> tool{.position = {S(-0.2), S(-0.2), S(0.9)}, .axis = axis, .radius = S(0.15)};
+            const auto tick = [&] { return loop.tick(tool).status; };
+            for (int i = 0; i < 3; ++i) CHECK(tick() == StepStatus::advanced);
+            const S near = std::exchange(tool.position[0], far);
+            (void)tick();
+            tool.position[0] = near;
+            (void)tick();  // it sweeps whatever is between
+            CHECK(tick() == StepStatus::advanced);
+        }
+    }
+}
 
 TEMPLATE_TEST_CASE("a tool exactly on a vertex, an edge, a face or an anchor divides nothing by zero", "[extremes]",
                    double, float) {
