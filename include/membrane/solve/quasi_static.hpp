@@ -100,8 +100,8 @@ class QuasiStaticSolver {
     ///@{
     /// The membrane has torn, and the network has followed: the copy goes on as the vertex; a vertex has moved at rest.
     /// Both wake, and the vertices around them; beyond the layers the membrane stays as it is until `wake_all`. The
-    /// next report lists both as moved. Online. Cost: that of the contact points of the last step. @pre the solver's
-    /// network follows tears (asserted)
+    /// next report lists both as moved, if the solver was made for a network that `FollowsSplit`. Online. Cost: that of
+    /// the contact points of the last step.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept;
     ///@}
@@ -392,7 +392,7 @@ void QuasiStaticSolver<Scalar, Rule>::split(const VertexSplit& split) noexcept {
     active_.network_changed();
     for (const auto& corners : split.corners) wake(corners);
     wake({&split.copy, 1});
-    placed_.insert(split.copy);
+    if (placed_.capacity() > 0) placed_.insert(split.copy);
     if (options_.predict) last_displacements_.col(split.copy) = last_displacements_.col(split.vertex);
     if (has_moved(split.vertex)) moved_.try_push_back(split.copy);
 }
@@ -401,7 +401,7 @@ template <Real Scalar, CheckedStepRule<Scalar> Rule>
 void QuasiStaticSolver<Scalar, Rule>::reshape(const MovedVertex<Scalar>& moved) noexcept {
     active_.network_changed();
     for (const auto& triangle : moved.triangles) wake(triangle.corners);
-    placed_.insert(moved.vertex);
+    if (placed_.capacity() > 0) placed_.insert(moved.vertex);
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
