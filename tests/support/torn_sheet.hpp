@@ -60,6 +60,21 @@ template <class Tissue, class Positions>
     return sum;
 }
 
+/// The energy that a foundation's damping took in a step of `dt` [s] from `before` to `x`, in which `moved` moved [J].
+template <membrane::Real Scalar>
+[[nodiscard]] double taken_by_damping(const membrane::VirtualVolumeSprings<Scalar>& foundation,
+                                      const membrane::Points<Scalar>& before, const membrane::Points<Scalar>& x,
+                                      std::span<const membrane::Index> moved, Scalar dt) {
+    double sum = 0;
+    for (const membrane::Index v : moved) {
+        const auto anchor = membrane::point(foundation.anchors(), v);
+        const auto length = [&](const auto& at) { return norm<Scalar>(membrane::point(at, v) - anchor); };
+        const auto longer = static_cast<double>(length(x) - length(before));
+        sum += static_cast<double>(foundation.damping(v) / dt) * longer * longer;
+    }
+    return sum;
+}
+
 /// Triangular springs and `Others`, elements that follow a tear.
 template <membrane::Real Scalar, class Criterion = membrane::EnergyRelease, class... Others>
 class TornSheet {
@@ -151,7 +166,7 @@ class TornSheet {
             report = solver.step(x, dt, tissue, foundation, membrane::pin(hands[0]), membrane::pin(hands[1]),
                                  tear.ligaments());
             if (report.status != membrane::StepStatus::advanced) throw std::runtime_error("a step was refused");
-            if (options_.damping > 0) add_damping(before);
+            if (options_.damping > 0) damped += taken_by_damping(foundation, before, x, report.moved, dt);
             if (at_rest() || i + 1 == steps) break;
             if (options_.damping > 0) continue;
             in_turn = report.residual < std::exchange(residual, report.residual) ? in_turn + 1 : 0;
@@ -160,14 +175,6 @@ class TornSheet {
             last = now;
         }
         for (std::size_t i = 0; i < 2; ++i) forces[i] = -report.reactions[i];
-    }
-    void add_damping(const membrane::Points<Scalar>& before) {
-        for (const Index v : report.moved) {
-            const Vector anchor = membrane::point(foundation.anchors(), v);
-            const auto length = [&](const auto& at) { return norm<Scalar>(membrane::point(at, v) - anchor); };
-            const auto longer = static_cast<double>(length(x) - length(before));
-            damped += static_cast<double>(foundation.damping(v) / dt) * longer * longer;
-        }
     }
     void follow(std::span<const membrane::TearEvent<Scalar>> events) {
         for (const auto& event : events) membrane::follow(event, tissue, foundation, solver);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <span>
 #include <type_traits>
@@ -15,6 +14,7 @@
 #include <membrane/tear/tearing.hpp>
 
 #include "support/pure_shear.hpp"
+#include "support/torn_sheet.hpp"
 #include "support/turned_grid.hpp"
 
 /// A strip between two clamps, with a notch, that is torn.
@@ -123,12 +123,7 @@ class TornStrip {
 
     /// The clamps' force [N].
     double force() const { return -static_cast<double>(report.reactions[1][1]); }
-    double energy() const {
-        double sum = 0;
-        sheet.for_each_element(
-            [&](const auto& instance) { sum += static_cast<double>(instance.element.energy(instance.where(x))); });
-        return sum;
-    }
+    double energy() const { return stored_in(sheet, x); }
     /// Energy stored and dissipated, over the work of the clamps.
     double balance() const { return (energy() + tear.stored(x) + tear.dissipated() + damped) / work; }
     double torn_edges() const { return tear.torn_length() / edge; }
@@ -158,17 +153,8 @@ class TornStrip {
             solver.wake_all();
             const membrane::Points<Scalar> before = x;
             report = solver.step(x, dt, sheet, foundation, tear.ligaments(), membrane::pin(top), membrane::pin(held));
-            if (options_.damping > 0) add_damping(before);
+            if (options_.damping > 0) damped += taken_by_damping(foundation, before, x, report.moved, dt);
             if (at_rest()) return;
-        }
-    }
-    void add_damping(const membrane::Points<Scalar>& before) {
-        for (Index v = 0; v < mesh.vertex_count(); ++v) {
-            if (sheet.pinned(v) || std::find(top.begin(), top.end(), v) != top.end()) continue;
-            const auto anchor = membrane::point(foundation.anchors(), v);
-            const auto length = [&](const auto& at) { return norm<Scalar>(membrane::point(at, v) - anchor); };
-            const double longer = static_cast<double>(length(x) - length(before));
-            damped += static_cast<double>(foundation.damping(v) / dt) * longer * longer;
         }
     }
     template <class... Parts>
