@@ -23,7 +23,7 @@
 #include "support/catch.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
-#include "support/torn_sheet.hpp"
+#include "support/torn_centre.hpp"
 #include "support/torn_strip.hpp"
 
 using namespace membrane;
@@ -239,55 +239,15 @@ TEST_CASE("without moved vertices the grid steers the tear", "[tear]") {
 
 TEMPLATE_TEST_CASE("both ends of a cut in a sheet stretched in both directions go on alike, along it", "[tear]", double,
                    float) {
-    using Vector = Vector3<TestType>;
-    const int rows = 24, edges = 8;
-    const double edge = 1e-3, thickness = test::torn_material.thickness;
-    const auto at_rest = [&](double turn, double toughness) {
-        const auto mesh = test::turned_grid<TestType>(rows, rows, edge, turn).mesh();
-        const auto is_fixed = [&](const auto& at) {
-            const auto end = static_cast<TestType>(rows * edge);
-            return at[0] == 0 || at[1] == 0 || at[0] == end || at[1] == end;
-        };
-        test::TornSheetOptions options{.hands = {}, .fixed = test::vertices_where(mesh, is_fixed), .tolerance = 1e-6};
-        test::TornSheet<TestType> sheet(with_reserve(mesh, 20), options, EnergyRelease{toughness, thickness});
-        const Vector3<double> along(std::cos(turn), std::sin(turn), 0);
-        const Vector3<double> start = Vector3<double>(rows, rows, 0) * (edge / 2) - edges / 2.0 * edge * along;
-        sheet.cut(start.cast<TestType>(), along.cast<TestType>(), edges);
-        sheet.x *= TestType(1.3);
-        sheet.start();
-        return sheet;
-    };
     for (const double turn : {0.0, 20 * degree, 45 * degree}) {
         CAPTURE(turn);
-        const Vector along = Vector3<double>(std::cos(turn), std::sin(turn), 0).template cast<TestType>();
-        const Vector aside(-along[1], along[0], 0);
-        auto held = at_rest(turn, 1e9);
-        held.update();
-        const auto tips = held.tear.tips();
-        REQUIRE(tips.size() == 2);
-        for (const auto& tip : tips) {
-            const Vector force = tip.driving_force;
-            CHECK(std::abs(std::atan2(dot(force, aside), std::abs(dot(force, along)))) < 3 * degree);
-        }
-        const auto force = static_cast<double>(norm(tips[0].driving_force));
-        CHECK(dot(tips[0].driving_force, tips[1].driving_force) < 0);
-        CHECK(static_cast<double>(norm(tips[1].driving_force)) == Approx(force).epsilon(0.05));
-
-        auto torn = at_rest(turn, 0.9 * force / thickness);
-        const auto tip = [&](std::size_t i) {
-            return point(torn.tear.surface().rest_positions(), torn.tear.tips()[i].vertex);
-        };
-        const std::array<Vector, 2> start{tip(0), tip(1)};
-        for (int tick = 0; tick < 200 && torn.tear.torn_length() < 5.5 * edge; ++tick) {
-            torn.tick({Vector::Zero(), Vector::Zero()});
-            REQUIRE(torn.tear.tips().size() == 2);
-        }
-        REQUIRE(torn.tear.torn_length() >= 5.5 * edge);
-        for (std::size_t i = 0; i < 2; ++i) {
-            const Vector off = (1 / TestType(edge)) * (tip(i) - start[i]);
-            CHECK(std::abs(dot(off, aside)) < std::tan(3 * degree) * norm(off));
-            CHECK(norm(off) > 1.5);
-        }
+        const auto found = test::tear_from_centre<TestType>({.rows = 24, .turn = turn}, 2.75);
+        CHECK(found.angle < 3 * degree);
+        CHECK(found.unlike < 0.05);
+        const auto [left, right] = found.advances;
+        CHECK(left > 1.5);
+        CHECK(right > 1.5);
+        CHECK(found.off_line < std::tan(3 * degree) * std::min(left, right));
     }
 }
 
