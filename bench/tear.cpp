@@ -94,9 +94,9 @@ constexpr double none = std::numeric_limits<double>::quiet_NaN();
 double percent(double ratio) { return 100 * std::abs(ratio - 1); }
 
 // A strip whose ends are far from the tear, on a grid that is turned so that no edge is along it.
-Shear strip_of(int rows, double edges) {
+Strip long_strip(int rows, double edges) {
     const int notch = rows * 6 / 10;
-    return {.rows = rows, .columns = 2 * notch + static_cast<int>(edges) + 4, .notch = notch, .turn = 17 * degree};
+    return strip_of(rows, 2 * notch + static_cast<int>(edges) + 4, notch, 17 * degree);
 }
 
 void shear(Page& page, const Effort& effort) {
@@ -109,19 +109,18 @@ void shear(Page& page, const Effort& effort) {
         page.print("| %d | ", rows);
         std::string forces;
         for (const int tenths : {6, 8, 10}) {
-            const double found = driving_force({.rows = rows, .columns = 2 * rows, .notch = rows * tenths / 10});
+            const double found = driving_force(strip_of(rows, 2 * rows, rows * tenths / 10));
             force = std::max(force, percent(found));
             char text[20];
             std::snprintf(text, sizeof text, "%s%.3f", forces.empty() ? "" : ", ", found);
             forces += text;
         }
-        const ShearRun found = run(strip_of(rows, effort.edges), effort.edges);
-        begins = std::max(begins, percent(found.begins / Shear::closed_form.critical_stretch()));
+        const ShearRun found = run(long_strip(rows, effort.edges), effort.edges);
+        begins = std::max(begins, percent(found.begins));
         off = std::max(off, found.off_line);
         lost = std::max(lost, std::abs(found.lost) / found.given * 100);
-        page.print("%d | %s | %.4f | %.2f | %.3f | %.3f |\n", int{found.vertices}, forces.c_str(),
-                   found.begins / Shear::closed_form.critical_stretch(), found.off_line,
-                   found.dissipated / (resistance * found.torn), 1 - found.lost / found.given);
+        page.print("%d | %s | %.4f | %.2f | %.3f | %.3f |\n", int{found.vertices}, forces.c_str(), found.begins,
+                   found.off_line, found.dissipated / (resistance * found.torn), 1 - found.lost / found.given);
     }
     page.add({"pure shear: driving force, from the closed form", force, 5, "%"});
     page.add({"pure shear: stretch at which it begins, from the right one", begins, 3, "%"});
@@ -137,9 +136,9 @@ void damping(Page& page, const Effort& effort) {
         "| by nothing |\n|---|---|---|---|\n");
     double lost = 0;
     for (const int rows : effort.rows) {
-        Shear shear = strip_of(rows, effort.edges / 2);
-        shear.damping = 1.5 * torn_material.young_modulus * torn_material.thickness * TornSheet<double>::dt;
-        const ShearRun found = run(shear, effort.edges / 2);
+        Strip strip = long_strip(rows, effort.edges / 2);
+        strip.damping = 1.5 * torn_material.young_modulus * torn_material.thickness * TornStrip<double>::dt;
+        const ShearRun found = run(strip, effort.edges / 2);
         lost = std::max(lost, std::abs(found.lost) / found.given * 100);
         page.print("| %d | %.1f %% | %.1f %% | %.1f %% |\n", rows, 100 * found.dissipated / found.given,
                    100 * found.damped / found.given, 100 * found.lost / found.given);
@@ -158,19 +157,18 @@ void grids(Page& page, const Effort& effort) {
     for (const int rows : effort.rows) {
         double sum = 0, largest = 0, at = 0, least = 2, most = 0;
         for (int i = 0; i < effort.directions; ++i) {
-            Shear shear = strip_of(rows, effort.edges);
+            Strip strip = long_strip(rows, effort.edges);
             const double turn = 60.0 * i / (effort.directions - 1);
-            shear.turn = turn * degree;
-            const ShearRun found = run(shear, effort.edges);
-            const double begins = found.begins / Shear::closed_form.critical_stretch();
+            strip.turn = turn * degree;
+            const ShearRun found = run(strip, effort.edges);
             sum += found.off_line;
             if (found.off_line > largest) largest = found.off_line, at = turn;
-            least = std::min(least, begins), most = std::max(most, begins);
+            least = std::min(least, found.begins), most = std::max(most, found.begins);
             if (rows == effort.rows[1]) {
-                shear.move_vertices = false;
-                along_edges = std::max(along_edges, run(shear, effort.edges).off_line);
+                strip.tear.move_vertices = false;
+                along_edges = std::max(along_edges, run(strip, effort.edges).off_line);
             }
-            distances << rows << '\t' << turn << '\t' << found.off_line << '\t' << begins << '\n';
+            distances << rows << '\t' << turn << '\t' << found.off_line << '\t' << found.begins << '\n';
             for (const auto& [x, y] : found.path) paths << rows << '\t' << turn << '\t' << x << '\t' << y << '\n';
             paths << "\n\n";
         }
@@ -193,8 +191,7 @@ void criteria(Page& page, const Effort& effort) {
     for (int i = 0; i <= 12; ++i) stretches.push_back(1.1 + 0.03 * i);
     std::vector<std::vector<AtStretch>> states;
     for (const int rows : effort.rows) {
-        states.push_back(
-            loaded({.rows = rows, .columns = 2 * rows, .notch = rows * 6 / 10, .turn = 17 * degree}, stretches));
+        states.push_back(loaded(strip_of(rows, 2 * rows, rows * 6 / 10, 17 * degree), stretches));
     }
     const auto released = [](const AtStretch& state) { return state.driving_force; };
     const auto tension = [](const AtStretch& state) { return state.tension; };
@@ -207,7 +204,7 @@ void criteria(Page& page, const Effort& effort) {
     for (std::size_t i = 0; i < states.size(); ++i) {
         by_energy.push_back(value_where(states[i], released, force, resistance));
         by_tension.push_back(value_where(states[i], tension, force, strength));
-        const double edge = 1e3 * Shear::height / effort.rows[i];
+        const double edge = 20.0 / effort.rows[i];
         page.print("| %g | %.3f | %.3f |\n", edge, by_energy.back(), by_tension.back());
         plot << edge << '\t' << by_energy.back() << '\t' << by_tension.back() << '\n';
     }

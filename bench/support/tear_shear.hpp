@@ -8,60 +8,32 @@
 #include <numbers>
 #include <vector>
 
-#include "support/pure_shear.hpp"
-#include "support/torn_sheet.hpp"
+#include "support/torn_strip.hpp"
 
-/// A strip in pure shear: clamps along both long sides move apart, and a notch from a short side tears on.
+/// A strip in pure shear, whose notch tears on.
 namespace bench::tears {
 
 using membrane::Index;
 using test::torn_material;
-using test::TornSheet;
-using test::TornSheetOptions;
-using test::vertices_where;
+using test::TornStrip;
 using Vector = membrane::Vector3<double>;
 
 inline constexpr double degree = std::numbers::pi / 180;
 inline constexpr double toughness = 1000;                                  // [J/m^2]
 inline constexpr double resistance = toughness * torn_material.thickness;  // [J/m]
 
-struct Shear {
-    int rows = 20, columns = 40, notch = 12;  ///< height, length and notch [edges]
-    double turn = 0;                          ///< of the grid [rad]
-    double damping = 0;                       ///< of a vertex [N s/m]
-    bool move_vertices = true;                ///< onto the tear's direction
+using Strip = test::TornStripOptions;
 
-    static constexpr double height = 20e-3;  ///< [m]
-    static constexpr test::PureShear closed_form{torn_material, toughness, height};
-
-    [[nodiscard]] double edge() const { return height / rows; }
-
-    template <class Criterion>
-    [[nodiscard]] TornSheet<double, Criterion> notched(const Criterion& criterion) const {
-        const auto mesh = test::turned_grid<double>(columns, rows, edge(), turn).mesh();
-        const double middle = height / 2, half = middle - edge() / 2;
-        TornSheet<double, Criterion> strip(
-            membrane::with_reserve(mesh, 2 * columns),
-            {.hands = {vertices_where(mesh, [&](const Vector& at) { return at[1] - middle < -half; }),
-                       vertices_where(mesh, [&](const Vector& at) { return at[1] - middle > half; })},
-             .tolerance = 3e-4 * resistance,
-             .damping = damping,
-             .tear = {.move_vertices = move_vertices}},
-            criterion);
-        strip.cut({0, height / 2, 0}, {1, 0, 0}, notch);
-        return strip;
-    }
-    template <class Criterion>
-    static void stretch(TornSheet<double, Criterion>& strip, double to) {
-        strip.x.row(1) = to * strip.tear.surface().rest_positions().row(1);
-        strip.start();
-    }
-};
+/// 20 mm high, at the toughness above, on a grid that is turned by `turn` [rad].
+[[nodiscard]] inline Strip strip_of(int rows, int columns, int notch, double turn = 0) {
+    return {
+        .columns = columns, .rows = rows, .edge = 20e-3 / rows, .notch = notch, .turn = turn, .toughness = toughness};
+}
 
 /// What a tear has done.
 struct ShearRun {
     Index vertices = 0;
-    double begins = 0;                        ///< the stretch
+    double begins = 0;                        ///< the stretch, over the critical one
     double off_line = 0;                      ///< largest distance from the line of the notch [edges]
     double torn = 0;                          ///< [m]
     double given = 0, dissipated = 0;         ///< by the clamps and the strip; taken by the tear [J]
@@ -70,23 +42,19 @@ struct ShearRun {
 };
 
 /// Tears on by this number of edges, as slowly as forces balance.
-[[nodiscard]] inline ShearRun run(const Shear& shear, double edges) {
-    auto strip = shear.notched(membrane::EnergyRelease{toughness, torn_material.thickness});
-    const double critical = Shear::closed_form.critical_stretch();
-    double stretch = 0.98 * critical;
-    Shear::stretch(strip, stretch);
-    const auto& rest = strip.tear.surface().rest_positions();
-    const Vector start = membrane::point(rest, strip.tear.tips()[0].vertex);
+[[nodiscard]] inline ShearRun run(const Strip& options, double edges) {
+    TornStrip<double> strip(options);
+    strip.cut();
+    const double critical = strip.pure_shear().critical_stretch();
+    strip.stretch(0.98 * critical);
     ShearRun result;
-    result.vertices = strip.mesh.vertex_count() - 2 * shear.columns;
-    while (strip.tear.torn_length() < edges * shear.edge()) {
+    result.vertices = strip.vertices;
+    while (strip.torn_edges() < edges) {
         // With damping the strip moves as long as the clamps do.
-        const double by = strip.at_rest() || shear.damping > 0 ? 2e-4 * critical : 0;
-        stretch += by;
-        strip.tick({Vector(0, 0, 0), Vector(0, by * Shear::height, 0)});
+        strip.tick(strip.at_rest() || options.damping > 0 ? 2e-4 * critical : 0);
         if (strip.tear.tips().empty()) break;
-        if (result.begins == 0 && strip.tear.torn_length() > 0) result.begins = stretch;
-        const Vector at = (1 / shear.edge()) * (membrane::point(rest, strip.tear.tips()[0].vertex) - start);
+        if (result.begins == 0 && strip.torn_edges() > 0) result.begins = strip.stretched / critical;
+        const Vector at = strip.advance();
         if (result.path.empty() || result.path.back()[0] != at[0]) result.path.push_back({at[0], at[1]});
         result.off_line = std::max(result.off_line, std::abs(at[1]));
     }
@@ -99,12 +67,13 @@ struct ShearRun {
 }
 
 /// The driving force at the notch over the closed form, at nine tenths of the critical stretch.
-[[nodiscard]] inline double driving_force(const Shear& shear) {
-    const double stretch = 0.9 * Shear::closed_form.critical_stretch();
-    auto strip = shear.notched(membrane::EnergyRelease{toughness, torn_material.thickness});
-    Shear::stretch(strip, stretch);
+[[nodiscard]] inline double driving_force(const Strip& options) {
+    TornStrip<double> strip(options);
+    strip.cut();
+    strip.stretch(0.9 * strip.pure_shear().critical_stretch());
     strip.update();
-    return norm(strip.tear.tips()[0].driving_force) / (Shear::closed_form.energy_density(stretch) * Shear::height);
+    return norm(strip.tear.tips()[0].driving_force) /
+           (strip.pure_shear().energy_density(strip.stretched) * strip.height());
 }
 
 /// At the tip, what criteria get.
@@ -124,15 +93,16 @@ struct AtStretch {
     double stretch, force, driving_force, tension;
 };
 
-[[nodiscard]] inline std::vector<AtStretch> loaded(const Shear& shear, const std::vector<double>& stretches) {
+[[nodiscard]] inline std::vector<AtStretch> loaded(const Strip& options, const std::vector<double>& stretches) {
     membrane::TipState<double> tip;
-    auto strip = shear.notched(Recorder{&tip});
+    TornStrip<double, Recorder> strip(options, Recorder{&tip});
+    strip.cut();
     std::vector<AtStretch> result;
     for (const double stretch : stretches) {
-        Shear::stretch(strip, stretch);
+        strip.stretch(stretch);
         strip.update();
-        const double length = shear.columns * shear.edge();
-        result.push_back({stretch, strip.forces[1][1] / length, norm(tip.driving_force), tip.tension});
+        result.push_back(
+            {stretch, strip.force() / (options.columns * options.edge), norm(tip.driving_force), tip.tension});
     }
     return result;
 }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include <membrane/model/material.hpp>
+#include <membrane/model/spring_stiffness.hpp>
 #include <membrane/model/tearable_springs.hpp>
 #include <membrane/model/tissue.hpp>
 #include <membrane/model/triangular_springs.hpp>
@@ -33,6 +34,7 @@ struct TornSheetOptions {
     std::array<std::vector<membrane::Index>, 2> hands;  ///< the vertices that each holds
     std::vector<membrane::Index> fixed = {};            ///< vertices that never move
     double tolerance;                                   ///< residual force that counts as none [N]
+    bool springs = false;                               ///< a network of springs in place of a continuous sheet
     double damping = 0;                                 ///< of each vertex, by a body that does not support it [N s/m]
     membrane::Index sweeps = 6;                         ///< of a step
     membrane::Index steps = 20;                         ///< of a tick, at most
@@ -93,17 +95,19 @@ class TornSheet {
         : options_(options),
           hands(options.hands),
           mesh(reserved),
-          tissue(no_springs(mesh, options.fixed), membrane::triangular_springs(mesh, options.material), others...),
+          tissue(springs_of(mesh, options), triangles_of(mesh, options), others...),
           foundation(mesh, {.stiffness = Scalar(0), .damping = static_cast<Scalar>(options.damping)}),
           tear(mesh, criterion, options.tear),
           solver(tissue, {.layers = membrane::unlimited, .sweeps = options.sweeps, .predict = false}),
           x(mesh.positions()) {}
 
-    /// Cuts from the vertex nearest to `from` as nearly as possible along a line.
-    void cut(const Vector& from, const Vector& direction, int edges) {
+    /// Cuts from the vertex nearest to `from` as nearly as possible along a line; so do `parts`.
+    template <class... Parts>
+    void cut(const Vector& from, const Vector& direction, int edges, Parts&... parts) {
         const auto& rest = tear.surface().rest_positions();
         const auto off = [&](Index v) { return norm<Scalar>(membrane::point(rest, v) - from); };
-        std::vector<Index> path{0};
+        auto& path = cut_path;
+        path = {0};
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             if (off(v) < off(path[0])) path[0] = v;
         }
@@ -116,7 +120,7 @@ class TornSheet {
         }
         const auto events = tear.cut_along(path, x);
         if (events.empty()) throw std::runtime_error("the sheet cannot be cut there");
-        follow(events);
+        follow(events, parts...);
     }
 
     /// Takes the present positions as where the hands are, once they are at equilibrium.
@@ -151,9 +155,15 @@ class TornSheet {
     [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped; }
 
   private:
-    static Springs no_springs(const membrane::TriangleMesh<Scalar>& mesh, const std::vector<Index>& pinned) {
-        return Springs(mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
-                                                         {.stiffness = Scalar(0), .pinned = pinned}));
+    static Springs springs_of(const membrane::TriangleMesh<Scalar>& mesh, const TornSheetOptions& options) {
+        membrane::NetworkOptions<Scalar> network{.stiffness = Scalar(0), .pinned = options.fixed};
+        if (options.springs) network.stiffness = membrane::spring_stiffnesses(mesh, options.material);
+        return Springs(mesh, membrane::MassSpringNetwork(mesh, membrane::LinearSpring{}, network));
+    }
+    static Triangles triangles_of(const membrane::TriangleMesh<Scalar>& mesh, const TornSheetOptions& options) {
+        auto material = options.material;
+        if (options.springs) material.young_modulus *= 1e-9;  // as good as none
+        return membrane::triangular_springs(mesh, material);
     }
     // Without damping only the equilibrium matters: steps extrapolate the last ones, as long as the residual force
     // decreases [Nesterov83].
@@ -176,8 +186,9 @@ class TornSheet {
         }
         for (std::size_t i = 0; i < 2; ++i) forces[i] = -report.reactions[i];
     }
-    void follow(std::span<const membrane::TearEvent<Scalar>> events) {
-        for (const auto& event : events) membrane::follow(event, tissue, foundation, solver);
+    template <class... Parts>
+    void follow(std::span<const membrane::TearEvent<Scalar>> events, Parts&... parts) {
+        for (const auto& event : events) membrane::follow(event, tissue, foundation, solver, parts...);
     }
 
     TornSheetOptions options_;
@@ -191,6 +202,7 @@ class TornSheet {
     membrane::QuasiStaticSolver<Scalar> solver;
     membrane::Points<Scalar> x;
     membrane::StepReport<Scalar> report;
+    std::vector<Index> cut_path;
     std::array<Vector, 2> forces{};  ///< of the hands [N]
     double work = 0, damped = 0;     ///< of the hands; taken by damping [J]
 };

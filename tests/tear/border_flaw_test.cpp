@@ -244,8 +244,8 @@ TEST_CASE("a border that has just started to tear does not start again at the sa
 TEST_CASE("a border does not start to tear where it is pinned, or if there can be no further tip", "[tear]") {
     test::TornStrip<double> strip({});
     strip.x.row(0) *= 1.4;  // along both clamps
-    const Index v = strip.top[strip.top.size() / 2];
-    CHECK(strip.tear.start_at(v, 3e-3, strip.x, strip.sheet).empty());
+    const Index v = strip.top()[strip.top().size() / 2];
+    CHECK(strip.tear.start_at(v, 3e-3, strip.x, strip.tissue).empty());
     Sheet<double> sheet(0.2, 1e-3, 100, 20, {.max_tips = 1});
     sheet.stretch(1.3);
     REQUIRE_FALSE(sheet.tear.cut_along(sheet.start(sheet.at_side(), 1e-3), sheet.x).empty());
@@ -263,14 +263,14 @@ struct FlawedStrip {
             const auto at = point(strip.mesh.positions(), w);
             return std::abs(at[0]) + 0.1 * std::abs(at[1] - strip.height() / 2);
         };
-        for (Index w = 0; w < strip.surface.vertex_count(); ++w) {
+        for (Index w = 0; w < strip.vertices; ++w) {
             if (off(w) < off(v)) v = w;
         }
     }
-    auto border() const { return border_state<double>(strip.tear.surface(), v, strip.x, strip.sheet); }
-    auto start(double flaw) { return strip.tear.start_at(v, flaw, strip.x, strip.sheet); }
+    auto border() const { return border_state<double>(strip.tear.surface(), v, strip.x, strip.tissue); }
+    auto start(double flaw) { return strip.tear.start_at(v, flaw, strip.x, strip.tissue); }
     void cut(std::span<const Index> path) {
-        for (const auto& event : strip.tear.cut_along(path, strip.x)) follow(event, strip.sheet, strip.solver);
+        for (const auto& event : strip.tear.cut_along(path, strip.x)) follow(event, strip.tissue, strip.solver);
     }
 
     test::TornStrip<double> strip;
@@ -286,7 +286,7 @@ TEST_CASE("a tear that starts from a flaw runs on, and a tougher one does not", 
         CAPTURE(turn);
         const double force = flaw_driving_force(FlawedStrip(200, turn, 1.2).border(), flaw);
         const auto path_at = [&](double part, double& torn, double& driving_force) {
-            const double toughness = part * force / test::TornStrip<double>::thickness;
+            const double toughness = part * force / test::torn_material.thickness;
             FlawedStrip flawed(toughness, turn, 1.2);
             const auto path = flawed.start(flaw);
             const bool starts = !path.empty();

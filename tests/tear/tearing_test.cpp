@@ -107,7 +107,10 @@ TEMPLATE_TEST_CASE("the driving force is what two equilibria, before and after a
         };
         Vector3<TestType> forceps;  // at the same place in all of them
         const auto at = [&](int edges) {
-            TornStrip<TestType> strip({.columns = scene.columns, .notch = edges, .springs = scene.springs});
+            TornStrip<TestType> strip({.columns = scene.columns,
+                                       .notch = edges,
+                                       .springs = scene.springs,
+                                       .tolerance = std::is_same_v<TestType, double> ? 3e-6 : 3e-4});
             strip.cut();
             strip.stretch(scene.stretch);
             if (scene.drawn > 0) {
@@ -117,13 +120,13 @@ TEMPLATE_TEST_CASE("the driving force is what two equilibria, before and after a
             }
             strip.tick(0);
             const auto& tip = strip.tear.tips()[0];
-            return State{strip.energy(), static_cast<double>(strip.tear.surface().rest_positions()(0, tip.vertex)),
+            return State{strip.stored(), static_cast<double>(strip.tear.surface().rest_positions()(0, tip.vertex)),
                          static_cast<double>(tip.driving_force[0])};
         };
         const State before = at(scene.notch - 1), now = at(scene.notch), after = at(scene.notch + 1);
         const double released = (before.energy - after.energy) / (after.tip - before.tip);
         const double force = (before.force + 4 * now.force + after.force) / 6;  // Simpson's rule
-        CHECK(force == Approx(released).epsilon(std::is_same_v<TestType, double> ? 0.02 : 0.08));
+        CHECK(force == Approx(released).epsilon(std::is_same_v<TestType, double> ? 0.01 : 0.08));
     }
 }
 
@@ -142,12 +145,12 @@ TEMPLATE_TEST_CASE("what the clamps give is stored, or taken by the tear and by 
         }
         REQUIRE(strip.torn_edges() >= 6);
         CAPTURE(strip.balance(), strip.damped / strip.work);
-        CHECK(strip.balance() == Approx(1).epsilon(std::is_same_v<TestType, double> ? 0.005 : 0.02));
+        CHECK(strip.balance() == Approx(1).epsilon(std::is_same_v<TestType, double> ? 0.01 : 0.02));
         CHECK(strip.damped > 0.02 * strip.work);
         // The last edge may not have opened.
-        const double resistance = 1000 * strip.thickness, torn = strip.tear.torn_length();
+        const double resistance = 1000 * test::torn_material.thickness, torn = strip.tear.torn_length();
         CHECK(strip.tear.dissipated() <= resistance * torn * (1 + 1e-12));
-        CHECK(strip.tear.dissipated() > resistance * (torn - 1.2 * strip.edge) * 0.99);
+        CHECK(strip.tear.dissipated() > resistance * (torn - 1.2 * strip.edge()) * 0.99);
     }
 }
 
@@ -158,7 +161,7 @@ TEST_CASE("the driving force counts the energy of a foundation", "[tear]") {
     for (const double kappa_h : {0.25, 1.0, 2.0, 3.0}) {
         CAPTURE(kappa_h);
         TornStrip<double> strip({.notch = 20, .toughness = 1e9});
-        const Material material = TornStrip<double>::material();
+        const Material material = test::torn_material;
         const double modulus = material.young_modulus * material.thickness / (1 - 0.3 * 0.3);
         const double kappa = kappa_h / strip.height(), up = 0.01 * strip.height();
         auto stiffness = vertex_areas(strip.mesh);
@@ -166,14 +169,14 @@ TEST_CASE("the driving force counts the energy of a foundation", "[tear]") {
         FoundationSprings<double> foundation(strip.mesh, {.normal = stiffness, .tangential = stiffness});
         MovingBody body(strip.mesh);
         strip.cut(foundation, body);
-        for (const Index v : strip.top) strip.x(1, v) += up;
+        for (const Index v : strip.top()) strip.x(1, v) += up;
         for (int i = 0; i < 5000 && !(i > 0 && strip.report.converged); ++i) {
             strip.solver.wake_all();
-            strip.report = strip.solver.step(strip.x, 1e-3, strip.sheet, foundation, pin(strip.top));
+            strip.report = strip.solver.step(strip.x, 1e-3, strip.tissue, foundation, pin(strip.top()));
         }
         REQUIRE(strip.report.converged);
-        REQUIRE(strip.tear.update(strip.x, 1e-3, strip.sheet, foundation).empty());
-        const double arm = strip.height() - strip.start[1];
+        REQUIRE(strip.tear.update(strip.x, 1e-3, strip.tissue, foundation).empty());
+        const double arm = strip.height() - strip.notch_end[1];
         const double whole = 1 / std::tanh(kappa * strip.height()), torn = std::tanh(kappa * arm);
         const double released = modulus * kappa * up * up / 2 * (whole - torn);
         const Vector3<double> force = strip.tear.tips()[0].driving_force;
@@ -181,7 +184,7 @@ TEST_CASE("the driving force counts the energy of a foundation", "[tear]") {
         // It is that in the frame of the body at rest.
         const RigidFrame<double> pose{.rotation = test::Random(1).rotation(), .origin = {0.1, 0.2, -0.3}};
         REQUIRE(body.move_to(pose, strip.x));
-        REQUIRE(strip.tear.update(strip.x, 1e-3, strip.sheet, on(body, foundation)).empty());
+        REQUIRE(strip.tear.update(strip.x, 1e-3, strip.tissue, on(body, foundation)).empty());
         CHECK(norm<double>(strip.tear.tips()[0].driving_force - force) < 1e-6 * norm(force));
     }
 }
@@ -195,14 +198,14 @@ TEST_CASE("what forceps do near a tip is not taken for the tear's driving force"
         strip.stretch(0.9 * strip.pure_shear().critical_stretch());
         Index near = 0;  // beyond the smaller patch, within the larger one
         const auto distance = [&](Index v) {
-            const auto at = strip.start + Vector3<double>(1.5, 2.2, 0) * strip.edge;
+            const auto at = strip.notch_end + Vector3<double>(1.5, 2.2, 0) * strip.edge();
             return norm<double>(point(strip.mesh.positions(), v) - at);
         };
-        for (Index v = 0; v < strip.surface.vertex_count(); ++v) near = distance(v) < distance(near) ? v : near;
-        strip.hold(near, Vector3<double>(1, 0.5, 0) * (0.3 * strip.edge));
+        for (Index v = 0; v < strip.vertices; ++v) near = distance(v) < distance(near) ? v : near;
+        strip.hold(near, Vector3<double>(1, 0.5, 0) * (0.3 * strip.edge()));
         const std::array<Index, 1> held{near};
         const auto ignored = i == 1 ? std::span<const Index>(held) : std::span<const Index>();
-        REQUIRE(strip.tear.update(strip.x, 1e-3, strip.sheet, NoFoundation(), ignored).empty());
+        REQUIRE(strip.tear.update(strip.x, 1e-3, strip.tissue, NoFoundation(), ignored).empty());
         forces[i] = norm(strip.tear.tips()[0].driving_force);
     }
     CAPTURE(forces[0], forces[1], forces[2]);
@@ -214,16 +217,20 @@ TEST_CASE("an edge that the load does not draw apart does not hold the tip", "[t
     TornStrip<double> strip({});
     strip.cut();
     strip.stretch(0.98 * strip.pure_shear().critical_stretch());
-    const double resistance = 1000 * strip.thickness;
+    const double resistance = 1000 * test::torn_material.thickness;
     double largest = 0;
+    bool is_held = false;
     for (int tick = 0; tick < 400 && strip.torn_edges() < 3; ++tick) {
         strip.tick(strip.at_rest() ? 1e-3 : 0.0);
         REQUIRE(strip.report.status == StepStatus::advanced);
         const auto opening = strip.tear.ligaments().ligaments;
-        if (strip.held.empty() && !opening.empty()) strip.held = {opening[0].vertex, opening[0].copy};
+        if (!is_held && !opening.empty()) {
+            strip.hands[0].insert(strip.hands[0].end(), {opening[0].vertex, opening[0].copy});
+            is_held = true;
+        }
         largest = std::max(largest, norm(strip.tear.tips()[0].driving_force) / resistance);
     }
-    CHECK(!strip.held.empty());
+    CHECK(is_held);
     CHECK(strip.torn_edges() >= 3);
     CHECK(largest > 1.9);  // it has taken next to nothing: an advance has to pay for two edges
     CHECK(largest < 2.1);
@@ -350,13 +357,13 @@ TEMPLATE_TEST_CASE("the next report lists what a tear has placed, also where not
 
 TEST_CASE("a snapshot holds the tear: ticks go on with the same bits, and before the tear it is whole", "[tear]") {
     TornStrip<double> strip({.columns = 24, .rows = 12, .notch = 8});
-    const InitialState whole(strip.sheet, strip.tear, strip.solver, strip.x);
-    std::vector<std::byte> torn(snapshot_capacity(strip.sheet, strip.tear, strip.solver, strip.x));
+    const InitialState whole(strip.tissue, strip.tear, strip.solver, strip.x);
+    std::vector<std::byte> torn(snapshot_capacity(strip.tissue, strip.tear, strip.solver, strip.x));
     const auto save = [&](std::vector<std::byte>& to) {
-        return save_snapshot(to, strip.sheet, strip.tear, strip.solver, strip.x);
+        return save_snapshot(to, strip.tissue, strip.tear, strip.solver, strip.x);
     };
     const auto restore = [&](std::span<const std::byte> from) {
-        return restore_snapshot(from, strip.sheet, strip.tear, strip.solver, strip.x);
+        return restore_snapshot(from, strip.tissue, strip.tear, strip.solver, strip.x);
     };
     const Triangles triangles = strip.tear.surface().triangles();
     strip.cut();
@@ -371,9 +378,9 @@ TEST_CASE("a snapshot holds the tear: ticks go on with the same bits, and before
     CHECK(strip.tear.torn_length() > 0);
     REQUIRE(restore(std::span(torn).first(torn_size)));
     CHECK(run() == once);
-    CHECK_FALSE(whole.reset(strip.sheet, strip.tear, strip.x, strip.solver));
+    CHECK_FALSE(whole.reset(strip.tissue, strip.tear, strip.x, strip.solver));
     CHECK(strip.tear.torn_length() > 0);
-    REQUIRE(whole.reset(strip.sheet, strip.tear, strip.solver, strip.x));
+    REQUIRE(whole.reset(strip.tissue, strip.tear, strip.solver, strip.x));
     CHECK(strip.tear.surface().triangles() == triangles);
     CHECK(strip.tear.tips().empty());
     CHECK(strip.x == strip.mesh.positions());
@@ -494,19 +501,19 @@ TEST_CASE("the driving forces of near tips are those before any of them advances
         TornStrip<double> strip({.columns = 24, .rows = 24, .turn = 0.2, .toughness = toughness});
         const auto& rest = strip.tear.surface().rest_positions();
         Index at = 0;
-        for (Index v = 0; v < strip.surface.vertex_count(); ++v) {
+        for (Index v = 0; v < strip.vertices; ++v) {
             const auto off = [&](Index w) { return (rest.col(w) - Eigen::Vector3d(12e-3, 12e-3, 0)).norm(); };
             if (off(v) < off(at)) at = v;
         }
         for (const auto& event : strip.tear.cut_along(strip.tear.slit_at(at, {1, 0, 0}), strip.x)) {
-            follow(event, strip.sheet, strip.solver);
+            follow(event, strip.tissue, strip.solver);
         }
         for (int n = 0; n < 400; ++n) {
             strip.x.row(1) = 1.4 * rest.row(1);
             strip.solver.wake_all();
-            static_cast<void>(strip.solver.step(strip.x, 1e-3, strip.sheet, NoFoundation()));
+            static_cast<void>(strip.solver.step(strip.x, 1e-3, strip.tissue, NoFoundation()));
         }
-        const auto events = strip.tear.update(strip.x, 1e-3, strip.sheet, NoFoundation());
+        const auto events = strip.tear.update(strip.x, 1e-3, strip.tissue, NoFoundation());
         for (const auto& event : events) splits += event.split.vertex != no_index ? 1U : 0U;
         REQUIRE(strip.tear.tips().size() == 2);
         return std::array{strip.tear.tips()[0].driving_force, strip.tear.tips()[1].driving_force};
@@ -529,11 +536,11 @@ TEST_CASE("a ligament begins with the force that the membrane transmitted throug
         const Points<double> x = strip.x;
         Vector3<double> force = Vector3<double>::Zero();
         bool has_moved = false;
-        for (const auto& event : strip.tear.update(strip.x, 1e-3, strip.sheet, NoFoundation())) {
+        for (const auto& event : strip.tear.update(strip.x, 1e-3, strip.tissue, NoFoundation())) {
             has_moved |= event.moved.vertex != no_index;
             for (const Index f : event.split.triangles) {
                 const auto& corners = event.split.corners_of(f);
-                const auto response = strip.sheet.triangle_response(f, corners, x);
+                const auto response = strip.tissue.triangle_response(f, corners, x);
                 const auto at = std::find(corners.begin(), corners.end(), event.split.vertex) - corners.begin();
                 force += response.force[static_cast<std::size_t>(at)];
             }
