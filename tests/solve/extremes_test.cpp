@@ -251,6 +251,37 @@ TEMPLATE_TEST_CASE("a tool that is at the end of the range for a tick presses ag
     }
 }
 
+// A tool that oscillates with growing amplitude takes what it holds along. A step from which the next one could not go
+// on is refused, so that the membrane comes back however far it was drawn.
+TEMPLATE_TEST_CASE("a membrane that is drawn off farther and farther comes back when it is released", "[extremes][bad]",
+                   double, float) {
+    using S = TestType;
+    const auto mesh = unit_sphere<S>(2);
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = S(40)});
+    const VirtualVolumeSprings<S> foundation(mesh, {.stiffness = S(8), .damping = S(0.005)});
+    for (const Index layers : {Index(3), unlimited}) {
+        for (const S growth : {S(-1.5), S(1e4)}) {
+            CAPTURE(layers, growth);
+            QuasiStaticSolver<S> solver(network, {.layers = layers, .sweeps = 1});
+            Points<S> x = mesh.positions();
+            const Vector3<S> from = point(x, 0);
+            int refused = 0;
+            for (S distance = S(0.1); is_finite(distance); distance *= growth) {
+                const Vector3<S> to = from + distance * Vector3<S>(S(0.8), S(0.6), 0);
+                if (solver.step(x, S(1e-3), network, foundation, pull(0, to)).status == StepStatus::advanced) continue;
+                ++refused;
+                REQUIRE(solver.step(x, S(1e-3), network, foundation).status == StepStatus::advanced);
+            }
+            CHECK(refused > 0);
+            for (int tick = 0; tick < 20'000; ++tick) {
+                solver.wake_all();
+                REQUIRE(solver.step(x, S(1e-3), network, foundation).status == StepStatus::advanced);
+            }
+            CHECK((x - mesh.positions()).cwiseAbs().maxCoeff() < S(1e-3));
+        }
+    }
+}
+
 TEMPLATE_TEST_CASE("a tool exactly on a vertex, an edge, a face or an anchor divides nothing by zero", "[extremes]",
                    double, float) {
     using S = TestType;

@@ -90,6 +90,7 @@ struct HapticLoop {
         Paper({.stiffness = 100, .damping = 0.5}, {.coefficient = 0.2, .stiffness = 100}), {.duration = 0.05}};
     membrane::ReactionForce react{.scale = 5};
     membrane::ExtrapolatedReaction<S> extrapolate{{.scale = 5}};
+    // Less than `min_damping` for what it holds: the tool runs away, and all else has to bear that.
     membrane::VirtualCoupling<S> coupling{{.stiffness = 200, .damping = 0.2, .scale = 5}};
     membrane::SpringDamperForce spring{.stiffness = 100, .damping = 0.5};
     membrane::ForceLimiter limit{membrane::devices::touch};

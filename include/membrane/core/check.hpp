@@ -70,6 +70,10 @@ template <class... Parts>
 
 namespace detail {
 
+/// Squares of larger numbers overflow: half of the exponent range, less a few bits.
+template <Real Scalar>
+inline constexpr Scalar too_large = Scalar(sizeof(Scalar) == 4 ? 1e18 : 1e153);
+
 inline std::atomic<InvalidInputHandler> invalid_input_handler{nullptr};
 inline std::atomic<AssertHandler> assert_handler{nullptr};
 

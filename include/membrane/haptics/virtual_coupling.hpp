@@ -29,7 +29,8 @@ struct CouplingOptions {
 };
 
 /// The `damping` needed for a tissue whose stiffness, after the scale, is `tissue` [N/m]: 0 if the coupling is stiffer.
-/// The hand feels it as drag in free air, too.
+/// With less the tool oscillates about the hand, farther in each tick, as soon as it touches or holds that tissue. A
+/// vertex in forceps is as stiff as its springs together. The hand feels the damping as drag in free air, too.
 [[nodiscard]] inline double min_damping(double tissue, double coupling, double tick) noexcept {
     return (std::max)(tissue - coupling, 0.0) * tick / 2;
 }

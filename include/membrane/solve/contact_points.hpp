@@ -100,10 +100,6 @@ template <Number N>
     return stiffness;
 }
 
-/// Squares of larger numbers overflow: half of the exponent range, less a few bits.
-template <Real Scalar>
-inline constexpr Scalar too_far = Scalar(sizeof(Scalar) == 4 ? 1e18 : 1e153);
-
 /// The normal with the sign that keeps the tool on its last side.
 template <Real Scalar>
 [[nodiscard]] MEMBRANE_INLINE Vector3<Lanes<Scalar>> on_same_side(const Vector3<Lanes<Scalar>>& normal,
@@ -119,7 +115,7 @@ MEMBRANE_INLINE void set_normal(const typename Lanes<Scalar>::Mask& found, const
                                 const Vector3<Lanes<Scalar>>& separation, ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
     const Wide length = norm(along);
-    const auto exists = found & (length < too_far<Scalar>)&(squared_norm(separation) < too_far<Scalar>);
+    const auto exists = found & (length < too_large<Scalar>)&(squared_norm(separation) < too_large<Scalar>);
     pack.used = select<Wide>(exists, 1, 0);
     pack.load.force = select<Wide>(exists, pack.load.force, 0);
     const auto has_length = exists & (length > 0);
@@ -154,7 +150,7 @@ MEMBRANE_INLINE bool locate_in_faces(const Triangle<Lanes<Scalar>>& triangle, co
     const Wide whole = squared_norm(area), listed = pack.listed;
     const Wide weight_b = dot(area, cross(aq, ac)), weight_c = dot(area, cross(ab, aq));
     const auto has_area = (whole > Limits::epsilon() * (squared_norm(ab) * squared_norm(ac))) &
-                          (whole > 16 * (Limits::min)()) & (larger<Wide>(whole, squared_norm(aq)) < too_far<Scalar>);
+                          (whole > 16 * (Limits::min)()) & (larger<Wide>(whole, squared_norm(aq)) < too_large<Scalar>);
     const Wide least = smaller<Wide>(smaller(weight_b, weight_c), whole - weight_b - weight_c);
     const auto in_face = has_area & (least > 0);
     if (any((listed > 0) & !in_face)) return false;

@@ -151,10 +151,6 @@ class QuasiStaticSolver {
     void extrapolate(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
     void select(const Network& network, const ConstraintContext<Scalar>& context) noexcept;
-    // Of the residual forces and the reactions, which are read here.
-    [[nodiscard]] bool has_finite_forces(const ConstraintList<Scalar>& acting) noexcept {
-        return is_finite(report_.residual) && acting.react(reactions_);
-    }
     template <class Network>
     void write_back(PointsRef<Scalar>& x, const Network& network, bool constraints_changed) noexcept;
     [[nodiscard]] bool has_moved(Index v) const noexcept {
@@ -262,10 +258,10 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     sweeps.run();
     if (report_.status == StepStatus::advanced && !sweeps.evaluate_residuals()) {
         state_.reset_points();  // a force of the last step may have diverged
-        state_.restore(start);  // not finite at the start positions either: the input is invalid
+        state_.restore(start);  // not bounded at the start positions either: the input is invalid
         report_.status = sweeps.evaluate_residuals() ? StepStatus::unstable : StepStatus::invalid_input;
     }
-    if (report_.status == StepStatus::advanced && !has_finite_forces(acting)) report_.status = StepStatus::unstable;
+    if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
     if (report_.status != StepStatus::advanced) return refuse_step(report_.status);
     acting.end();
     resume_ = sweeps.resume;

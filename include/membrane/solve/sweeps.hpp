@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include <membrane/core/check.hpp>
 #include <membrane/core/executor.hpp>
 #include <membrane/solve/active_vertices.hpp>
 #include <membrane/solve/constraints.hpp>
@@ -24,7 +25,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 ///
 ///     sweeps.load_and_pack();
 ///     sweeps.run();
-///     const bool finite = sweeps.evaluate_residuals();
+///     const bool bounded = sweeps.evaluate_residuals();
 template <class Scalar, class Rule, class Network, class Volume>
 struct Sweeps {
     ///@{
@@ -78,14 +79,15 @@ struct Sweeps {
         }
     }
 
-    /// Evaluates the residual forces on all active vertices; returns false if one is not finite.
+    /// Evaluates the residual forces on all active vertices; returns false if one, also on a fixed vertex that the next
+    /// step may free, is too large for an update.
     [[nodiscard]] bool evaluate_residuals() noexcept {
-        bool finite = true;
+        bool bounded = true;
         const auto count = [&](Index v) {
-            const Vector3<Scalar> force = scene.state.residual_force(v);
+            const Scalar force = norm(scene.state.residual_force(v));
             ++report.vertex_updates;
-            if (!scene.state.is_fixed(v)) report.residual = (std::max)(report.residual, norm(force));
-            finite &= is_finite(force);
+            if (!scene.state.is_fixed(v)) report.residual = (std::max)(report.residual, force);
+            bounded &= is_finite(force) && force < detail::too_large<Scalar>;
         };
         const auto evaluate = [&](Index v) {
             const Vector3<Scalar> force = total_force(scene, v).force;
@@ -107,7 +109,7 @@ struct Sweeps {
             }
         }
         for (const Index v : prescribed.items()) evaluate(v);
-        return finite;
+        return bounded;
     }
 
   private:
