@@ -13,7 +13,7 @@
 ///     CHECK(found.angle < 3 * degree);
 namespace test {
 
-struct Centre {
+struct CentreCut {
     int rows = 30;         ///< edges along each side
     double turn = 0;       ///< of the grid, and of the cut along it [rad]
     double stretch = 1.3;  ///< in both directions
@@ -53,7 +53,7 @@ struct CentreRun {
 
 /// Each end tears on by about this number of edges, at nine tenths of the energy that it releases at first.
 template <membrane::Real Scalar>
-[[nodiscard]] CentreRun tear_from_centre(const Centre& scene, double edges) {
+[[nodiscard]] CentreRun tear_from_centre(const CentreCut& scene, double edges) {
     using Vector = membrane::Vector3<double>;
     const Vector along = scene.direction(), aside(-along[1], along[0], 0);
     auto held = scene.cut<Scalar>(1e9);

@@ -101,7 +101,7 @@ class TornSheet {
           solver(tissue, {.layers = membrane::unlimited, .sweeps = options.sweeps, .predict = false}),
           x(mesh.positions()) {}
 
-    /// Cuts from the vertex nearest to `from` as nearly as possible along a line; so do `parts`.
+    /// Cuts from the vertex nearest to `from` as nearly as possible along a line; `parts` follow.
     template <class... Parts>
     void cut(const Vector& from, const Vector& direction, int edges, Parts&... parts) {
         const auto& rest = tear.surface().rest_positions();

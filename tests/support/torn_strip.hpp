@@ -55,7 +55,7 @@ class TornStrip : public TornSheet<Scalar, Criterion> {
     /// The vertices of the upper clamp.
     [[nodiscard]] const std::vector<Index>& top() const { return this->hands[1]; }
 
-    /// Cuts the notch from the middle of the left side; so do `parts`.
+    /// Cuts the notch from the middle of the left side; `parts` follow.
     template <class... Parts>
     void cut(Parts&... parts) {
         Sheet::cut({0, static_cast<Scalar>(height() / 2), 0}, {1, 0, 0}, options_.notch, parts...);
