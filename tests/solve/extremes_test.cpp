@@ -273,11 +273,14 @@ TEMPLATE_TEST_CASE("a membrane that is drawn off farther and farther comes back 
                 REQUIRE(solver.step(x, S(1e-3), network, foundation).status == StepStatus::advanced);
             }
             CHECK(refused > 0);
-            for (int tick = 0; tick < 20'000; ++tick) {
+            const auto is_back = [&] { return (x - mesh.positions()).cwiseAbs().maxCoeff() < S(1e-3); };
+            int stopped = 0;
+            for (int tick = 0; tick < 20'000 && !is_back(); ++tick) {
                 solver.wake_all();
-                REQUIRE(solver.step(x, S(1e-3), network, foundation).status == StepStatus::advanced);
+                stopped += solver.step(x, S(1e-3), network, foundation).status != StepStatus::advanced;
             }
-            CHECK((x - mesh.positions()).cwiseAbs().maxCoeff() < S(1e-3));
+            CHECK(stopped == 0);
+            CHECK(is_back());
         }
     }
 }
