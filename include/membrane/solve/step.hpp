@@ -42,10 +42,10 @@ struct SolverOptions {
 
 /// Whether a step advanced, or why it was refused.
 enum class StepStatus {
-    advanced,                 ///< the positions are the new ones
-    bad_time_step,            ///< dt is not finite, positive and a normal number: nothing has moved
-    invalid_input,            ///< a tool, target, load, anchor, index or position is not valid: nothing has moved
-    unstable,                 ///< the rule may diverge for this dt, or a force is unbounded: nothing has moved
+    advanced,       ///< the positions are the new ones
+    bad_time_step,  ///< dt is not finite, positive and a normal number: nothing has moved
+    invalid_input,  ///< a tool, target, load, anchor, index or position is not valid, or too far off: nothing has moved
+    unstable,       ///< the rule may diverge for this dt, or a force is unbounded: nothing has moved
     too_many_contact_points,  ///< more contact points than the capacity: nothing has moved
 };
 
