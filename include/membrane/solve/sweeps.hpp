@@ -79,9 +79,9 @@ struct Sweeps {
         }
     }
 
-    /// Evaluates the residual forces on all active vertices. Returns whether the next step can go on from there, also
-    /// without constraints: whether squares of positions, forces, and forces without those of constraints fit. As forces
-    /// may grow once constraints are gone, a step with constraints has a margin.
+    /// Evaluates the residual forces on all active vertices. Returns whether the next step can go on from there: whether
+    /// squares of positions and forces do not overflow, nor those of the forces without constraints, which may be gone
+    /// then. As forces may increase once they are gone, a step with constraints has a margin.
     [[nodiscard]] bool evaluate_residuals() noexcept {
         const bool constrained = !scene.state.forced.items().empty() || !scene.state.prescribed.items().empty();
         const Scalar largest = detail::too_large<Scalar> / (constrained ? 100 : 1);
