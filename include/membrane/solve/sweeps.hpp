@@ -79,7 +79,7 @@ struct Sweeps {
         }
     }
 
-    /// Evaluates the residual forces on all active vertices. Returns whether the next step can go on from there: whether
+    /// Evaluates the residual forces on all active vertices. Returns whether the next step can go on from there: the
     /// squares of positions and forces do not overflow, nor those of the forces without constraints, which may be gone
     /// then. As forces may increase once they are gone, a step with constraints has a margin.
     [[nodiscard]] bool evaluate_residuals() noexcept {
