@@ -683,7 +683,7 @@ struct Runaway {
     template <Real S>
     [[nodiscard]] SpringResponse<S> operator()(const SpringState<S>& spring) const noexcept {
         const S stretch = spring.length / spring.rest_length - 1;
-        const S force = spring.stiffness * std::exp(450 * std::abs(stretch)) * stretch;
+        const S force = spring.stiffness * std::exp(400 * std::abs(stretch)) * stretch;
         return {force, spring.stiffness, S(0)};
     }
 };

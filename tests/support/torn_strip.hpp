@@ -92,14 +92,15 @@ class TornStrip : public TornSheet<Scalar, Criterion> {
     [[nodiscard]] double off_line() const { return std::abs(advance()[1]); }
 
   private:
-    TornStrip(const TornStripOptions& options, const Criterion& criterion, const membrane::TriangleMesh<Scalar>& mesh)
-        : Sheet(membrane::with_reserve(mesh, 2 * options.columns), sheet_options(options, mesh), criterion),
+    TornStrip(const TornStripOptions& options, const Criterion& criterion, const membrane::TriangleMesh<Scalar>& whole)
+        : Sheet(membrane::with_reserve(whole, 2 * options.columns), sheet_options(options, whole), criterion),
           options_(options),
-          vertices(mesh.vertex_count()) {}
-    static TornSheetOptions sheet_options(const TornStripOptions& options, const membrane::TriangleMesh<Scalar>& mesh) {
+          vertices(whole.vertex_count()) {}
+    static TornSheetOptions sheet_options(const TornStripOptions& options,
+                                          const membrane::TriangleMesh<Scalar>& whole) {
         const double middle = options.height() / 2, half = middle - options.edge / 2;
-        const auto bottom = vertices_where(mesh, [&](const auto& at) { return at[1] - middle < -half; });
-        const auto top = vertices_where(mesh, [&](const auto& at) { return at[1] - middle > half; });
+        const auto bottom = vertices_where(whole, [&](const auto& at) { return at[1] - middle < -half; });
+        const auto top = vertices_where(whole, [&](const auto& at) { return at[1] - middle > half; });
         auto both = bottom;
         both.insert(both.end(), top.begin(), top.end());
         const double tolerance = std::is_same_v<Scalar, double> ? options.tolerance : 10 * options.tolerance;
