@@ -17,8 +17,7 @@
 ///     const auto x = test::jittered(mesh.positions(), 1e-4, random);
 namespace test {
 
-/// What MEMBRANE_SEED adds to every seed, so that a campaign is continued with cases that it has not tried; 0 if that is
-/// not set.
+/// What MEMBRANE_SEED adds to every seed, so that a campaign is continued with other cases; 0 if that is not set.
 inline std::uint64_t seed_offset() {
     const char* const number = std::getenv("MEMBRANE_SEED");
     return number == nullptr ? 0 : std::strtoull(number, nullptr, 10) << 40;  // beyond the tests' own seeds
