@@ -4,8 +4,8 @@
 ///@{
 /// The version of these headers. The build files read it from here.
 #define MEMBRANE_VERSION_MAJOR 0
-#define MEMBRANE_VERSION_MINOR 12
-#define MEMBRANE_VERSION_PATCH 1
+#define MEMBRANE_VERSION_MINOR 13
+#define MEMBRANE_VERSION_PATCH 0
 ///@}
 
 /// The same as one number, 600 for 0.6.0: `#if MEMBRANE_VERSION >= 700`. Of the numbers for minor and patch, each is

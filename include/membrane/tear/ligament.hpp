@@ -11,11 +11,10 @@
 /// The force across an edge that is opening.
 namespace membrane {
 
-/// What still joins the two vertices into which a tear has parted one: a force against their separation that is
-/// `strength` up to the separation `plateau` and decreases linearly to zero at `failure_opening`; the area below is
-/// what the edge takes to open: a cohesive law that is rigid at first [Camacho96]. A tear so advances without a jump,
-/// and takes that energy however coarse mesh and ticks are. If the separation decreases, the force decreases in
-/// proportion.
+/// What still joins the two vertices into which a tear has parted one: a force against their separation, at first as
+/// large as the membrane's force through the vertex, so that nothing jumps [Camacho96]. It is released as the edge
+/// opens [Malluck80]: in each tick so far that the tip's driving force stays near the resistance, but no sooner than
+/// the edge has taken its energy. If the separation decreases, the force decreases in proportion.
 template <Real Scalar>
 struct Ligament {
     ///@{
@@ -23,50 +22,61 @@ struct Ligament {
     Index vertex = no_index, copy = no_index;
     ///@}
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< on `vertex` when it begins; the opposite acts on `copy` [N]
-    Scalar strength = 0;                              ///< when it begins [N]
-    Scalar plateau = 0;                               ///< separation up to which it keeps its strength [m]
-    Scalar failure_opening = 0;                       ///< separation at which it fails [m]
-    Scalar reached = 0;                               ///< largest separation in earlier ticks [m]
+    Scalar energy = 0;                                ///< that the edge takes until it is open, nearly [J]
+    Scalar strength = 0;                              ///< its largest force when it begins [N]
+    Scalar tension = strength;                        ///< its largest force by now [N]
+    Scalar least = 0;                                 ///< what that may decrease to in this tick [N]
+    Scalar slope = 0;                                 ///< by which it decreases as the edge opens [N/m]
+    Scalar opening = 0;                               ///< separation after the last tick [m]
+    Scalar reached = 0;                               ///< largest separation so far [m]
+    Scalar increment = 0;                             ///< by which a tick increases that, as in the last ones [m]
+    Scalar dissipated = 0;                            ///< energy that it has taken and would not give back [J]
 
     /// Whether it holds hardly more, a tenth of its strength: the tip goes on.
-    [[nodiscard]] bool failed() const noexcept { return !(first_tension(reached) > strength / 10); }
+    [[nodiscard]] bool failed() const noexcept { return !(tension > strength / 10); }
 
     /// The force at a separation [N].
-    [[nodiscard]] Scalar tension(Scalar opening) const noexcept {
-        return opening < reached ? first_tension(reached) * (opening / reached) : first_tension(opening);
+    [[nodiscard]] Scalar force_at(Scalar separation) const noexcept {
+        if (separation < reached) return tension * (separation / reached);
+        return (std::max)(least, tension - slope * (separation - reached));
     }
 
-    /// The largest force at any separation from now on [N].
-    [[nodiscard]] Scalar largest_tension() const noexcept { return first_tension(reached); }
+    /// Energy that it would give back at a separation [J].
+    [[nodiscard]] Scalar stored(Scalar separation) const noexcept { return force_at(separation) * separation / 2; }
 
-    /// That it takes until it fails [J].
-    [[nodiscard]] Scalar energy() const noexcept { return work(failure_opening); }
-
-    /// The part of it that opening has taken so far, 0 to 1.
-    [[nodiscard]] Scalar part_taken() const noexcept { return work(reached) / energy(); }
-
-    /// Energy that it would give back [J].
-    [[nodiscard]] Scalar stored(Scalar opening) const noexcept { return tension(opening) * opening / 2; }
-
-    /// That it would not give back of the work of opening it so far [J].
-    [[nodiscard]] Scalar dissipated() const noexcept { return work(reached) - stored(reached); }
-
-    /// After a tick, at a separation of `opening`.
-    void open(Scalar opening) noexcept {
-        if (opening > reached) reached = opening;
+    /// After a tick, at this separation.
+    void open(Scalar separation) noexcept {
+        opening = separation;
+        const Scalar further = separation - reached;
+        increment = further > 0 ? (std::max)(further, increment / 2) : 0;
+        if (!(further > 0)) return;
+        const Scalar before = stored(reached), end = force_at(separation);
+        const Scalar softens = slope > 0 ? (std::min)(further, (tension - least) / slope) : further;
+        const Scalar work = (tension + end) / 2 * softens + end * (further - softens);
+        tension = end;
+        reached = separation;
+        dissipated += work - (stored(reached) - before);
     }
 
-  private:
-    // The area below the law.
-    [[nodiscard]] Scalar work(Scalar opening) const noexcept {
-        const Scalar end = (std::min)(opening, failure_opening);
-        if (end <= plateau) return strength * end;
-        return strength * plateau + (strength + first_tension(end)) / 2 * (end - plateau);
-    }
-    // At a separation that increases.
-    [[nodiscard]] Scalar first_tension(Scalar opening) const noexcept {
-        if (opening >= failure_opening) return 0;
-        return opening <= plateau ? strength : strength * (failure_opening - opening) / (failure_opening - plateau);
+    /// Before a tick, where the tip's driving force exceeds the resistance by this part of it. A decrease of the
+    /// tension by a part of the strength decreases the driving force by about as large a part or a smaller one: twice
+    /// the excess keeps up with a hand. The tension decreases over the usual opening in a tick, or at once if there is
+    /// none. If an advance would pay for the next edge and for what this one has left to take, or for a quarter too
+    /// much, the load does not draw this one apart, and it need not take that.
+    void weaken(Scalar excess) noexcept {
+        least = tension;
+        slope = 0;
+        if (!(excess > 0)) return;
+        const Scalar taken = dissipated + stored(reached) + tension * increment, before = stored(opening);
+        const Scalar left = (std::max)(Scalar(0), 1 - taken / energy);
+        const Scalar kept = excess < (std::max)(left, Scalar(0.25)) ? left * strength : 0;
+        least = (std::min)(tension, (std::max)(kept, tension - 2 * excess * strength));
+        if (increment > 0) {
+            slope = (tension - least) / increment;
+        } else {
+            tension = least;
+            dissipated += before - stored(opening);
+        }
     }
 };
 
@@ -98,8 +108,8 @@ void LigamentForces<Scalar>::begin(ConstraintContext<Scalar>& context) const noe
     }
 }
 
-// With the response S of the separation u, and c = u / tension, the force f on the vertex solves c f = -(u + S (f -
-// f_0)).
+// With the response S of the separation u, and c that over the tension where it is largest, the force f on the vertex
+// solves c f = -(u + S (f - f_0)).
 template <Real Scalar>
 bool LigamentForces<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
     bool changed = false;
@@ -112,16 +122,17 @@ bool LigamentForces<Scalar>::enforce(ConstraintContext<Scalar>& context) const n
         const Vector3<Scalar> z = response_of<Scalar>(context, point, Vector3<Scalar>::UnitZ());
         if (!(x[0] > 0)) continue;
         const Vector3<Scalar> apart = context.position(ligament.vertex) - context.position(ligament.copy);
-        const Scalar opening = norm(apart), tension = ligament.tension(opening);
+        const Scalar opening = (std::max)(norm(apart), ligament.reached), tension = ligament.force_at(opening);
         const Scalar stiffness = 1 / x[0];  // scaled, for the range of a float
         const Symmetric3<Scalar> response = stiffness * Symmetric3<Scalar>{x[0], y[1], z[2], x[1], x[2], y[2]};
-        Symmetric3<Scalar> sum = response;
-        if (tension > 0) sum += diagonal3(stiffness * (opening / tension));
         Vector3<Scalar> force = Vector3<Scalar>::Zero();
-        if (opening < ligament.failure_opening) force = inverse(sum) * (response * point.force - stiffness * apart);
+        if (tension > 0) {
+            Symmetric3<Scalar> sum = response;
+            sum += diagonal3(stiffness * (opening / tension));
+            force = inverse(sum) * (response * point.force - stiffness * apart);
+        }
         const Scalar size = norm(force);
-        const Scalar largest = ligament.largest_tension();
-        if (size > largest) force *= largest / size;
+        if (size > ligament.tension) force *= ligament.tension / size;
         const Vector3<Scalar> more = force - point.force;
         if (!(norm(more) > context.force_tolerance())) continue;
         change_force<Scalar>(context, point, more);

@@ -23,7 +23,8 @@ struct TipState {
 };
 
 /// When a tear advances. `opens(tip)`: whether it does now; `direction(tip)`: where to, not necessarily a unit vector,
-/// 0: nowhere; `resistance()`: the energy that a length takes [J/m], which the opening edge takes up as it opens.
+/// 0: nowhere; `resistance()`: the energy that a length takes [J/m], and so the driving force [N] near which an edge
+/// opens.
 template <class Criterion, class Scalar>
 concept TearCriterion = Real<Scalar> && std::copyable<Criterion> &&
     requires(const Criterion& criterion, const TipState<Scalar>& tip) {

@@ -75,10 +75,10 @@ void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
 /// A cut starts them; each of its ends within the membrane is a tip. In each tick the configurational force at a tip
 /// [Miehe07] says what energy an advance would release, and in which direction most. If the `Criterion` says so, the
 /// next vertex in that direction moves onto it, at rest and now, and the edge to it opens: the tip's vertex becomes
-/// two, from a reserve (`with_reserve`). A `Ligament` takes up the energy of the edge as it opens. The tip goes on when
-/// that has failed. An edge that the load no longer draws apart would hold the tip: it fails as well if an advance
-/// would release what the edge has left to take and what the next one takes, or 1.25 times the latter if that is more.
-/// Triangles keep their numbers; other parts `follow` the events.
+/// two, from a reserve (`with_reserve`). A `Ligament` holds the edge together, takes energy as it opens, and becomes
+/// weaker while the driving force exceeds the criterion's resistance; the tip goes on when it has failed. A slow load
+/// so opens edge after edge at a driving force near the resistance; the more a load exceeds that, the faster a tear
+/// runs. Triangles keep their numbers; other parts `follow` the events.
 ///
 /// A flap may pass through the membrane: there is no contact of the membrane with itself. Elements that are no
 /// triangles do not count in the driving force; a foundation does, as if its stiffness per area were the same
@@ -168,12 +168,10 @@ class Tearing {
         is_outer_border_[static_cast<std::size_t>(copy)] = is_outer_border_[static_cast<std::size_t>(v)];
     }
     void open_ligaments(const ConstPointsRef<Scalar>& x) noexcept;
-    void let_go(const Ligament<Scalar>& behind) noexcept;
-    [[nodiscard]] const Ligament<Scalar>* ligament_behind(const TearTip<Scalar>& tip) const noexcept {
+    void weaken_ligaments() noexcept;
+    [[nodiscard]] bool is_opening_behind(const TearTip<Scalar>& tip) const noexcept {
         const auto all = ligaments_.items();
-        const auto joins = [&](const auto& ligament) { return ligament.copy == tip.behind[1]; };
-        const auto found = std::find_if(all.begin(), all.end(), joins);
-        return found == all.end() ? nullptr : &*found;
+        return std::any_of(all.begin(), all.end(), [&](const auto& one) { return one.copy == tip.behind[1]; });
     }
     [[nodiscard]] bool has_changed_around(Index v) const noexcept;
     [[nodiscard]] Scalar patch_radius_at(Index tip) const noexcept;
@@ -195,7 +193,7 @@ class Tearing {
     [[nodiscard]] bool advance(TearTip<Scalar>& tip, const Vector3<Scalar>& direction, PointsRef<Scalar>& x,
                                const Network& network) noexcept;
     template <class Network>
-    void add_ligament(const TearTip<Scalar>& tip, Index copy, Scalar length, const ConstPointsRef<Scalar>& x,
+    void add_ligament(Index v, Index copy, Scalar length, const ConstPointsRef<Scalar>& x,
                       const Network& network) noexcept;
 
     Criterion criterion_;
@@ -401,15 +399,27 @@ std::span<const Index> Tearing<Scalar, Criterion>::start_at(Index v, Scalar flaw
     return used_up_ ? std::span<const Index>() : path;
 }
 
-// Makes the separations permanent, and drops what has failed: all its energy is lost.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x) noexcept {
+    for (auto& ligament : ligaments_.items()) {
+        ligament.open(norm<Scalar>(point(x, ligament.vertex) - point(x, ligament.copy)));
+    }
+}
+
+// By the driving force of the tip before the edge, or slowly if that has met a border. Drops what has failed.
+template <Real Scalar, TearCriterion<Scalar> Criterion>
+void Tearing<Scalar, Criterion>::weaken_ligaments() noexcept {
+    constexpr auto without_tip = Scalar(0.1);
+    const auto resistance = static_cast<Scalar>(criterion_.resistance());
     const auto all = ligaments_.items();
+    const auto tips = tips_.items();
     std::size_t left = 0;
     for (auto& ligament : all) {
-        ligament.open(norm<Scalar>(point(x, ligament.vertex) - point(x, ligament.copy)));
+        const auto tip =
+            std::find_if(tips.begin(), tips.end(), [&](const auto& each) { return each.behind[1] == ligament.copy; });
+        ligament.weaken(tip == tips.end() ? without_tip : norm(tip->driving_force) / resistance - 1);
         if (ligament.failed()) {
-            failed_ += static_cast<double>(ligament.energy());
+            failed_ += static_cast<double>(ligament.dissipated + ligament.stored(ligament.opening));
         } else {
             all[left++] = ligament;
         }
@@ -417,20 +427,10 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
     ligaments_.truncate(left);
 }
 
-// The edge behind the tip fails before its time. The membrane gives up what it has left to take as the tip advances.
-template <Real Scalar, TearCriterion<Scalar> Criterion>
-void Tearing<Scalar, Criterion>::let_go(const Ligament<Scalar>& behind) noexcept {
-    const auto all = ligaments_.items();
-    failed_ += static_cast<double>(behind.energy());
-    const auto at = all.begin() + (&behind - all.data());
-    std::move(at + 1, all.end(), at);
-    ligaments_.truncate(all.size() - 1);
-}
-
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 double Tearing<Scalar, Criterion>::dissipated() const noexcept {
     double sum = failed_;
-    for (const auto& ligament : ligaments_.items()) sum += static_cast<double>(ligament.dissipated());
+    for (const auto& ligament : ligaments_.items()) sum += static_cast<double>(ligament.dissipated);
     return sum;
 }
 
@@ -451,19 +451,14 @@ auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Ne
     used_up_ = false;
     open_ligaments(x);
     const auto all = tips_.items();
+    for (auto& tip : all) tip.driving_force = driving_force_at(tip.vertex, x, dt, network, volume, held);
+    weaken_ligaments();
     // All before any advances: the network has not followed until the next step.
     for (std::size_t i = 0; i < all.size(); ++i) {
-        auto& tip = all[i];
+        const auto& tip = all[i];
         opens_[i] = Vector3<Scalar>::Zero();
-        tip.driving_force = driving_force_at(tip.vertex, x, dt, network, volume, held);
+        if (is_opening_behind(tip)) continue;
         TipState<Scalar> state{tip.driving_force, 0, Vector3<Scalar>::Zero(), tip.heading};
-        if (const auto* behind = ligament_behind(tip)) {
-            // An advance must also pay for what that one has left; and in quick ticks nothing is at equilibrium.
-            constexpr auto least = Scalar(1.25);
-            state.driving_force /= (std::max)(least, 2 - behind->part_taken());
-            if (criterion_.opens(state)) let_go(*behind);
-            continue;
-        }
         find_tension(state, tip.vertex, x, network);
         const Vector3<Scalar> direction = criterion_.direction(state);
         if (is_finite(direction) && criterion_.opens(state)) opens_[i] = direction;
@@ -645,7 +640,7 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     torn_length_ += static_cast<double>(length);
     const Vector3<Scalar> moved = point(x, next);
     set_point(x, next, before);  // the network does not know that it has moved
-    add_ligament(tip, copy, length, x, network);
+    add_ligament(v, copy, length, x, network);
     set_point(x, next, moved);
     if (reaches_border) {
         const Index other = surface_.split(x, next, v);
@@ -661,15 +656,11 @@ bool Tearing<Scalar, Criterion>::advance(TearTip<Scalar>& tip, const Vector3<Sca
     return true;
 }
 
-// It begins with the force that the membrane has transmitted through the vertex, and ends with the opening that the
-// edge behind has now, as in a virtual crack closure [Rybicki77]. A force that decreases linearly has half their
-// product as its energy. Where the sides part without stretch, as the legs of a torn strip, more: it first keeps its
-// strength, and if that is not enough, it is stronger.
+// It begins with the force that the membrane has transmitted through the vertex.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network>
-void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index copy, Scalar length,
-                                              const ConstPointsRef<Scalar>& x, const Network& network) noexcept {
-    const Index v = tip.vertex;
+void Tearing<Scalar, Criterion>::add_ligament(Index v, Index copy, Scalar length, const ConstPointsRef<Scalar>& x,
+                                              const Network& network) noexcept {
     const auto energy = static_cast<Scalar>(criterion_.resistance()) * length;
     if (!(energy > 0)) return;
     const auto forces_on = [&](Index end, const VertexSplit& split) {
@@ -687,20 +678,9 @@ void Tearing<Scalar, Criterion>::add_ligament(const TearTip<Scalar>& tip, Index 
     const auto share = static_cast<Scalar>(split.area_share);
     const Vector3<Scalar> force = (1 - share) * forces_on(copy, split) - share * forces_on(v, split);
     const auto strength = norm(force);
-    if (!(strength > 0) || !is_finite(force)) {
-        failed_ += static_cast<double>(energy);
-        return;
-    }
+    if (!(strength > 0) || !is_finite(force)) return;
     constexpr auto yields = Scalar(0.98);  // of the membrane's force: it opens at once
-    Ligament<Scalar> ligament{v, copy, yields * force};
-    const auto [left, right] = tip.behind;
-    const auto behind = norm<Scalar>(point(x, left) - point(x, right)) * (length / tip.advanced);
-    const Scalar opens = (std::max)(behind, length / 4);  // the edge behind may hardly be open
-    ligament.strength = (std::max)(yields * strength, energy / opens);
-    const Scalar sum = 2 * energy / ligament.strength;
-    ligament.failure_opening = (std::min)(sum, opens);
-    ligament.plateau = sum - ligament.failure_opening;
-    if (!ligaments_.try_push_back(ligament)) failed_ += static_cast<double>(energy);
+    ligaments_.try_push_back({v, copy, yields * force, energy, yields * strength});
 }
 
 }  // namespace membrane
