@@ -94,7 +94,7 @@ struct TickCost {
 };
 
 /// The bound on vertex updates of a disc that tears: some more than the whole one needs.
-inline constexpr Index update_bound = 1500;
+inline constexpr Index update_bound = 1300;
 
 /// Of a whole disc, one that is cut, one that tears, the same with bounded updates, and with steps near convergence.
 /// They tick in turns: load of the machine affects all of them.
