@@ -55,6 +55,48 @@ TEST_CASE("a ligament takes the work that opens it, however often it closes and 
     }
 }
 
+TEST_CASE("a tick weakens a ligament by twice the excess, but no sooner than it has taken energy", "[tear]") {
+    Ligament<double> ligament{0, 1, {1, 0, 0}, 3, 2};
+    ligament.open(0.9);  // it has taken 0.6 of its energy
+    ligament.open(0.9);  // it no longer opens
+    const auto weakened = [&ligament](double excess) {
+        auto other = ligament;
+        other.weaken(excess);
+        CHECK(other.slope == 0);
+        return other.tension;
+    };
+    CHECK(weakened(0.1) == Approx(2 - 2 * 0.1 * 2));
+    CHECK(weakened(0.3) == Approx(2 - 2 * 0.3 * 2));    // as it has left to take
+    CHECK(weakened(0.35) == Approx(0.4 * 2));           // not less
+    CHECK(weakened(0.42) == Approx(2 - 2 * 0.42 * 2));  // an advance pays for the next edge and for that
+    ligament.open(1.35);                                // 0.9 of its energy: a quarter is more than it has left
+    ligament.open(1.35);
+    ligament.weaken(0.2);
+    ligament.weaken(0.2);
+    CHECK(weakened(0.2) == Approx(0.1 * 2));
+    CHECK(weakened(0.26) == 0);
+}
+
+TEST_CASE("a ligament is weakened over the opening that a tick has by now", "[tear]") {
+    Ligament<double> ligament{0, 1, {1, 0, 0}, 3, 2};
+    ligament.open(0.6);
+    CHECK(ligament.increment == 0.6);
+    ligament.open(0.9);
+    CHECK(ligament.increment == Approx(0.3));
+    ligament.open(0.91);
+    CHECK(ligament.increment == Approx(0.15));  // half of the last one, if it opens by less
+    ligament.weaken(0.1);
+    CHECK(ligament.tension == 2);
+    CHECK(ligament.least == Approx(1.6));
+    CHECK(ligament.slope == Approx(0.4 / 0.15));
+    CHECK(ligament.force_at(0.91 + 0.075) == Approx(1.8));
+    CHECK(ligament.force_at(0.91 + 0.2) == Approx(1.6));
+    ligament.open(0.91 + 0.075);
+    CHECK(ligament.tension == Approx(1.8));
+    ligament.open(0.9);
+    CHECK(ligament.increment == 0);
+}
+
 TEST_CASE("a ligament fails at once if an advance pays for two edges, and never by what is no number", "[tear]") {
     const Ligament<double> whole{0, 1, {1, 0, 0}, 3, 2};
     for (const double excess : {1.0, 2.0, 1e300, std::numeric_limits<double>::infinity()}) {
