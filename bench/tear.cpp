@@ -216,7 +216,7 @@ void criteria(Page& page, const Effort& effort) {
     page.add({"the same: `LargestTension`", spread(by_tension), none, "%"});
 }
 
-// Legs that stretch more let an edge open farther before it fails: what it releases then is less.
+// Legs that stretch more take up the peaks of the force.
 void trouser_test(Page& page, const Effort& effort) {
     page.print(
         "\n### Trousers\n\n| strain of the legs | edges over the width of a leg | directions | force over the closed "

@@ -93,7 +93,7 @@ struct TickCost {
     double torn;                     ///< in all [m]
 };
 
-/// The bound on vertex updates of a disc that tears: some more than the whole one needs.
+/// The bound on vertex updates of a disc that tears: some fewer than the whole one takes.
 inline constexpr Index update_bound = 1300;
 
 /// Of a whole disc, one that is cut, one that tears, the same with bounded updates, and with steps near convergence.

@@ -67,13 +67,14 @@ struct Ligament {
         least = tension;
         slope = 0;
         if (!(excess > 0)) return;
-        const Scalar taken = dissipated + stored(reached) + tension * increment, before = stored(opening);
+        const Scalar taken = dissipated + stored(reached) + tension * increment;
         const Scalar left = (std::max)(Scalar(0), 1 - taken / energy);
         const Scalar kept = excess < (std::max)(left, Scalar(0.25)) ? left * strength : 0;
         least = (std::min)(tension, (std::max)(kept, tension - 2 * excess * strength));
         if (increment > 0) {
             slope = (tension - least) / increment;
         } else {
+            const Scalar before = stored(opening);
             tension = least;
             dissipated += before - stored(opening);
         }
@@ -108,8 +109,8 @@ void LigamentForces<Scalar>::begin(ConstraintContext<Scalar>& context) const noe
     }
 }
 
-// With the response S of the separation u, and c that over the tension where it is largest, the force f on the vertex
-// solves c f = -(u + S (f - f_0)).
+// With the response S of the separation u, and c the largest separation so far over the tension there, the force f on
+// the vertex solves c f = -(u + S (f - f_0)).
 template <Real Scalar>
 bool LigamentForces<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
     bool changed = false;
