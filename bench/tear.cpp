@@ -301,24 +301,29 @@ void peel(Page& page, const Effort&) {
     page.add({"peel: energy that nothing has taken, of that given", lost, 1, "%"});
 }
 
+// Under a hand that moves on, vertices behind it relax for some time, whether it tears or not.
 void speed(Page& page, const Effort& effort) {
     const auto costs = cost_of_ticks(effort.ticks);
     page.print(
         "\n### Cost of a tick, 10,267 vertices\n\n| | time of a tick, over that of the whole membrane | one tick of 20 "
         "is slower than | vertex updates | torn [edges] |\n|---|---|---|---|---|\n");
     const std::string bounded = std::to_string(update_bound) + " vertex updates at most";
-    const std::string names[]{"whole", "cut, not torn", "a tear runs", "the same, " + bounded,
-                              "the same, all layers, 8 sweeps"};
+    const std::string names[]{
+        "whole, the hand stays", "whole",         "one tip, not torn",    "one tip, runs",
+        "two tips, not torn",    "two tips, run", "the same, " + bounded, "the same, all layers, 8 sweeps"};
+    const auto over = [&](std::size_t i, std::size_t other) { return costs[i].seconds / costs[other].seconds; };
     for (std::size_t i = 0; i < costs.size(); ++i) {
-        page.print("| %s | %.2f, %.0f us | %.0f us | %.0f | %.1f |\n", names[i].c_str(),
-                   costs[i].seconds / costs[0].seconds, 1e6 * costs[i].seconds, 1e6 * costs[i].slow,
-                   costs[i].vertex_updates, costs[i].torn / DrawnDisc::edge);
+        page.print("| %s | %.2f, %.0f us | %.0f us | %.0f | %.1f |\n", names[i].c_str(), over(i, 1),
+                   1e6 * costs[i].seconds, 1e6 * costs[i].slow, costs[i].vertex_updates,
+                   costs[i].torn / DrawnDisc::edge);
     }
-    page.add({"a tick while a tear runs, over the same without", costs[2].seconds / costs[0].seconds, 1.5, ""});
-    page.add({"the same with " + bounded, costs[3].seconds / costs[0].seconds, 1.5, ""});
-    const auto beside = [&](std::size_t i) { return percent(costs[i].torn / costs[4].torn); };
-    page.add({"length of that tear, from the one with all layers and 8 sweeps", beside(2), none, "%"});
-    page.add({"the same with " + bounded, beside(3), none, "%"});
+    page.add({"a tick while a tear with one tip runs, over one of the whole membrane", over(3, 1), 1.5, ""});
+    page.add({"the same with two tips", over(5, 1), 1.5, ""});
+    page.add({"the same with " + bounded, over(6, 1), 1.5, ""});
+    page.add({"a tick while a tear with two tips runs, over one under a hand that stays", over(5, 0), none, ""});
+    const auto beside = [&](std::size_t i) { return percent(costs[i].torn / costs[7].torn); };
+    page.add({"length of that tear, from the one with all layers and 8 sweeps", beside(5), none, "%"});
+    page.add({"the same with " + bounded, beside(6), none, "%"});
 }
 
 struct Part {

@@ -2,9 +2,11 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <vector>
 
 #include <membrane/contact/aabb_tree.hpp>
@@ -19,8 +21,17 @@
 /// What a tear costs in a tick.
 namespace bench::tears {
 
+enum class Cut { none, from_rim, inside };  ///< with no, one and two tips
+
+struct DrawnDiscOptions {
+    Cut cut = Cut::none;
+    double toughness = 1e9;  ///< that of one that does not tear [J/m^2]
+    int further = 3;         ///< where the hand takes hold anew if there is no tip [edges]
+    membrane::SolverOptions<double> solver = {.layers = 12};
+};
+
 /// A stretched disc of springs with a clamped rim. A hand draws the lip of a cut, just behind its tip, up and aside,
-/// for three edges; then takes hold anew. Without a cut it draws a vertex at the same place.
+/// for three edges; then takes hold anew. Without a cut it draws a vertex, and takes hold anew further on.
 class DrawnDisc {
   public:
     static constexpr int rings = 58;                                ///< 10,267 vertices
@@ -31,26 +42,30 @@ class DrawnDisc {
         double torn;  ///< since the last one [m]
     };
 
-    /// Not cut at all, or cut, with a toughness of `energy` [J/m^2].
-    DrawnDisc(bool is_cut, double energy, const membrane::SolverOptions<double>& options = {.layers = 12})
-        : mesh_(membrane::with_reserve(membrane::disc<double>({.radius = radius, .rings = rings}), 400)),
+    explicit DrawnDisc(const DrawnDiscOptions& options)
+        : further_(options.further),
+          mesh_(membrane::with_reserve(membrane::disc<double>({.radius = radius, .rings = rings}), 400)),
           springs_(membrane::TearableSprings(
               mesh_, membrane::MassSpringNetwork(mesh_, membrane::LinearSpring{},
                                                  {.stiffness = 20.0, .pinned = membrane::border(mesh_)}))),
           foundation_(mesh_, {.stiffness = 1e-3}),
-          solver_(springs_, options),
-          tear_(mesh_, membrane::EnergyRelease{energy, 1e-5}),
+          solver_(springs_, options.solver),
+          tear_(mesh_, membrane::EnergyRelease{options.toughness, 1e-5}),
           tree_(mesh_),
           x_(1.02 * mesh_.positions()) {
-        std::vector<Index> path{0};
-        while (path.size() < 15) path.push_back(tear_.surface().nearest_in_direction(path.back(), {1, 0, 0}));
-        held_ = path[13];
-        if (is_cut) follow(tear_.cut_along(path, x_));
+        const bool from_rim = options.cut == Cut::from_rim;
+        std::vector<Index> path{from_rim ? left_end() : 0};
+        while (path.size() < (from_rim ? 30 : 15)) {
+            path.push_back(tear_.surface().nearest_in_direction(path.back(), {1, 0, 0}));
+        }
+        held_ = path[path.size() - 2];
+        if (options.cut != Cut::none) follow(tear_.cut_along(path, x_));
     }
 
     [[nodiscard]] Tick tick() {
         constexpr int ticks_an_edge = 60;
-        if (ticks_++ % (3 * ticks_an_edge) == 0) hold();
+        if (ticks_ % (3 * ticks_an_edge) == 0) hold();
+        ++ticks_;
         target_ += edge / ticks_an_edge * Vector(0, std::sqrt(0.5), std::sqrt(0.5));
         const double torn = tear_.torn_length();
         const auto start = std::chrono::steady_clock::now();
@@ -62,6 +77,11 @@ class DrawnDisc {
     }
 
   private:
+    [[nodiscard]] Index left_end() const {
+        Eigen::Index v = 0;
+        mesh_.positions().row(0).minCoeff(&v);
+        return static_cast<Index>(v);
+    }
     // The left side behind the tip at the right.
     void hold() {
         const auto& rest = tear_.surface().rest_positions();
@@ -69,12 +89,16 @@ class DrawnDisc {
         for (const auto& tip : tear_.tips()) {
             if (rest(0, tip.vertex) > ahead) ahead = rest(0, tip.vertex), held_ = tip.behind[1];
         }
+        for (int i = 0; tear_.tips().empty() && ticks_ > 0 && i < further_; ++i) {
+            held_ = tear_.surface().nearest_in_direction(held_, {1, 0, 0});
+        }
         target_ = membrane::point(x_, held_);
     }
     void follow(std::span<const membrane::TearEvent<double>> events) {
         for (const auto& event : events) membrane::follow(event, springs_, foundation_, solver_, tree_);
     }
 
+    int further_;
     membrane::TriangleMesh<double> mesh_;
     membrane::Tissue<membrane::TearableSprings<double, membrane::LinearSpring>> springs_;
     membrane::VirtualVolumeSprings<double> foundation_;
@@ -96,14 +120,21 @@ struct TickCost {
 /// The bound on vertex updates of a disc that tears: some fewer than the whole one takes.
 inline constexpr Index update_bound = 1300;
 
-/// Of a whole disc, one that is cut, one that tears, the same with bounded updates, and with steps near convergence.
-/// They tick in turns: load of the machine affects all of them.
-[[nodiscard]] inline std::vector<TickCost> cost_of_ticks(int ticks) {
-    std::vector<DrawnDisc> discs{{false, 1.0},
-                                 {true, 1e9},
-                                 {true, 30.0},
-                                 {true, 30.0, {.layers = 12, .max_vertex_updates = update_bound}},
-                                 {true, 30.0, {.layers = membrane::unlimited, .sweeps = 8}}};
+/// Of a whole disc, under a hand that stays where it is, and that moves on; one with one tip that is too tough to tear,
+/// and that tears; the same with two tips; that with bounded updates, and with steps near convergence. They tick in
+/// turns: load of the machine affects all of them.
+[[nodiscard]] inline std::array<TickCost, 8> cost_of_ticks(int ticks) {
+    constexpr double weak = 30;  // [J/m^2]
+    const DrawnDiscOptions scenes[]{
+        {.further = 0},
+        {},
+        {.cut = Cut::from_rim},
+        {.cut = Cut::from_rim, .toughness = weak},
+        {.cut = Cut::inside},
+        {.cut = Cut::inside, .toughness = weak},
+        {.cut = Cut::inside, .toughness = weak, .solver = {.layers = 12, .max_vertex_updates = update_bound}},
+        {.cut = Cut::inside, .toughness = weak, .solver = {.layers = membrane::unlimited, .sweeps = 8}}};
+    std::vector<DrawnDisc> discs(std::begin(scenes), std::end(scenes));
     std::vector<std::vector<DrawnDisc::Tick>> measured(discs.size());
     constexpr int in_turn = 20;
     for (int done = 0; done < ticks; done += in_turn) {
@@ -111,8 +142,9 @@ inline constexpr Index update_bound = 1300;
             for (int n = 0; n < in_turn; ++n) measured[i].push_back(discs[i].tick());
         }
     }
-    std::vector<TickCost> result;
-    for (const auto& all : measured) {
+    std::array<TickCost, 8> result;
+    for (std::size_t i = 0; i < result.size(); ++i) {
+        const auto& all = measured[i];
         const auto quantile = [&](double DrawnDisc::Tick::*value, double part) {
             std::vector<double> values;
             for (const auto& tick : all) values.push_back(tick.*value);
@@ -124,7 +156,7 @@ inline constexpr Index update_bound = 1300;
         TickCost cost{quantile(&Tick::seconds, 0.5), quantile(&Tick::vertex_updates, 0.5),
                       quantile(&Tick::seconds, 0.95), 0};
         for (const auto& tick : all) cost.torn += tick.torn;
-        result.push_back(cost);
+        result[i] = cost;
     }
     return result;
 }

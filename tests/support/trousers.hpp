@@ -143,7 +143,7 @@ class TrouserTest {
                 mesh, [&](const auto& at) { return at[0] > static_cast<Scalar>((columns - 0.5) * edge); }),
             .tolerance = 1e-4 * scene.resistance(),
             .sweeps = 10,
-            .steps = 10};
+            .steps = 20};
         return {membrane::with_reserve(mesh, 2 * columns), options,
                 membrane::EnergyRelease{scene.toughness(), torn_material.thickness}};
     }
