@@ -11,6 +11,7 @@ set ytics nomirror
 set key top left reverse Left spacing 1.1 samplen 2 font ',10'
 colours = '#1a1a1a #2471a3 #c0392b'
 colour(i) = word(colours, i)
+pale(i) = word('#c4c4c4 #a9c9e3 #eab3ab', i)
 distinct(table) = system("awk 'NR > 1 && NF && !seen[$1]++ { printf \"%s \", $1 }' " . table)
 only(c, name) = column(1) == real(name) ? column(c) : NaN
 meshes = distinct('tear_grids.tsv')
@@ -33,13 +34,15 @@ plot 0.7 dt 2 lc '#999999' notitle, \
 legs = distinct('tear_trousers.tsv')
 only_first(c, name) = column(2) == 0 ? only(c, name) : NaN
 
-set title 'Trousers, a grid of 0 degrees'
+set title 'Trousers, grids of all directions; bold: of 0 degrees'
 set xlabel 'displacement of a hand [edges]'
 set ylabel 'force over the closed form'
 set yrange [0:2]
 plot 1 dt 2 lc '#999999' notitle, \
+     for [i = 1:words(legs)] 'tear_trousers.tsv' every 6 using 3:(only(4, word(legs, i))) with lines \
+         lc rgb pale(i) lw 0.4 notitle, \
      for [i = 1:words(legs)] 'tear_trousers.tsv' using 3:(only_first(4, word(legs, i))) with lines \
-         lc rgb colour(i) lw 0.8 title word(legs, i) . ' edges over a leg'
+         lc rgb colour(i) lw 0.9 title word(legs, i) . ' edges over a leg'
 
 set title 'Trousers, mean force on grids of all directions'
 set xlabel 'direction of the grid [degrees]'

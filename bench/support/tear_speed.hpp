@@ -6,7 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
-#include <iterator>
+#include <deque>
 #include <vector>
 
 #include <membrane/contact/aabb_tree.hpp>
@@ -23,15 +23,17 @@ namespace bench::tears {
 
 enum class Cut { none, from_rim, inside };  ///< with no, one and two tips
 
+class DrawnDisc;
+
 struct DrawnDiscOptions {
     Cut cut = Cut::none;
-    double toughness = 1e9;  ///< that of one that does not tear [J/m^2]
-    int further = 3;         ///< where the hand takes hold anew if there is no tip [edges]
+    double toughness = 1e9;              ///< that of one that does not tear [J/m^2]
+    const DrawnDisc* like_in = nullptr;  ///< a disc whose hand this one's repeats
     membrane::SolverOptions<double> solver = {.layers = 12};
 };
 
 /// A stretched disc of springs with a clamped rim. A hand draws the lip of a cut, just behind its tip, up and aside,
-/// for three edges; then takes hold anew. Without a cut it draws a vertex, and takes hold anew further on.
+/// for three edges; then takes hold anew. Without a cut it draws a vertex in the middle.
 class DrawnDisc {
   public:
     static constexpr int rings = 58;                                ///< 10,267 vertices
@@ -43,7 +45,7 @@ class DrawnDisc {
     };
 
     explicit DrawnDisc(const DrawnDiscOptions& options)
-        : further_(options.further),
+        : like_in_(options.like_in),
           mesh_(membrane::with_reserve(membrane::disc<double>({.radius = radius, .rings = rings}), 400)),
           springs_(membrane::TearableSprings(
               mesh_, membrane::MassSpringNetwork(mesh_, membrane::LinearSpring{},
@@ -82,6 +84,13 @@ class DrawnDisc {
         mesh_.positions().row(0).minCoeff(&v);
         return static_cast<Index>(v);
     }
+    [[nodiscard]] Index nearest_to(const Vector& place) const {
+        Eigen::Index v = 0;
+        (mesh_.positions().colwise() - Eigen::Vector3d(place)).colwise().squaredNorm().minCoeff(&v);
+        return static_cast<Index>(v);
+    }
+    // Of the held vertex, at rest.
+    [[nodiscard]] Vector place() const { return membrane::point(tear_.surface().rest_positions(), held_); }
     // The left side behind the tip at the right.
     void hold() {
         const auto& rest = tear_.surface().rest_positions();
@@ -89,16 +98,14 @@ class DrawnDisc {
         for (const auto& tip : tear_.tips()) {
             if (rest(0, tip.vertex) > ahead) ahead = rest(0, tip.vertex), held_ = tip.behind[1];
         }
-        for (int i = 0; tear_.tips().empty() && ticks_ > 0 && i < further_; ++i) {
-            held_ = tear_.surface().nearest_in_direction(held_, {1, 0, 0});
-        }
+        if (like_in_ != nullptr) held_ = nearest_to(like_in_->place());
         target_ = membrane::point(x_, held_);
     }
     void follow(std::span<const membrane::TearEvent<double>> events) {
         for (const auto& event : events) membrane::follow(event, springs_, foundation_, solver_, tree_);
     }
 
-    int further_;
+    const DrawnDisc* like_in_;
     membrane::TriangleMesh<double> mesh_;
     membrane::Tissue<membrane::TearableSprings<double, membrane::LinearSpring>> springs_;
     membrane::VirtualVolumeSprings<double> foundation_;
@@ -120,21 +127,25 @@ struct TickCost {
 /// The bound on vertex updates of a disc that tears: some fewer than the whole one takes.
 inline constexpr Index update_bound = 1300;
 
-/// Of a whole disc, under a hand that stays where it is, and that moves on; one with one tip that is too tough to tear,
-/// and that tears; the same with two tips; that with bounded updates, and with steps near convergence. They tick in
-/// turns: load of the machine affects all of them.
-[[nodiscard]] inline std::array<TickCost, 8> cost_of_ticks(int ticks) {
+/// The discs of `cost_of_ticks`. Two whole ones have the hand of one that tears.
+enum class Disc { hand_stays, one_tip, one_tip_runs, whole_as_one, two_tips, two_tips_run, whole_as_two, bounded, all };
+inline constexpr std::size_t disc_count = 9;
+
+/// Of whole discs; of one with one tip, and with two, that are too tough to tear, and that tear; of the one with two
+/// tips and bounded updates, and with steps near convergence. They tick in turns: load of the machine affects all.
+[[nodiscard]] inline std::array<TickCost, disc_count> cost_of_ticks(int ticks) {
     constexpr double weak = 30;  // [J/m^2]
-    const DrawnDiscOptions scenes[]{
-        {.further = 0},
-        {},
-        {.cut = Cut::from_rim},
-        {.cut = Cut::from_rim, .toughness = weak},
-        {.cut = Cut::inside},
-        {.cut = Cut::inside, .toughness = weak},
-        {.cut = Cut::inside, .toughness = weak, .solver = {.layers = 12, .max_vertex_updates = update_bound}},
-        {.cut = Cut::inside, .toughness = weak, .solver = {.layers = membrane::unlimited, .sweeps = 8}}};
-    std::vector<DrawnDisc> discs(std::begin(scenes), std::end(scenes));
+    std::deque<DrawnDisc> discs;
+    const auto add = [&](const DrawnDiscOptions& options) { return &discs.emplace_back(options); };
+    add({});
+    add({.cut = Cut::from_rim});
+    const DrawnDisc* const one_tip = add({.cut = Cut::from_rim, .toughness = weak});
+    add({.like_in = one_tip});
+    add({.cut = Cut::inside});
+    const DrawnDisc* const two_tips = add({.cut = Cut::inside, .toughness = weak});
+    add({.like_in = two_tips});
+    add({.cut = Cut::inside, .toughness = weak, .solver = {.layers = 12, .max_vertex_updates = update_bound}});
+    add({.cut = Cut::inside, .toughness = weak, .solver = {.layers = membrane::unlimited, .sweeps = 8}});
     std::vector<std::vector<DrawnDisc::Tick>> measured(discs.size());
     constexpr int in_turn = 20;
     for (int done = 0; done < ticks; done += in_turn) {
@@ -142,7 +153,7 @@ inline constexpr Index update_bound = 1300;
             for (int n = 0; n < in_turn; ++n) measured[i].push_back(discs[i].tick());
         }
     }
-    std::array<TickCost, 8> result;
+    std::array<TickCost, disc_count> result;
     for (std::size_t i = 0; i < result.size(); ++i) {
         const auto& all = measured[i];
         const auto quantile = [&](double DrawnDisc::Tick::*value, double part) {

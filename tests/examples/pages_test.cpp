@@ -708,11 +708,11 @@ TEST_CASE("pages: tear_starts") {
         std::vector<Eigen::Vector3d> reactions;
     } report{{0.03 * contact.normal}};
     // [tear_starts]
-    const auto is_pulled = tear.start_at(v, 50e-6, x, tissue);  // the border at v has flaws of 50 um
-    for (const auto& event : tear.cut_along(is_pulled, x)) follow(event, tissue, solver, tree, tracker);
+    const auto from_flaw = tear.start_at(v, 50e-6, x, tissue);  // the border at v has flaws of 50 um
+    for (const auto& event : tear.cut_along(from_flaw, x)) follow(event, tissue, solver, tree, tracker);
 
-    const auto is_poked = tear.slit_under(contact, report.reactions[0], 20e-3, {1, 0, 0});  // a blade along x: at 20 mN
-    for (const auto& event : tear.cut_along(is_poked, x)) follow(event, tissue, solver, tree, tracker);
+    const auto under_blade = tear.slit_under(contact, report.reactions[0], 20e-3, {1, 0, 0});  // along x, from 20 mN on
+    for (const auto& event : tear.cut_along(under_blade, x)) follow(event, tissue, solver, tree, tracker);
     // [/tear_starts]
     CHECK(tear.tips().size() == 3);
 }

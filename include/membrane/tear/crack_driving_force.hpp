@@ -53,7 +53,8 @@ template <Real Scalar>
     return -1 / (2 * squared_norm(area)) * cross(area, sum);
 }
 
-/// The largest principal tension of a triangle, per width at rest [N/m]: T^T T, T its first Piola-Kirchhoff stress.
+/// T^T T of a triangle, with its first Piola-Kirchhoff stress T, a force per width at rest [N^2/m^2]: the root of its
+/// largest principal value is the largest tension.
 template <Real Scalar>
 [[nodiscard]] Symmetric3<Scalar> squared_tension(const RestTriangle<Scalar>& rest,
                                                  const std::array<Vector3<Scalar>, 3>& at_rest,

@@ -11,10 +11,11 @@
 /// The force across an edge that is opening.
 namespace membrane {
 
-/// What still joins the two vertices into which a tear has parted one: a force against their separation, at first as
-/// large as the membrane's force through the vertex, so that nothing jumps [Camacho96]. It is released as the edge
-/// opens [Malluck80]: in each tick so far that the tip's driving force stays near the resistance, but no sooner than
-/// the edge has taken its energy. If the separation decreases, the force decreases in proportion.
+/// What still joins the two vertices into which a tear has parted one: a force against their separation, at first
+/// nearly as large as the membrane's force through the vertex, so that nothing jumps [Camacho96]. It is released as the
+/// edge opens [Malluck80]: in each tick so far that the tip's driving force stays near the resistance, but no sooner
+/// than the edge has nearly taken its energy, unless an advance pays for two edges. If the separation decreases, the
+/// force decreases in proportion.
 template <Real Scalar>
 struct Ligament {
     ///@{
@@ -22,14 +23,14 @@ struct Ligament {
     Index vertex = no_index, copy = no_index;
     ///@}
     Vector3<Scalar> force = Vector3<Scalar>::Zero();  ///< on `vertex` when it begins; the opposite acts on `copy` [N]
-    Scalar energy = 0;                                ///< that the edge takes until it is open, nearly [J]
+    Scalar energy = 0;                                ///< resistance times length, nearly what the edge takes [J]
     Scalar strength = 0;                              ///< its largest force when it begins [N]
     Scalar tension = strength;                        ///< its largest force by now [N]
     Scalar least = 0;                                 ///< what that may decrease to in this tick [N]
     Scalar slope = 0;                                 ///< by which it decreases as the edge opens [N/m]
     Scalar opening = 0;                               ///< separation after the last tick [m]
     Scalar reached = 0;                               ///< largest separation so far [m]
-    Scalar increment = 0;                             ///< by which a tick increases that, as in the last ones [m]
+    Scalar increment = 0;                             ///< of that, usual in a tick; 0 if none in the last one [m]
     Scalar dissipated = 0;                            ///< energy that it has taken and would not give back [J]
 
     /// Whether it holds hardly more, a tenth of its strength: the tip goes on.
@@ -58,11 +59,11 @@ struct Ligament {
         dissipated += work - (stored(reached) - before);
     }
 
-    /// Before a tick, where the tip's driving force exceeds the resistance by this part of it. A decrease of the
-    /// tension by a part of the strength decreases the driving force by about as large a part or a smaller one: twice
-    /// the excess keeps up with a hand. The tension decreases over the usual opening in a tick, or at once if there is
-    /// none. If an advance would pay for the next edge and for what this one has left to take, or for a quarter too
-    /// much, the load does not draw this one apart, and it need not take that.
+    /// Before a tick. `excess`: the tip's driving force over the resistance, less 1. The tension decreases by twice
+    /// that part of the strength: this decreases the driving force by about the same part or a smaller one, so that it
+    /// keeps up with a hand. It decreases over the opening that is usual in a tick, or at once if the edge does not
+    /// open, and not below the part of the energy that the edge has not taken yet. If `excess` is that part or more,
+    /// and a quarter or more, an advance pays for this edge and the next: it may fail without that energy.
     void weaken(Scalar excess) noexcept {
         least = tension;
         slope = 0;
@@ -109,8 +110,8 @@ void LigamentForces<Scalar>::begin(ConstraintContext<Scalar>& context) const noe
     }
 }
 
-// With the response S of the separation u, and c the largest separation so far over the tension there, the force f on
-// the vertex solves c f = -(u + S (f - f_0)).
+// With the response S of the separation u, and c the larger of u and the largest separation so far, over the tension
+// there, the force f on the vertex solves c f = -(u + S (f - f_0)).
 template <Real Scalar>
 bool LigamentForces<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
     bool changed = false;

@@ -36,7 +36,7 @@ namespace membrane {
 /// How a tear runs.
 struct TearOptions {
     Index max_tips = 16;        ///< capacity
-    double patch_radius = 3.5;  ///< around a tip, where its driving force is found [edges], at least 2; to the next tip
+    double patch_radius = 3.5;  ///< around a tip, where its driving force is found [edges], at least 2
     double min_angle = 0.35;    ///< of a triangle that a moved vertex may leave [rad]
     bool move_vertices = true;  ///< onto the tear's direction; if not, it runs along the edges that there are
 
@@ -113,8 +113,8 @@ class Tearing {
     /// border tears from a flaw, a cut that may be too small for the mesh, of length `flaw` [m]: if the criterion opens
     /// a tip with the flaw's driving force (see `border_flaw.hpp`). The path goes inward, at right angles to the
     /// border, and is twice as long as the flaw or longer by less than an edge, so that the tear goes on; it ends at a
-    /// border, and has 32 edges at most. None starts at a pinned vertex, beside a tip, if positions or `flaw` are not
-    /// finite and positive, or if the reserve or the capacity for tips is too small. As of any cut, the energy of its
+    /// border, and has 32 edges at most. None starts at a pinned vertex, beside a tip, if a position is not finite or
+    /// `flaw` not positive, or if the reserve or the capacity for tips is too small. As of any cut, the energy of its
     /// edges is not in `dissipated`. Valid until the next call. @pre the network has followed all events. Cost: the
     /// triangles around the path.
     template <class Network>
@@ -125,7 +125,7 @@ class Tearing {
     [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items()}; }
 
     /// After a step of `dt` [s]: edges open, tips advance. `held`: the few vertices on which tools act, as the corners
-    /// of a triangle in forceps; their forces are none of a tear.
+    /// of a triangle in forceps; they do not count in the driving force.
     template <class Network, class Volume>
     [[nodiscard]] Events update(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
                                 std::span<const Index> held = {}) noexcept;
@@ -136,11 +136,11 @@ class Tearing {
     /// Triangles and rest positions by now.
     [[nodiscard]] const TornSurface<Scalar>& surface() const noexcept { return surface_; }
 
-    /// Whether a tear did not advance in the last call because the reserve was used up.
+    /// Whether a tear did not advance in the last call because the reserve was too small.
     [[nodiscard]] bool reserve_used_up() const noexcept { return used_up_; }
 
     ///@{
-    /// Length torn so far, without cuts [m]; the energy that has taken, and what opening edges would give back [J].
+    /// Length torn so far, without cuts [m]; the energy that this took, and what opening edges would give back [J].
     [[nodiscard]] double torn_length() const noexcept { return torn_length_; }
     [[nodiscard]] double dissipated() const noexcept;
     [[nodiscard]] double stored(const ConstPointsRef<Scalar>& x) const noexcept;
@@ -406,7 +406,7 @@ void Tearing<Scalar, Criterion>::open_ligaments(const ConstPointsRef<Scalar>& x)
     }
 }
 
-// By the driving force of the tip before the edge, or slowly if that has met a border. Drops what has failed.
+// By the driving force of the tip ahead of the edge, or slowly if that has met a border. Drops what has failed.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 void Tearing<Scalar, Criterion>::weaken_ligaments() noexcept {
     constexpr auto without_tip = Scalar(0.1);
