@@ -28,7 +28,7 @@ class DrawnDisc;
 struct DrawnDiscOptions {
     Cut cut = Cut::none;
     double toughness = 1e9;              ///< that of one that does not tear [J/m^2]
-    const DrawnDisc* like_in = nullptr;  ///< a disc whose hand this one's repeats
+    const DrawnDisc* hand_of = nullptr;  ///< a disc whose hand draws this one, too
     membrane::SolverOptions<double> solver = {.layers = 12};
 };
 
@@ -45,7 +45,7 @@ class DrawnDisc {
     };
 
     explicit DrawnDisc(const DrawnDiscOptions& options)
-        : like_in_(options.like_in),
+        : hand_of_(options.hand_of),
           mesh_(membrane::with_reserve(membrane::disc<double>({.radius = radius, .rings = rings}), 400)),
           springs_(membrane::TearableSprings(
               mesh_, membrane::MassSpringNetwork(mesh_, membrane::LinearSpring{},
@@ -98,14 +98,14 @@ class DrawnDisc {
         for (const auto& tip : tear_.tips()) {
             if (rest(0, tip.vertex) > ahead) ahead = rest(0, tip.vertex), held_ = tip.behind[1];
         }
-        if (like_in_ != nullptr) held_ = nearest_to(like_in_->place());
+        if (hand_of_ != nullptr) held_ = nearest_to(hand_of_->place());
         target_ = membrane::point(x_, held_);
     }
     void follow(std::span<const membrane::TearEvent<double>> events) {
         for (const auto& event : events) membrane::follow(event, springs_, foundation_, solver_, tree_);
     }
 
-    const DrawnDisc* like_in_;
+    const DrawnDisc* hand_of_;
     membrane::TriangleMesh<double> mesh_;
     membrane::Tissue<membrane::TearableSprings<double, membrane::LinearSpring>> springs_;
     membrane::VirtualVolumeSprings<double> foundation_;
@@ -140,10 +140,10 @@ inline constexpr std::size_t disc_count = 9;
     add({});
     add({.cut = Cut::from_rim});
     const DrawnDisc* const one_tip = add({.cut = Cut::from_rim, .toughness = weak});
-    add({.like_in = one_tip});
+    add({.hand_of = one_tip});
     add({.cut = Cut::inside});
     const DrawnDisc* const two_tips = add({.cut = Cut::inside, .toughness = weak});
-    add({.like_in = two_tips});
+    add({.hand_of = two_tips});
     add({.cut = Cut::inside, .toughness = weak, .solver = {.layers = 12, .max_vertex_updates = update_bound}});
     add({.cut = Cut::inside, .toughness = weak, .solver = {.layers = membrane::unlimited, .sweeps = 8}});
     std::vector<std::vector<DrawnDisc::Tick>> measured(discs.size());
