@@ -180,6 +180,8 @@ TEMPLATE_TEST_CASE("a border that is slack, in compression, or stretched across 
         Sheet<TestType> sheet(turn, 1e-3, 1e-3);
         const Index v = sheet.at_side();
         CHECK(sheet.start(v, 1e-3).empty());
+        const auto slack = border_state<TestType>(sheet.tear.surface(), v, sheet.x, sheet.tissue);
+        CHECK(slack.energy == Approx(0).margin(1e-12));
         sheet.stretch(0.8);
         CHECK(sheet.start(v, 1e-3).empty());
         sheet.x = sheet.mesh.positions();
@@ -189,6 +191,35 @@ TEMPLATE_TEST_CASE("a border that is slack, in compression, or stretched across 
         sheet.stretch(1.2);
         CHECK_FALSE(sheet.start(v, 1e-3).empty());
     }
+}
+
+TEST_CASE("the border runs along the sides of a sheet, next to its corners too; within the sheet there is none",
+          "[tear]") {
+    Sheet<double> sheet(0.2, 1e-3, 1e-3);
+    sheet.stretch(1.2);
+    const auto& rest = sheet.mesh.positions();
+    const Eigen::Vector3d ends = rest.rowwise().maxCoeff();
+    int at_sides = 0, starts = 0;
+    for (Index v = 0; v < sheet.surface.vertex_count(); ++v) {
+        CAPTURE(v);
+        const auto border = border_state<double>(sheet.tear.surface(), v, sheet.x, sheet.tissue);
+        if (!sheet.tear.surface().adjacency().on_border(v)) {
+            CHECK(border.along == Vector3<double>::Zero());
+            CHECK(border.inward == Vector3<double>::Zero());
+            CHECK((border.stretch == 1 && border.tension == 0 && border.energy == 0));
+            continue;
+        }
+        const bool at_x = rest(0, v) == 0 || rest(0, v) == ends[0], at_y = rest(1, v) == 0 || rest(1, v) == ends[1];
+        if (at_x && at_y) continue;
+        ++at_sides;
+        CHECK(std::abs(border.along[at_x ? 1 : 0]) == Approx(1));
+        if (!at_x) continue;
+        const bool starts_here = !sheet.start(v, 0.4e-3).empty();
+        CHECK(starts_here);
+        starts += starts_here;
+    }
+    CHECK(at_sides >= 2 * (11 + 15));
+    CHECK(starts >= 2 * 15);
 }
 
 TEMPLATE_TEST_CASE("a start from nonsense is none", "[tear]", double, float) {

@@ -9,6 +9,8 @@
 #include <type_traits>
 #include <vector>
 
+#include <Eigen/Eigenvalues>
+
 #include <membrane/contact/aabb_tree.hpp>
 #include <membrane/contact/contact_tracker.hpp>
 #include <membrane/core/initial_state.hpp>
@@ -50,6 +52,66 @@ double tear(TornStrip<Scalar>& strip, double edges, double& off_line) {
 
 }  // namespace
 
+namespace {
+
+/// Lets nothing tear, and keeps the states that it sees.
+struct Recorded {
+    std::vector<TipState<double>>* states;
+
+    bool opens(const TipState<double>& tip) const noexcept { return states->push_back(tip), false; }
+    Vector3<double> direction(const TipState<double>& tip) const noexcept { return tip.heading; }
+    double resistance() const noexcept { return 1; }
+};
+
+}  // namespace
+
+// Eigenvalues of the mean of T^T T in the tangent plane, by Eigen.
+TEST_CASE("a criterion sees the largest principal tension around the tip, in the surface at rest", "[tear]") {
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const double size = std::pow(10, random.number(-3.0, 1.0));  // [m]
+        const bool is_curved = random.chance(0.5);
+        const auto mesh = with_reserve(is_curved ? icosphere<double>({.radius = size, .subdivisions = 2})
+                                                 : disc<double>({.radius = size, .rings = 6}),
+                                       4);
+        auto tissue = Tissue(TearableSprings(mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 10.0})));
+        std::vector<TipState<double>> states;
+        Tearing tear(mesh, Recorded{&states});
+        Points<double> x = mesh.positions();
+        for (Index v = 0; v < x.cols(); ++v) x.col(v) += random.vector(-0.03, 0.03) * size;
+        x.row(0) *= random.number(1.1, 1.4);
+        const auto slit = tear.slit_at(random.index(30), random.unit_vector<double>());
+        for (const auto& event : tear.cut_along(slit, x)) follow(event, tissue);
+        REQUIRE(tear.update(x, 1e-3, tissue, NoFoundation()).empty());
+        REQUIRE(states.size() == tear.tips().size());
+        for (std::size_t i = 0; i < states.size(); ++i) {
+            const auto& surface = tear.surface();
+            const Index tip = tear.tips()[i].vertex;
+            Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+            double area = 0;
+            for (const Index f : surface.adjacency().triangles_of(tip)) {
+                const auto rest = surface.corners_at(surface.rest_positions(), f);
+                const auto response = tissue.triangle_response(f, surface.corners(f), x);
+                Eigen::Matrix3d stress = Eigen::Matrix3d::Zero();  // times the area
+                for (std::size_t k = 0; k < 3; ++k) {
+                    stress -= Eigen::Vector3d(response.force[k]) * Eigen::Vector3d(rest[k] - rest[0]).transpose();
+                }
+                sum += stress.transpose() * stress / surface.rest_area(f);
+                area += surface.rest_area(f);
+            }
+            const Eigen::Vector3d normal(surface.rest_normal(tip));
+            Eigen::Matrix<double, 3, 2> tangents;
+            tangents << normal.unitOrthogonal(), normal.cross(normal.unitOrthogonal());
+            const Eigen::Matrix2d in_plane = tangents.transpose() * sum * tangents / area;
+            const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solved(in_plane);
+            const Eigen::Vector3d direction(states[i].tension_direction);
+            CHECK(states[i].tension == Approx(std::sqrt(solved.eigenvalues()[1])));
+            CHECK(std::abs(direction.dot(tangents * solved.eigenvectors().col(1))) == Approx(1));
+        }
+    }
+}
+
 // Closed form: a strip in pure shear releases its energy density times its height.
 TEST_CASE("a tear in pure shear begins at the right stretch, on any grid, and runs straight", "[tear]") {
     const int directions = cases(5, 20);
@@ -65,6 +127,11 @@ TEST_CASE("a tear in pure shear begins at the right stretch, on any grid, and ru
         CHECK(off_line <= 0.7);
         CHECK(strip.balance() < 1.001);
         CHECK(strip.balance() > 0.82);  // nothing takes what a quick tear releases
+        const auto& tip = strip.tear.tips()[0];
+        const auto& rest = strip.tear.surface().rest_positions();
+        const Vector3<double> edge = point(rest, tip.vertex) - point(rest, tip.behind[0]);
+        CHECK(tip.advanced == Approx(norm(edge)));
+        CHECK(norm<double>(edge - tip.advanced * tip.heading) < 1e-12);
     }
 }
 
@@ -184,8 +251,8 @@ struct SupportedStrip {
         return {.normal = stiffness, .tangential = stiffness};
     }
     template <class Volume>
-    Vector3<double> driving_force(const Volume& volume) {
-        REQUIRE(strip.tear.update(strip.x, strip.dt, strip.tissue, volume).empty());
+    Vector3<double> driving_force(const Volume& volume, std::span<const Index> held = {}) {
+        REQUIRE(strip.tear.update(strip.x, strip.dt, strip.tissue, volume, held).empty());
         return strip.tear.tips()[0].driving_force.template cast<double>();
     }
 
@@ -214,6 +281,11 @@ TEST_CASE("the driving force counts the energy of a foundation", "[tear]") {
         REQUIRE(supported.body.move_to(pose, strip.x));
         const auto moved = supported.driving_force(on(supported.body, supported.foundation));
         CHECK(norm<double>(moved - supported.force) < 1e-6 * norm(supported.force));
+        // It is hardly less where a tool holds a vertex ahead.
+        REQUIRE(supported.body.move_to({}, strip.x));
+        const std::array held{strip.tear.surface().nearest_in_direction(strip.tear.tips()[0].vertex, {1, 0, 0})};
+        const auto beside_tool = supported.driving_force(supported.foundation, held);
+        CHECK(norm<double>(beside_tool - supported.force) < 0.02 * norm(supported.force));
     }
 }
 

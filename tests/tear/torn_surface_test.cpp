@@ -436,11 +436,17 @@ TEST_CASE("a vertex that moves at rest keeps the area, the angles, and its point
         const double area = area_of(surface);
         const Index v = random.index(37);  // within the disc
         const Vector3<double> from = point(surface.rest_positions(), v);
+        const double farthest = random.chance(0.2) ? 4 : 0.12;
         const Vector3<double> place =
-            from + 0.12 * Vector3<double>(random.number(-1.0, 1.0), random.number(-1.0, 1.0), 0);
-        if (!surface.move_vertex(x, v, place, least)) continue;
+            from + farthest * Vector3<double>(random.number(-1.0, 1.0), random.number(-1.0, 1.0), 0);
+        if (!surface.move_vertex(x, v, place, least)) {
+            REQUIRE(point(surface.rest_positions(), v) == from);
+            REQUIRE(surface.events().empty());
+            continue;
+        }
         ++moved;
         const Vector3<double> to = point(surface.rest_positions(), v);
+        REQUIRE(16 * norm<double>(to - from) >= (1 - 1e-12) * norm<double>(place - from));  // it is halved four times
         const Eigen::Vector3d expected = map * Eigen::Vector3d(to[0], to[1], to[2]);
         REQUIRE((all.col(v) - expected).norm() < 1e-12);
         REQUIRE(norm<double>(cross<double>(to - from, place - from)) < 1e-12);
@@ -454,6 +460,12 @@ TEST_CASE("a vertex that moves at rest keeps the area, the angles, and its point
         }
         REQUIRE(surface.events().size() == 1);
         REQUIRE(surface.events()[0].moved.triangles.size() == surface.adjacency().triangles_of(v).size());
+        for (int i = 0; i < 3; ++i) {  // more than there is memory for
+            const Vector3<double> before = point(surface.rest_positions(), v);
+            const bool moves = surface.move_vertex(x, v, before + Vector3<double>(1e-3, 0, 0), least);
+            REQUIRE(moves == (point(surface.rest_positions(), v) != before));
+        }
+        REQUIRE(surface.events().size() <= 2);
     }
     CHECK(moved > cases(150));
 }
