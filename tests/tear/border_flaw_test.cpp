@@ -288,6 +288,19 @@ TEST_CASE("a border does not start to tear where it is pinned, or if there can b
     CHECK(sheet.start(sheet.at_side(true), 1e-3).empty());
 }
 
+TEST_CASE("the side of a tear is no border that starts to tear", "[tear]") {
+    Sheet<double> sheet(0.2, 1e-3, 1);
+    sheet.x = 1.3 * sheet.mesh.positions();
+    const auto found = sheet.start(sheet.at_side(), 1.5e-3);
+    const std::vector<Index> path(found.begin(), found.end());
+    REQUIRE(path.size() >= 4);
+    for (const auto& event : sheet.tear.cut_along(path, sheet.x)) follow(event, sheet.tissue);
+    const auto border = border_state<double>(sheet.tear.surface(), path[1], sheet.x, sheet.tissue);
+    REQUIRE(flaw_driving_force(border, 0.5e-3) > 2 * 1 * material.thickness);
+    REQUIRE(sheet.tear.surface().nearest_in_direction(path[1], border.inward) != no_index);
+    CHECK(sheet.start(path[1], 0.5e-3).empty());
+}
+
 namespace {
 
 /// A strip between clamps whose tear starts from a flaw in the middle of its left side.
