@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -234,7 +233,7 @@ void trouser_test(Page& page, const Effort& effort) {
             for (int i = 0; i < directions; ++i) {
                 const double turn = 60.0 * i / (directions - 1);
                 const auto found = test::tear_trousers<double>(
-                    {.width = width, .turn = turn * degree, .strain = strain}, effort.edges);
+                    {.width = width, .turn = turn * degree, .strain = strain, .steps = 20}, effort.edges);
                 sum += found.mean / directions, lost += found.lost / directions;
                 off = std::max(off, found.off_line);
                 least = std::min(least, found.mean), largest = std::max(largest, found.mean);
@@ -307,30 +306,25 @@ void peel(Page& page, const Effort&) {
 // Under a hand that takes hold anew, vertices behind it relax for some time, whether the membrane tears or not.
 void speed(Page& page, const Effort& effort) {
     const auto costs = cost_of_ticks(effort.ticks);
-    const std::string bounded = std::to_string(update_bound) + " vertex updates at most";
-    const std::array<std::string, disc_count> names{
-        "whole, the hand stays",      "one tip, not torn",         "one tip, runs",
-        "whole, under the same hand", "two tips, not torn",        "two tips, run",
-        "whole, under the same hand", "two tips, run, " + bounded, "two tips, run, all layers, 8 sweeps"};
     page.print(
         "\n### Cost of a tick, 10,267 vertices\n\n| | time of a tick | one tick of 20 is slower than | vertex updates "
         "| "
         "torn [edges] |\n|---|---|---|---|---|\n");
-    for (std::size_t i = 0; i < costs.size(); ++i) {
-        page.print("| %s | %.0f us | %.0f us | %.0f | %.1f |\n", names[i].c_str(), 1e6 * costs[i].seconds,
-                   1e6 * costs[i].slow, costs[i].vertex_updates, costs[i].torn / DrawnDisc::edge);
+    for (const TickCost& cost : costs) {
+        page.print("| %s | %.0f us | %.0f us | %.0f | %.1f |\n", cost.name.c_str(), 1e6 * cost.seconds, 1e6 * cost.slow,
+                   cost.vertex_updates, cost.torn / DrawnDisc::edge);
     }
-    const auto of = [&](Disc disc) { return costs[static_cast<std::size_t>(disc)]; };
+    const auto of = [&](Disc disc) -> const TickCost& { return costs[static_cast<std::size_t>(disc)]; };
     const auto over = [&](Disc disc, Disc other) { return of(disc).seconds / of(other).seconds; };
     const auto beside = [&](Disc disc) { return percent(of(disc).torn / of(Disc::all).torn); };
     page.add({"a tick while a tear with one tip runs, over one of the whole membrane under the same hand",
               over(Disc::one_tip_runs, Disc::whole_as_one), 1.5, ""});
     page.add({"the same with two tips", over(Disc::two_tips_run, Disc::whole_as_two), 1.5, ""});
-    page.add({"the same with " + bounded, over(Disc::bounded, Disc::whole_as_two), 1.5, ""});
+    page.add({"the same with " + bounded_updates(), over(Disc::bounded, Disc::whole_as_two), 1.5, ""});
     page.add({"a tick while a tear with two tips runs, over one of the whole membrane under a hand that stays",
               over(Disc::two_tips_run, Disc::hand_stays), none, ""});
     page.add({"length of that tear, from the one with all layers and 8 sweeps", beside(Disc::two_tips_run), none, "%"});
-    page.add({"the same with " + bounded, beside(Disc::bounded), none, "%"});
+    page.add({"the same with " + bounded_updates(), beside(Disc::bounded), none, "%"});
 }
 
 struct Part {

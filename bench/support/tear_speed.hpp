@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 #include <deque>
+#include <string>
 #include <vector>
 
 #include <membrane/contact/aabb_tree.hpp>
@@ -56,7 +57,7 @@ class DrawnDisc {
           tree_(mesh_),
           x_(1.02 * mesh_.positions()) {
         const bool from_rim = options.cut == Cut::from_rim;
-        std::vector<Index> path{from_rim ? left_end() : 0};
+        std::vector<Index> path{nearest_to({from_rim ? -radius : 0, 0, 0})};
         while (path.size() < (from_rim ? 30 : 15)) {
             path.push_back(tear_.surface().nearest_in_direction(path.back(), {1, 0, 0}));
         }
@@ -66,8 +67,7 @@ class DrawnDisc {
 
     [[nodiscard]] Tick tick() {
         constexpr int ticks_an_edge = 60;
-        if (ticks_ % (3 * ticks_an_edge) == 0) hold();
-        ++ticks_;
+        if (ticks_++ % (3 * ticks_an_edge) == 0) hold();
         target_ += edge / ticks_an_edge * Vector(0, std::sqrt(0.5), std::sqrt(0.5));
         const double torn = tear_.torn_length();
         const auto start = std::chrono::steady_clock::now();
@@ -79,11 +79,6 @@ class DrawnDisc {
     }
 
   private:
-    [[nodiscard]] Index left_end() const {
-        Eigen::Index v = 0;
-        mesh_.positions().row(0).minCoeff(&v);
-        return static_cast<Index>(v);
-    }
     [[nodiscard]] Index nearest_to(const Vector& place) const {
         Eigen::Index v = 0;
         (mesh_.positions().colwise() - Eigen::Vector3d(place)).colwise().squaredNorm().minCoeff(&v);
@@ -119,15 +114,17 @@ class DrawnDisc {
 };
 
 struct TickCost {
-    double seconds, vertex_updates;  ///< of a tick, medians
-    double slow;                     ///< time that one of 20 ticks exceeds [s]
-    double torn;                     ///< in all [m]
+    std::string name;                        ///< of the disc
+    double seconds = 0, vertex_updates = 0;  ///< of a tick, medians
+    double slow = 0;                         ///< time that one of 20 ticks exceeds [s]
+    double torn = 0;                         ///< in all [m]
 };
 
 /// The bound on vertex updates of a disc that tears: some fewer than the whole one takes.
 inline constexpr Index update_bound = 1300;
+[[nodiscard]] inline std::string bounded_updates() { return std::to_string(update_bound) + " vertex updates at most"; }
 
-/// The discs of `cost_of_ticks`. Two whole ones have the hand of one that tears.
+/// The discs of `cost_of_ticks`, in order. Two whole ones have the hand of one that tears.
 enum class Disc { hand_stays, one_tip, one_tip_runs, whole_as_one, two_tips, two_tips_run, whole_as_two, bounded, all };
 inline constexpr std::size_t disc_count = 9;
 
@@ -136,16 +133,22 @@ inline constexpr std::size_t disc_count = 9;
 [[nodiscard]] inline std::array<TickCost, disc_count> cost_of_ticks(int ticks) {
     constexpr double weak = 30;  // [J/m^2]
     std::deque<DrawnDisc> discs;
-    const auto add = [&](const DrawnDiscOptions& options) { return &discs.emplace_back(options); };
-    add({});
-    add({.cut = Cut::from_rim});
-    const DrawnDisc* const one_tip = add({.cut = Cut::from_rim, .toughness = weak});
-    add({.hand_of = one_tip});
-    add({.cut = Cut::inside});
-    const DrawnDisc* const two_tips = add({.cut = Cut::inside, .toughness = weak});
-    add({.hand_of = two_tips});
-    add({.cut = Cut::inside, .toughness = weak, .solver = {.layers = 12, .max_vertex_updates = update_bound}});
-    add({.cut = Cut::inside, .toughness = weak, .solver = {.layers = membrane::unlimited, .sweeps = 8}});
+    std::array<TickCost, disc_count> result;
+    const auto add = [&](const std::string& name, const DrawnDiscOptions& options) {
+        result[discs.size()].name = name;
+        return &discs.emplace_back(options);
+    };
+    add("whole, the hand stays", {});
+    add("one tip, not torn", {.cut = Cut::from_rim});
+    const auto* const one_tip = add("one tip, runs", {.cut = Cut::from_rim, .toughness = weak});
+    add("whole, under the same hand", {.hand_of = one_tip});
+    add("two tips, not torn", {.cut = Cut::inside});
+    const auto* const two_tips = add("two tips, run", {.cut = Cut::inside, .toughness = weak});
+    add("whole, under the same hand", {.hand_of = two_tips});
+    add("two tips, run, " + bounded_updates(),
+        {.cut = Cut::inside, .toughness = weak, .solver = {.layers = 12, .max_vertex_updates = update_bound}});
+    add("two tips, run, all layers, 8 sweeps",
+        {.cut = Cut::inside, .toughness = weak, .solver = {.layers = membrane::unlimited, .sweeps = 8}});
     std::vector<std::vector<DrawnDisc::Tick>> measured(discs.size());
     constexpr int in_turn = 20;
     for (int done = 0; done < ticks; done += in_turn) {
@@ -153,7 +156,6 @@ inline constexpr std::size_t disc_count = 9;
             for (int n = 0; n < in_turn; ++n) measured[i].push_back(discs[i].tick());
         }
     }
-    std::array<TickCost, disc_count> result;
     for (std::size_t i = 0; i < result.size(); ++i) {
         const auto& all = measured[i];
         const auto quantile = [&](double DrawnDisc::Tick::*value, double part) {
@@ -164,10 +166,11 @@ inline constexpr std::size_t disc_count = 9;
             return values[static_cast<std::size_t>(at)];
         };
         using Tick = DrawnDisc::Tick;
-        TickCost cost{quantile(&Tick::seconds, 0.5), quantile(&Tick::vertex_updates, 0.5),
-                      quantile(&Tick::seconds, 0.95), 0};
+        auto& cost = result[i];
+        cost.seconds = quantile(&Tick::seconds, 0.5);
+        cost.vertex_updates = quantile(&Tick::vertex_updates, 0.5);
+        cost.slow = quantile(&Tick::seconds, 0.95);
         for (const auto& tick : all) cost.torn += tick.torn;
-        result[i] = cost;
     }
     return result;
 }

@@ -17,6 +17,7 @@ struct Trousers {
     int width = 6;         ///< of a leg [edges]
     double turn = 0;       ///< of the grid [rad]
     double strain = 0.02;  ///< of a leg while it tears, nearly
+    int steps = 10;        ///< of a tick, at most; with more the forces balance better
 
     static constexpr double leg_width = 6e-3;  ///< [m]
 
@@ -143,7 +144,7 @@ class TrouserTest {
                 mesh, [&](const auto& at) { return at[0] > static_cast<Scalar>((columns - 0.5) * edge); }),
             .tolerance = 1e-4 * scene.resistance(),
             .sweeps = 10,
-            .steps = 20};
+            .steps = scene.steps};
         return {membrane::with_reserve(mesh, 2 * columns), options,
                 membrane::EnergyRelease{scene.toughness(), torn_material.thickness}};
     }

@@ -50,10 +50,6 @@ double tear(TornStrip<Scalar>& strip, double edges, double& off_line) {
     return begins;
 }
 
-}  // namespace
-
-namespace {
-
 /// Lets nothing tear, and keeps the states that it sees.
 struct Recorded {
     std::vector<TipState<double>>* states;

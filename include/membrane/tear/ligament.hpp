@@ -30,7 +30,7 @@ struct Ligament {
     Scalar slope = 0;                                 ///< by which it decreases as the edge opens [N/m]
     Scalar opening = 0;                               ///< separation after the last tick [m]
     Scalar reached = 0;                               ///< largest separation so far [m]
-    Scalar increment = 0;                             ///< of that, usual in a tick; 0 if none in the last one [m]
+    Scalar increment = 0;                             ///< growth of that in a tick, as in the last ones [m]
     Scalar dissipated = 0;                            ///< energy that it has taken and would not give back [J]
 
     /// Whether it holds hardly more, a tenth of its strength: the tip goes on.
@@ -62,8 +62,9 @@ struct Ligament {
     /// Before a tick. `excess`: the tip's driving force over the resistance, less 1. The tension decreases by twice
     /// that part of the strength: this decreases the driving force by about the same part or a smaller one, so that it
     /// keeps up with a hand. It decreases over the opening that is usual in a tick, or at once if the edge does not
-    /// open, and not below the part of the energy that the edge has not taken yet. If `excess` is that part or more,
-    /// and a quarter or more, an advance pays for this edge and the next: it may fail without that energy.
+    /// open, and not below the strength times the part of the energy that the edge has not taken yet. If `excess` is
+    /// that part or more, and a quarter or more, an advance pays for this edge and the next: then the tension may
+    /// decrease to zero.
     void weaken(Scalar excess) noexcept {
         least = tension;
         slope = 0;

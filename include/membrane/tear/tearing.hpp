@@ -36,7 +36,7 @@ namespace membrane {
 /// How a tear runs.
 struct TearOptions {
     Index max_tips = 16;        ///< capacity
-    double patch_radius = 3.5;  ///< around a tip, where its driving force is found [edges], at least 2
+    double patch_radius = 3.5;  ///< where a tip's driving force is found [edges], at least 2; at most to the next tip
     double min_angle = 0.35;    ///< of a triangle that a moved vertex may leave [rad]
     bool move_vertices = true;  ///< onto the tear's direction; if not, it runs along the edges that there are
 
