@@ -193,7 +193,7 @@ TEMPLATE_TEST_CASE("a border that is slack, in compression, or stretched across 
     }
 }
 
-TEST_CASE("the border runs along the sides of a sheet, next to its corners too; within the sheet there is none",
+TEST_CASE("the border runs along the sides of a sheet, next to its corners too, and within it there is none",
           "[tear]") {
     Sheet<double> sheet(0.2, 1e-3, 1e-3);
     sheet.stretch(1.2);
