@@ -777,7 +777,8 @@ test::Surface<double> regular_surface(test::Random& random) {
 Tool<double> tool_near(const test::TearingSurface<double>& surface, const Points<double>& x, test::Random& random) {
     const auto triangle =
         membrane::triangle_at(x, surface.triangles().col(random.index(static_cast<Index>(surface.triangles().cols()))));
-    Tool<double> tool{.position = point_at(triangle, random.barycentric()) + 0.4 * random.vector(), .radius = 0.3};
+    const auto place = point_at(triangle, random.barycentric());
+    Tool<double> tool{.position = place + 0.4 * random.vector(), .radius = 0.3};
     if (random.chance(0.3)) tool.axis = random.vector();
     return tool;
 }
@@ -814,7 +815,8 @@ TEST_CASE("after random tears the contacts are those of a tracker that is built 
     for (int seed = 1; seed <= cases(150); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
-        test::TearingSurface<double> surface(regular_surface(random), 4 + random.index(60));
+        const auto whole = regular_surface(random);
+        test::TearingSurface<double> surface(whole, 4 + random.index(60));
         AabbTree<double> tree(surface.mesh());
         ContactTracker<double> tracker(surface.mesh());
         Points<double> x = surface.mesh().positions();
@@ -825,6 +827,7 @@ TEST_CASE("after random tears the contacts are those of a tracker that is built 
         };
         while (surface.tear(random, follow)) {
             const auto mesh = surface.mesh();
+            if (surface.used() == mesh.vertex_count()) break;  // the split below needs a vertex without triangles
             ContactTracker<double> fresh(mesh);
             fresh.split({.vertex = 0, .copy = mesh.vertex_count() - 1});  // torn, but for no triangle
             for (Index v = 0; v < surface.used(); ++v) x.col(v) += 0.03 * random.vector();
