@@ -49,6 +49,7 @@ struct CentreRun {
     double unlike = 0;                 ///< difference of the driving forces of both ends, relative
     double off_line = 0;               ///< largest distance of a tip from that line while it tears [edges]
     std::array<double, 2> advances{};  ///< of both ends [edges]; 0 if one has come to the border
+    double lost = 0;                   ///< energy that nothing has taken, over what the sheet has released
 };
 
 /// Each end tears on by about this number of edges, at nine tenths of the energy that it releases at first.
@@ -84,6 +85,7 @@ template <membrane::Real Scalar>
             result.advances[i] = norm(off);
         }
     }
+    result.lost = torn.lost() / (torn.work - torn.stored());
     return result;
 }
 

@@ -19,6 +19,7 @@
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/tear/tearing.hpp>
 
+#include "support/hand_work.hpp"
 #include "support/turned_grid.hpp"
 
 /// A flat sheet that two hands tear, and the energy that they give.
@@ -127,23 +128,30 @@ class TornSheet {
     void start() {
         relax(5000);
         work = stored();
-        damped = 0;
+        damped = relaxed = 0;
     }
 
     /// The hands move; the membrane follows, up to the tolerance or the number of steps; and what tears then.
     void tick(const std::array<Vector, 2>& displacements) {
-        for (std::size_t i = 0; i < 2; ++i) {
-            for (const Index v : hands[i]) x.col(v) += Eigen::Matrix<Scalar, 3, 1>(displacements[i]);
-        }
         const auto before = forces;
+        const auto halfway = forces_alone(displacements, Scalar(0.5)), alone = forces_alone(displacements, Scalar(1));
+        move(x, displacements, Scalar(1));
         relax(options_.steps);
-        for (std::size_t i = 0; i < 2; ++i)
-            work += static_cast<double>(dot<Scalar>((before[i] + forces[i]) / 2, displacements[i]));
+        for (std::size_t i = 0; i < 2; ++i) {
+            const auto hand = hand_work<Scalar>(displacements[i], before[i], halfway[i], alone[i], forces[i]);
+            work += hand.smooth;
+            relaxed -= hand.excess();
+        }
         update();
     }
 
-    /// Edges open, tips advance.
-    void update() { follow(tear.update(x, dt, tissue, foundation)); }
+    /// Edges open, tips advance. Vertices that a tear moves onto its path give the membrane energy, which the next step
+    /// takes.
+    void update() {
+        const double before = stored_in(tissue, x);
+        follow(tear.update(x, dt, tissue, foundation));
+        relaxed += before - stored_in(tissue, x);
+    }
 
     /// Whether the forces balance.
     [[nodiscard]] bool at_rest() const { return static_cast<double>(report.residual) < options_.tolerance; }
@@ -152,7 +160,7 @@ class TornSheet {
     [[nodiscard]] double stored() const { return stored_in(tissue, x) + tear.stored(x); }
 
     /// What the hands gave and nothing has taken [J].
-    [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped; }
+    [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped - relaxed; }
 
   private:
     static Springs springs_of(const membrane::TriangleMesh<Scalar>& mesh, const TornSheetOptions& options) {
@@ -165,9 +173,35 @@ class TornSheet {
         if (options.springs) material.young_modulus *= 1e-9;  // as good as none
         return membrane::triangular_springs(mesh, material);
     }
+    void move(membrane::Points<Scalar>& points, const std::array<Vector, 2>& displacements, Scalar part) const {
+        for (std::size_t i = 0; i < 2; ++i) {
+            for (const Index v : hands[i]) points.col(v) += Eigen::Matrix<Scalar, 3, 1>(part * displacements[i]);
+        }
+    }
+    // Of the hands, if they moved by this part and the membrane did not follow [N].
+    [[nodiscard]] std::array<Vector, 2> forces_alone(const std::array<Vector, 2>& displacements, Scalar part) const {
+        membrane::Points<Scalar> moved = x;
+        move(moved, displacements, part);
+        std::array<Vector, 2> sums{Vector::Zero(), Vector::Zero()};
+        for (std::size_t i = 0; i < 2; ++i) {
+            for (const Index v : hands[i]) sums[i] -= tissue.force_on(v, moved).force;
+        }
+        return sums;
+    }
+    // What the membrane stores, and what its opening edges store and have taken [J].
+    [[nodiscard]] double taken_up() const {
+        double sum = stored_in(tissue, x);
+        for (auto ligament : tear.ligaments().ligaments) {
+            const auto apart = membrane::point(x, ligament.vertex) - membrane::point(x, ligament.copy);
+            ligament.open(norm<Scalar>(apart));
+            sum += static_cast<double>(ligament.dissipated + ligament.stored(ligament.opening));
+        }
+        return sum;
+    }
     // Without damping only the equilibrium matters: steps extrapolate the last ones, as long as the residual force
     // decreases [Nesterov83].
     void relax(int steps) {
+        relaxed += taken_up() + damped;
         membrane::Points<Scalar> last = x;
         Scalar residual = std::numeric_limits<Scalar>::infinity();
         for (int i = 0, in_turn = 0; i < steps; ++i) {
@@ -184,6 +218,7 @@ class TornSheet {
             x += static_cast<Scalar>(in_turn / (in_turn + 3.0)) * (now - last);
             last = now;
         }
+        relaxed -= taken_up() + damped;
         for (std::size_t i = 0; i < 2; ++i) forces[i] = -report.reactions[i];
     }
     template <class... Parts>
@@ -205,6 +240,7 @@ class TornSheet {
     std::vector<Index> cut_path;
     std::array<Vector, 2> forces{};  ///< of the hands [N]
     double work = 0, damped = 0;     ///< of the hands; taken by damping [J]
+    double relaxed = 0;              ///< released by jumps, which the steps take [J]
 };
 
 }  // namespace test

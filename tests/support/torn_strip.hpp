@@ -84,7 +84,7 @@ class TornStrip : public TornSheet<Scalar, Criterion> {
 
     /// The clamps' force [N].
     [[nodiscard]] double force() const { return static_cast<double>(this->forces[1][1]); }
-    /// Energy stored and dissipated, over the work of the clamps.
+    /// Energy stored and taken, over the work of the clamps.
     [[nodiscard]] double balance() const { return 1 - this->lost() / this->work; }
     [[nodiscard]] double torn_edges() const { return this->tear.torn_length() / edge(); }
     /// Where the tip is at rest, from the end of the notch [edges].

@@ -48,7 +48,8 @@ struct TrouserRun {
     double mean = 0;                           ///< force of a hand while the tear is steady, over the expected one
     double low = 0, high = 0;                  ///< least and largest force then, over the same
     double energy = 0;                         ///< work of the hands then, over that of the closed form
-    double lost = 0;                           ///< in all, over what the hands gave
+    double relaxed = 0;                        ///< taken by the steps, over what the hands gave and legs do not store
+    double lost = 0;                           ///< taken by nothing, over the same
     double off_line = 0;                       ///< [edges]
     std::vector<std::array<double, 2>> curve;  ///< displacement of a hand [edges], force over the expected one
 };
@@ -196,7 +197,9 @@ template <membrane::Real Scalar>
     }
     result.mean = sum / (count - 1);
     result.energy = (test.sheet.work - first_work) / (2 * expected * (count - 1) * step);
-    result.lost = test.sheet.lost() / (test.sheet.work - test.sheet.stored());
+    const double given = test.sheet.work - test.sheet.stored();
+    result.relaxed = test.sheet.relaxed / given;
+    result.lost = test.sheet.lost() / given;
     return result;
 }
 
