@@ -231,7 +231,7 @@ void trouser_test(Page& page, const Effort& effort) {
     for (const double strain : {0.02, 0.05, 0.1}) {
         const bool stiff = strain == 0.02;
         const int directions = stiff ? effort.directions : std::min(effort.directions, 5);
-        double all = 0, bottom = 10, top = 0, most_relaxed = 0, most_lost = 0;
+        double all = 0, bottom = 10, top = 0, largest_relaxed = 0, largest_lost = 0;
         for (const int width : effort.widths) {
             double sum = 0, relaxed = 0, off = 0, least = 10, largest = 0, low = 10, high = 0;
             for (int i = 0; i < directions; ++i) {
@@ -239,7 +239,7 @@ void trouser_test(Page& page, const Effort& effort) {
                 const auto found = test::tear_trousers<double>(
                     {.width = width, .turn = turn * degree, .strain = strain, .steps = 20}, effort.edges);
                 sum += found.mean / directions, relaxed += found.relaxed / directions;
-                most_lost = std::max(most_lost, std::abs(found.lost));
+                largest_lost = std::max(largest_lost, std::abs(found.lost));
                 off = std::max(off, found.off_line);
                 least = std::min(least, found.mean), largest = std::max(largest, found.mean);
                 low = std::min(low, found.low), high = std::max(high, found.high);
@@ -253,7 +253,7 @@ void trouser_test(Page& page, const Effort& effort) {
             }
             page.print("| %.0f %% | %d | %d | %.3f | %.3f to %.3f | %.2f to %.2f | %.0f %% | %.2f |\n", 100 * strain,
                        width, directions, sum, least, largest, low, high, 100 * relaxed, off);
-            most_relaxed = std::max(most_relaxed, relaxed);
+            largest_relaxed = std::max(largest_relaxed, relaxed);
             all += sum / static_cast<double>(effort.widths.size());
             bottom = std::min(bottom, least), top = std::max(top, largest);
         }
@@ -261,8 +261,8 @@ void trouser_test(Page& page, const Effort& effort) {
         std::snprintf(legs, sizeof legs, "trousers whose legs stretch by %.0f %%: ", 100 * strain);
         page.add({legs + std::string("mean force, from the closed form"), percent(all), 5, "%"});
         page.add({legs + std::string("spread of all meshes and grids"), 100 * (top - bottom) / all, 10, "%"});
-        page.add({legs + std::string("energy that jumps release, of that given"), 100 * most_relaxed, none, "%"});
-        page.add({legs + std::string("energy that nothing has taken"), 100 * most_lost, 1, "%"});
+        page.add({legs + std::string("energy that jumps release, of that given"), 100 * largest_relaxed, none, "%"});
+        page.add({legs + std::string("energy that nothing has taken"), 100 * largest_lost, 1, "%"});
     }
 }
 

@@ -23,8 +23,8 @@ TEMPLATE_TEST_CASE("a 90 degree peel takes the adhesion energy per area, on thre
     }
 }
 
-// The front is not straight: its vertices let go one by one, and the flap wrinkles. As in `examples/peel`, the steps are
-// too few for an equilibrium.
+// The front is not straight: its vertices let go one by one, and the flap wrinkles. As in the example `peel`, the steps
+// are too few for an equilibrium.
 TEMPLATE_TEST_CASE("what peels a disc off is stored, taken by the peel, or released by jumps", "[cohesion][peel]",
                    double, float) {
     using S = TestType;
