@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 // Cost of a part that a scene leaves out. Each pair of functions computes the same for every vertex of a sphere: ours
 // leaves a part out by the library's means (no foundation, volume springs without damping, a law of whose result only
-// the tension is used), the other has no such part. The last one is a loop written by hand. `left_out` counts their
-// instructions; here their results must have the same bits.
+// the tension is used, a membrane that may tear and does not), the other has no such part; that of `by_hand` is a loop
+// written by hand. The last pair cuts two meshes. `left_out` counts their instructions; here their results must have
+// the same bits.
 #include <algorithm>
 #include <cmath>
 #include <concepts>
@@ -15,6 +16,9 @@
 #include <vector>
 
 #include <membrane/membrane.hpp>
+#include <membrane/model/tearable_springs.hpp>
+#include <membrane/model/tissue.hpp>
+#include <membrane/tear/tearing.hpp>
 
 namespace {
 
@@ -100,6 +104,51 @@ struct Rows {
     std::vector<S> masses;
 };
 
+using Tearable = membrane::Tissue<membrane::TearableSprings<S, membrane::LinearSpring>>;
+using Foundation = membrane::VirtualVolumeSprings<S>;
+
+Tearable tearable(const membrane::TriangleMesh<S>& mesh) {
+    return Tearable(membrane::TearableSprings(mesh, Network(mesh, {}, {.stiffness = stiffness})));
+}
+
+/// Drags a vertex aside, a tick of the solver at a time.
+template <class Springs, class... Constraints>
+void drag(Points& x, const Springs& springs, const Foundation& volume, membrane::QuasiStaticSolver<S>& solver,
+          const Constraints&... constraints) {
+    constexpr Index held = 5;
+    membrane::Vector3<S> target = membrane::point(x, held);
+    for (int tick = 0; tick < 20; ++tick) {
+        target[0] += S(1e-5);
+        if (!solver.step(x, dt, springs, volume, membrane::pull(held, target), constraints...).moved.size()) {
+            std::abort();
+        }
+    }
+}
+
+/// A membrane, all parts that follow a tear, and a path of 16 edges.
+struct Cutting {
+    explicit Cutting(Index rings)
+        : mesh(membrane::with_reserve(membrane::disc<S>({.radius = S(0.01), .rings = rings}), 40)) {
+        while (path.size() < 17) {
+            path.push_back(tear.surface().nearest_in_direction(path.back(), {1, 0, 0}));
+        }
+    }
+    membrane::TriangleMesh<S> mesh;
+    Tearable springs = tearable(mesh);
+    Foundation volume{mesh, {.stiffness = foundation}};
+    membrane::QuasiStaticSolver<S> solver{springs};
+    membrane::AabbTree<S> tree{mesh};
+    membrane::Tearing<S> tear{mesh, membrane::EnergyRelease{.toughness = 1e3, .thickness = 1e-5}};
+    Points x = mesh.positions();
+    std::vector<Index> path{0};
+};
+
+void cut(Cutting& membrane) {
+    for (const auto& event : membrane.tear.cut_along(membrane.path, membrane.x)) {
+        follow(event, membrane.springs, membrane.volume, membrane.solver, membrane.tree);
+    }
+}
+
 }  // namespace
 
 // All that is called is inlined: what is left is what the parts need, not what a compiler makes of their number.
@@ -156,6 +205,18 @@ COUNTED void by_hand_bare(const Rows& rows, S* x, const S* external, const S* co
     }
 }
 
+[[gnu::noinline]] void tear_ours(Points& x, const Tearable& springs, const Foundation& volume,
+                                 membrane::QuasiStaticSolver<S>& solver, const membrane::Tearing<S>& tear) {
+    drag(x, springs, volume, solver, tear.ligaments());
+}
+[[gnu::noinline]] void tear_bare(Points& x, const Network& springs, const Foundation& volume,
+                                 membrane::QuasiStaticSolver<S>& solver) {
+    drag(x, springs, volume, solver);
+}
+
+[[gnu::noinline]] void split_ours(Cutting& large) { cut(large); }
+[[gnu::noinline]] void split_bare(Cutting& small) { cut(small); }
+
 }  // extern "C"
 
 int main(int argc, char** argv) {
@@ -205,6 +266,24 @@ int main(int argc, char** argv) {
     const std::vector<S> no_stiffness(static_cast<std::size_t>(mesh.vertex_count()), S(0));
     compare("by_hand", visited(foundation_ours, none),
             [&](Points& x) { by_hand_bare(rows, x.data(), no_forces.data(), no_stiffness.data()); });
-    std::printf("%d vertices\n", static_cast<int>(mesh.vertex_count()));
+    const Tearable tissue = tearable(mesh);
+    const membrane::Tearing<S> tear(mesh, membrane::EnergyRelease{.toughness = 1e3, .thickness = 1e-5});
+    compare(
+        "tear",
+        [&](Points& x) {
+            membrane::QuasiStaticSolver<S> solver(tissue);
+            tear_ours(x, tissue, springs, solver, tear);
+        },
+        [&](Points& x) {
+            membrane::QuasiStaticSolver<S> solver(network);
+            tear_bare(x, network, springs, solver);
+        });
+    Cutting large(50), small(25);
+    split_ours(large);
+    split_bare(small);
+    if (large.tear.tips().size() != 2 || small.tear.tips().size() != 2) {
+        std::printf("split: not cut\n");
+        same = false;
+    }
     return same ? 0 : 1;
 }
