@@ -41,7 +41,9 @@ TEST_CASE("the search converges quadratically", "[equilibrium_solver]") {
     const Search search;
     std::vector<double> residuals;
     for (Index i = 1; i <= 20 && (residuals.empty() || residuals.back() > 1e-9); ++i) {
-        residuals.push_back(search.run({.max_iterations = i}).residual);
+        const auto found = search.run({.max_iterations = i});
+        CHECK(found.iterations <= i);
+        residuals.push_back(found.residual);
     }
     REQUIRE(residuals.size() >= 3);
     REQUIRE(residuals.size() <= 8);

@@ -168,3 +168,20 @@ TEST_CASE("in a safe part of a step no triangle reaches the axis", "[tool_points
     const Points<double> none = Points<double>::Zero(3, mesh.vertex_count());
     CHECK(collision_free_step(mesh.triangles(), mesh.positions(), none, std::array{Tool<double>{}}) == 1);
 }
+
+TEST_CASE("a step towards the axis is cut to four fifths of the distance", "[tool_points]") {
+    Points<double> x(3, 3);
+    x << 0, 1, 0,  //
+        0, 0, 1,   //
+        0, 0, 0;
+    Triangles triangles(3, 1);
+    triangles.col(0) << 0, 1, 2;
+    Points<double> step = Points<double>::Zero(3, 3);
+    step.row(2).setConstant(0.1);
+    for (int i = 1; i <= 20; ++i) {
+        const double distance = 0.01 * i;
+        CAPTURE(distance);
+        const std::array tools{Tool<double>{.position = {0.2, 0.2, distance}}};
+        CHECK(collision_free_step(triangles, x, step, tools) == Approx(std::min(1.0, 0.8 * distance / 0.1)));
+    }
+}
