@@ -316,11 +316,11 @@ TEST_CASE("A fit that was stopped early determines no constant") {
 
 TEST_CASE("A step of a fit changes no constant by more than a factor of e^2") {
     double furthest = 0;
-    const auto watched = [&](Numbers constants, Numbers at) {
+    const auto recorded = [&](Numbers constants, Numbers at) {
         furthest = std::max(furthest, std::abs(std::log(constants[0] / 0.02)));
         return proportional(constants, at);
     };
-    static_cast<void>(fit(table_of(proportional, {20}, depths(10)), {0.02}, watched, {.max_iterations = 1}));
+    static_cast<void>(fit(table_of(proportional, {20}, depths(10)), {0.02}, recorded, {.max_iterations = 1}));
     CHECK(furthest == Approx(2).epsilon(1e-3));  // and the steps of differences
 }
 

@@ -99,6 +99,21 @@ TEST_CASE("forceps that were closed before they touched hold nothing", "[grasp]"
     CHECK(grasper.update(contact, mesh.positions(), tool).holding());  // as a new one takes hold
 }
 
+// That it slips beyond what the jaws hold: solve/slipping_grasp_test.cpp.
+TEST_CASE("forceps do not slip below what the jaws hold, or if they hold nothing", "[grasp]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    Grasper<double> grasper(mesh, {.holding_force = 2.0, .jaw_length = 0.1});
+    const Tool<double> tool{.grasping = true}, moved{.position = {0.01, 0, 0}, .grasping = true};
+    CHECK_FALSE(grasper.slip(mesh.positions(), moved, {3, 0, 0}));
+    const auto grasp = grasper.update(contact_at<double>(mesh, 3, {0.2, 0.3, 0.5}), mesh.positions(), tool);
+    REQUIRE(grasp.holding());
+    CHECK_FALSE(grasper.slip(mesh.positions(), moved, {1.99, 0, 0}));
+    const auto still = grasper.update(Contact<double>::none(), mesh.positions(), tool);
+    CHECK(still.offset == grasp.offset);
+    CHECK(grasper.slip(mesh.positions(), moved, {2, 0, 0}));
+    CHECK(grasper.update(Contact<double>::none(), mesh.positions(), tool).offset != grasp.offset);
+}
+
 TEST_CASE("a contact that has ended is not held, one that begins is", "[grasp]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     for (const auto& [phase, holds] : {std::pair(ContactPhase::none, false),

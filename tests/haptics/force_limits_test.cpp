@@ -531,6 +531,18 @@ TEST_CASE("a limiter restored from a snapshot goes on with the same bits", "[lim
     }
 }
 
+TEST_CASE("a watchdog restored from a snapshot fades on from where it was", "[limits]") {
+    Watchdog watchdog(0.01, 0.1);
+    for (int i = 0; i < 50; ++i) watchdog.update(7, 1e-3);
+    std::vector<std::byte> saved(snapshot_capacity(watchdog));
+    REQUIRE(save_snapshot(saved, watchdog) > 0);
+    Watchdog other(0.01, 0.1);
+    REQUIRE(restore_snapshot(saved, other));
+    const double factor = watchdog.update(7, 1e-3);
+    CHECK(factor == Approx(1 - (0.051 - 0.01) / 0.1).margin(0.011));
+    CHECK(other.update(7, 1e-3) == factor);
+}
+
 TEST_CASE("limits that make no sense are refused by name", "[limits][bad]") {
     const auto refused = [](const LimitOptions& options) {
         return test::refusal([&] { const ForceLimiter limit(devices::touch, options); });

@@ -210,6 +210,32 @@ TEMPLATE_TEST_CASE("ticks are identical if all of their bits are", "[recording]"
     }
 }
 
+// With all parts of a loop: core/snapshot_test.cpp.
+TEST_CASE("a replay starts at the last snapshot at or before a tick, and a full recorder keeps no more",
+          "[recording]") {
+    Points<double> state = Points<double>::Zero(3, 1);
+    Recorder<double> recorder(6, 1, {.count = 2, .bytes = snapshot_capacity(state)});
+    for (int tick = 0; tick < 6; ++tick) {
+        state.setConstant(tick);
+        if (tick % 2 == 1) CHECK(recorder.add_snapshot(state) == (tick < 5));  // before ticks 1 and 3
+        recorder.add(Tool<double>{}, Vector3<double>::Zero());
+    }
+    Recorder<double> full(1, 1, {.count = 2, .bytes = snapshot_capacity(state)});
+    CHECK(full.add_snapshot(state));
+    full.add(Tool<double>{}, Vector3<double>::Zero());
+    CHECK_FALSE(full.add_snapshot(state));
+
+    ReplayDevice<double> device(recorder.recording());
+    CHECK_FALSE(device.start_from(0, state));
+    for (std::size_t tick = 1; tick < 6; ++tick) {
+        CAPTURE(tick);
+        const std::size_t expected = tick < 3 ? 1 : 3;
+        REQUIRE(device.start_from(tick, state));
+        CHECK(device.next_tick() == expected);
+        CHECK(state == Points<double>::Constant(3, 1, static_cast<double>(expected)));
+    }
+}
+
 TEST_CASE("no capacity, no tick and no vertices are refused", "[recording][bad]") {
     CHECK(test::refusal([] { Recorder<double> recorder(0, 1); }) == "Recorder: max_ticks must be positive, got 0");
     CHECK(test::refusal([] { Recorder<float> recorder(1, -1); }) ==

@@ -12,6 +12,7 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/meshes.hpp"
+#include "support/random.hpp"
 
 using namespace membrane;
 using test::Surface;
@@ -76,6 +77,64 @@ TEST_CASE("triangles meet where they cross, touch or lie on each other", "[mesh]
     CHECK(folded({0, 1, 0}));
     CHECK(!folded({0, 1, 1e-300}));
     CHECK(!folded({5, -1e-300, 0}));
+}
+
+// Oracle: of convex polygons in a plane, the line of a side separates those that do not meet. Small whole numbers are
+// exact.
+TEST_CASE("triangles in one plane meet unless the line of a side separates them", "[mesh]") {
+    int met = 0, apart = 0;
+    for (int seed = 1; seed <= cases(2000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        Surface<double> both;
+        for (int i = 0; i < 6; ++i) {
+            const double x = random.index(9), y = random.index(9);
+            both.add({x, y, 0});
+        }
+        const auto area = [&](Index a, Index b, Index c) {
+            const Eigen::Vector3d u = both.x.col(b) - both.x.col(a), v = both.x.col(c) - both.x.col(a);
+            return u[0] * v[1] - u[1] * v[0];
+        };
+        if (area(0, 1, 2) == 0 || area(3, 4, 5) == 0) continue;
+        both.add(0, 1, 2), both.add(3, 4, 5);
+        const auto separates = [&](Index first, Index others) {
+            for (Index i = 0; i < 3; ++i) {
+                const Index from = first + i, to = first + (i + 1) % 3, inside = first + (i + 2) % 3;
+                int beyond = 0;
+                for (Index k = others; k < others + 3; ++k) beyond += area(from, to, k) * area(from, to, inside) < 0;
+                if (beyond == 3) return true;
+            }
+            return false;
+        };
+        const bool expected = !separates(0, 3) && !separates(3, 0);
+        REQUIRE((meetings(both) == 1) == expected);
+        (expected ? met : apart) += 1;
+    }
+    CHECK(met > cases(200));
+    CHECK(apart > cases(200));
+}
+
+// The exact predicates without the quick test before them.
+TEST_CASE("triangles that share a corner meet where a side of one meets the other", "[mesh]") {
+    int met = 0, apart = 0;
+    for (int seed = 1; seed <= cases(20'000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        std::array<Vector3<double>, 5> p;
+        for (auto& each : p) {
+            for (const int k : {0, 1, 2}) each[k] = random.index(5);
+        }
+        const Triangle<double> s{p[0], p[1], p[2]}, t{p[0], p[3], p[4]};
+        if (area_vector(s) == Vector3<double>::Zero() || area_vector(t) == Vector3<double>::Zero()) continue;
+        Surface<double> both;
+        for (const auto& each : p) both.add(each);
+        both.add(0, 1, 2), both.add(0, 3, 4);
+        const bool expected = detail::meets(s, t.b, t.c) || detail::meets(t, s.b, s.c);
+        REQUIRE((meetings(both) == 1) == expected);
+        (expected ? met : apart) += 1;
+    }
+    CHECK(met > cases(1000));
+    CHECK(apart > cases(1000));
 }
 
 TEST_CASE("surfaces as they should be meet nowhere, however they are turned", "[mesh]") {

@@ -133,6 +133,12 @@ TEMPLATE_TEST_CASE("a spring without length does not act", "[network]", double, 
     }
 }
 
+TEST_CASE("a volume spring without constants does not act", "[network]") {
+    const VolumeSpring<double> none;
+    CHECK(none.force_on({1, 2, 3}).force == Vector3<double>::Zero());
+    CHECK(none.force_on({1, 2, 3}).stiffness == 0);
+}
+
 TEMPLATE_TEST_CASE("no volume springs, no pull", "[network]", double, float) {
     using S = TestType;
     const auto pull = NoFoundation{}.force_on<S>(3, {1, 2, 3}, {4, 5, 6}, S(0.1));
