@@ -78,6 +78,7 @@ TEMPLATE_TEST_CASE("largest curvature by hand", "[curvature]", double, float) {
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = S(2)});
     CHECK(largest_eigenvalue_at<S>(network, 0, mesh.positions()) == Approx(6));
     CHECK(network.force_on(0, mesh.positions()).stiffness == 12);
+    CHECK(stiffness_bound_of(network.majoriser(0, mesh.positions())) < 11);
     // All ends in one point: the springs have no direction, any may be the stiff one.
     const Points<S> collapsed = Points<S>::Zero(3, 7);
     CHECK(largest_eigenvalue_at<S>(network, 0, collapsed) == 12);

@@ -2,8 +2,12 @@
 #include <membrane/surface/mesh_checks.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
+
+#include <membrane/surface/triangle.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
@@ -52,6 +56,26 @@ TEST_CASE("checks go on after what they have found", "[mesh][bad]") {
         REQUIRE(good == count - some);
         REQUIRE(all.defects == std::vector<MeshDefect>(bad.size(), MeshDefect::index_out_of_range));
         for (std::size_t i = 0; i < bad.size(); ++i) REQUIRE(all.triangles[i] == std::vector<Index>{bad[i]});
+    }
+}
+
+TEMPLATE_TEST_CASE("the largest coordinates have finite squares of areas, larger ones are refused", "[mesh][bad]",
+                   double, float) {
+    using S = TestType;
+    const S most = std::sqrt(std::sqrt((std::numeric_limits<S>::max)())) / 4;
+    for (const bool is_too_large : {false, true}) {
+        const S size = is_too_large ? S(1.001) * most : most;
+        Points<S> x(3, 3);
+        x << size, -size, -size,  //
+            -size, size, -size,   //
+            -size, -size, size;
+        Collected all;
+        S largest = 0;
+        for (Index v = 0; v < 3; ++v) CHECK(detail::check_point(x, v, largest, collect(all)) != is_too_large);
+        CHECK(all.defects == std::vector(is_too_large ? 3 : 0, MeshDefect::coordinate_too_large));
+        Triangles corners(3, 1);
+        corners.col(0) << 0, 1, 2;
+        if (!is_too_large) CHECK(is_finite(squared_norm(area_vector(triangle_at(x, corners.col(0))))));
     }
 }
 
