@@ -343,6 +343,12 @@ TEMPLATE_TEST_CASE("on a grid, hits are exactly those of integer arithmetic", "[
         const auto hit = first_hit<S>(triangle, from.template cast<S>(), to.template cast<S>());
         const bool expected = test::meet(t, from, to);
         if (hit.has_value() != expected) FAIL_CHECK("seed " << seed << ": expected " << expected);
+        constexpr int binary_places = std::is_same_v<S, double> ? 40 : 20;
+        for (const S scale : {std::ldexp(S(1), -binary_places), std::ldexp(S(1), binary_places)}) {  // exact
+            const Triangle<S> scaled{scale * triangle.a, scale * triangle.b, scale * triangle.c};
+            const Vector3<S> start = scale * from.template cast<S>(), end = scale * to.template cast<S>();
+            if (first_hit<S>(scaled, start, end).has_value() != expected) FAIL_CHECK("seed " << seed << ", " << scale);
+        }
         if (!hit || !expected) continue;
         ++hits;
         const Vector3<S> at = from.template cast<S>() + hit->fraction * (to - from).template cast<S>();
