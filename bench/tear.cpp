@@ -103,7 +103,7 @@ void shear(Page& page, const Effort& effort) {
     page.print(
         "\n### A strip in pure shear\n\n| edges over the height | vertices | driving force over the closed form, three "
         "notches | begins at, over the right stretch | off the line [edges] | energy the tear took, over toughness x "
-        "area | energy that jumps release, of that given |\n|---|---|---|---|---|---|---|\n");
+        "area | energy that steps take, of that given |\n|---|---|---|---|---|---|---|\n");
     double force = 0, begins = 0, off = 0, relaxed = 0, lost = 0;
     for (const int rows : effort.rows) {
         page.print("| %d | ", rows);
@@ -126,8 +126,8 @@ void shear(Page& page, const Effort& effort) {
     page.add({"pure shear: driving force, from the closed form", force, 5, "%"});
     page.add({"pure shear: stretch at which it begins, from the right one", begins, 3, "%"});
     page.add({"pure shear: distance from a straight line", off, 0.7, "edges"});
-    page.add({"pure shear, without damping: energy that jumps release, of that given", relaxed, none, "%"});
-    page.add({"pure shear, without damping: energy that nothing has taken", lost, 1, "%"});
+    page.add({"pure shear, without damping: energy that steps take, of that given", relaxed, none, "%"});
+    page.add({"pure shear, without damping: energy in no account", lost, 1, "%"});
 }
 
 // Damping, which also takes energy. Ticks resolve the opening of an edge if damping / dt is above the stiffness of the
@@ -135,7 +135,7 @@ void shear(Page& page, const Effort& effort) {
 void damping(Page& page, const Effort& effort) {
     page.print(
         "\n### The same with damping\n\n| edges over the height | taken by the tear, of the energy given | by damping "
-        "| released by jumps |\n|---|---|---|---|\n");
+        "| by the steps |\n|---|---|---|---|\n");
     double relaxed = 0, lost = 0;
     for (const int rows : effort.rows) {
         Strip strip = long_strip(rows, effort.edges / 2);
@@ -146,8 +146,8 @@ void damping(Page& page, const Effort& effort) {
         page.print("| %d | %.1f %% | %.1f %% | %.1f %% |\n", rows, 100 * found.dissipated / found.given,
                    100 * found.damped / found.given, 100 * found.relaxed / found.given);
     }
-    page.add({"pure shear with damping: energy that jumps release, of that given", relaxed, none, "%"});
-    page.add({"pure shear with damping: energy that nothing has taken", lost, 1, "%"});
+    page.add({"pure shear with damping: energy that steps take, of that given", relaxed, 1, "%"});
+    page.add({"pure shear with damping: energy in no account", lost, 1, "%"});
 }
 
 void grids(Page& page, const Effort& effort) {
@@ -224,7 +224,7 @@ void criteria(Page& page, const Effort& effort) {
 void trouser_test(Page& page, const Effort& effort) {
     page.print(
         "\n### Trousers\n\n| strain of the legs | edges over the width of a leg | directions | force over the closed "
-        "form: mean | least and largest mean of a grid | least and largest of any tick | energy that jumps release "
+        "form: mean | least and largest mean of a grid | least and largest of any tick | energy that steps take "
         "| off the line [edges] |\n|---|---|---|---|---|---|---|---|\n");
     auto curves = page.table("trousers", "width\tturn\tdrawn\tforce");
     auto means = page.table("trouser_means", "width\tturn\tmean\tlow\thigh");
@@ -261,8 +261,8 @@ void trouser_test(Page& page, const Effort& effort) {
         std::snprintf(legs, sizeof legs, "trousers whose legs stretch by %.0f %%: ", 100 * strain);
         page.add({legs + std::string("mean force, from the closed form"), percent(all), 5, "%"});
         page.add({legs + std::string("spread of all meshes and grids"), 100 * (top - bottom) / all, 10, "%"});
-        page.add({legs + std::string("energy that jumps release, of that given"), 100 * largest_relaxed, none, "%"});
-        page.add({legs + std::string("energy that nothing has taken"), 100 * largest_lost, 1, "%"});
+        page.add({legs + std::string("energy that steps take, of that given"), 100 * largest_relaxed, 1, "%"});
+        page.add({legs + std::string("energy in no account"), 100 * largest_lost, 1, "%"});
     }
 }
 
@@ -292,7 +292,7 @@ void centre(Page& page, const Effort& effort) {
     page.add({"cut in a sheet: driving force, from the cut", angle, 3, "degrees"});
     page.add({"cut in a sheet: driving forces of both ends, difference", 100 * unlike, 5, "%"});
     page.add({"cut in a sheet: distance from a straight line", off, 0.7, "edges"});
-    page.add({"cut in a sheet: energy that nothing has taken, of that released", 100 * lost, 1, "%"});
+    page.add({"cut in a sheet: energy in no account, of that released", 100 * lost, 1, "%"});
 }
 
 void peel(Page& page, const Effort&) {

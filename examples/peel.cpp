@@ -42,8 +42,8 @@ std::vector<Curve> show(const PeelScene& scene, const std::filesystem::path& fol
                 1e3 * peeled.peak, 1e3 * peeled.mean());
     if (scene.width) std::printf(", %.3f of the closed form", peeled.of_closed_form(peel_energy));
     std::printf(
-        "; %.3g mm^2 have let go\n  the hand's work %.3g nJ = %.3g stored + %.3g dissipated + %.1f %% released by "
-        "jumps; %.0f us for a tick\n",
+        "; %.3g mm^2 have let go\n  the hand's work %.3g nJ = %.3g stored + %.3g dissipated + %.1f %% taken by the "
+        "steps; %.0f us for a tick\n",
         1e6 * peeled.area, 1e9 * peeled.work, 1e9 * peeled.stored, 1e9 * peeled.dissipated,
         100 * (1 - (peeled.stored + peeled.dissipated) / peeled.work),
         1e6 * peeled.seconds / static_cast<double>(peeled.force.size()));

@@ -37,7 +37,7 @@ struct ShearRun {
     double off_line = 0;                      ///< largest distance from the line of the notch [edges]
     double torn = 0;                          ///< [m]
     double given = 0, dissipated = 0;         ///< by the clamps and the strip; taken by the tear [J]
-    double damped = 0, relaxed = 0;           ///< by damping; by the steps, where the strip jumps [J]
+    double damped = 0, relaxed = 0;           ///< by damping; by the steps [J]
     double lost = 0;                          ///< by nothing [J]
     std::vector<std::array<double, 2>> path;  ///< of the tip, from the notch on [edges]
 };

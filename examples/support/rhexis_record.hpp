@@ -128,9 +128,10 @@ inline void print(const RhexisScene& scene, const Opened& opened, double resista
     std::printf("  force: RMS %.3g mN (surgeons: expert 8.97, novice 17.16), peak %.3g mN, %.0f degrees off the tear\n",
                 1e3 * opened.rms(), 1e3 * opened.peak(), 180 / std::numbers::pi * opened.angle());
     std::printf("  the tear took %.3f of toughness * thickness * length\n", opened.torn / (resistance * opened.length));
-    std::printf("  the hand's work %.3g uJ = %.3g stored + %.3g torn + %.3g as the forceps opened + %.1f %% by jumps\n",
-                1e6 * opened.work, 1e6 * opened.stored, 1e6 * opened.torn, 1e6 * opened.let_go,
-                100 * (1 - (opened.stored + opened.torn + opened.let_go) / opened.work));
+    std::printf(
+        "  the hand's work %.3g uJ = %.3g stored + %.3g torn + %.3g as the forceps opened + %.1f %% by the steps\n",
+        1e6 * opened.work, 1e6 * opened.stored, 1e6 * opened.torn, 1e6 * opened.let_go,
+        100 * (1 - (opened.stored + opened.torn + opened.let_go) / opened.work));
 }
 
 /// The pictures side by side.

@@ -2,8 +2,8 @@
 // Cost of a part that a scene leaves out. Each pair of functions computes the same for every vertex of a sphere: ours
 // leaves a part out by the library's means (no foundation, volume springs without damping, a law of whose result only
 // the tension is used, a membrane that may tear and does not), the other has no such part; that of `by_hand` is a loop
-// written by hand. The last pair cuts two meshes. `left_out` counts their instructions; here their results must have
-// the same bits.
+// written by hand. Their results must have the same bits. The last pair cuts two meshes, of which one has four times as
+// many vertices. `left_out` counts their instructions.
 #include <algorithm>
 #include <cmath>
 #include <concepts>
@@ -125,7 +125,7 @@ void drag(Points& x, const Springs& springs, const Foundation& volume, membrane:
     }
 }
 
-/// A membrane, all parts that follow a tear, and a path of 16 edges.
+/// A membrane, parts that follow a tear, and a path of 16 edges.
 struct Cutting {
     explicit Cutting(Index rings)
         : mesh(membrane::with_reserve(membrane::disc<S>({.radius = S(0.01), .rings = rings}), 40)) {
@@ -138,6 +138,8 @@ struct Cutting {
     Foundation volume{mesh, {.stiffness = foundation}};
     membrane::QuasiStaticSolver<S> solver{springs};
     membrane::AabbTree<S> tree{mesh};
+    membrane::ContactTracker<S> tracker{mesh};
+    membrane::VertexNormals<S> normals{mesh};
     membrane::Tearing<S> tear{mesh, membrane::EnergyRelease{.toughness = 1e3, .thickness = 1e-5}};
     Points x = mesh.positions();
     std::vector<Index> path{0};
@@ -145,7 +147,8 @@ struct Cutting {
 
 void cut(Cutting& membrane) {
     for (const auto& event : membrane.tear.cut_along(membrane.path, membrane.x)) {
-        follow(event, membrane.springs, membrane.volume, membrane.solver, membrane.tree);
+        follow(event, membrane.springs, membrane.volume, membrane.solver, membrane.tree, membrane.tracker,
+               membrane.normals);
     }
 }
 
@@ -278,12 +281,14 @@ int main(int argc, char** argv) {
             membrane::QuasiStaticSolver<S> solver(network);
             tear_bare(x, network, springs, solver);
         });
-    Cutting large(50), small(25);
-    split_ours(large);
-    split_bare(small);
-    if (large.tear.tips().size() != 2 || small.tear.tips().size() != 2) {
-        std::printf("split: not cut\n");
-        same = false;
+    if (argc < 2 || std::strcmp(argv[1], "split") == 0) {
+        Cutting large(50), small(25);
+        split_ours(large);
+        split_bare(small);
+        if (large.tear.tips().size() != 2 || small.tear.tips().size() != 2) {
+            std::printf("split: not cut\n");
+            same = false;
+        }
     }
     return same ? 0 : 1;
 }

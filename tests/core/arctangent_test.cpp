@@ -33,6 +33,11 @@ TEMPLATE_TEST_CASE("the angle is that of the standard library", "[arctangent]", 
     CHECK(arctangent(S(0), S(-1)) == pi);
     CHECK(arctangent(S(-1), S(0)) == -pi / 2);
     CHECK(arctangent(S(1), S(1)) == pi / 4);
+    for (const S large : {std::numeric_limits<S>::max() / 2, std::numeric_limits<S>::max()}) {
+        CHECK(arctangent(large, large) == pi / 4);
+        CHECK(arctangent(large, -large) == Approx(3 * pi / 4));
+        CHECK(arctangent(-large, large) == -pi / 4);
+    }
     CHECK(std::isnan(arctangent(std::numeric_limits<S>::quiet_NaN(), S(1))));
     CHECK(std::isnan(arctangent(S(1), std::numeric_limits<S>::quiet_NaN())));
 }

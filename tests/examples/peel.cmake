@@ -1,15 +1,15 @@
-# cmake -D program=FILE -D folder=DIR -P peel.cmake: the strip takes the force of the closed form, jumps release little
+# cmake -D program=FILE -D folder=DIR -P peel.cmake: the strip takes the force of the closed form, the steps take little
 # energy, and the pictures are small and whole.
 file(REMOVE_RECURSE ${folder})
 execute_process(COMMAND ${program} --out ${folder} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
 if(NOT code EQUAL 0 OR NOT error STREQUAL "")
     message(FATAL_ERROR "expected exit code 0 and no error, got ${code}:\n${error}")
 endif()
-if(NOT output MATCHES "strip, [^;]*, ([0-9.]+) of the closed form; [^%]* (-?[0-9.]+) % released by jumps")
+if(NOT output MATCHES "strip, [^;]*, ([0-9.]+) of the closed form; [^%]* (-?[0-9.]+) % taken by the steps")
     message(FATAL_ERROR "expected the force and the energies of a strip:\n${output}")
 endif()
 if(CMAKE_MATCH_1 LESS 0.95 OR CMAKE_MATCH_1 GREATER 1.05 OR CMAKE_MATCH_2 LESS -1 OR CMAKE_MATCH_2 GREATER 5)
-    message(FATAL_ERROR "expected the closed form, and at most 5 % released by jumps:\n${output}")
+    message(FATAL_ERROR "expected the closed form, and at most 5 % taken by the steps:\n${output}")
 endif()
 
 foreach(scene IN ITEMS strip circle)

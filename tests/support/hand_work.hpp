@@ -4,18 +4,18 @@
 #include <membrane/core/types.hpp>
 #include <membrane/core/vector3.hpp>
 
-/// The work of a hand that displaces vertices, and what of it a jump of the membrane has not released.
+/// The work of a hand that displaces vertices, for the balance of energies.
 ///
 ///     const auto work = test::hand_work(displacement, before, halfway, alone, after);
 ///     given += work.smooth;
-///     released += energy_before_the_steps - energy_after_them - work.excess();
+///     relaxed += energy_before_the_steps - energy_after_them - work.excess();
 namespace test {
 
-/// Of one displacement. First the vertices move alone, then steps move the membrane to its equilibrium: they take the
-/// energy that a jump releases, and what a hand gives too much because the membrane has not followed it.
+/// Of one displacement. The vertices move first, then steps move the membrane to its equilibrium and take energy. The
+/// excess of the work is not energy that a jump of the membrane releases: it vanishes with the displacement.
 struct HandWork {
-    double smooth = 0;  ///< where the membrane follows all the time: trapezoidal rule [J]
-    double alone = 0;   ///< where it does not: Simpson's rule [J]
+    double smooth = 0;  ///< if the membrane follows all the time: trapezoidal rule [J]
+    double alone = 0;   ///< if it follows only after the displacement: Simpson's rule [J]
 
     [[nodiscard]] double excess() const { return alone - smooth; }
 };

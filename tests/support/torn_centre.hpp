@@ -78,6 +78,7 @@ template <membrane::Real Scalar>
     const std::array<Vector, 2> start{tip(0), tip(1)};
     while (tear.torn_length() < 2 * edges * scene.edge()) {
         torn.tick({membrane::Vector3<Scalar>::Zero(), membrane::Vector3<Scalar>::Zero()});
+        result.lost = torn.lost() / (torn.work - torn.stored());
         if (tear.tips().size() < 2) return result;
         for (std::size_t i = 0; i < 2; ++i) {
             const Vector off = (1 / scene.edge()) * (tip(i) - start[i]);
@@ -85,7 +86,6 @@ template <membrane::Real Scalar>
             result.advances[i] = norm(off);
         }
     }
-    result.lost = torn.lost() / (torn.work - torn.stored());
     return result;
 }
 

@@ -159,7 +159,8 @@ class TornSheet {
     /// In the membrane and in opening edges [J].
     [[nodiscard]] double stored() const { return stored_in(tissue, x) + tear.stored(x); }
 
-    /// What the hands gave and nothing has taken [J].
+    /// What the hands gave and nothing has taken [J]. `relaxed` makes the balance close, whatever the solver does, if the
+    /// forces on the hands belong to the energies and the tear loses none.
     [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped - relaxed; }
 
   private:
@@ -240,7 +241,7 @@ class TornSheet {
     std::vector<Index> cut_path;
     std::array<Vector, 2> forces{};  ///< of the hands [N]
     double work = 0, damped = 0;     ///< of the hands; taken by damping [J]
-    double relaxed = 0;              ///< released by jumps, which the steps take [J]
+    double relaxed = 0;              ///< taken by the steps: in jumps, or by what they leave unbalanced [J]
 };
 
 }  // namespace test

@@ -48,7 +48,7 @@ struct TrouserRun {
     double mean = 0;                           ///< force of a hand while the tear is steady, over the expected one
     double low = 0, high = 0;                  ///< least and largest force then, over the same
     double energy = 0;                         ///< work of the hands then, over that of the closed form
-    double relaxed = 0;                        ///< taken by the steps, over what the hands gave and legs do not store
+    double relaxed = 0;                        ///< taken by the steps, over what the hands gave and is not stored
     double lost = 0;                           ///< taken by nothing, over the same
     double off_line = 0;                       ///< [edges]
     std::vector<std::array<double, 2>> curve;  ///< displacement of a hand [edges], force over the expected one

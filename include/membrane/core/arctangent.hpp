@@ -43,9 +43,9 @@ template <Number N>
 
 }  // namespace detail
 
-/// `std::atan2(y, x)` [rad], to four epsilons; zero at the origin, NaN unless both are finite. It has the same bits on
-/// every machine, which the standard library does not promise: by sums, products, one division and comparisons. Faster
-/// if all angles are below pi / 8.
+/// `std::atan2(y, x)` [rad], to four epsilons for numbers up to half of the largest one; zero at the origin, NaN unless
+/// both are finite. It has the same bits on every machine, which the standard library does not promise: by sums,
+/// products, one division and comparisons. Faster if all angles are below pi / 8.
 template <Number N>
 [[nodiscard]] MEMBRANE_INLINE N arctangent(const N& y, const N& x) noexcept {
     using std::abs;
@@ -65,7 +65,7 @@ template <Number N>
     const N in_eighth = select<N>(beyond, pi / 4 + small, small);
     const N in_quarter = select<N>(across > along, pi / 2 - in_eighth, in_eighth);
     const N in_half = select<N>(x < 0, pi - in_quarter, in_quarter);
-    return select<N>(y < 0, -in_half, in_half) + 0 * (x + y);  // comparisons alone would lose a NaN
+    return select<N>(y < 0, -in_half, in_half) + (0 * x + 0 * y);  // comparisons alone would lose a NaN
 }
 
 }  // namespace membrane
