@@ -159,7 +159,7 @@ class TornSheet {
     /// In the membrane and in opening edges [J].
     [[nodiscard]] double stored() const { return stored_in(tissue, x) + tear.stored(x); }
 
-    /// What the hands gave and nothing has taken [J]. `relaxed` makes the balance close, whatever the solver does, if the
+    /// What the hands gave and nothing has taken [J]. `relaxed` closes the balance, whatever the solver does, if the
     /// forces on the hands belong to the energies and the tear loses none.
     [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped - relaxed; }
 
