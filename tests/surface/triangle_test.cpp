@@ -483,6 +483,21 @@ TEMPLATE_TEST_CASE("a box touches what its sides leave something of, whatever th
     }
 }
 
+TEMPLATE_TEST_CASE("a fraction of any two numbers is clamped to 0 and 1", "[triangle][bad]", float, double) {
+    using S = TestType;
+    using membrane::detail::fraction;
+    constexpr S infinity = std::numeric_limits<S>::infinity(), nan = std::numeric_limits<S>::quiet_NaN();
+    CHECK(fraction<S>(1, 4) == S(0.25));
+    for (const S whole : {S(0), S(1), infinity, nan}) {
+        CHECK(fraction<S>(infinity, whole) == 1);
+        CHECK(fraction<S>(0, whole) == 0);
+        CHECK(fraction<S>(-1, whole) == 0);
+        CHECK(fraction<S>(nan, whole) == 0);
+    }
+    CHECK(fraction<S>(2, 1) == 1);
+    CHECK(fraction<S>(1, infinity) == 0);
+}
+
 TEMPLATE_TEST_CASE("no finite number gives a NaN, and no number a crash", "[triangle][bad]", float, double) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
