@@ -119,9 +119,8 @@ void drag(Points& x, const Springs& springs, const Foundation& volume, membrane:
     membrane::Vector3<S> target = membrane::point(x, held);
     for (int tick = 0; tick < 20; ++tick) {
         target[0] += S(1e-5);
-        if (!solver.step(x, dt, springs, volume, membrane::pull(held, target), constraints...).moved.size()) {
-            std::abort();
-        }
+        const auto report = solver.step(x, dt, springs, volume, membrane::pull(held, target), constraints...);
+        if (report.moved.empty()) std::abort();
     }
 }
 

@@ -78,14 +78,14 @@ template <membrane::Real Scalar>
     const std::array<Vector, 2> start{tip(0), tip(1)};
     while (tear.torn_length() < 2 * edges * scene.edge()) {
         torn.tick({membrane::Vector3<Scalar>::Zero(), membrane::Vector3<Scalar>::Zero()});
-        result.lost = torn.lost() / (torn.work - torn.stored());
-        if (tear.tips().size() < 2) return result;
+        if (tear.tips().size() < 2) break;
         for (std::size_t i = 0; i < 2; ++i) {
             const Vector off = (1 / scene.edge()) * (tip(i) - start[i]);
             result.off_line = std::max(result.off_line, std::abs(dot(off, aside)));
             result.advances[i] = norm(off);
         }
     }
+    result.lost = torn.lost() / (torn.work - torn.stored());
     return result;
 }
 
