@@ -168,6 +168,42 @@ TEST_CASE("edges follow a length that depends on the place", "[remesh]") {
     }
 }
 
+TEST_CASE("edges become short where they are to be within three iterations, though most other vertices are removed",
+          "[remesh]") {
+    const LevelSurface surface(Ball{}, around);
+    const auto start = icosphere({.radius = 1, .subdivisions = 4});
+    for (const double slope : {0.3, 0.5}) {
+        CAPTURE(slope);
+        const auto wanted = [&](const Point& p) { return 0.01 + slope * (1 - p.z()); };
+        const auto mesh = remesh(start, surface, EdgeLength(wanted), 3);
+        const Adjacency adjacency(mesh);
+        for (const auto& [first, second] : adjacency.edges()) {
+            const Point p = point(mesh.positions(), first), q = point(mesh.positions(), second);
+            const double ratio = norm<double>(p - q) / wanted((p + q) / 2);
+            REQUIRE(ratio > 0.5);
+            REQUIRE(ratio < 2);
+        }
+    }
+}
+
+TEST_CASE("the result for a scaled mesh and length is the scaled result", "[remesh]") {
+    for (int seed = 1; seed <= cases(5, 100); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto flat = sheet({.width = 1, .height = 1, .columns = 8, .rows = 8});
+        Points<double> x = test::jittered(flat.positions(), 0.04, random);
+        x.row(2).setZero();
+        const auto mesh = remesh(TriangleMesh<double>(x, flat.triangles()), FacingUp{}, 0.1, 6);
+        REQUIRE(mesh.triangles().cols() > flat.triangles().cols());
+        for (const double scale : {0x1p-20, 0x1p20}) {  // products with powers of two are exact
+            CAPTURE(scale);
+            const auto scaled = remesh(TriangleMesh<double>(scale * x, flat.triangles()), FacingUp{}, 0.1 * scale, 6);
+            REQUIRE(scaled.triangles() == mesh.triangles());
+            REQUIRE(scaled.positions() == scale * mesh.positions());
+        }
+    }
+}
+
 TEST_CASE("progress is reported after each iteration, of as many vertices as there are", "[remesh]") {
     const LevelSurface surface(Ball{}, around);
     std::vector<RemeshProgress> reported;
