@@ -310,6 +310,44 @@ TEST_CASE("an open sheet is touched from either side, and the side of first cont
     }
 }
 
+TEMPLATE_TEST_CASE("a shaft across a valley of a sheet, one end beyond the border, is behind it by its other end", "",
+                   double, float) {
+    using S = TestType;
+    const auto mesh = membrane::sheet<S>({.width = 1, .height = 1, .columns = 10, .rows = 10});
+    for (const S side : {S(1), S(-1)}) {
+        for (const S border : {S(-1), S(1)}) {
+            for (const S across : {S(-0.33), S(-0.21), S(0.02), S(0.27)}) {
+                for (const bool inner_first : {true, false}) {
+                    CAPTURE(side, border, across, inner_first);
+                    const auto at = [&](S from_border, S height) {
+                        return Vector3<S>(across, border * (S(0.5) - from_border), side * height);
+                    };
+                    const Vector3<S> inner = at(S(0.8), S(0.015)), outer = at(S(-0.06), S(0.016));
+                    const Tool<S> tool{.position = inner_first ? inner : outer,
+                                       .axis = inner_first ? outer - inner : inner - outer,
+                                       .radius = S(0.02)};
+                    AabbTree<S> tree(mesh);
+                    ContactTracker<S> tracker(mesh);
+                    Points<S> x = mesh.positions();
+                    REQUIRE(tracker.update(tree, x, tool).side == side);  // it lies on the flat sheet
+                    for (Eigen::Index v = 0; v < x.cols(); ++v) {         // highest at the border and at the inner end
+                        const S from_border = S(0.5) - border * x(1, v);
+                        x(2, v) = side * S(0.06) * std::cos(2 * std::numbers::pi_v<S> * from_border / S(0.8));
+                    }
+                    tree.refit(x);
+                    const auto contact = tracker.update(tree, x, tool);
+                    REQUIRE(contact.phase == ContactPhase::ongoing);
+                    CHECK(contact.tunnelled);
+                    CHECK(contact.side == side);
+                    CHECK(membrane::norm<S>(contact.axis_point - inner) < S(1e-6));
+                    const auto nearest = tree.closest_point(x, inner);
+                    CHECK(contact.gap < S(1e-5) - std::sqrt(nearest.squared_distance) - tool.radius);
+                }
+            }
+        }
+    }
+}
+
 TEST_CASE("a tool that flies through in one tick touches where it went through") {
     const auto mesh = membrane::sheet<double>({.width = 1, .height = 1, .columns = 10, .rows = 10});
     const AabbTree<double> tree(mesh);
