@@ -9,6 +9,8 @@
 
 #include <malloc.h>
 
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/core/thread_pool.hpp>
 #include <membrane/model/bending.hpp>
 #include <membrane/model/foundation_layer.hpp>
@@ -18,6 +20,7 @@
 #include <membrane/model/triangular_springs.hpp>
 #include <membrane/solve/constraints.hpp>
 #include <membrane/solve/quasi_static.hpp>
+#include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
@@ -216,6 +219,46 @@ TEMPLATE_TEST_CASE("a tissue updated in lanes ends in the bits of updates one by
                    double) {
     SECTION("block") { check_same_tissue<TestType>(BlockStep{}); }
     SECTION("block, over-relaxed") { check_same_tissue<TestType>(BlockStep{.omega = 1.7}); }
+}
+
+TEMPLATE_TEST_CASE(
+    "a tool on vertices that a constraint fixes meets the same resistance if these are in packs, to the bit",
+    "[packed]", float, double) {
+    using S = TestType;
+    int pressed = 0;
+    for (int seed = 1; seed <= cases(60); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = sheet<S>({.width = 1, .height = 1, .columns = 8, .rows = 8});
+        std::vector<Index> fixed;  // of pinned ones none would be in packs
+        for (Index v = 0; v < mesh.vertex_count(); ++v) {
+            if (random.chance(0.5)) fixed.push_back(v);
+        }
+        const MassSpringNetwork<S, LinearSpring> network(mesh, {}, {.stiffness = S(10)});
+        const VirtualVolumeSprings<S> foundation(mesh, {.stiffness = S(1)});
+        SolverOptions<S> options{.layers = 2, .force_tolerance = random.number(S(0), S(0.05))};
+        QuasiStaticSolver<S> in_packs(network, options);
+        options.max_packed_vertices = 0;
+        QuasiStaticSolver<S> one_by_one(network, options);
+        Points<S> x = mesh.positions(), y = x;
+        AabbTree<S> tree(mesh);
+        ContactTracker<S> tracker(mesh);
+        Tool<S> tool{.position = {random.number(S(-0.4), S(0.4)), random.number(S(-0.4), S(0.4)), S(0.1)},
+                     .radius = S(0.1)};
+        for (int tick = 0; tick < 8; ++tick) {
+            tool.position[2] -= random.number(S(0), S(0.005));
+            const auto contact = tracker.update(tree, x, tool);
+            const auto report = in_packs.step(x, S(1e-3), network, foundation, pin(fixed), press(tool, contact));
+            const auto other = one_by_one.step(y, S(1e-3), network, foundation, pin(fixed), press(tool, contact));
+            REQUIRE(report.status == StepStatus::advanced);
+            REQUIRE(other.status == StepStatus::advanced);
+            REQUIRE(same_bits(x, y));
+            REQUIRE(report.total_reaction() == other.total_reaction());
+            if (norm(report.total_reaction()) > 0) ++pressed;
+            tree.refit(x, report.moved);
+        }
+    }
+    CHECK(pressed > 0);
 }
 
 TEMPLATE_TEST_CASE("it is all the same in what order an executor does its tasks, or in how many threads", "[packed]",
