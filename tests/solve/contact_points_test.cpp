@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "support/cases.hpp"
@@ -123,6 +124,33 @@ TEMPLATE_TEST_CASE("located points are the nearest ones of their features", "[co
             REQUIRE(norm<S>(weights - nearest->barycentric) <= slack);
             REQUIRE(std::abs(norm(normal) - 1) <= slack);
             REQUIRE(norm<S>(pack.distance[i] * normal - nearest->separation) <= slack);
+        });
+    }
+}
+
+TEMPLATE_TEST_CASE("on a triangle too thin for its normal to be known a point is off by at most its thickness",
+                   "[contact]", float, double) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        Patch<S> patch(random, 1, random_tool<S>(random, false));
+        const Vector3<S> a = random.vector<S>(), along = random.unit_vector<S>();
+        const Vector3<S> aside = cross(along, random.unit_vector<S>()).normalized();
+        const S thickness = std::pow(std::numeric_limits<S>::epsilon(), random.number(S(0.65), S(0.95)));
+        const S apex = random.number(S(0.2), S(0.8)), distance = random.number(S(0), S(10)) * thickness;
+        const S slack = thickness + 64 * std::numeric_limits<S>::epsilon();
+        patch.state.set_position(0, a);
+        patch.state.set_position(1, a + along);
+        patch.state.set_position(2, a + apex * along + thickness * aside);
+        const Vector3<S> over = Vector3<S>::Constant(S(0.2)) + S(0.4) * random.barycentric<S>();
+        patch.tool.position = point_at(patch.triangle(0), over) + distance * cross(along, aside);
+        for_each_located(patch, [&](const auto& pack, std::size_t i, const auto& point, const auto&) {
+            Vector3<S> weights;
+            for (Eigen::Index k = 0; k < 3; ++k) weights[k] = pack.load.weights[k][i];
+            const Vector3<S> located = point_at(patch.triangle(point.triangle), weights);
+            REQUIRE(std::abs(norm<S>(located - patch.tool.position) - distance) <= slack);
+            REQUIRE(std::abs(std::abs(pack.distance[i]) - distance) <= slack);
         });
     }
 }
