@@ -283,6 +283,27 @@ TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals",
     }
 }
 
+TEMPLATE_TEST_CASE("beside a fixed corner that has no stiffness yet the free ones are pushed out as far as any",
+                   "[contact]", float, double) {
+    using S = TestType;
+    for (int seed = 1; seed <= cases(200); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const Tool<S> tool = random_tool<S>(random, false);
+        Patch<S> patch(random, 1, tool);
+        REQUIRE(patch.points.size() == 1);
+        Patch<S> free = patch;
+        auto& point = patch.points.front();
+        point.on_fixed = true;
+        patch.state.packs.clear();
+        patch.state.packs.append(std::span<const ContactPoint<S>>(patch.points), 0, [](Index v) { return v == 0; });
+        REQUIRE(push_out<S>(patch.state, patch.shape(), patch.state.packs.items()) ==
+                push_out<S>(free.state, free.shape(), free.state.packs.items()));
+        REQUIRE(patch.state.position_of(0) == Vector3<S>(patch.x.col(0)));
+        for (const Index v : {1, 2}) REQUIRE(patch.state.position_of(v) == free.state.position_of(v));
+    }
+}
+
 TEST_CASE("the largest move is that of the vertex that has moved farthest from where it was kept", "[contact]") {
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
