@@ -13,21 +13,21 @@
 #include "support/specimen.hpp"
 
 using namespace examples;
-using membrane::Index;
 
-Opened open(const RhexisScene& scene, double toughness, double lift, Index sweeps) {
-    Capsulorhexis operation(scene, toughness, sweeps);  // its loop: support/capsulorhexis.hpp
+Opened open(const RhexisScene& scene, double toughness, double lift, const LoopOptions& options) {
+    Capsulorhexis operation(scene, toughness, options);  // its loop: support/capsulorhexis.hpp
     const auto& tear = operation.tear();
     if (tear.tips().size() < 2) membrane::refuse("capsulorhexis", "the mesh must be fine enough for a cut");
 
     Forceps forceps(scene, lift);
     Opened result;
-    while (result.ticks < 30'000 && !is_round(tear)) {
+    Vector felt = Vector::Zero();
+    while (result.ticks * options.tick < 30 && !is_round(tear)) {
         const auto start = std::chrono::steady_clock::now();
-        forceps.guide(tear, operation.x(), Capsulorhexis::tick);
-        const auto report = operation.step(forceps.hold(tear));
+        forceps.guide(tear, operation.x(), options.tick, felt.norm());
+        felt = operation.step(forceps.hold(tear)).reactions[0];
         result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-        result.add(scene, operation, forceps, report.reactions[0]);
+        result.add(scene, operation, forceps, felt);
     }
     operation.run_to_equilibrium();
     result.states.push_back(picture_of(scene, operation, forceps, Vector::Zero()));
@@ -40,17 +40,17 @@ int main(int argc, char** argv) {
     MeshOptions other;
     double toughness = capsule_toughness;
     double lift = capsule_lift;
-    Index sweeps = 4;
+    LoopOptions options{.sweeps = 4};
     CommandLine command("Tears a round opening into the lens capsule, and draws its tension.");
     other.add_to(command);
     command.add("--out", folder, "folder for pictures");
     command.add("--toughness", toughness, "energy that the tear takes [J/m^2]");
     command.add_within("--lift", lift, 0, 80, "angle of the pull over the surface [degrees]");
-    command.add("--sweeps", sweeps, "passes over the vertices in each step");
+    options.add_to(command);
     return command.run(argc, argv, [&] {
         const auto scene = other.file.empty() ? lens_front() : rhexis_scene(other.specimen(stock_sphere()));
         std::filesystem::create_directories(folder);
-        const Opened opened = open(scene, toughness, lift * std::numbers::pi / 180, sweeps);
+        const Opened opened = open(scene, toughness, lift * std::numbers::pi / 180, options);
         print(scene, opened, toughness * capsule.thickness);
         save(folder / "capsulorhexis.svg", drawn(rhexis_figure(scene, opened.states)));
         std::puts(plot(folder / "capsulorhexis_force", {opened.force}, "capsulorhexis").c_str());

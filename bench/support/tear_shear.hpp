@@ -37,7 +37,7 @@ struct ShearRun {
     double off_line = 0;                      ///< largest distance from the line of the notch [edges]
     double torn = 0;                          ///< [m]
     double given = 0, dissipated = 0;         ///< by the clamps and the strip; taken by the tear [J]
-    double damped = 0, relaxed = 0;           ///< by damping; by the steps [J]
+    double damped = 0, relaxed = 0;           ///< by the drag; by the steps [J]
     double lost = 0;                          ///< by nothing [J]
     std::vector<std::array<double, 2>> path;  ///< of the tip, from the notch on [edges]
 };
@@ -51,8 +51,8 @@ struct ShearRun {
     ShearRun result;
     result.vertices = strip.vertices;
     while (strip.torn_edges() < edges) {
-        // With damping the strip moves as long as the clamps do.
-        strip.tick(strip.at_rest() || options.damping > 0 ? 2e-4 * critical : 0);
+        // In a fluid the strip moves as long as the clamps do.
+        strip.tick(strip.at_rest() || options.drag > 0 ? 2e-4 * critical : 0);
         if (strip.tear.tips().empty()) break;
         if (result.begins == 0 && strip.torn_edges() > 0) result.begins = strip.stretched / critical;
         const Vector at = strip.advance();

@@ -13,6 +13,8 @@
 #include <membrane/model/triangular_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 
+#include "support/in_fluid.hpp"
+#include "support/loop_options.hpp"
 #include "support/rhexis.hpp"
 
 /// The loop of a capsulorhexis, for a hand of any kind.
@@ -47,15 +49,16 @@ class Capsulorhexis {
     using Tissue = decltype(capsule_tissue(std::declval<const RhexisScene&>()));
     using Sheet = membrane::Elements<double, membrane::TriangularSpring<double>>;
 
-    static constexpr double tick = 1e-3;  ///< [s]
-
     /// Its tension presses it onto the body, and then it is cut.
-    explicit Capsulorhexis(const RhexisScene& scene, double toughness = capsule_toughness, membrane::Index sweeps = 4)
+    explicit Capsulorhexis(const RhexisScene& scene, double toughness = capsule_toughness,
+                           const LoopOptions& options = {.sweeps = 4})
         : tissue_(capsule_tissue(scene)),
           body_(scene.body()),
-          solver_(tissue_, {.layers = 12, .sweeps = sweeps}),
+          options_(options),
+          solver_(tissue_, {.layers = 12, .sweeps = options.sweeps}),
           tear_(scene.mesh, membrane::EnergyRelease{.toughness = toughness, .thickness = capsule.thickness}),
-          x_(scene.mesh.positions()) {
+          x_(scene.mesh.positions()),
+          drag_work_(x_.cols()) {
         run_to_equilibrium();
         for (const auto& event : tear_.cut_along(scene.cut(tear_.surface()), x_)) {
             follow(event, tissue_, body_, solver_);
@@ -64,8 +67,11 @@ class Capsulorhexis {
 
     /// One tick, with what the forceps hold.
     auto step(const membrane::PointAttachment<double>& held) {
-        const auto report = solver_.step(x_, tick, tissue_, body_, held, tear_.ligaments());
-        for (const auto& event : tear_.update(x_, tick, tissue_, body_, held.corners)) {
+        const InFluid fluid(body_, options_.drag);
+        const membrane::Points<double> before = x_;
+        const auto report = solver_.step(x_, options_.tick, tissue_, fluid, held, tear_.ligaments());
+        drag_work_.add(x_ - before, options_.drag / options_.tick);
+        for (const auto& event : tear_.update(x_, options_.tick, tissue_, body_, held.corners)) {
             follow(event, tissue_, body_, solver_);
         }
         return report;
@@ -74,7 +80,8 @@ class Capsulorhexis {
     /// Nothing holds it, and it does not tear.
     void run_to_equilibrium(int ticks = 300) {
         solver_.wake_all();
-        for (int i = 0; i < ticks && !solver_.step(x_, tick, tissue_, body_).converged; ++i) solver_.wake_all();
+        for (int i = 0; i < ticks && !solver_.step(x_, options_.tick, tissue_, body_).converged; ++i)
+            solver_.wake_all();
     }
 
     [[nodiscard]] const Tissue& tissue() const { return tissue_; }
@@ -89,13 +96,17 @@ class Capsulorhexis {
     [[nodiscard]] const BallUnder& body() const { return body_; }
     [[nodiscard]] const Tear& tear() const { return tear_; }
     [[nodiscard]] const membrane::Points<double>& x() const { return x_; }
+    /// Energy that a fluid has taken [J].
+    [[nodiscard]] double damped() const { return drag_work_.taken(); }
 
   private:
     Tissue tissue_;
     BallUnder body_;
+    LoopOptions options_;
     membrane::QuasiStaticSolver<double> solver_;
     Tear tear_;
     membrane::Points<double> x_;  // [m]
+    DragWork<double> drag_work_;
 };
 
 }  // namespace examples

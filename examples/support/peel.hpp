@@ -32,12 +32,13 @@ namespace examples {
 
 /// What a peel took.
 struct Peeled {
-    Curve force = {};                             ///< over the displacement of the forceps [mm], [mN]
-    std::vector<Picture> states = {};             ///< before, during, after
-    double peak = 0;                              ///< of the force [N]
-    double work = 0, stored = 0, dissipated = 0;  ///< of the hand; in membrane and adhesion; by the damage [J]
-    double area = 0;                              ///< that has let go [m^2]
-    double seconds = 0;                           ///< of computation
+    Curve force = {};                   ///< over the displacement of the forceps [mm], [mN]
+    std::vector<Picture> states = {};   ///< before, during, after
+    double peak = 0;                    ///< of the force [N]
+    double work = 0, stored = 0;        ///< of the hand; in membrane and adhesion [J]
+    double dissipated = 0, damped = 0;  ///< by the damage; by a fluid [J]
+    double area = 0;                    ///< that has let go [m^2]
+    double seconds = 0;                 ///< of computation
 
     /// A tick.
     void add(const PeelScene& scene, const membrane::Points<double>& x, const membrane::Tool<double>& tool,

@@ -9,6 +9,8 @@
 #include <membrane/model/material.hpp>
 #include <membrane/model/spring_stiffness.hpp>
 
+#include "support/in_fluid.hpp"
+#include "support/loop_options.hpp"
 #include "support/peel_scene.hpp"
 
 /// The loop of a peel, for a hand of any kind.
@@ -34,18 +36,18 @@ constexpr double peel_energy = 0.05;  // [J/m^2]
 /// A membrane that adheres, under forceps.
 class Peeling {
   public:
-    static constexpr double tick = 1e-3;  ///< [s]
-
     /// With 8 sweeps a tick takes less than 1 ms.
-    explicit Peeling(const PeelScene& scene, membrane::Index sweeps = 8)
+    explicit Peeling(const PeelScene& scene, const LoopOptions& options = {.sweeps = 8})
         : scene_(scene),
           network_(scene.mesh, membrane::LinearSpring{}, {.stiffness = membrane::spring_stiffnesses(scene.mesh, ilm)}),
           adhesion_(adhesion_of(scene)),
-          solver_(network_, {.layers = membrane::unlimited, .sweeps = sweeps}),
+          options_(options),
+          solver_(network_, {.layers = membrane::unlimited, .sweeps = options.sweeps}),
           tree_(scene.mesh),
           tracker_(scene.mesh),
           grasper_(scene.mesh, {.snap_to_vertex = true}),
-          x_(scene.mesh.positions()) {}
+          x_(scene.mesh.positions()),
+          drag_work_(x_.cols()) {}
 
     /// What the forceps hold of the membrane.
     [[nodiscard]] membrane::Grasp<double> grasp(const membrane::Tool<double>& tool) {
@@ -56,7 +58,7 @@ class Peeling {
     /// One tick, with a constraint that holds the membrane.
     template <class Held>
     auto step(const Held& held) {
-        const auto report = solver_.step(x_, tick, network_, adhesion_, held);
+        const auto report = options_.drag > 0 ? step_in_fluid(held) : step_on(adhesion_, held);
         adhesion_.update(x_, report.moved);
         tree_.refit(x_, report.moved);
         return report;
@@ -65,13 +67,15 @@ class Peeling {
     [[nodiscard]] const membrane::Points<double>& x() const { return x_; }
 
     ///@{
-    /// Energy in membrane and adhesion, and that the damage has taken [J]. Area beyond the flap that has let go [m^2].
+    /// Energy in membrane and adhesion; that the damage has taken; that a fluid has taken [J]. Area beyond the flap
+    /// that has let go [m^2].
     [[nodiscard]] double stored() const {
         double sum = network_.energy(x_);
         for (membrane::Index v = 0; v < scene_.mesh.vertex_count(); ++v) sum += adhesion_.energy(v, x_.col(v));
         return sum;
     }
     [[nodiscard]] double dissipated() const { return adhesion_.dissipated(); }
+    [[nodiscard]] double damped() const { return drag_work_.taken(); }
     [[nodiscard]] double area() const {
         const auto areas = membrane::vertex_areas(scene_.mesh);
         double sum = 0;
@@ -83,14 +87,28 @@ class Peeling {
     ///@}
 
   private:
+    template <class Foundation, class Held>
+    auto step_on(const Foundation& foundation, const Held& held) {
+        return solver_.step(x_, options_.tick, network_, foundation, held);
+    }
+    template <class Held>
+    auto step_in_fluid(const Held& held) {
+        const membrane::Points<double> before = x_;
+        const auto report = step_on(InFluid(adhesion_, options_.drag), held);
+        drag_work_.add(x_ - before, options_.drag / options_.tick);
+        return report;
+    }
+
     PeelScene scene_;
     membrane::MassSpringNetwork<double, membrane::LinearSpring> network_;
     membrane::CohesiveSprings<double> adhesion_;
+    LoopOptions options_;
     membrane::QuasiStaticSolver<double> solver_;
     membrane::AabbTree<double> tree_;
     membrane::ContactTracker<double> tracker_;
     membrane::Grasper<double> grasper_;
     membrane::Points<double> x_;  // [m]
+    DragWork<double> drag_work_;
 };
 
 }  // namespace examples

@@ -192,28 +192,33 @@ inline std::vector<membrane::Index> RhexisScene::cut(const membrane::TornSurface
 /// along e, and the flap between tip and forceps becomes longer against m: unit vectors from the tip to the held point,
 /// now and at rest. The driving force is the force times e - m. So the hand goes where the mirror image of the flap is,
 /// across the direction that the tear should take: along the circle, and inward if the tip is out. When the tip is far
-/// ahead, the forceps open and grasp anew.
+/// ahead, the forceps open, so that the flap slips out of them, and grasp anew.
 class Forceps {
   public:
     /// For a scene that outlives them; they pull at an angle `lift` to the surface [rad].
     Forceps(const RhexisScene& scene, double lift) : scene_(scene), lift_(lift) {}
 
-    /// Moves the hand for a tick of `dt` [s], or opens or closes the forceps.
-    void guide(const Tear& tear, const membrane::Points<double>& x, double dt);
+    /// Moves the hand for a tick of `dt` [s], or opens or closes the forceps. `force`: on them, by the last step [N].
+    void guide(const Tear& tear, const membrane::Points<double>& x, double dt, double force);
 
     /// What holds the flap.
     [[nodiscard]] membrane::PointAttachment<double> hold(const Tear& tear) const {
         if (!closed()) return {};
-        return {triangle_, tear.surface().corners(triangle_), {1.0 / 3, 1.0 / 3, 1.0 / 3}, position_};
+        return {triangle_, tear.surface().corners(triangle_), {1.0 / 3, 1.0 / 3, 1.0 / 3}, position_, max_force_};
+    }
+    /// How far the flap has slipped out of them [m].
+    [[nodiscard]] double slip(const Tear& tear, const membrane::Points<double>& x) const {
+        return closed() ? (middle_of(tear.surface().corners_at(x, triangle_)) - position_).norm() : 0;
     }
     [[nodiscard]] bool closed() const { return triangle_ != membrane::no_index; }
     [[nodiscard]] const Vector& position() const { return position_; }
     [[nodiscard]] int grasps() const { return grasps_; }
 
   private:
-    static constexpr double speed = 6e-3;      // of the hand [m/s]
-    static constexpr double ahead = 0.3;       // part of it at which it draws away from the tip
-    static constexpr double open_time = 0.05;  // between two grasps [s]
+    static constexpr double infinite = std::numeric_limits<double>::infinity();
+    static constexpr double speed = 6e-3;     // of the hand [m/s]
+    static constexpr double ahead = 0.3;      // part of it at which it draws away from the tip
+    static constexpr double open_time = 0.1;  // in which they hold less and less [s]
 
     static Vector middle_of(const std::array<Vector, 3>& corners) {
         return (corners[0] + corners[1] + corners[2]) / 3.0;
@@ -225,10 +230,10 @@ class Forceps {
     double lift_;
     membrane::Index triangle_ = membrane::no_index;
     Vector position_ = Vector::Zero();
-    double open_for_ = 0;            // [s]
-    double fold_ = 0;                // by which the flap is turned over [rad]
-    double stretch_ = 1;             // of the flap between tip and forceps
-    Vector drawn_ = Vector::Zero();  // from the tip, a unit vector
+    double max_force_ = infinite, opened_at_ = 0;  // that they hold, less as they open; when they began to [N]
+    double fold_ = 0;                              // by which the flap is turned over [rad]
+    double stretch_ = 1;                           // of the flap between tip and forceps
+    Vector drawn_ = Vector::Zero();                // from the tip, a unit vector
     int grasps_ = 0;
 };
 
@@ -251,7 +256,7 @@ inline void Forceps::grasp(const membrane::TornSurface<double>& surface, const V
     ++grasps_;
 }
 
-inline void Forceps::guide(const Tear& tear, const membrane::Points<double>& x, double dt) {
+inline void Forceps::guide(const Tear& tear, const membrane::Points<double>& x, double dt, double force) {
     if (tear.tips().size() < 2) {  // round
         position_ += ahead * speed * dt * drawn_;
         return;
@@ -261,9 +266,12 @@ inline void Forceps::guide(const Tear& tear, const membrane::Points<double>& x, 
     const auto& tip = tear.tips().back();
     const Vector start = rest.col(tip.vertex), now = x.col(tip.vertex);
     const auto to_held = [&]() -> Vector { return middle_of(surface.corners_at(rest, triangle_)) - start; };
-    if (closed() && to_held().norm() > 0.62 * scene_.radius) triangle_ = membrane::no_index, open_for_ = open_time;
-    open_for_ -= dt;
-    if (!closed() && open_for_ > 0) return;
+    if (closed() && max_force_ == infinite && to_held().norm() > 0.62 * scene_.radius) max_force_ = opened_at_ = force;
+    if (closed() && max_force_ < infinite) {
+        max_force_ -= opened_at_ * dt / open_time;
+        if (!(max_force_ > 0)) triangle_ = membrane::no_index, max_force_ = infinite;
+        return;
+    }
     const Vector normal = surface.rest_normal(tip.vertex), toward = wanted_direction(start, normal);
     if (!closed()) {
         grasp(surface, start - 0.3 * scene_.radius * toward + 1.5 * scene_.edge * normal.cross(toward));

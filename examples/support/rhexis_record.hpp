@@ -61,8 +61,9 @@ struct Opened {
     Curve force = {};             ///< on the forceps over the torn length [mm], [mN]
     std::vector<Picture> states;  ///< before, during, after
     double work = 0;              ///< of the hand [J]
-    double let_go = 0;            ///< lost while the forceps are open [J]
     double stored = 0, torn = 0;  ///< in membrane, ball and opening edges; by the tear [J]
+    double damped = 0;            ///< by a fluid [J]
+    double slipped = 0;           ///< by slip out of the forceps as they open [J]
     double length = 0;            ///< torn [m]
     double circularity = 0;       ///< of the opening
     double seconds = 0;           ///< of computation
@@ -79,9 +80,10 @@ struct Opened {
     ///@}
 
   private:
-    void add_force(const Tear& tear, const Forceps& forceps, const Vector& felt);
+    void add_force(const Capsulorhexis& operation, const Forceps& forceps, const Vector& felt);
 
     Vector last_ = Vector::Zero(), last_force_ = Vector::Zero();
+    double last_slip_ = 0;  // [m]
     bool held_ = false;
     double squares_ = 0, held_ticks_ = 0, peak_ = 0, angles_ = 0, advances_ = 0;
 };
@@ -90,12 +92,11 @@ inline void Opened::add(const RhexisScene& scene, const Capsulorhexis& operation
                         const Vector& felt) {
     const auto& tear = operation.tear();
     const auto& x = operation.x();
-    if (forceps.closed()) add_force(tear, forceps, felt);
-    const double before = stored + torn;
+    if (forceps.closed()) add_force(operation, forceps, felt);
     stored = operation.body().energy(x) + tear.stored(x);
     operation.tissue().for_each_element([&](const auto& one) { stored += one.element.energy(one.where(x)); });
     torn = tear.dissipated();
-    if (!forceps.closed()) let_go += before - stored - torn;
+    damped = operation.damped();
     length = tear.torn_length();
     grasps = forceps.grasps();
     ++ticks;
@@ -109,8 +110,14 @@ inline void Opened::add(const RhexisScene& scene, const Capsulorhexis& operation
     }
 }
 
-inline void Opened::add_force(const Tear& tear, const Forceps& forceps, const Vector& felt) {
-    if (held_) work -= (last_force_ + felt).dot(forceps.position() - last_) / 2;
+inline void Opened::add_force(const Capsulorhexis& operation, const Forceps& forceps, const Vector& felt) {
+    const Tear& tear = operation.tear();
+    const double slip = forceps.slip(tear, operation.x());
+    if (held_) {
+        work -= (last_force_ + felt).dot(forceps.position() - last_) / 2;
+        slipped += (last_force_.norm() + felt.norm()) / 2 * (slip - last_slip_);
+    }
+    last_slip_ = slip;
     squares_ += felt.squaredNorm();
     ++held_ticks_;
     peak_ = std::max(peak_, felt.norm());
@@ -129,9 +136,10 @@ inline void print(const RhexisScene& scene, const Opened& opened, double resista
                 1e3 * opened.rms(), 1e3 * opened.peak(), 180 / std::numbers::pi * opened.angle());
     std::printf("  the tear took %.3f of toughness * thickness * length\n", opened.torn / (resistance * opened.length));
     std::printf(
-        "  the hand's work %.3g uJ = %.3g stored + %.3g torn + %.3g as the forceps opened + %.1f %% by the steps\n",
-        1e6 * opened.work, 1e6 * opened.stored, 1e6 * opened.torn, 1e6 * opened.let_go,
-        100 * (1 - (opened.stored + opened.torn + opened.let_go) / opened.work));
+        "  the hand's work %.3g uJ = %.3g stored + %.3g torn + %.3g by the fluid + %.3g by slip in the forceps + "
+        "%.1f %% by the steps\n",
+        1e6 * opened.work, 1e6 * opened.stored, 1e6 * opened.torn, 1e6 * opened.damped, 1e6 * opened.slipped,
+        100 * (1 - (opened.stored + opened.torn + opened.damped + opened.slipped) / opened.work));
 }
 
 /// The pictures side by side.

@@ -17,6 +17,7 @@ struct CentreCut {
     int rows = 30;         ///< edges along each side
     double turn = 0;       ///< of the grid, and of the cut along it [rad]
     double stretch = 1.3;  ///< in both directions
+    double drag = 0;       ///< of a fluid, on each vertex, over the membrane's stiffness times a tick
 
     static constexpr double side = 30e-3;  ///< [m]
 
@@ -32,7 +33,10 @@ struct CentreCut {
             return std::min({x, y, side - x, side - y}) < edge() / 2;
         };
         TornSheet<Scalar> sheet(membrane::with_reserve(mesh, 2 * rows),
-                                {.hands = {}, .fixed = vertices_where(mesh, is_border), .tolerance = 1e-6},
+                                {.hands = {},
+                                 .fixed = vertices_where(mesh, is_border),
+                                 .tolerance = 1e-6,
+                                 .drag = drag * torn_material.young_modulus * torn_material.thickness * 1e-3},
                                 membrane::EnergyRelease{toughness, torn_material.thickness});
         const int edges = rows * 3 / 10;
         const membrane::Vector3<double> middle(side / 2, side / 2, 0);
@@ -49,7 +53,8 @@ struct CentreRun {
     double unlike = 0;                 ///< difference of the driving forces of both ends, relative
     double off_line = 0;               ///< largest distance of a tip from that line while it tears [edges]
     std::array<double, 2> advances{};  ///< of both ends [edges]; 0 if one has come to the border
-    double lost = 0;                   ///< energy that nothing has taken, over what the sheet has released
+    double torn = 0, damped = 0;       ///< taken by tear and drag, over what the sheet has released
+    double relaxed = 0, lost = 0;      ///< by the steps; by nothing
 };
 
 /// Each end tears on by about this number of edges, at nine tenths of the energy that it releases at first.
@@ -85,7 +90,11 @@ template <membrane::Real Scalar>
             result.advances[i] = norm(off);
         }
     }
-    result.lost = torn.lost() / (torn.work - torn.stored());
+    const double released = torn.work - torn.stored();
+    result.torn = tear.dissipated() / released;
+    result.damped = torn.damped / released;
+    result.relaxed = torn.relaxed / released;
+    result.lost = torn.lost() / released;
     return result;
 }
 

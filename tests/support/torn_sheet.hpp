@@ -20,6 +20,7 @@
 #include <membrane/tear/tearing.hpp>
 
 #include "support/hand_work.hpp"
+#include "support/in_fluid.hpp"
 #include "support/turned_grid.hpp"
 
 /// A flat sheet that two hands tear, and the energy that they give.
@@ -36,7 +37,7 @@ struct TornSheetOptions {
     std::vector<membrane::Index> fixed = {};            ///< vertices that never move
     double tolerance;                                   ///< residual force that counts as none [N]
     bool springs = false;                               ///< a network of springs in place of a continuous sheet
-    double damping = 0;                                 ///< of each vertex, by a body that does not support it [N s/m]
+    double drag = 0;                                    ///< of a fluid, on each vertex [N s/m]
     membrane::Index sweeps = 6;                         ///< of a step
     membrane::Index steps = 20;                         ///< of a tick, at most
     membrane::TearOptions tear = {};                    ///< how it tears
@@ -63,21 +64,6 @@ template <class Tissue, class Positions>
     return sum;
 }
 
-/// The energy that a foundation's damping took in a step of `dt` [s] from `before` to `x`, in which `moved` moved [J].
-template <membrane::Real Scalar>
-[[nodiscard]] double taken_by_damping(const membrane::VirtualVolumeSprings<Scalar>& foundation,
-                                      const membrane::Points<Scalar>& before, const membrane::Points<Scalar>& x,
-                                      std::span<const membrane::Index> moved, Scalar dt) {
-    double sum = 0;
-    for (const membrane::Index v : moved) {
-        const auto anchor = membrane::point(foundation.anchors(), v);
-        const auto length = [&](const auto& at) { return norm<Scalar>(membrane::point(at, v) - anchor); };
-        const auto longer = static_cast<double>(length(x) - length(before));
-        sum += static_cast<double>(foundation.damping(v) / dt) * longer * longer;
-    }
-    return sum;
-}
-
 /// Triangular springs and `Others`, elements that follow a tear.
 template <membrane::Real Scalar, class Criterion = membrane::EnergyRelease, class... Others>
 class TornSheet {
@@ -94,10 +80,10 @@ class TornSheet {
     TornSheet(const membrane::TriangleMesh<Scalar>& reserved, const TornSheetOptions& options,
               const Criterion& criterion, Others... others)
         : options_(options),
+          drag_work_(reserved.vertex_count()),
           hands(options.hands),
           mesh(reserved),
           tissue(springs_of(mesh, options), triangles_of(mesh, options), others...),
-          foundation(mesh, {.stiffness = Scalar(0), .damping = static_cast<Scalar>(options.damping)}),
           tear(mesh, criterion, options.tear),
           solver(tissue, {.layers = membrane::unlimited, .sweeps = options.sweeps, .predict = false}),
           x(mesh.positions()) {}
@@ -126,7 +112,7 @@ class TornSheet {
 
     /// Takes the present positions as where the hands are, once they are at equilibrium.
     void start() {
-        relax(5000);
+        relax(5000, Scalar(0));
         work = stored();
         damped = relaxed = 0;
     }
@@ -136,7 +122,7 @@ class TornSheet {
         const auto before = forces;
         const auto halfway = forces_alone(displacements, Scalar(0.5)), alone = forces_alone(displacements, Scalar(1));
         move(x, displacements, Scalar(1));
-        relax(options_.steps);
+        relax(options_.steps, static_cast<Scalar>(options_.drag));
         for (std::size_t i = 0; i < 2; ++i) {
             const auto hand = hand_work<Scalar>(displacements[i], before[i], halfway[i], alone[i], forces[i]);
             work += hand.smooth;
@@ -149,7 +135,7 @@ class TornSheet {
     /// takes.
     void update() {
         const double before = stored_in(tissue, x);
-        follow(tear.update(x, dt, tissue, foundation));
+        follow(tear.update(x, dt, tissue, none));
         relaxed += before - stored_in(tissue, x);
     }
 
@@ -199,21 +185,23 @@ class TornSheet {
         }
         return sum;
     }
-    // Without damping only the equilibrium matters: steps extrapolate the last ones, as long as the residual force
+    // Without a fluid only the equilibrium matters: steps extrapolate the last ones, as long as the residual force
     // decreases [Nesterov83].
-    void relax(int steps) {
+    void relax(int steps, Scalar drag) {
+        const examples::InFluid fluid(none, drag);
         relaxed += taken_up() + damped;
         membrane::Points<Scalar> last = x;
         Scalar residual = std::numeric_limits<Scalar>::infinity();
         for (int i = 0, in_turn = 0; i < steps; ++i) {
             solver.wake_all();
             const membrane::Points<Scalar> before = x;
-            report = solver.step(x, dt, tissue, foundation, membrane::pin(hands[0]), membrane::pin(hands[1]),
-                                 tear.ligaments());
+            report =
+                solver.step(x, dt, tissue, fluid, membrane::pin(hands[0]), membrane::pin(hands[1]), tear.ligaments());
             if (report.status != membrane::StepStatus::advanced) throw std::runtime_error("a step was refused");
-            if (options_.damping > 0) damped += taken_by_damping(foundation, before, x, report.moved, dt);
+            if (drag > 0) drag_work_.add(x - before, drag / dt);
+            damped = drag_work_.taken();
             if (at_rest() || i + 1 == steps) break;
-            if (options_.damping > 0) continue;
+            if (drag > 0) continue;
             in_turn = report.residual < std::exchange(residual, report.residual) ? in_turn + 1 : 0;
             const membrane::Points<Scalar> now = x;
             x += static_cast<Scalar>(in_turn / (in_turn + 3.0)) * (now - last);
@@ -224,23 +212,24 @@ class TornSheet {
     }
     template <class... Parts>
     void follow(std::span<const membrane::TearEvent<Scalar>> events, Parts&... parts) {
-        for (const auto& event : events) membrane::follow(event, tissue, foundation, solver, parts...);
+        for (const auto& event : events) membrane::follow(event, tissue, solver, parts...);
     }
 
+    static constexpr membrane::NoFoundation none{};
     TornSheetOptions options_;
+    examples::DragWork<Scalar> drag_work_;
 
   public:
     std::array<std::vector<Index>, 2> hands;  ///< the vertices that each holds
     membrane::TriangleMesh<Scalar> mesh;
     Tissue tissue;
-    membrane::VirtualVolumeSprings<Scalar> foundation;
     membrane::Tearing<Scalar, Criterion> tear;
     membrane::QuasiStaticSolver<Scalar> solver;
     membrane::Points<Scalar> x;
     membrane::StepReport<Scalar> report;
     std::vector<Index> cut_path;
     std::array<Vector, 2> forces{};  ///< of the hands [N]
-    double work = 0, damped = 0;     ///< of the hands; taken by damping [J]
+    double work = 0, damped = 0;     ///< of the hands; taken by drag [J]
     double relaxed = 0;              ///< taken by the steps: in jumps, or by what they leave unbalanced [J]
 };
 

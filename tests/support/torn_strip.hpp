@@ -24,7 +24,7 @@ struct TornStripOptions {
     double turn = 0;                  ///< of the grid [rad]
     double toughness = 1000;          ///< [J/m^2]
     bool springs = false;             ///< a network of springs in place of a continuous sheet
-    double damping = 0;               ///< of a vertex, by a body that does not support it [N s/m]
+    double drag = 0;                  ///< of a fluid, on each vertex [N s/m]
     double tolerance = 3e-4;          ///< of residual forces, over the resistance; in single precision ten times that
     membrane::TearOptions tear = {};  ///< how it tears
 
@@ -108,7 +108,7 @@ class TornStrip : public TornSheet<Scalar, Criterion> {
                 .fixed = both,
                 .tolerance = tolerance * options.resistance(),
                 .springs = options.springs,
-                .damping = options.damping,
+                .drag = options.drag,
                 .tear = options.tear};
     }
     [[nodiscard]] membrane::Vector3<double> tip() const {

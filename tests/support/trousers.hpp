@@ -17,6 +17,7 @@ struct Trousers {
     int width = 6;         ///< of a leg [edges]
     double turn = 0;       ///< of the grid [rad]
     double strain = 0.02;  ///< of a leg while it tears, nearly
+    double drag = 0;       ///< of a fluid, on each vertex, over the membrane's stiffness times a tick
     int steps = 10;        ///< of a tick, at most; with more the forces balance better
 
     static constexpr double leg_width = 6e-3;  ///< [m]
@@ -48,7 +49,7 @@ struct TrouserRun {
     double mean = 0;                           ///< force of a hand while the tear is steady, over the expected one
     double low = 0, high = 0;                  ///< least and largest force then, over the same
     double energy = 0;                         ///< work of the hands then, over that of the closed form
-    double relaxed = 0;                        ///< taken by the steps, over what the hands gave and is not stored
+    double torn = 0, damped = 0, relaxed = 0;  ///< taken by tear, drag and steps, over what was given and is not stored
     double lost = 0;                           ///< taken by nothing, over the same
     double off_line = 0;                       ///< [edges]
     std::vector<std::array<double, 2>> curve;  ///< displacement of a hand [edges], force over the expected one
@@ -144,6 +145,7 @@ class TrouserTest {
             .fixed = vertices_where(
                 mesh, [&](const auto& at) { return at[0] > static_cast<Scalar>((columns - 0.5) * edge); }),
             .tolerance = 1e-4 * scene.resistance(),
+            .drag = scene.drag * torn_material.young_modulus * torn_material.thickness * 1e-3,
             .sweeps = 10,
             .steps = scene.steps};
         return {membrane::with_reserve(mesh, 2 * columns), options,
@@ -168,7 +170,7 @@ class TrouserTest {
     Sheet sheet;
 };
 
-/// Tears on; steady is what comes after the first quarter.
+/// Tears on, a `part` of an edge in a tick; steady is what comes after the first quarter.
 template <membrane::Real Scalar>
 [[nodiscard]] TrouserRun tear_trousers(const Trousers& scene, double edges, double part = 1.0 / 60) {
     TrouserTest<Scalar> test(scene);
@@ -198,6 +200,8 @@ template <membrane::Real Scalar>
     result.mean = sum / (count - 1);
     result.energy = (test.sheet.work - first_work) / (2 * expected * (count - 1) * step);
     const double given = test.sheet.work - test.sheet.stored();
+    result.torn = tear.dissipated() / given;
+    result.damped = test.sheet.damped / given;
     result.relaxed = test.sheet.relaxed / given;
     result.lost = test.sheet.lost() / given;
     return result;

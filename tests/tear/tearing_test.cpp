@@ -199,14 +199,14 @@ TEMPLATE_TEST_CASE("the driving force is what two equilibria, before and after a
     }
 }
 
-TEMPLATE_TEST_CASE("what the clamps give is stored, or taken by the tear and by damping", "[tear]", double, float) {
+TEMPLATE_TEST_CASE("what the clamps give is stored, or taken by the tear and a fluid's drag", "[tear]", double, float) {
     struct Case {
-        double damping, turn;
+        double drag, turn;
     };
-    for (const auto& [damping, turn] : {Case{1e-2, 0}, Case{3e-2, 17}, Case{1e-1, 40}}) {
+    for (const auto& [drag, turn] : {Case{1e-2, 0}, Case{3e-2, 17}, Case{1e-1, 40}}) {
         if (cases_are_slow && turn != 17) continue;
-        CAPTURE(turn, damping);
-        TornStrip<TestType> strip({.turn = turn * degree, .damping = damping});
+        CAPTURE(turn, drag);
+        TornStrip<TestType> strip({.turn = turn * degree, .drag = drag});
         strip.cut();
         strip.stretch(0.98 * strip.pure_shear().critical_stretch());
         for (int tick = 0; tick < 3000 && strip.torn_edges() < 6; ++tick) {
@@ -217,7 +217,7 @@ TEMPLATE_TEST_CASE("what the clamps give is stored, or taken by the tear and by 
         CHECK(strip.balance() == Approx(1).epsilon(0.001));
         CHECK(std::abs(strip.relaxed) < (std::is_same_v<TestType, double> ? 0.01 : 0.02) * strip.work);
         CHECK(strip.damped > 0.02 * strip.work);
-        // The last edge may not have opened. What damping takes of the driving force, the edges do not.
+        // The last edge may not have opened. What the drag takes of the driving force, the edges do not.
         const double resistance = 1000 * test::torn_material.thickness, torn = strip.tear.torn_length();
         const double least = strip.damped < 0.16 * strip.work ? 0.9 : 0.6;
         CHECK(strip.tear.dissipated() < resistance * torn * 1.1);

@@ -6,6 +6,7 @@
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/torn_centre.hpp"
 #include "support/trousers.hpp"
 
 // Closed form: each leg takes toughness times thickness / 2, but for its stretch. In a long run as `bench/run tear`.
@@ -33,4 +34,28 @@ TEMPLATE_TEST_CASE("a strip that is torn like trousers takes the force of the cl
     CAPTURE(mean, least, largest);
     CHECK(mean == Approx(1).epsilon(0.05));
     CHECK(largest - least <= 0.1 * mean);
+}
+
+// A drag on each vertex that is above the membrane's stiffness: jumps take several ticks, and the drag takes their
+// energy.
+TEMPLATE_TEST_CASE("in a viscous fluid the hands' work is stored, or taken by tear and drag", "[tear]", double, float) {
+    const double bar = std::is_same_v<TestType, double> ? 0.01 : 0.03;
+    for (const double turn : {0.0, 20.0, 45.0}) {
+        if (cases_are_slow && turn != 20) continue;
+        const auto found = test::tear_trousers<TestType>(
+            {.width = 4, .turn = turn * std::numbers::pi / 180, .strain = 0.1, .drag = 1.5, .steps = 1},
+            cases_are_slow ? 2 : 4, 1.0 / 500);
+        CAPTURE(turn, found.torn, found.damped, found.relaxed, found.lost);
+        CHECK(found.torn + found.damped == Approx(1).margin(bar));
+        CHECK(found.damped > 0.1);
+        CHECK(std::abs(found.lost) < 0.002);
+    }
+}
+
+TEMPLATE_TEST_CASE("in a viscous fluid tear and drag take what a stretched sheet gives around a cut", "[tear]", double,
+                   float) {
+    const auto found = test::tear_from_centre<TestType>({.rows = 24, .turn = 0.3, .drag = 5}, 2);
+    CAPTURE(found.torn, found.damped, found.relaxed, found.lost);
+    CHECK(found.torn + found.damped == Approx(1).margin(std::is_same_v<TestType, double> ? 0.01 : 0.03));
+    CHECK(found.damped > 0.05);
 }
