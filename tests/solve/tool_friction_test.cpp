@@ -156,7 +156,7 @@ TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and 
                    "[friction]", double, float) {
     for (const double coefficient : {0.1, 0.3, 1.0}) {
         CAPTURE(coefficient);
-        Drag<TestType> drag({.friction = coefficient, .rings = 20});
+        Drag<TestType> drag({.friction = coefficient, .rings = 20, .radius = 5e-3, .stretch = 1.02});
         drag.press_in();
         const Vector3<double> direction(0.8, 0.6, 0);
         Vector3<double> sum = Vector3<double>::Zero();
@@ -171,10 +171,10 @@ TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and 
             at_vertices += drag.ratio_at_vertices();
             ++count;
         }
-        // The facets push the ball by some per cent to and fro.
+        // In single ticks the facets push the ball to and fro.
         CHECK(at_vertices / count == Approx(coefficient).epsilon(0.01));
-        CHECK(along_disc(sum) / sum[2] == Approx(coefficient).epsilon(0.02));
-        CHECK(-dot(sum, direction) / along_disc(sum) > std::cos(0.02));
+        CHECK(along_disc(sum) / sum[2] == Approx(coefficient).epsilon(0.01));
+        CHECK(-dot(sum, direction) / along_disc(sum) > std::cos(0.01));
     }
 }
 
