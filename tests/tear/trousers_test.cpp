@@ -9,7 +9,8 @@
 #include "support/torn_centre.hpp"
 #include "support/trousers.hpp"
 
-// Closed form: each leg takes toughness times thickness / 2, but for its stretch. In a long run as `bench/run tear`.
+// Closed form: each leg takes toughness times thickness / 2, but for its stretch. In a long run as `bench/run tear`, with
+// legs that stretch by 2 %; on few grids with legs that stretch by 5 %, whose mean force differs less from grid to grid.
 TEMPLATE_TEST_CASE("a strip that is torn like trousers takes the force of the closed form, on any mesh and grid",
                    "[tear]", double, float) {
     const int directions = cases(3, 20);
@@ -20,8 +21,11 @@ TEMPLATE_TEST_CASE("a strip that is torn like trousers takes the force of the cl
     for (const int width : widths) {
         for (int i = 0; i < directions; ++i) {
             const double turn = 60.0 * i / (is_long ? directions - 1 : directions);
-            const auto found = test::tear_trousers<TestType>(
-                {.width = width, .turn = turn * std::numbers::pi / 180, .steps = is_long ? 20 : 10}, edges);
+            const auto found = test::tear_trousers<TestType>({.width = width,
+                                                              .turn = turn * std::numbers::pi / 180,
+                                                              .strain = is_long ? 0.02 : 0.05,
+                                                              .steps = is_long ? 20 : 10},
+                                                             edges);
             CAPTURE(width, turn, found.mean, found.low, found.high, found.relaxed, found.lost);
             CHECK(found.mean == Approx(1).epsilon(0.1));
             CHECK(std::abs(found.lost) < 0.002);
