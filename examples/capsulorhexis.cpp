@@ -26,6 +26,7 @@ Opened open(const RhexisScene& scene, double toughness, double lift, const LoopO
         const auto start = std::chrono::steady_clock::now();
         forceps.guide(tear, operation.x(), options.tick, felt.norm());
         felt = operation.step(forceps.hold(tear)).reactions[0];
+        forceps.slip(tear, operation.x());
         result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         result.add(scene, operation, forceps, felt);
     }
@@ -40,7 +41,7 @@ int main(int argc, char** argv) {
     MeshOptions other;
     double toughness = capsule_toughness;
     double lift = capsule_lift;
-    LoopOptions options{.sweeps = 4};
+    LoopOptions options = capsule_loop;
     CommandLine command("Tears a round opening into the lens capsule, and draws its tension.");
     other.add_to(command);
     command.add("--out", folder, "folder for pictures");

@@ -54,7 +54,7 @@ std::vector<Curve> show(const PeelScene& scene, const std::filesystem::path& fol
 int main(int argc, char** argv) {
     auto folder = std::filesystem::path(argv[0]).parent_path() / "pictures";
     MeshOptions mesh;
-    LoopOptions options{.sweeps = 8};  // a tick takes less than 1 ms
+    LoopOptions options;  // a tick takes less than 1 ms
     CommandLine command("Peels a membrane off with forceps, and draws its tension.");
     mesh.add_to(command);
     command.add("--out", folder, "folder for pictures");

@@ -62,7 +62,7 @@ struct ShearRun {
     result.torn = strip.tear.torn_length();
     result.given = strip.work - strip.stored();
     result.dissipated = strip.tear.dissipated();
-    result.damped = strip.damped;
+    result.damped = strip.damped();
     result.relaxed = strip.relaxed;
     result.lost = strip.lost();
     return result;

@@ -23,6 +23,7 @@ namespace examples {
 const membrane::Material capsule = membrane::materials::lens_capsule().typical;
 constexpr double capsule_toughness = 1.4e3;  // of the amnion [Koh19]: that of the capsule is not known [J/m^2]
 constexpr double capsule_lift = 12;          // of the pull over the surface [degrees]
+constexpr LoopOptions capsule_loop{.sweeps = 4};
 constexpr double stiffer = 30;  // in bending than the capsule: else the flap crumples, as finely as its triangles
 
 /// The front of a lens.
@@ -51,14 +52,14 @@ class Capsulorhexis {
 
     /// Its tension presses it onto the body, and then it is cut.
     explicit Capsulorhexis(const RhexisScene& scene, double toughness = capsule_toughness,
-                           const LoopOptions& options = {.sweeps = 4})
+                           const LoopOptions& options = capsule_loop)
         : tissue_(capsule_tissue(scene)),
           body_(scene.body()),
           options_(options),
           solver_(tissue_, {.layers = 12, .sweeps = options.sweeps}),
           tear_(scene.mesh, membrane::EnergyRelease{.toughness = toughness, .thickness = capsule.thickness}),
           x_(scene.mesh.positions()),
-          drag_work_(x_.cols()) {
+          fluid_(options.drag, x_.cols()) {
         run_to_equilibrium();
         for (const auto& event : tear_.cut_along(scene.cut(tear_.surface()), x_)) {
             follow(event, tissue_, body_, solver_);
@@ -67,10 +68,7 @@ class Capsulorhexis {
 
     /// One tick, with what the forceps hold.
     auto step(const membrane::PointAttachment<double>& held) {
-        const InFluid fluid(body_, options_.drag);
-        const membrane::Points<double> before = x_;
-        const auto report = solver_.step(x_, options_.tick, tissue_, fluid, held, tear_.ligaments());
-        drag_work_.add(x_ - before, options_.drag / options_.tick);
+        const auto report = fluid_.step(solver_, x_, options_.tick, tissue_, body_, held, tear_.ligaments());
         for (const auto& event : tear_.update(x_, options_.tick, tissue_, body_, held.corners)) {
             follow(event, tissue_, body_, solver_);
         }
@@ -97,7 +95,7 @@ class Capsulorhexis {
     [[nodiscard]] const Tear& tear() const { return tear_; }
     [[nodiscard]] const membrane::Points<double>& x() const { return x_; }
     /// Energy that a fluid has taken [J].
-    [[nodiscard]] double damped() const { return drag_work_.taken(); }
+    [[nodiscard]] double damped() const { return fluid_.taken(); }
 
   private:
     Tissue tissue_;
@@ -106,7 +104,7 @@ class Capsulorhexis {
     membrane::QuasiStaticSolver<double> solver_;
     Tear tear_;
     membrane::Points<double> x_;  // [m]
-    DragWork<double> drag_work_;
+    Fluid<double> fluid_;
 };
 
 }  // namespace examples

@@ -7,21 +7,19 @@
 
 /// A membrane in a viscous fluid.
 ///
-///     const examples::InFluid fluid(foundation, drag);                   // [N s/m]
-///     const auto before = x;
-///     const auto report = solver.step(x, dt, tissue, fluid, pull(tool, grasp));
-///     drag_work.add(x - before, drag / dt);                              // examples::DragWork<double>(vertices)
+///     examples::Fluid<double> fluid(3e-3, mesh.vertex_count());           // [N s/m]
+///     const auto report = fluid.step(solver, x, dt, tissue, foundation, pull(tool, grasp));
+///     std::printf("%g J", fluid.taken());
 namespace examples {
 
 /// A foundation, and a fluid at rest around the membrane: a drag on each vertex against its velocity. A
-/// `FoundationModel`. A membrane that jumps to its next equilibrium takes several ticks for it if drag / dt is near the
-/// stiffness that it moves against, and then the drag takes the energy, not the solver's steps.
-template <membrane::Real Scalar, class Foundation = membrane::NoFoundation>
+/// `FoundationModel`.
+template <membrane::Real Scalar, class Foundation>
 class InFluid {
     using Vector = membrane::Vector3<Scalar>;
 
   public:
-    /// `drag` on a vertex per velocity [N s/m], 0 for no fluid. The foundation must outlive this.
+    /// `drag` on a vertex per velocity [N s/m]. The foundation must outlive this.
     InFluid(const Foundation& foundation, Scalar drag) : foundation_(&foundation), drag_(drag) {}
 
     [[nodiscard]] membrane::VertexForce<Scalar> force_on(membrane::Index v, const Vector& position, const Vector& start,
@@ -32,11 +30,11 @@ class InFluid {
         return sum;
     }
 
-    /// In a tick the drag is as a spring to where the vertex started: a solver updates several vertices at once with
-    /// it.
+    /// The drag alone is the damping of a spring from where the vertex started: with it a solver updates several
+    /// vertices at once.
     [[nodiscard]] membrane::VolumeSpring<Scalar> spring(membrane::Index, const Vector& start, Scalar dt)
         const noexcept requires std::same_as<Foundation, membrane::NoFoundation> {
-        return {start, drag_ / dt};
+        return {.anchor = start, .rate = drag_ / dt};
     }
 
   private:
@@ -44,23 +42,35 @@ class InFluid {
     Scalar drag_;
 };
 
-/// The energy that a drag takes, by the trapezoidal rule from step to step.
+/// A fluid, and the energy that its drag takes. If drag / dt is near the stiffness that a membrane moves against, it
+/// takes several ticks to jump to its next equilibrium, and the drag takes the energy of the jump, not the solver's
+/// steps.
 template <membrane::Real Scalar>
-class DragWork {
+class Fluid {
   public:
-    explicit DragWork(Eigen::Index vertices) : last_(membrane::Points<Scalar>::Zero(3, vertices)) {}
+    /// `drag` on a vertex per velocity [N s/m]; 0: no fluid, at no cost.
+    Fluid(Scalar drag, Eigen::Index vertices) : drag_(drag), last_(membrane::Points<Scalar>::Zero(3, vertices)) {}
 
-    /// A step with these displacements of all vertices [m]; `rate` is the drag over the time of the step [N/m].
-    void add(const membrane::Points<Scalar>& displacements, Scalar rate) {
-        taken_ += static_cast<double>(rate * displacements.cwiseProduct(displacements + last_).sum() / 2);
+    /// A step of the solver, in the fluid.
+    template <class Solver, class Network, class Foundation, class... Constraints>
+    auto step(Solver& solver, membrane::Points<Scalar>& x, Scalar dt, const Network& network,
+              const Foundation& foundation, const Constraints&... constraints) {
+        if (!(drag_ > 0)) return solver.step(x, dt, network, foundation, constraints...);
+        const membrane::Points<Scalar> before = x;
+        const auto report = solver.step(x, dt, network, InFluid(foundation, drag_), constraints...);
+        const membrane::Points<Scalar> displacements = x - before;
+        taken_ += static_cast<double>(drag_ / dt * displacements.cwiseProduct(displacements + last_).sum() / 2);
         last_ = displacements;
+        return report;
     }
 
-    /// Since the first step [J].
+    [[nodiscard]] Scalar drag() const { return drag_; }
+    /// Energy that the drag has taken, by the trapezoidal rule from step to step [J].
     [[nodiscard]] double taken() const { return taken_; }
 
   private:
-    membrane::Points<Scalar> last_;  // displacements [m]
+    Scalar drag_;
+    membrane::Points<Scalar> last_;  // displacements in the last step [m]
     double taken_ = 0;
 };
 

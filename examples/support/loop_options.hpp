@@ -9,14 +9,14 @@
 namespace examples {
 
 struct LoopOptions {
-    membrane::Index sweeps;  ///< of a step
-    double tick = 1e-3;      ///< [s]
-    double drag = 0;         ///< of a viscous fluid, on each vertex [N s/m]
+    membrane::Index sweeps = 8;  ///< of a step
+    double tick = 1e-3;          ///< [s]
+    double drag = 0;             ///< of a viscous fluid, on each vertex [N s/m]
 
     void add_to(CommandLine& command) {
         command.add("--sweeps", sweeps, "passes over the vertices in each step");
-        command.add_within("--tick", tick, 1e-6, 1e-2, "time of a tick [s]");
-        command.add_within("--drag", drag, 0, 1, "of a viscous fluid on each vertex [N s/m]");
+        command.add_within("--tick", tick, 5e-5, 1e-2, "time of a tick [s]");
+        command.add_within("--drag", drag, 0, 1e-2, "of a viscous fluid on each vertex [N s/m]");
     }
 };
 

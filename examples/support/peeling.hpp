@@ -37,7 +37,7 @@ constexpr double peel_energy = 0.05;  // [J/m^2]
 class Peeling {
   public:
     /// With 8 sweeps a tick takes less than 1 ms.
-    explicit Peeling(const PeelScene& scene, const LoopOptions& options = {.sweeps = 8})
+    explicit Peeling(const PeelScene& scene, const LoopOptions& options = {})
         : scene_(scene),
           network_(scene.mesh, membrane::LinearSpring{}, {.stiffness = membrane::spring_stiffnesses(scene.mesh, ilm)}),
           adhesion_(adhesion_of(scene)),
@@ -47,7 +47,7 @@ class Peeling {
           tracker_(scene.mesh),
           grasper_(scene.mesh, {.snap_to_vertex = true}),
           x_(scene.mesh.positions()),
-          drag_work_(x_.cols()) {}
+          fluid_(options.drag, x_.cols()) {}
 
     /// What the forceps hold of the membrane.
     [[nodiscard]] membrane::Grasp<double> grasp(const membrane::Tool<double>& tool) {
@@ -58,7 +58,7 @@ class Peeling {
     /// One tick, with a constraint that holds the membrane.
     template <class Held>
     auto step(const Held& held) {
-        const auto report = options_.drag > 0 ? step_in_fluid(held) : step_on(adhesion_, held);
+        const auto report = fluid_.step(solver_, x_, options_.tick, network_, adhesion_, held);
         adhesion_.update(x_, report.moved);
         tree_.refit(x_, report.moved);
         return report;
@@ -75,7 +75,7 @@ class Peeling {
         return sum;
     }
     [[nodiscard]] double dissipated() const { return adhesion_.dissipated(); }
-    [[nodiscard]] double damped() const { return drag_work_.taken(); }
+    [[nodiscard]] double damped() const { return fluid_.taken(); }
     [[nodiscard]] double area() const {
         const auto areas = membrane::vertex_areas(scene_.mesh);
         double sum = 0;
@@ -87,18 +87,6 @@ class Peeling {
     ///@}
 
   private:
-    template <class Foundation, class Held>
-    auto step_on(const Foundation& foundation, const Held& held) {
-        return solver_.step(x_, options_.tick, network_, foundation, held);
-    }
-    template <class Held>
-    auto step_in_fluid(const Held& held) {
-        const membrane::Points<double> before = x_;
-        const auto report = step_on(InFluid(adhesion_, options_.drag), held);
-        drag_work_.add(x_ - before, options_.drag / options_.tick);
-        return report;
-    }
-
     PeelScene scene_;
     membrane::MassSpringNetwork<double, membrane::LinearSpring> network_;
     membrane::CohesiveSprings<double> adhesion_;
@@ -108,7 +96,7 @@ class Peeling {
     membrane::ContactTracker<double> tracker_;
     membrane::Grasper<double> grasper_;
     membrane::Points<double> x_;  // [m]
-    DragWork<double> drag_work_;
+    Fluid<double> fluid_;
 };
 
 }  // namespace examples

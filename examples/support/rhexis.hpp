@@ -204,12 +204,18 @@ class Forceps {
     /// What holds the flap.
     [[nodiscard]] membrane::PointAttachment<double> hold(const Tear& tear) const {
         if (!closed()) return {};
-        return {triangle_, tear.surface().corners(triangle_), {1.0 / 3, 1.0 / 3, 1.0 / 3}, position_, max_force_};
+        return {triangle_,
+                tear.surface().corners(triangle_),
+                {1.0 / 3, 1.0 / 3, 1.0 / 3},
+                position_ + slipped_,
+                max_force_};
+    }
+    /// After a step: the flap slips out of forceps that open.
+    void slip(const Tear& tear, const membrane::Points<double>& x) {
+        if (opens()) slipped_ = middle_of(tear.surface().corners_at(x, triangle_)) - position_;
     }
     /// How far the flap has slipped out of them [m].
-    [[nodiscard]] double slip(const Tear& tear, const membrane::Points<double>& x) const {
-        return closed() ? (middle_of(tear.surface().corners_at(x, triangle_)) - position_).norm() : 0;
-    }
+    [[nodiscard]] const Vector& slipped() const { return slipped_; }
     [[nodiscard]] bool closed() const { return triangle_ != membrane::no_index; }
     [[nodiscard]] const Vector& position() const { return position_; }
     [[nodiscard]] int grasps() const { return grasps_; }
@@ -223,6 +229,7 @@ class Forceps {
     static Vector middle_of(const std::array<Vector, 3>& corners) {
         return (corners[0] + corners[1] + corners[2]) / 3.0;
     }
+    [[nodiscard]] bool opens() const { return closed() && max_force_ < infinite; }
     [[nodiscard]] Vector wanted_direction(const Vector& tip, const Vector& normal) const;
     void grasp(const membrane::TornSurface<double>& surface, const Vector& place);
 
@@ -230,10 +237,12 @@ class Forceps {
     double lift_;
     membrane::Index triangle_ = membrane::no_index;
     Vector position_ = Vector::Zero();
-    double max_force_ = infinite, opened_at_ = 0;  // that they hold, less as they open; when they began to [N]
-    double fold_ = 0;                              // by which the flap is turned over [rad]
-    double stretch_ = 1;                           // of the flap between tip and forceps
-    Vector drawn_ = Vector::Zero();                // from the tip, a unit vector
+    double max_force_ = infinite;      // that they hold [N]
+    double force_before_ = 0;          // on them when they began to open [N]
+    Vector slipped_ = Vector::Zero();  // from the hand to what they hold [m]
+    double fold_ = 0;                  // by which the flap is turned over [rad]
+    double stretch_ = 1;               // of the flap between tip and forceps
+    Vector drawn_ = Vector::Zero();    // from the tip, a unit vector
     int grasps_ = 0;
 };
 
@@ -266,9 +275,9 @@ inline void Forceps::guide(const Tear& tear, const membrane::Points<double>& x, 
     const auto& tip = tear.tips().back();
     const Vector start = rest.col(tip.vertex), now = x.col(tip.vertex);
     const auto to_held = [&]() -> Vector { return middle_of(surface.corners_at(rest, triangle_)) - start; };
-    if (closed() && max_force_ == infinite && to_held().norm() > 0.62 * scene_.radius) max_force_ = opened_at_ = force;
-    if (closed() && max_force_ < infinite) {
-        max_force_ -= opened_at_ * dt / open_time;
+    if (closed() && !opens() && to_held().norm() > 0.62 * scene_.radius) max_force_ = force_before_ = force;
+    if (opens()) {
+        max_force_ -= force_before_ * dt / open_time;
         if (!(max_force_ > 0)) triangle_ = membrane::no_index, max_force_ = infinite;
         return;
     }
@@ -276,6 +285,7 @@ inline void Forceps::guide(const Tear& tear, const membrane::Points<double>& x, 
     if (!closed()) {
         grasp(surface, start - 0.3 * scene_.radius * toward + 1.5 * scene_.edge * normal.cross(toward));
         position_ = middle_of(surface.corners_at(x, triangle_));
+        slipped_ = Vector::Zero();
         stretch_ = (position_ - now).norm() / to_held().norm();
     }
     const double length = to_held().norm(), most = speed * dt;

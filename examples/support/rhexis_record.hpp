@@ -80,10 +80,9 @@ struct Opened {
     ///@}
 
   private:
-    void add_force(const Capsulorhexis& operation, const Forceps& forceps, const Vector& felt);
+    void add_force(const Tear& tear, const Forceps& forceps, const Vector& felt);
 
-    Vector last_ = Vector::Zero(), last_force_ = Vector::Zero();
-    double last_slip_ = 0;  // [m]
+    Vector last_ = Vector::Zero(), last_slip_ = last_, last_force_ = last_;
     bool held_ = false;
     double squares_ = 0, held_ticks_ = 0, peak_ = 0, angles_ = 0, advances_ = 0;
 };
@@ -92,7 +91,7 @@ inline void Opened::add(const RhexisScene& scene, const Capsulorhexis& operation
                         const Vector& felt) {
     const auto& tear = operation.tear();
     const auto& x = operation.x();
-    if (forceps.closed()) add_force(operation, forceps, felt);
+    if (forceps.closed()) add_force(tear, forceps, felt);
     stored = operation.body().energy(x) + tear.stored(x);
     operation.tissue().for_each_element([&](const auto& one) { stored += one.element.energy(one.where(x)); });
     torn = tear.dissipated();
@@ -110,14 +109,12 @@ inline void Opened::add(const RhexisScene& scene, const Capsulorhexis& operation
     }
 }
 
-inline void Opened::add_force(const Capsulorhexis& operation, const Forceps& forceps, const Vector& felt) {
-    const Tear& tear = operation.tear();
-    const double slip = forceps.slip(tear, operation.x());
+inline void Opened::add_force(const Tear& tear, const Forceps& forceps, const Vector& felt) {
     if (held_) {
         work -= (last_force_ + felt).dot(forceps.position() - last_) / 2;
-        slipped += (last_force_.norm() + felt.norm()) / 2 * (slip - last_slip_);
+        slipped += (last_force_ + felt).dot(forceps.slipped() - last_slip_) / 2;
     }
-    last_slip_ = slip;
+    last_slip_ = forceps.slipped();
     squares_ += felt.squaredNorm();
     ++held_ticks_;
     peak_ = std::max(peak_, felt.norm());

@@ -158,9 +158,10 @@ class RhexisOperation : public Operation {
   protected:
     [[nodiscard]] ForcepsState follow_example() override {
         if (finished_) return {example_hand_.position(), advance(membrane::PointAttachment<double>())};
-        example_hand_.guide(loop_.tear(), loop_.x(), dt, felt_.norm());
-        felt_ = advance(example_hand_.hold(loop_.tear()));
-        return {example_hand_.position(), felt_, example_hand_.closed() && !finished_};
+        example_hand_.guide(loop_.tear(), loop_.x(), dt, norm(forceps().force));
+        const Vector3 force = advance(example_hand_.hold(loop_.tear()));
+        example_hand_.slip(loop_.tear(), loop_.x());
+        return {example_hand_.position(), force, example_hand_.closed() && !finished_};
     }
 
     [[nodiscard]] Vector3 advance(const membrane::PointAttachment<double>& held) override {
@@ -194,8 +195,7 @@ class RhexisOperation : public Operation {
     const examples::RhexisScene& scene_;
     examples::Capsulorhexis loop_;
     examples::Forceps example_hand_;
-    Vector3 felt_ = Vector3::Zero();  // by that hand, in the last tick
-    membrane::Triangles triangles_;   // of what is drawn
+    membrane::Triangles triangles_;  // of what is drawn
     double circularity_ = 0;
     bool finished_ = false;
 };

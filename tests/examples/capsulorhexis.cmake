@@ -21,7 +21,11 @@ if(size GREATER 300000 OR NOT count EQUAL 2 OR NOT text MATCHES "^<svg .*</svg>\
     message(FATAL_ERROR "${svg} is not a small drawing with forceps in two of three states: ${size} bytes, ${count} tools")
 endif()
 
-execute_process(COMMAND ${program} --out ${folder} --tick 5e-4 --drag 3e-3 --sweeps 6 OUTPUT_VARIABLE output)
+execute_process(COMMAND ${program} --out ${folder}/fluid --tick 5e-4 --drag 3e-3 --sweeps 6
+    RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
+if(NOT code EQUAL 0 OR NOT error STREQUAL "")
+    message(FATAL_ERROR "expected exit code 0 and no error in a fluid, got ${code}:\n${error}")
+endif()
 if(NOT output MATCHES "([0-9.]+) by the fluid . ([0-9.]+) by slip in the forceps . (-?[0-9.]+) % by the steps")
     message(FATAL_ERROR "expected the energies in a fluid:\n${output}")
 endif()

@@ -23,7 +23,11 @@ foreach(scene IN ITEMS strip circle)
     endif()
 endforeach()
 
-execute_process(COMMAND ${program} --out ${folder} --tick 1e-4 --drag 1e-5 OUTPUT_VARIABLE output)
+execute_process(COMMAND ${program} --out ${folder}/fluid --tick 1e-4 --drag 1e-5
+    RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
+if(NOT code EQUAL 0 OR NOT error STREQUAL "")
+    message(FATAL_ERROR "expected exit code 0 and no error in a fluid, got ${code}:\n${error}")
+endif()
 string(REGEX MATCHALL "(-?[0-9.]+) by the fluid . (-?[0-9.]+) % by the steps" runs "${output}")
 list(LENGTH runs count)
 foreach(run IN LISTS runs)

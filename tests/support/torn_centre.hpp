@@ -14,10 +14,10 @@
 namespace test {
 
 struct CentreCut {
-    int rows = 30;         ///< edges along each side
-    double turn = 0;       ///< of the grid, and of the cut along it [rad]
-    double stretch = 1.3;  ///< in both directions
-    double drag = 0;       ///< of a fluid, on each vertex, over the membrane's stiffness times a tick
+    int rows = 30;             ///< edges along each side
+    double turn = 0;           ///< of the grid, and of the cut along it [rad]
+    double stretch = 1.3;      ///< in both directions
+    double relative_drag = 0;  ///< of a fluid, as `drag_of_stiffness` takes it
 
     static constexpr double side = 30e-3;  ///< [m]
 
@@ -36,7 +36,7 @@ struct CentreCut {
                                 {.hands = {},
                                  .fixed = vertices_where(mesh, is_border),
                                  .tolerance = 1e-6,
-                                 .drag = drag * torn_material.young_modulus * torn_material.thickness * 1e-3},
+                                 .drag = drag_of_stiffness(relative_drag)},
                                 membrane::EnergyRelease{toughness, torn_material.thickness});
         const int edges = rows * 3 / 10;
         const membrane::Vector3<double> middle(side / 2, side / 2, 0);
@@ -92,7 +92,7 @@ template <membrane::Real Scalar>
     }
     const double released = torn.work - torn.stored();
     result.torn = tear.dissipated() / released;
-    result.damped = torn.damped / released;
+    result.damped = torn.damped() / released;
     result.relaxed = torn.relaxed / released;
     result.lost = torn.lost() / released;
     return result;

@@ -44,6 +44,14 @@ struct TornSheetOptions {
     membrane::Material material = torn_material;        ///< of the sheet
 };
 
+inline constexpr double torn_tick = 1e-3;  ///< [s]
+
+/// The drag on a vertex that over the time of a tick is `relative` times the stiffness of a membrane of `torn_material`
+/// there, young_modulus x thickness whatever the mesh [N s/m].
+[[nodiscard]] constexpr double drag_of_stiffness(double relative) {
+    return relative * torn_material.young_modulus * torn_material.thickness * torn_tick;
+}
+
 /// The vertices of a mesh without a reserve at which `is_in(position at rest)`.
 template <membrane::Real Scalar, class IsIn>
 [[nodiscard]] std::vector<membrane::Index> vertices_where(const membrane::TriangleMesh<Scalar>& mesh,
@@ -74,13 +82,13 @@ class TornSheet {
     using Index = membrane::Index;
     using Vector = membrane::Vector3<Scalar>;
     using Tissue = membrane::Tissue<Springs, Triangles, Others...>;
-    static constexpr auto dt = Scalar(1e-3);  ///< [s]
+    static constexpr auto dt = static_cast<Scalar>(torn_tick);  ///< [s]
 
     /// `reserved` is a mesh with a reserve, of which `others` are too.
     TornSheet(const membrane::TriangleMesh<Scalar>& reserved, const TornSheetOptions& options,
               const Criterion& criterion, Others... others)
         : options_(options),
-          drag_work_(reserved.vertex_count()),
+          fluid_(static_cast<Scalar>(options.drag), reserved.vertex_count()),
           hands(options.hands),
           mesh(reserved),
           tissue(springs_of(mesh, options), triangles_of(mesh, options), others...),
@@ -112,9 +120,11 @@ class TornSheet {
 
     /// Takes the present positions as where the hands are, once they are at equilibrium.
     void start() {
-        relax(5000, Scalar(0));
+        examples::Fluid<Scalar> no_fluid(0, x.cols());
+        relax(5000, no_fluid);
         work = stored();
-        damped = relaxed = 0;
+        relaxed = 0;
+        fluid_ = {static_cast<Scalar>(options_.drag), x.cols()};
     }
 
     /// The hands move; the membrane follows, up to the tolerance or the number of steps; and what tears then.
@@ -122,7 +132,7 @@ class TornSheet {
         const auto before = forces;
         const auto halfway = forces_alone(displacements, Scalar(0.5)), alone = forces_alone(displacements, Scalar(1));
         move(x, displacements, Scalar(1));
-        relax(options_.steps, static_cast<Scalar>(options_.drag));
+        relax(options_.steps, fluid_);
         for (std::size_t i = 0; i < 2; ++i) {
             const auto hand = hand_work<Scalar>(displacements[i], before[i], halfway[i], alone[i], forces[i]);
             work += hand.smooth;
@@ -147,7 +157,10 @@ class TornSheet {
 
     /// What the hands gave and nothing has taken [J]. `relaxed` closes the balance, whatever the solver does, if the
     /// forces on the hands belong to the energies and the tear loses none.
-    [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped - relaxed; }
+    [[nodiscard]] double lost() const { return work - stored() - tear.dissipated() - damped() - relaxed; }
+
+    /// Taken by the drag [J].
+    [[nodiscard]] double damped() const { return fluid_.taken(); }
 
   private:
     static Springs springs_of(const membrane::TriangleMesh<Scalar>& mesh, const TornSheetOptions& options) {
@@ -187,27 +200,23 @@ class TornSheet {
     }
     // Without a fluid only the equilibrium matters: steps extrapolate the last ones, as long as the residual force
     // decreases [Nesterov83].
-    void relax(int steps, Scalar drag) {
-        const examples::InFluid fluid(none, drag);
-        relaxed += taken_up() + damped;
+    void relax(int steps, examples::Fluid<Scalar>& fluid) {
+        relaxed += taken_up() + fluid.taken();
         membrane::Points<Scalar> last = x;
         Scalar residual = std::numeric_limits<Scalar>::infinity();
         for (int i = 0, in_turn = 0; i < steps; ++i) {
             solver.wake_all();
-            const membrane::Points<Scalar> before = x;
-            report =
-                solver.step(x, dt, tissue, fluid, membrane::pin(hands[0]), membrane::pin(hands[1]), tear.ligaments());
+            report = fluid.step(solver, x, dt, tissue, none, membrane::pin(hands[0]), membrane::pin(hands[1]),
+                                tear.ligaments());
             if (report.status != membrane::StepStatus::advanced) throw std::runtime_error("a step was refused");
-            if (drag > 0) drag_work_.add(x - before, drag / dt);
-            damped = drag_work_.taken();
             if (at_rest() || i + 1 == steps) break;
-            if (drag > 0) continue;
+            if (fluid.drag() > 0) continue;
             in_turn = report.residual < std::exchange(residual, report.residual) ? in_turn + 1 : 0;
             const membrane::Points<Scalar> now = x;
             x += static_cast<Scalar>(in_turn / (in_turn + 3.0)) * (now - last);
             last = now;
         }
-        relaxed -= taken_up() + damped;
+        relaxed -= taken_up() + fluid.taken();
         for (std::size_t i = 0; i < 2; ++i) forces[i] = -report.reactions[i];
     }
     template <class... Parts>
@@ -217,7 +226,7 @@ class TornSheet {
 
     static constexpr membrane::NoFoundation none{};
     TornSheetOptions options_;
-    examples::DragWork<Scalar> drag_work_;
+    examples::Fluid<Scalar> fluid_;
 
   public:
     std::array<std::vector<Index>, 2> hands;  ///< the vertices that each holds
@@ -229,7 +238,7 @@ class TornSheet {
     membrane::StepReport<Scalar> report;
     std::vector<Index> cut_path;
     std::array<Vector, 2> forces{};  ///< of the hands [N]
-    double work = 0, damped = 0;     ///< of the hands; taken by drag [J]
+    double work = 0;                 ///< of the hands [J]
     double relaxed = 0;              ///< taken by the steps: in jumps, or by what they leave unbalanced [J]
 };
 
