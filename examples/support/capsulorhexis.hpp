@@ -13,7 +13,7 @@
 #include <membrane/model/triangular_springs.hpp>
 #include <membrane/tear/tearing.hpp>
 
-#include "support/in_fluid.hpp"
+#include "support/fluid.hpp"
 #include "support/loop_options.hpp"
 #include "support/rhexis.hpp"
 

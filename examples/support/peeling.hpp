@@ -9,7 +9,7 @@
 #include <membrane/model/material.hpp>
 #include <membrane/model/spring_stiffness.hpp>
 
-#include "support/in_fluid.hpp"
+#include "support/fluid.hpp"
 #include "support/loop_options.hpp"
 #include "support/peel_scene.hpp"
 

@@ -19,8 +19,8 @@
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/tear/tearing.hpp>
 
+#include "support/fluid.hpp"
 #include "support/hand_work.hpp"
-#include "support/in_fluid.hpp"
 #include "support/turned_grid.hpp"
 
 /// A flat sheet that two hands tear, and the energy that they give.

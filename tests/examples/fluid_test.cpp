@@ -8,7 +8,7 @@
 #include <membrane/surface/shapes.hpp>
 
 #include "support/catch.hpp"
-#include "support/in_fluid.hpp"
+#include "support/fluid.hpp"
 
 using namespace membrane;
 
