@@ -229,7 +229,7 @@ class Forceps {
     static Vector middle_of(const std::array<Vector, 3>& corners) {
         return (corners[0] + corners[1] + corners[2]) / 3.0;
     }
-    [[nodiscard]] bool opens() const { return closed() && max_force_ < infinite; }
+    [[nodiscard]] bool opens() const { return max_force_ < infinite; }
     [[nodiscard]] Vector wanted_direction(const Vector& tip, const Vector& normal) const;
     void grasp(const membrane::TornSurface<double>& surface, const Vector& place);
 

@@ -1,10 +1,9 @@
 # cmake -D program=FILE -D folder=DIR -P capsulorhexis.cmake: the tear meets its beginning, the opening is round, and the
 # picture is small and whole. In a viscous fluid the steps take at most 1 % of the hand's work.
+include(${CMAKE_CURRENT_LIST_DIR}/run_program.cmake)
+
 file(REMOVE_RECURSE ${folder})
-execute_process(COMMAND ${program} --out ${folder} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
-if(NOT code EQUAL 0 OR NOT error STREQUAL "")
-    message(FATAL_ERROR "expected exit code 0 and no error, got ${code}:\n${error}")
-endif()
+run_program(--out ${folder})
 if(NOT output MATCHES "^capsule, [^;]* circularity ([0-9.]+); ")
     message(FATAL_ERROR "expected the circularity of the opening:\n${output}")
 endif()
@@ -21,11 +20,7 @@ if(size GREATER 300000 OR NOT count EQUAL 2 OR NOT text MATCHES "^<svg .*</svg>\
     message(FATAL_ERROR "${svg} is not a small drawing with forceps in two of three states: ${size} bytes, ${count} tools")
 endif()
 
-execute_process(COMMAND ${program} --out ${folder}/fluid --tick 5e-4 --drag 3e-3 --sweeps 6
-    RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
-if(NOT code EQUAL 0 OR NOT error STREQUAL "")
-    message(FATAL_ERROR "expected exit code 0 and no error in a fluid, got ${code}:\n${error}")
-endif()
+run_program(--out ${folder}/fluid --tick 5e-4 --drag 3e-3 --sweeps 6)
 if(NOT output MATCHES "([0-9.]+) by the fluid . ([0-9.]+) by slip in the forceps . (-?[0-9.]+) % by the steps")
     message(FATAL_ERROR "expected the energies in a fluid:\n${output}")
 endif()

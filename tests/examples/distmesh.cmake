@@ -1,10 +1,9 @@
 # cmake -D program=FILE -D folder=DIR -P distmesh.cmake: the paper's figure 2 is drawn whole and small, the table is as
 # good as the bars, and what makes no mesh ends in one line.
+include(${CMAKE_CURRENT_LIST_DIR}/run_program.cmake)
+
 file(REMOVE_RECURSE ${folder})
-execute_process(COMMAND ${program} --out ${folder} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
-if(NOT code EQUAL 0 OR NOT error STREQUAL "")
-    message(FATAL_ERROR "expected exit code 0 and no error, got ${code}:\n${error}")
-endif()
+run_program(--out ${folder})
 string(REGEX MATCHALL "smallest angle [0-9.]+, mean smallest angle [0-9.]+" angles "${output}")
 list(LENGTH angles count)
 if(NOT count EQUAL 2)

@@ -1,10 +1,9 @@
 # cmake -D program=FILE -D folder=DIR -P peel.cmake: the strip takes the force of the closed form, the steps take little
 # energy, in a viscous fluid less than 1 %, and the pictures are small and whole.
+include(${CMAKE_CURRENT_LIST_DIR}/run_program.cmake)
+
 file(REMOVE_RECURSE ${folder})
-execute_process(COMMAND ${program} --out ${folder} RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
-if(NOT code EQUAL 0 OR NOT error STREQUAL "")
-    message(FATAL_ERROR "expected exit code 0 and no error, got ${code}:\n${error}")
-endif()
+run_program(--out ${folder})
 if(NOT output MATCHES "strip, [^;]*, ([0-9.]+) of the closed form; [^%]* (-?[0-9.]+) % by the steps")
     message(FATAL_ERROR "expected the force and the energies of a strip:\n${output}")
 endif()
@@ -23,11 +22,7 @@ foreach(scene IN ITEMS strip circle)
     endif()
 endforeach()
 
-execute_process(COMMAND ${program} --out ${folder}/fluid --tick 1e-4 --drag 1e-5
-    RESULT_VARIABLE code OUTPUT_VARIABLE output ERROR_VARIABLE error)
-if(NOT code EQUAL 0 OR NOT error STREQUAL "")
-    message(FATAL_ERROR "expected exit code 0 and no error in a fluid, got ${code}:\n${error}")
-endif()
+run_program(--out ${folder}/fluid --tick 1e-4 --drag 1e-5)
 string(REGEX MATCHALL "(-?[0-9.]+) by the fluid . (-?[0-9.]+) % by the steps" runs "${output}")
 list(LENGTH runs count)
 foreach(run IN LISTS runs)

@@ -10,6 +10,7 @@
 #include <optional>
 #include <tuple>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/snapshot.hpp>
@@ -154,9 +155,13 @@ double along_disc(const Vector3<double>& force) { return std::hypot(force[0], fo
 
 TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and is pulled against its motion",
                    "[friction]", double, float) {
-    for (const double coefficient : {0.1, 0.3, 1.0}) {
-        CAPTURE(coefficient);
-        Drag<TestType> drag({.friction = coefficient, .rings = 20, .radius = 5e-3, .stretch = 1.02});
+    // Around a flat ball, as under a block, all normal forces are nearly parallel.
+    for (const auto& [coefficient, is_flat] :
+         {std::pair{0.1, false}, {0.3, false}, {1.0, false}, {0.1, true}, {0.3, true}, {1.0, true}}) {
+        CAPTURE(coefficient, is_flat);
+        Settings settings{.friction = coefficient, .rings = 20};
+        if (is_flat) settings.radius = 5e-3, settings.stretch = 1.02;
+        Drag<TestType> drag(settings);
         drag.press_in();
         const Vector3<double> direction(0.8, 0.6, 0);
         Vector3<double> sum = Vector3<double>::Zero();
@@ -171,10 +176,10 @@ TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and 
             at_vertices += drag.ratio_at_vertices();
             ++count;
         }
-        // In single ticks the facets push the ball to and fro.
+        // The facets push the ball by some per cent to and fro.
         CHECK(at_vertices / count == Approx(coefficient).epsilon(0.01));
-        CHECK(along_disc(sum) / sum[2] == Approx(coefficient).epsilon(0.01));
-        CHECK(-dot(sum, direction) / along_disc(sum) > std::cos(0.01));
+        CHECK(along_disc(sum) / sum[2] == Approx(coefficient).epsilon(is_flat ? 0.01 : 0.02));
+        CHECK(-dot(sum, direction) / along_disc(sum) > std::cos(is_flat ? 0.01 : 0.02));
     }
 }
 

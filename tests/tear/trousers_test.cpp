@@ -9,36 +9,38 @@
 #include "support/torn_centre.hpp"
 #include "support/trousers.hpp"
 
-// Closed form: each leg takes toughness times thickness / 2, but for its stretch. A long run is that of `bench/run
-// tear`, with legs that stretch by 2 %; a short one, on few grids, has legs that stretch by 5 %: their mean force
-// depends less on the grid.
+// Closed form: each leg takes toughness times thickness / 2, but for its stretch. In a long run as `bench/run tear`.
+// The mean force of legs that stretch by 5 % depends less on the grid.
 TEMPLATE_TEST_CASE("a strip that is torn like trousers takes the force of the closed form, on any mesh and grid",
                    "[tear]", double, float) {
     const int directions = cases(3, 20);
     const bool is_long = directions >= 20;
     const std::vector<int> widths = is_long && std::is_same_v<TestType, double> ? std::vector{4, 6, 8} : std::vector{4};
     const int edges = cases_are_slow ? 4 : is_long ? 20 : 12;
-    double mean = 0, least = 10, largest = 0;
-    for (const int width : widths) {
-        for (int i = 0; i < directions; ++i) {
-            const double turn = 60.0 * i / (is_long ? directions - 1 : directions);
-            const auto found = test::tear_trousers<TestType>({.width = width,
-                                                              .turn = turn * std::numbers::pi / 180,
-                                                              .strain = is_long ? 0.02 : 0.05,
-                                                              .steps = is_long ? 20 : 10},
-                                                             edges);
-            CAPTURE(width, turn, found.mean, found.low, found.high, found.relaxed, found.lost);
-            CHECK(found.mean == Approx(1).epsilon(0.1));
-            CHECK(std::abs(found.lost) < 0.002);
-            CHECK(found.relaxed > 0);
-            CHECK(found.relaxed < 0.2);  // what folds beside the tip release as they snap over
-            mean += found.mean / (directions * static_cast<double>(widths.size()));
-            least = std::min(least, found.mean), largest = std::max(largest, found.mean);
+    for (const double strain : {0.02, 0.05}) {
+        if (cases_are_slow && strain == 0.05) continue;
+        double mean = 0, least = 10, largest = 0;
+        for (const int width : widths) {
+            for (int i = 0; i < directions; ++i) {
+                const double turn = 60.0 * i / (is_long ? directions - 1 : directions);
+                const auto found = test::tear_trousers<TestType>({.width = width,
+                                                                  .turn = turn * std::numbers::pi / 180,
+                                                                  .strain = strain,
+                                                                  .steps = is_long ? 20 : 10},
+                                                                 edges);
+                CAPTURE(strain, width, turn, found.mean, found.low, found.high, found.relaxed, found.lost);
+                CHECK(found.mean == Approx(1).epsilon(0.1));
+                CHECK(std::abs(found.lost) < 0.002);
+                CHECK(found.relaxed > 0);
+                CHECK(found.relaxed < 0.2);  // what folds beside the tip release as they snap over
+                mean += found.mean / (directions * static_cast<double>(widths.size()));
+                least = std::min(least, found.mean), largest = std::max(largest, found.mean);
+            }
         }
+        CAPTURE(strain, mean, least, largest);
+        CHECK(mean == Approx(1).epsilon(0.05));
+        CHECK(largest - least <= 0.1 * mean);
     }
-    CAPTURE(mean, least, largest);
-    CHECK(mean == Approx(1).epsilon(0.05));
-    CHECK(largest - least <= 0.1 * mean);
 }
 
 // A drag on each vertex that is above the membrane's stiffness: jumps take several ticks, and the drag takes their
