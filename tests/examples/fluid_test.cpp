@@ -32,7 +32,9 @@ struct LetGo {
     explicit LetGo(double rate) : foundation(of(mesh)), fluid(static_cast<S>(rate * 1e-3), mesh.vertex_count()) {
         Vector3<S> up = point(x, 0);
         up[2] += S(1e-3);
-        for (int i = 0; i < 500; ++i) solver.step(x, S(1e-3), network, foundation, pull(Index(0), up));
+        for (int i = 0; i < 500; ++i) {
+            REQUIRE(solver.step(x, S(1e-3), network, foundation, pull(Index(0), up)).status == StepStatus::advanced);
+        }
         before = energy();
     }
     void tick() { REQUIRE(fluid.step(solver, x, S(1e-3), network, foundation).status == StepStatus::advanced); }
@@ -75,7 +77,8 @@ TEST_CASE("without drag there is no fluid, to the bit", "[fluid]") {
     LetGo<double, VirtualVolumeSprings<double>> in_none(0), plain(0);
     for (int i = 0; i < 20; ++i) {
         in_none.tick();
-        plain.solver.step(plain.x, 1e-3, plain.network, plain.foundation);
+        const StepReport report = plain.solver.step(plain.x, 1e-3, plain.network, plain.foundation);
+        CHECK(report.status == StepStatus::advanced);
     }
     CHECK(in_none.x == plain.x);
     CHECK(in_none.fluid.taken() == 0);
