@@ -305,7 +305,7 @@ std::string checked_stl(const std::string& file, std::string_view bytes) {
                     lines.end_line();
                     lines.expect("a line of a facet");
                 } else if (lines.keep(lines.word()) != wanted) {
-                    lines.refuse("'" + std::string(wanted) + "'", lines.words[lines.at - 1]);
+                    lines.refuse(std::string("'").append(wanted).append("'"), lines.words[lines.at - 1]);
                 }
             }
             lines.end_line();

@@ -135,8 +135,8 @@ TEST_CASE("network and foundation of floats are evaluated in double", "[elastici
         Points<float> along = mesh.positions();
         REQUIRE(body.move_to(test::jittered<float>(along, 1e-4F, random), 1e-3F, along));
         const Points<double> x = test::jittered<double>(mesh.positions().cast<double>(), 1e-3, random);
-        const auto check = [&](const auto& foundation, const Points<float>& anchors, auto stiffness) {
-            const auto state = Elasticity(network, foundation).at(x);
+        const auto check = [&](const auto& model, const Points<float>& anchors, auto stiffness) {
+            const auto state = Elasticity(network, model).at(x);
             for (Index v = 0; v < mesh.vertex_count(); ++v) {
                 const Eigen::Vector3d displacement = anchors.col(v).cast<double>() - x.col(v);
                 const Eigen::Vector3d exact = stiffness(v) * displacement;

@@ -200,13 +200,13 @@ TEST_CASE("no offset without a ball's force, and what is refused") {
     membrane::Contact<double> contact;
     const auto& x = mesh.positions();
     CHECK(correction(x, contact, {0, 0, 1}).isZero(0));
-    contact = {.phase = membrane::ContactPhase::began,
-               .triangle = 0,
-               .corners = {mesh.triangles()(0, 0), mesh.triangles()(1, 0), mesh.triangles()(2, 0)},
-               .barycentric = {1, 0, 0},
-               .normal = {0, 0, 1},
-               .axis_point = {0, 0, 1e-3},
-               .radius = 1e-3};
+    contact.phase = membrane::ContactPhase::began;
+    contact.triangle = 0;
+    contact.corners = {mesh.triangles()(0, 0), mesh.triangles()(1, 0), mesh.triangles()(2, 0)};
+    contact.barycentric = {1, 0, 0};
+    contact.normal = {0, 0, 1};
+    contact.axis_point = {0, 0, 1e-3};
+    contact.radius = 1e-3;
     CHECK(correction(x, contact, {0, 0, 0}).isZero(0));
     CHECK(correction(x, contact, {0, 0, std::numeric_limits<double>::quiet_NaN()}).isZero(0));
     const Point offset = correction(x, contact, {0, 0, 1e-4});

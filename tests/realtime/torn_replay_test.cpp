@@ -36,7 +36,7 @@ struct Run {
             const auto force = loop.tick(tool);
             recorder.add(tool, force);
             allocated += count.so_far();
-            felt += norm(force) > 0 ? 1 : 0;
+            felt += norm(force) > 0 ? 1U : 0U;
         }
     }
 
