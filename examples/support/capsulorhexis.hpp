@@ -78,8 +78,9 @@ class Capsulorhexis {
     /// Nothing holds it, and it does not tear.
     void run_to_equilibrium(int ticks = 300) {
         solver_.wake_all();
-        for (int i = 0; i < ticks && !solver_.step(x_, options_.tick, tissue_, body_).converged; ++i)
+        for (int i = 0; i < ticks && !solver_.step(x_, options_.tick, tissue_, body_).converged; ++i) {
             solver_.wake_all();
+        }
     }
 
     [[nodiscard]] const Tissue& tissue() const { return tissue_; }

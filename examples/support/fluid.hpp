@@ -49,16 +49,17 @@ template <membrane::Real Scalar>
 class Fluid {
   public:
     /// `drag` on a vertex per velocity [N s/m]; 0: no fluid, at no cost.
-    Fluid(Scalar drag, Eigen::Index vertices) : drag_(drag), last_(membrane::Points<Scalar>::Zero(3, vertices)) {}
+    Fluid(Scalar drag, Eigen::Index vertices)
+        : drag_(drag), before_(3, vertices), last_(membrane::Points<Scalar>::Zero(3, vertices)) {}
 
     /// A step of the solver, in the fluid.
     template <class Solver, class Network, class Foundation, class... Constraints>
     auto step(Solver& solver, membrane::Points<Scalar>& x, Scalar dt, const Network& network,
               const Foundation& foundation, const Constraints&... constraints) {
         if (!(drag_ > 0)) return solver.step(x, dt, network, foundation, constraints...);
-        const membrane::Points<Scalar> before = x;
+        before_ = x;
         const auto report = solver.step(x, dt, network, InFluid(foundation, drag_), constraints...);
-        const membrane::Points<Scalar> displacements = x - before;
+        const auto displacements = x - before_;
         taken_ += static_cast<double>(drag_ / dt * displacements.cwiseProduct(displacements + last_).sum() / 2);
         last_ = displacements;
         return report;
@@ -70,7 +71,8 @@ class Fluid {
 
   private:
     Scalar drag_;
-    membrane::Points<Scalar> last_;  // displacements in the last step [m]
+    membrane::Points<Scalar> before_;  // positions before the step [m]
+    membrane::Points<Scalar> last_;    // displacements in the last step [m]
     double taken_ = 0;
 };
 

@@ -19,7 +19,7 @@ namespace web {
 
 using Points = membrane::Points<double>;
 
-static_assert(dt == examples::LoopOptions().tick);
+static_assert(dt == examples::capsule_loop.tick && dt == examples::LoopOptions().tick);
 
 /// How far it is.
 struct Progress {

@@ -120,8 +120,8 @@ class TornSheet {
 
     /// Takes the present positions as where the hands are, once they are at equilibrium.
     void start() {
-        examples::Fluid<Scalar> no_fluid(0, x.cols());
-        relax(5000, no_fluid);
+        fluid_ = {Scalar(0), x.cols()};
+        relax(5000);
         work = stored();
         relaxed = 0;
         fluid_ = {static_cast<Scalar>(options_.drag), x.cols()};
@@ -132,7 +132,7 @@ class TornSheet {
         const auto before = forces;
         const auto halfway = forces_alone(displacements, Scalar(0.5)), alone = forces_alone(displacements, Scalar(1));
         move(x, displacements, Scalar(1));
-        relax(options_.steps, fluid_);
+        relax(options_.steps);
         for (std::size_t i = 0; i < 2; ++i) {
             const auto hand = hand_work<Scalar>(displacements[i], before[i], halfway[i], alone[i], forces[i]);
             work += hand.smooth;
@@ -200,23 +200,23 @@ class TornSheet {
     }
     // Without a fluid only the equilibrium matters: steps extrapolate the last ones, as long as the residual force
     // decreases [Nesterov83].
-    void relax(int steps, examples::Fluid<Scalar>& fluid) {
-        relaxed += taken_up() + fluid.taken();
+    void relax(int steps) {
+        relaxed += taken_up() + damped();
         membrane::Points<Scalar> last = x;
         Scalar residual = std::numeric_limits<Scalar>::infinity();
         for (int i = 0, in_turn = 0; i < steps; ++i) {
             solver.wake_all();
-            report = fluid.step(solver, x, dt, tissue, none, membrane::pin(hands[0]), membrane::pin(hands[1]),
-                                tear.ligaments());
+            report = fluid_.step(solver, x, dt, tissue, none, membrane::pin(hands[0]), membrane::pin(hands[1]),
+                                 tear.ligaments());
             if (report.status != membrane::StepStatus::advanced) throw std::runtime_error("a step was refused");
             if (at_rest() || i + 1 == steps) break;
-            if (fluid.drag() > 0) continue;
+            if (fluid_.drag() > 0) continue;
             in_turn = report.residual < std::exchange(residual, report.residual) ? in_turn + 1 : 0;
             const membrane::Points<Scalar> now = x;
             x += static_cast<Scalar>(in_turn / (in_turn + 3.0)) * (now - last);
             last = now;
         }
-        relaxed -= taken_up() + fluid.taken();
+        relaxed -= taken_up() + damped();
         for (std::size_t i = 0; i < 2; ++i) forces[i] = -report.reactions[i];
     }
     template <class... Parts>
