@@ -10,7 +10,7 @@ using namespace bench;
 void whole(benchmark::State& state) {
     Loop loop = pressed(state.range(0));
     for (auto _ : state) loop.frame();
-    loop.check();
+    loop.validate();
 }
 BENCHMARK(whole)->Apply(sizes);
 

@@ -46,7 +46,7 @@ void ours(benchmark::State& state) {
         loop.frame();
         moved += static_cast<double>(loop.report.moved.size());
     }
-    loop.check();
+    loop.validate();
     state.counters["moved"] = benchmark::Counter(moved, benchmark::Counter::kAvgIterations);
 }
 BENCHMARK(ours<double, membrane::BlockStep, same>)->Name("same/double/block")->Apply(sizes_of_same);

@@ -150,7 +150,7 @@ void contact(benchmark::State& state, bool tracked) {
         state.SetIterationTime(time);
         touched += static_cast<double>(loop.contact.triangles.size());
     }
-    loop.check();
+    loop.validate();
     state.counters["touched"] = benchmark::Counter(touched, benchmark::Counter::kAvgIterations);
 }
 void sizes_of_contact(benchmark::internal::Benchmark* measured) {

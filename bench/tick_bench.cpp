@@ -118,7 +118,7 @@ void path(benchmark::State& state) {
                 if (t >= Slide::first_measured) bullets.push_back(time);
             }
         }
-        loop.check();
+        loop.validate();
         require(bullet.finite() && touched > 0, "the tool must press on Bullet's body");
         require(bullet.penetration() < depth / 2, "Bullet's nodes must not penetrate the tool");
 

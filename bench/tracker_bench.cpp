@@ -31,7 +31,7 @@ void tree(benchmark::State& state, const Path& path) {
         loop.frame();
         state.SetIterationTime(seconds(ask));
     }
-    loop.check();
+    loop.validate();
 
     loop.contact = loop.tracker.update(loop.tree, loop.x, loop.tool);
     ask();

@@ -130,7 +130,7 @@ void threshold_refit(benchmark::State& state) {
         loop.frame();
         state.SetIterationTime(seconds([&] { loop.tree.refit(loop.x, loop.report.moved); }));
     }
-    loop.check();
+    loop.validate();
 }
 BENCHMARK(threshold_refit)->Name("threshold/refit")->Apply(thresholds)->Iterations(100)->UseManualTime();
 

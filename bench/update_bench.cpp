@@ -17,7 +17,7 @@ void update(benchmark::State& state, Update update) {
         state.SetIterationTime(seconds([&] { update(loop); }));
         moved += static_cast<double>(loop.report.moved.size());
     }
-    loop.check();
+    loop.validate();
     state.counters["moved"] = benchmark::Counter(moved, benchmark::Counter::kAvgIterations);
 }
 BENCHMARK_CAPTURE(update, refit_moved, [](Loop& l) { l.tree.refit(l.x, l.report.moved); })->Apply(sizes_around);

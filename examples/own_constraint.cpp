@@ -21,7 +21,7 @@ struct Suction {
     bool valid() const noexcept { return membrane::is_finite(force); }
     void begin(Context& context) const noexcept {
         for (const membrane::Index v : vertices) {
-            if (!context.check(v)) return;
+            if (!context.validate(v)) return;
             context.seed(v);  // the force spreads from here
             context.add_force(v, force);
         }

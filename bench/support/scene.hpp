@@ -24,7 +24,7 @@
 ///
 ///     Loop loop = pressed(642);
 ///     for (auto _ : state) loop.frame();
-///     loop.check();
+///     loop.validate();
 namespace bench {
 
 using membrane::Index;
@@ -136,7 +136,7 @@ struct LoopOf {
 
     /// Requires that the tool was in contact since `ticks_in`, that normals and tree match the positions, and that the
     /// reaction is outward.
-    void check() const;
+    void validate() const;
 
     Trajectory path;
     Index now = 0;  // ticks
@@ -213,7 +213,7 @@ inline void measure_stage(benchmark::State& state, Loop loop, Stage part) {
             }
         });
     }
-    loop.check();
+    loop.validate();
 }
 
 /// Points within 0.87 to 1.13 radii of the centre, equal in every run.
@@ -246,7 +246,7 @@ template <membrane::Real Scalar>
 }
 
 template <membrane::Real Scalar, class Rule, class Trajectory>
-void LoopOf<Scalar, Rule, Trajectory>::check() const {
+void LoopOf<Scalar, Rule, Trajectory>::validate() const {
     const membrane::Vector3<Scalar>& reaction = report.reactions[0];
     require(pressing, "the tool has lost contact, or a step was refused");
     require(report.residual < membrane::norm(reaction) / 2, "the residual must be below half the reaction");

@@ -77,7 +77,7 @@ struct Reference {
         squares += membrane::squared_norm(force);
         reference.largest = std::max(reference.largest, membrane::norm(force));
     }
-    loop.check();
+    loop.validate();
     reference.rms = std::sqrt(squares / static_cast<double>(reference.forces.size()));
     return reference;
 }

@@ -22,7 +22,7 @@ struct Suction {
     }
     void begin(membrane::ConstraintContext<Scalar>& context) const noexcept {
         for (const membrane::Index v : vertices) {
-            if (!context.check(v)) return;
+            if (!context.validate(v)) return;
             context.seed(v);
             context.add_force(v, force / static_cast<Scalar>(vertices.size()));
         }

@@ -137,7 +137,7 @@ inline constexpr int patience = 100;    // ticks that `stop` waits for the last 
 template <class Hd>
 OpenHapticsDevice<Hd>::OpenHapticsDevice(OpenHapticsOptions options)
     : options_(std::move(options)), limiter_(options_.profile, options_.limits) {
-    options_.scale.check();
+    options_.scale.validate();
     membrane::detail::check_option("OpenHapticsDevice", options_.radius, "radius", "m");
     membrane::detail::check_option("OpenHapticsDevice", options_.shaft, "shaft", "m");
 }

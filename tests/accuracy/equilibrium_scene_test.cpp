@@ -167,7 +167,7 @@ TEST_CASE("a scene refuses what is not valid", "[equilibrium_scene]") {
 }
 
 TEST_CASE("equilibrium refuses options out of their range", "[equilibrium_scene]") {
-    const auto refused = [](const EquilibriumOptions& options) { return refusal([&] { options.check(); }); };
+    const auto refused = [](const EquilibriumOptions& options) { return refusal([&] { options.validate(); }); };
     CHECK(refused({}) == "");
     CHECK(refused({.increments = 0}) == "equilibrium: increments must be at least 1, got 0");
     CHECK(refused({.layers = -1}) == "equilibrium: layers must be at least 0, got -1");

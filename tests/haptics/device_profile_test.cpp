@@ -13,7 +13,7 @@ TEST_CASE("the stock devices are valid, their numbers those of such devices", "[
     for (const auto& device : {devices::touch, devices::phantom_desktop, devices::premium_1_5, devices::premium_3_0,
                                devices::omega, devices::delta, devices::sigma}) {
         CAPTURE(std::string(device.name));
-        CHECK(test::refusal([&] { device.check(); }) == "");
+        CHECK(test::refusal([&] { device.validate(); }) == "");
         CHECK(device.peak_force >= 3.3);
         CHECK(device.peak_force <= 22);
         CHECK(device.stiffness >= 500);
@@ -31,7 +31,7 @@ TEST_CASE("profiles that make no sense are refused by name", "[profile][bad]") {
     const auto refused = [](Field field, double value) {
         auto device = devices::touch;
         device.*field = value;
-        return test::refusal([&] { device.check(); });
+        return test::refusal([&] { device.validate(); });
     };
     struct Case {
         Field field;

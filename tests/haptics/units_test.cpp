@@ -95,7 +95,7 @@ TEST_CASE("work by the hand is force times motion times the work on the tissue",
 }
 
 TEST_CASE("scales that make no sense are refused by name", "[units][bad]") {
-    const auto refused = [](const DeviceScale& scale) { return test::refusal([&] { scale.check(); }); };
+    const auto refused = [](const DeviceScale& scale) { return test::refusal([&] { scale.validate(); }); };
     CHECK(refused({}) == "");
     CHECK(refused({.force = 0}) == "DeviceScale: force must be finite and positive, got 0");
     CHECK(refused({.motion = -1}) == "DeviceScale: motion must be finite and positive, got -1");

@@ -53,7 +53,7 @@ TEST_CASE("moduli are those of Hooke's law", "[material]") {
 TEST_CASE("tissues are materials, typical ones within the range", "[material]") {
     for (const MaterialRange& tissue : {materials::cornea(), materials::lens_capsule(), materials::retina()}) {
         for (const Material& material : {tissue.typical, tissue.lower, tissue.upper}) {
-            CHECK(test::refusal([&] { material.check(); }) == "");
+            CHECK(test::refusal([&] { material.validate(); }) == "");
         }
         CHECK((tissue.lower.young_modulus < tissue.typical.young_modulus));
         CHECK((tissue.typical.young_modulus < tissue.upper.young_modulus));
@@ -78,7 +78,7 @@ TEST_CASE("materials and foundations that make no sense are refused by name", "[
     const auto refused = [&](double Material::*field, double value) {
         Material material = valid;
         material.*field = value;
-        return test::refusal([&] { material.check(); });
+        return test::refusal([&] { material.validate(); });
     };
     CHECK(refused(&Material::young_modulus, -3) == "Material: young_modulus must be finite and positive [Pa], got -3");
     CHECK(refused(&Material::poisson_ratio, 0.51) == "Material: poisson_ratio must be 0 to 0.5, got 0.51");
@@ -90,7 +90,7 @@ TEST_CASE("materials and foundations that make no sense are refused by name", "[
     const auto refused_layer = [&](double FoundationLayer::*field, double value) {
         FoundationLayer layer{.young_modulus = 1e3, .poisson_ratio = 0.3, .thickness = 1e-3};
         layer.*field = value;
-        return test::refusal([&] { layer.check(); });
+        return test::refusal([&] { layer.validate(); });
     };
     CHECK(refused_layer(&FoundationLayer::young_modulus, 0) ==
           "Foundation: young_modulus must be finite and positive [Pa], got 0");

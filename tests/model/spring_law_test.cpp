@@ -222,7 +222,7 @@ TEMPLATE_TEST_CASE("wild lengths give finite results", "[network]", double, floa
 
 TEST_CASE("options of the exponential law that make no sense are refused by name", "[network][bad]") {
     const auto refused = [](double stiffening, double limit) {
-        return test::refusal([&] { ExponentialSpring{stiffening, limit}.check(); });
+        return test::refusal([&] { ExponentialSpring{stiffening, limit}.validate(); });
     };
     CHECK(refused(10, 0.5) == "");
     CHECK(refused(50, 1) == "");

@@ -36,13 +36,13 @@ TEST_CASE("a context knows its vertices", "[context]") {
     SixPoints scene;
     ConstraintContext<double> context(scene.x, scene.work, scene);
     for (Index v = 0; v < 6; ++v) {
-        CHECK(context.check(v));
+        CHECK(context.validate(v));
         CHECK(context.position(v) == point(scene.points, v));
     }
     CHECK_FALSE(scene.work.invalid);
     for (const Index wrong : {-1, 6, 1000, unlimited}) {
         scene.work.begin_step();
-        CHECK_FALSE(context.check(wrong));
+        CHECK_FALSE(context.validate(wrong));
         CHECK(scene.work.invalid);  // the step will be refused
     }
 }

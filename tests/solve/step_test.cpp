@@ -9,7 +9,7 @@
 using membrane::SolverOptions;
 
 TEST_CASE("solver options out of range are refused by name") {
-    const auto refused = [](SolverOptions<double> options) { return test::refusal([&] { options.check(); }); };
+    const auto refused = [](SolverOptions<double> options) { return test::refusal([&] { options.validate(); }); };
     CHECK(refused({}).empty());
     CHECK(refused({.layers = membrane::unlimited, .sweeps = 1000000, .max_vertex_updates = 1}).empty());
     CHECK(refused({.layers = -1}) == "QuasiStaticSolver: layers must be at least 0, got -1");

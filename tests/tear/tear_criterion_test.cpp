@@ -30,11 +30,11 @@ TEST_CASE("a tear opens by tension across the largest one", "[tear]") {
 
 TEST_CASE("constants of a tear are checked", "[tear]") {
     CHECK(test::refusal([] {
-              EnergyRelease{0, 1}.check();
+              EnergyRelease{0, 1}.validate();
           }) == "EnergyRelease: toughness must be finite and positive [J/m^2], got 0");
     CHECK(test::refusal([] {
-              EnergyRelease{1, -1}.check();
+              EnergyRelease{1, -1}.validate();
           }) == "EnergyRelease: thickness must be finite and positive [m], got -1");
-    CHECK(test::refusal([] { LargestTension{-2}.check(); }) ==
+    CHECK(test::refusal([] { LargestTension{-2}.validate(); }) ==
           "LargestTension: strength must be finite and positive [N/m], got -2");
 }

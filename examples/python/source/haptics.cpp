@@ -133,7 +133,7 @@ void bind_profiles(py::module_& module) {
         std::pair("friction", &DeviceProfile::friction), std::pair("resolution", &DeviceProfile::resolution),
         std::pair("thermal_time", &DeviceProfile::thermal_time));
     fields.def_init(profile, fields.taking<std::string>([](std::string name, const DeviceProfile& numbers) {
-        return (numbers.check(), Profile(std::move(name), numbers));
+        return (numbers.validate(), Profile(std::move(name), numbers));
     }),
                     py::arg("name"));
     fields.def_fields(profile);

@@ -29,7 +29,7 @@ void bind_material(py::module_& module) {
     const Keywords fields("Material", std::pair("young_modulus", &Material::young_modulus),
                           std::pair("poisson_ratio", &Material::poisson_ratio),
                           std::pair("thickness", &Material::thickness), std::pair("density", &Material::density));
-    fields.def_init(material, fields.taking<>([](const Material& m) { return (m.check(), m); }));
+    fields.def_init(material, fields.taking<>([](const Material& m) { return (m.validate(), m); }));
     fields.def_fields(material);
     material.def("biaxial_stiffness", &Material::biaxial_stiffness, doc("Material::biaxial_stiffness"));
 
@@ -37,7 +37,7 @@ void bind_material(py::module_& module) {
     const Keywords layer_fields("FoundationLayer", std::pair("young_modulus", &Layer::young_modulus),
                                 std::pair("poisson_ratio", &Layer::poisson_ratio),
                                 std::pair("thickness", &Layer::thickness));
-    layer_fields.def_init(layer, layer_fields.taking<>([](const Layer& l) { return (l.check(), l); }));
+    layer_fields.def_init(layer, layer_fields.taking<>([](const Layer& l) { return (l.validate(), l); }));
     layer_fields.def_fields(layer);
     layer.def("normal_stiffness", &Layer::normal_stiffness, doc("FoundationLayer::normal_stiffness"))
         .def("tangential_stiffness", &Layer::tangential_stiffness, doc("FoundationLayer::tangential_stiffness"));

@@ -19,7 +19,7 @@ using Law = std::variant<membrane::LinearSpring, membrane::TensionSpring, membra
         if constexpr (std::same_as<std::remove_cvref_t<decltype(one)>, membrane::LinearSpring>) {
             return {{membrane::MassSpringNetwork(mesh, one, options), SurfaceVersion(mesh)}};
         } else {
-            if constexpr (requires { one.check(); }) one.check();
+            if constexpr (requires { one.validate(); }) one.validate();
             return {{membrane::MassSpringNetwork(mesh, AnySpring{one}, options), SurfaceVersion(mesh)}};
         }
     };
@@ -68,7 +68,7 @@ void bind_laws(py::module_& module) {
     auto exponential = py::class_<ExponentialSpring>(module, "ExponentialSpring", doc("ExponentialSpring"));
     const Keywords options("ExponentialSpring", std::pair("stiffening", &ExponentialSpring::stiffening),
                            std::pair("strain_limit", &ExponentialSpring::strain_limit));
-    options.def_init(exponential, options.taking<>([](const ExponentialSpring& law) { return (law.check(), law); }));
+    options.def_init(exponential, options.taking<>([](const ExponentialSpring& law) { return (law.validate(), law); }));
     options.def_fields(exponential);
     auto table =
         py::class_<TableSpring>(

@@ -148,7 +148,7 @@ void bind_rules(py::module_& module) {
     py::class_<membrane::MassStep>(module, "MassStep", doc("MassStep")).def(py::init());
     auto options = py::class_<SolverOptions>(module, "SolverOptions", doc("SolverOptions"));
     const auto keywords = solver_keywords();
-    keywords.def_init(options, keywords.taking<>([](const SolverOptions& o) { return (o.check(), o); }));
+    keywords.def_init(options, keywords.taking<>([](const SolverOptions& o) { return (o.validate(), o); }));
     keywords.def_fields(options);
 }
 

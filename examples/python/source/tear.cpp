@@ -209,7 +209,7 @@ void bind_criteria(py::module_& module) {
     py::class_<EnergyRelease>(module, "EnergyRelease", doc("EnergyRelease"))
         .def(py::init([](double toughness, double thickness) {
                  const EnergyRelease criterion{.toughness = toughness, .thickness = thickness};
-                 criterion.check();
+                 criterion.validate();
                  return criterion;
              }),
              py::kw_only(), py::arg("toughness"), py::arg("thickness"), doc("EnergyRelease::check"))
@@ -218,7 +218,7 @@ void bind_criteria(py::module_& module) {
     py::class_<LargestTension>(module, "LargestTension", doc("LargestTension"))
         .def(py::init([](double strength) {
                  const LargestTension criterion{.strength = strength};
-                 criterion.check();
+                 criterion.validate();
                  return criterion;
              }),
              py::kw_only(), py::arg("strength"), doc("LargestTension::check"))

@@ -53,7 +53,7 @@ struct GridSearchOptions {
     bool count_viscosity = true;
 
     /// @throws InvalidInput for an option out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// The chosen setting, with its measured cost and error.
@@ -110,7 +110,7 @@ namespace detail {
 
 inline constexpr std::string_view choose_name = "choose_settings";
 
-inline void check(const Requirement& requirement) {
+inline void validate(const Requirement& requirement) {
     const auto [error, time, mesh_error] = requirement;
     if (error == 0 && time == 0) refuse(choose_name, "a force_error or a time must be required, got none");
     if (!is_finite(error) || error < 0) {
@@ -235,7 +235,7 @@ template <Real Scalar, class Attempt>
 }  // namespace detail
 
 template <Real Scalar>
-void GridSearchOptions<Scalar>::check() const {
+void GridSearchOptions<Scalar>::validate() const {
     const auto check_numbers = [](const std::vector<Index>& numbers, Index least, std::string_view name) {
         if (numbers.empty()) refuse(detail::choose_name, name, " must hold a number to try, got none");
         for (const Index number : numbers) {
@@ -247,7 +247,7 @@ void GridSearchOptions<Scalar>::check() const {
     check_numbers(layers, 0, "layers");
     check_numbers(sweeps, 1, "sweeps");
     check_numbers(contact_iterations, 1, "contact_iterations");
-    others.check();
+    others.validate();
     if (!is_finite(safety_factor) || !(safety_factor >= 1)) {
         refuse(detail::choose_name, "safety_factor must be finite and at least 1, got ", safety_factor);
     }
@@ -258,8 +258,8 @@ void GridSearchOptions<Scalar>::check() const {
 template <Real Scalar, class Attempt>
 ChosenSettings<Scalar> choose_settings(const GridSearchOptions<Scalar>& experiment, const Requirement& requirement,
                                        Attempt attempt) {
-    detail::check(requirement);
-    experiment.check();
+    detail::validate(requirement);
+    experiment.validate();
     const double error = detail::solver_error(requirement), time = requirement.time;
     ChosenSettings<Scalar> choice = error > 0 ? detail::choose_one(experiment, {.force_error = error}, attempt)
                                               : detail::choose_one(experiment, {.time = time}, attempt);
@@ -281,8 +281,8 @@ ChosenSettings<Scalar> choose_settings(const TriangleMesh<Scalar>& mesh, const N
                                        const History& history, const Requirement& requirement,
                                        const std::type_identity_t<GridSearchOptions<Scalar>>& experiment,
                                        const Rule& rule, const Clock& clock) {
-    detail::check(requirement);
-    experiment.check();
+    detail::validate(requirement);
+    experiment.validate();
     const auto references = experiment.count_viscosity
                                 ? equilibria(mesh, network, volume, history, experiment.tick_stride)
                                 : exact_steps(mesh, network, volume, history, experiment.tick_stride);

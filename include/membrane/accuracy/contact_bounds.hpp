@@ -99,7 +99,7 @@ class ContactBounds {
     }
     bool mark(const EquilibriumProblem& problem, double max_displacement) noexcept;
     bool narrow(double max_displacement) noexcept;
-    [[nodiscard]] double radius_of(const Near& near) const noexcept { return radii_[near.tool]; }
+    [[nodiscard]] double radius_of(const Near& candidate) const noexcept { return radii_[candidate.tool]; }
 
     std::vector<double> radii_;  // of the tools [m]
     std::vector<Near> near_;
@@ -221,13 +221,13 @@ inline bool ContactBounds::bound_softening(const EquilibriumProblem& problem, co
 // Assigns to each vertex the tool that may touch it; false if there are two, or the vertex is fixed.
 inline bool ContactBounds::mark(const EquilibriumProblem& problem, double max_displacement) noexcept {
     std::fill(marks_.begin(), marks_.end(), Mark{});
-    for (const auto& near : near_) {
-        if (near.distance - radius_of(near) > max_displacement) continue;
-        for (const Index v : near.corners) {
+    for (const auto& candidate : near_) {
+        if (candidate.distance - radius_of(candidate) > max_displacement) continue;
+        for (const Index v : candidate.corners) {
             auto& mark = marks_[at(v)];
-            if (problem.fixed(v) || (mark.tool != none && mark.tool != near.tool)) return false;
-            mark.tool = near.tool;
-            mark.middle += near.u;
+            if (problem.fixed(v) || (mark.tool != none && mark.tool != candidate.tool)) return false;
+            mark.tool = candidate.tool;
+            mark.middle += candidate.u;
         }
     }
     for (auto& mark : marks_) mark.middle = direction<double>(mark.middle, Vector3<double>::Zero());
@@ -241,12 +241,12 @@ inline bool ContactBounds::mark(const EquilibriumProblem& problem, double max_di
 inline bool ContactBounds::narrow(double max_displacement) noexcept {
     constexpr double min_allowed = 0.2;  // of a cosine
     const auto sine = [](double cosine) { return std::sqrt((std::max)(1 - cosine * cosine, 0.0)); };
-    for (const auto& near : near_) {
-        if (near.distance - radius_of(near) > max_displacement) continue;
-        const double from_u = (std::min)((near.distance - max_displacement) / radius_of(near), 1.0);
-        for (const Index v : near.corners) {
+    for (const auto& candidate : near_) {
+        if (candidate.distance - radius_of(candidate) > max_displacement) continue;
+        const double from_u = (std::min)((candidate.distance - max_displacement) / radius_of(candidate), 1.0);
+        for (const Index v : candidate.corners) {
             auto& mark = marks_[at(v)];
-            const double u_from_middle = (std::min)(dot(mark.middle, near.u), 1.0);
+            const double u_from_middle = (std::min)(dot(mark.middle, candidate.u), 1.0);
             if (!(from_u > min_allowed && u_from_middle > min_allowed)) return false;
             const double together = from_u * u_from_middle - sine(from_u) * sine(u_from_middle) - 1e-12;
             mark.cosine = (std::min)(mark.cosine, together);

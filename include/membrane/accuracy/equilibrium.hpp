@@ -80,9 +80,9 @@ void check_fit(const ConstPointsRef<Scalar>& x, const TriangleMesh<Scalar>& mesh
                                                  const Points<double>& x) {
     std::vector<Index> seeds = scene.seeds();
     for (const auto& pressing : scene.tools()) {
-        const double far = pressing.tool.radius + pressing.detection_distance;
+        const double max_distance = pressing.tool.radius + pressing.detection_distance;
         for (const auto& corners : triangles.colwise()) {
-            if (distance_from_axis(triangle_at(x, corners), pressing.tool) > far) continue;
+            if (distance_from_axis(triangle_at(x, corners), pressing.tool) > max_distance) continue;
             seeds.insert(seeds.end(), corners.begin(), corners.end());
         }
     }
@@ -96,7 +96,7 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
 Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x, const TriangleMesh<Scalar>& mesh,
                         const Network& network, const Volume& volume, const EquilibriumOptions& options,
                         const Constraints&... constraints) {
-    options.check();
+    options.validate();
     detail::check_fit(x, mesh, network, volume);
     std::vector<unsigned char> fixed(static_cast<std::size_t>(network.vertex_count()));
     for (Index v = 0; v < network.vertex_count(); ++v) fixed[static_cast<std::size_t>(v)] = network.pinned(v) ? 1 : 0;

@@ -28,7 +28,7 @@ struct EquilibriumOptions {
     double tolerance = 1e-12;
 
     /// @throws InvalidInput for an option out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// The equilibrium of a membrane under the constraints of a scene.
@@ -120,9 +120,9 @@ class EquilibriumScene {
     void prescribe_vertex(const ConstraintTerm& term);
     void act_on_point(const ConstraintTerm& term);
     void press(const ConstraintTerm& term);
-    void check(Index v) const;
-    void check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const;
-    void check(const Vector3<double>& vector, std::string_view what, std::string_view unit) const;
+    void validate(Index v) const;
+    void validate(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const;
+    void validate(const Vector3<double>& vector, std::string_view what, std::string_view unit) const;
 
     Points<double> start_, targets_;
     std::vector<unsigned char> pinned_, prescribed_;
@@ -162,7 +162,7 @@ namespace detail {
 inline constexpr std::string_view equilibrium_name = "equilibrium";
 }
 
-inline void EquilibriumOptions::check() const {
+inline void EquilibriumOptions::validate() const {
     const auto at_least = [](Index number, Index least, std::string_view name) {
         if (number < least) refuse(detail::equilibrium_name, name, " must be at least ", least, ", got ", number);
     };
@@ -174,14 +174,14 @@ inline void EquilibriumOptions::check() const {
     }
 }
 
-inline void EquilibriumScene::check(Index v) const {
+inline void EquilibriumScene::validate(Index v) const {
     if (v >= 0 && v < targets_.cols()) return;
     refuse(detail::equilibrium_name, "constraint ", constraint_, " names vertex ", v, ", expected 0 to ",
            targets_.cols() - 1);
 }
 
-inline void EquilibriumScene::check(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const {
-    for (const Index v : corners) check(v);
+inline void EquilibriumScene::validate(const std::array<Index, 3>& corners, const Vector3<double>& barycentric) const {
+    for (const Index v : corners) validate(v);
     // Weights that were floats have the rounding of floats.
     const bool is_float = barycentric.cast<float>().cast<double>() == barycentric;
     if (is_float ? detail::is_barycentric<float>(barycentric.cast<float>()) : detail::is_barycentric(barycentric))
@@ -190,7 +190,8 @@ inline void EquilibriumScene::check(const std::array<Index, 3>& corners, const V
            " must not be negative and have the sum 1, got ", barycentric[0], " ", barycentric[1], " ", barycentric[2]);
 }
 
-inline void EquilibriumScene::check(const Vector3<double>& vector, std::string_view what, std::string_view unit) const {
+inline void EquilibriumScene::validate(const Vector3<double>& vector, std::string_view what,
+                                       std::string_view unit) const {
     for (Eigen::Index k = 0; k < 3; ++k) {
         if (is_finite(vector[k])) continue;
         refuse(detail::equilibrium_name, std::string_view("xyz").substr(static_cast<std::size_t>(k), 1), " of the ",
@@ -210,8 +211,8 @@ inline void EquilibriumScene::add(const ConstraintTerm& term) {
 
 inline void EquilibriumScene::prescribe_vertex(const ConstraintTerm& term) {
     const Index v = term.corners[0];
-    check(v);
-    check(term.target, "target", "m");
+    validate(v);
+    validate(term.target, "target", "m");
     prescribed_[static_cast<std::size_t>(v)] = 1;
     prescribed_vertices_.emplace_back(constraint_, v);
     if (term.kind == ConstraintTerm::Kind::pin) return;
@@ -220,9 +221,9 @@ inline void EquilibriumScene::prescribe_vertex(const ConstraintTerm& term) {
 }
 
 inline void EquilibriumScene::act_on_point(const ConstraintTerm& term) {
-    check(term.corners, term.weights);
-    check(term.target, "target", "m");
-    check(term.force, "force", "N");
+    validate(term.corners, term.weights);
+    validate(term.target, "target", "m");
+    validate(term.force, "force", "N");
     auto& terms = term.kind == ConstraintTerm::Kind::load ? loads_ : attachments_;
     terms.push_back(term);
     terms.back().constraint = constraint_;
@@ -232,17 +233,17 @@ inline void EquilibriumScene::act_on_point(const ConstraintTerm& term) {
 inline void EquilibriumScene::press(const ConstraintTerm& term) {
     const auto& tool = term.tool;
     const auto& contact = term.contact;
-    check(tool.position, "tool's position", "m");
-    check(tool.axis, "tool's axis", "m");
+    validate(tool.position, "tool's position", "m");
+    validate(tool.axis, "tool's axis", "m");
     if (!is_finite(tool.radius) || tool.radius < 0) {
         refuse(detail::equilibrium_name, "radius of the tool of constraint ", constraint_,
                " must be finite and not negative [m], got ", tool.radius);
     }
     if (!contact.touching()) return;
-    for (const Index v : contact.corners) check(v);
-    check(contact.point, "contact's point", "m");
-    check(contact.normal, "contact's normal", "1");
-    check(contact.axis_point, "contact's point of the axis", "m");
+    for (const Index v : contact.corners) validate(v);
+    validate(contact.point, "contact's point", "m");
+    validate(contact.normal, "contact's normal", "1");
+    validate(contact.axis_point, "contact's point of the axis", "m");
     if (!is_finite(contact.radius) || !(contact.radius > 0)) {
         refuse(detail::equilibrium_name, "radius of the contact of constraint ", constraint_,
                " must be finite and positive [m], got ", contact.radius);

@@ -35,7 +35,7 @@ struct ErrorBoundOptions {
     Index cg_iterations = 200;  ///< at most, over all Newton steps; soft foundations need more
 
     /// @throws InvalidInput for an option out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Proves an upper bound of the distance of a membrane of linear springs from equilibrium. The state may come from any
@@ -116,14 +116,14 @@ ErrorBound(const MassSpringNetwork<Scalar, Law>&) -> ErrorBound<>;
 template <Real Scalar, class Law>
 ErrorBound(const MassSpringNetwork<Scalar, Law>&, const ErrorBoundOptions&) -> ErrorBound<>;
 
-inline void ErrorBoundOptions::check() const {
+inline void ErrorBoundOptions::validate() const {
     if (cg_iterations < 1) refuse("ErrorBound", "cg_iterations must be at least 1, got ", cg_iterations);
 }
 
 template <CheckedConvexityModel Convexity>
 template <Real Scalar, class Law>
 ErrorBound<Convexity>::ErrorBound(const MassSpringNetwork<Scalar, Law>& network, const ErrorBoundOptions& options)
-    : options_((options.check(), options)),
+    : options_((options.validate(), options)),
       problem_(network),
       stiffness_(problem_),
       convexity_(problem_),

@@ -22,7 +22,7 @@ struct TangentOptions {
     Index iterations = 300;   ///< maximum number of products with the stiffness, for each of three directions
 
     /// @throws InvalidInput for an option out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Whether the stiffness was found, or why not.
@@ -86,7 +86,7 @@ class TangentStiffness {
     TangentReport report_;
 };
 
-inline void TangentOptions::check() const {
+inline void TangentOptions::validate() const {
     constexpr std::string_view component = "TangentStiffness";
     if (!is_finite(tolerance) || !(tolerance > 0 && tolerance < 1)) {
         refuse(component, "tolerance must lie between 0 and 1, got ", tolerance);
@@ -96,7 +96,7 @@ inline void TangentOptions::check() const {
 
 template <Real Scalar, class Law>
 TangentStiffness::TangentStiffness(const MassSpringNetwork<Scalar, Law>& network, const TangentOptions& options)
-    : options_((options.check(), options)),
+    : options_((options.validate(), options)),
       problem_(network),
       stiffness_(problem_),
       shift_(Points<double>::Zero(3, network.vertex_count())),

@@ -40,7 +40,7 @@ struct ToolPoint : ContactPoint<double> {
 /// The contact points with a gap of at most `far` [m], sorted by `is_before`, without duplicates. A point on the axis
 /// has no normal and is left out. Cost: O(F) for each tool.
 [[nodiscard]] inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Points<double>& x,
-                                                        std::span<const Tool<double>> tools, double far);
+                                                        std::span<const Tool<double>> tools, double max_distance);
 
 /// Second derivative of the gap by the positions of the triangle's corners, x y z each [1/m]. As the corners move, the
 /// closest points slide along edge, face and axis: each sliding direction is eliminated by a Schur complement.
@@ -66,10 +66,10 @@ struct ToolPoint : ContactPoint<double> {
 namespace detail {
 
 /// Whether bounding boxes show that no point of the triangle is closer to the tool's axis than `far`.
-[[nodiscard]] inline bool is_far(const Triangle<double>& t, const Tool<double>& tool, double far) noexcept {
+[[nodiscard]] inline bool is_far(const Triangle<double>& t, const Tool<double>& tool, double max_distance) noexcept {
     Aabb<double> axis{tool.position, tool.position};
     axis.include(tool.position + tool.axis);
-    return gap_between(bounds(t), axis) > far;
+    return gap_between(bounds(t), axis) > max_distance;
 }
 
 /// Tool, part, corners with a weight, ascending.
@@ -87,16 +87,16 @@ namespace detail {
 inline bool is_before(const ToolPoint& a, const ToolPoint& b) { return detail::name_of(a) < detail::name_of(b); }
 
 inline std::vector<ToolPoint> tool_points(const Triangles& triangles, const Points<double>& x,
-                                          std::span<const Tool<double>> tools, double far) {
+                                          std::span<const Tool<double>> tools, double max_distance) {
     std::vector<ToolPoint> points;
     for (std::size_t i = 0; i < tools.size(); ++i) {
         for (Index f = 0; f < static_cast<Index>(triangles.cols()); ++f) {
             const std::array<Index, 3> corners{triangles(0, f), triangles(1, f), triangles(2, f)};
             const auto triangle = triangle_at(x, corners);
-            if (detail::is_far(triangle, tools[i], tools[i].radius + far)) continue;
+            if (detail::is_far(triangle, tools[i], tools[i].radius + max_distance)) continue;
             for (int feature = 0; feature < feature_pairs(tools[i]); ++feature) {
                 const auto point = contact_point(f, corners, triangle, tools[i], feature, tools[i].radius);
-                if (point && !point->normal.isZero(0) && point->gap <= far) points.push_back({*point, i});
+                if (point && !point->normal.isZero(0) && point->gap <= max_distance) points.push_back({*point, i});
             }
         }
     }

@@ -59,7 +59,7 @@ struct ForceTable {
 
     /// @throws InvalidInput for an empty table, columns of unequal length, a number that is not finite, a deviation
     /// that is not positive, or, without deviations, a force that is not positive
-    void check() const;
+    void validate() const;
 };
 
 /// Options of `fit`.
@@ -74,7 +74,7 @@ struct FitOptions {
     Index max_iterations = 60;  ///< after which a fit is not `converged`
 
     /// @throws InvalidInput for an option out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Confidence interval of a constant.
@@ -161,7 +161,7 @@ class FitSearch {
 
 }  // namespace detail
 
-inline void ForceTable::check() const {
+inline void ForceTable::validate() const {
     constexpr std::string_view component = "ForceTable";
     if (depth.empty()) refuse(component, "the table must have a row, got none");
     for (const auto* column : {&force, &deviation}) {
@@ -181,24 +181,24 @@ inline void ForceTable::check() const {
     }
 }
 
-inline void FitOptions::check() const {
-    const auto check = [](std::string_view field, double value, double low, double high) {
+inline void FitOptions::validate() const {
+    const auto validate = [](std::string_view field, double value, double low, double high) {
         if (is_finite(value) && value > low && value < high) return;
         refuse("FitOptions", field, " must be above ", low, " and below ", high, ", got ", value);
     };
-    check("tolerance", tolerance, 0, 1);
-    check("step", step, 0, 1);
-    check("search_factor", search_factor, 1, 1e30);
-    check("confidence", confidence, 0, 1);
-    check("max_interval_ratio", max_interval_ratio, 1, 1e30);
-    check("min_sensitivity", min_sensitivity, 0, 1);
+    validate("tolerance", tolerance, 0, 1);
+    validate("step", step, 0, 1);
+    validate("search_factor", search_factor, 1, 1e30);
+    validate("confidence", confidence, 0, 1);
+    validate("max_interval_ratio", max_interval_ratio, 1, 1e30);
+    validate("min_sensitivity", min_sensitivity, 0, 1);
     if (max_iterations < 1) refuse("FitOptions", "max_iterations must be at least 1, got ", max_iterations);
 }
 
 template <CheckedForceModel Model>
 Fit fit(const ForceTable& table, const std::vector<double>& start, const Model& model, const FitOptions& options) {
-    table.check();
-    options.check();
+    table.validate();
+    options.validate();
     if (start.empty()) refuse(detail::fit_name, "start must have a constant, got none");
     for (std::size_t k = 0; k < start.size(); ++k) {
         if (is_finite(start[k]) && start[k] > 0) continue;
@@ -290,8 +290,8 @@ Eigen::VectorXd FitSearch<Model>::damped_step(const Linearisation& local, double
 template <class Model>
 Eigen::VectorXd FitSearch<Model>::within_search_range(const Eigen::VectorXd& logs) const {
     const Eigen::VectorXd middle = start_.array().log();
-    const double far = std::log(options_.search_factor);
-    return logs.cwiseMin((middle.array() + far).matrix()).cwiseMax((middle.array() - far).matrix());
+    const double range = std::log(options_.search_factor);
+    return logs.cwiseMin((middle.array() + range).matrix()).cwiseMax((middle.array() - range).matrix());
 }
 
 // Takes a step that reduces the sum of squares; false if there is none.

@@ -72,11 +72,11 @@ inline constexpr std::string_view indentation_name = "Indentation";
 /// step is the present gap.
 [[nodiscard]] inline double distance_to_touch(Tool<double> tool, const Vector3<double>& direction,
                                               const Triangles& triangles, const Points<double>& x) {
-    const double far = norm<double>(tool.position - x.col(0)) + norm(tool.axis) +
-                       2 * norm<double>(x.rowwise().maxCoeff() - x.rowwise().minCoeff());
-    const double negligible = 1e-12 * far;
+    const double max_displacement = norm<double>(tool.position - x.col(0)) + norm(tool.axis) +
+                                    2 * norm<double>(x.rowwise().maxCoeff() - x.rowwise().minCoeff());
+    const double negligible = 1e-12 * max_displacement;
     double sum = 0;
-    for (int turn = 0; sum <= far && turn < 10000; ++turn) {
+    for (int turn = 0; sum <= max_displacement && turn < 10000; ++turn) {
         double gap = std::numeric_limits<double>::infinity();
         for (const auto& corners : triangles.colwise()) {
             gap = (std::min)(gap, distance_from_axis(triangle_at(x, corners), tool) - tool.radius);

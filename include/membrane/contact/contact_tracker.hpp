@@ -136,12 +136,13 @@ class ContactTracker {
     }
     [[nodiscard]] bool was_behind(const Scene& scene, Index f, Scalar side, const Vector3<Scalar>& q) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> middle_inside(const Scene& scene, Index f, Scalar side) const noexcept;
-    [[nodiscard]] bool has_passed(const Scene& scene, Index near, Scalar side, const Vector3<Scalar>& q) const noexcept;
+    [[nodiscard]] bool has_passed(const Scene& scene, Index start, Scalar side,
+                                  const Vector3<Scalar>& q) const noexcept;
     void gather_from_tree(const Scene& scene) noexcept;
     void flood(const Scene& scene) noexcept;
     [[nodiscard]] bool reaches_border() const noexcept {
-        const auto near = near_.items();
-        return std::any_of(near.begin(), near.end(), [&](Index f) { return surface_.has_border_vertex(f); });
+        const auto nearby = near_.items();
+        return std::any_of(nearby.begin(), nearby.end(), [&](Index f) { return surface_.has_border_vertex(f); });
     }
     void examine(const Scene& scene, std::span<const Index> some) noexcept;
     void collect_candidates(int rings) noexcept;
@@ -485,10 +486,10 @@ std::optional<Vector3<Scalar>> ContactTracker<Scalar>::middle_inside(const Scene
 // behind that triangle. Behind a closed surface the winding number is not 0. Behind an open surface the ray from `q`
 // along the outward normal of the rest surface first meets the back of a triangle.
 template <Real Scalar>
-bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index near, Scalar side,
+bool ContactTracker<Scalar>::has_passed(const Scene& scene, Index start, Scalar side,
                                         const Vector3<Scalar>& q) const noexcept {
     if (surface_.closed()) return winding_number(surface_, scene.tree, scene.x, q) != 0;
-    const Index f = at_rest().walk_to_closest(scene.anchors, near, q);
+    const Index f = at_rest().walk_to_closest(scene.anchors, start, q);
     const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), q);
     const Vector3<Scalar> outward = side * at_rest().outward(scene.anchors, f, nearest.barycentric);
     const auto hit = scene.tree.first_hit(scene.x, q, q + 2 * max_axis_distance(scene.tree.box(0), q) * outward);
@@ -689,8 +690,8 @@ bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>
         return before.squared_distance < scene.radius * scene.radius;
     };
     // A shaft may be inside between the points where its depth is measured.
-    const auto near = near_.items();
-    if (contact.depth > 0 || overlapped(contact.triangle) || std::any_of(near.begin(), near.end(), overlapped)) {
+    const auto nearby = near_.items();
+    if (contact.depth > 0 || overlapped(contact.triangle) || std::any_of(nearby.begin(), nearby.end(), overlapped)) {
         return false;
     }
     const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];

@@ -50,7 +50,7 @@ struct GraspOptions {
     double jaw_length = std::numeric_limits<double>::infinity();     ///< tissue that has slipped so far is free [m]
 
     /// @throws InvalidInput if a number is not positive
-    void check() const;
+    void validate() const;
 };
 
 /// Holds the contact point from when the tool closes in contact until it opens.
@@ -60,7 +60,7 @@ class Grasper {
     /// Keeps a copy of the positions of `mesh`, the rest surface. Cost: O(V).
     /// @throws InvalidInput if an option is out of its range
     explicit Grasper(const TriangleMesh<Scalar>& mesh, GraspOptions options = {})
-        : origins_(mesh.positions()), options_((options.check(), options)), has_reserve_(reserve_of(mesh) > 0) {}
+        : origins_(mesh.positions()), options_((options.validate(), options)), has_reserve_(reserve_of(mesh) > 0) {}
 
     /// The present grasp. Forceps that closed before the contact hold no point; those that are closed at the first
     /// update count as closing then.
@@ -116,7 +116,7 @@ class Grasper {
     bool has_reserve_;
 };
 
-inline void GraspOptions::check() const {
+inline void GraspOptions::validate() const {
     constexpr std::string_view component = "Grasper";
     if (!(holding_force > 0)) refuse(component, "holding_force must be positive [N], got ", holding_force);
     if (!(jaw_length > 0)) refuse(component, "jaw_length must be positive [m], got ", jaw_length);

@@ -61,8 +61,8 @@ template <Number N>
     const auto beyond = shorter > tangent_of_eighth * longer;
     const N divisor = select<N>(beyond, shorter + longer, longer);
     const N t = select<N>(beyond, shorter - longer, shorter) / select<N>(longer > 0, divisor, 1);
-    const N small = detail::arctangent_of_small<N>(t);
-    const N in_eighth = select<N>(beyond, pi / 4 + small, small);
+    const N reduced = detail::arctangent_of_small<N>(t);
+    const N in_eighth = select<N>(beyond, pi / 4 + reduced, reduced);
     const N in_quarter = select<N>(across > along, pi / 2 - in_eighth, in_eighth);
     const N in_half = select<N>(x < 0, pi - in_quarter, in_quarter);
     return select<N>(y < 0, -in_half, in_half) + (0 * x + 0 * y);  // comparisons alone would lose a NaN

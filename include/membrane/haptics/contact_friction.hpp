@@ -21,7 +21,7 @@ struct FrictionOptions {
     double stiffness;    ///< tangential stiffness while the tool sticks, at the device [N/m]
 
     /// @throws InvalidInput if a number is out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// The force of another policy plus Coulomb friction. At first contact the tool sticks: a spring along the surface
@@ -35,7 +35,7 @@ class ContactFriction {
   public:
     /// @throws InvalidInput if an option is out of its range
     ContactFriction(Policy policy, const FrictionOptions& options)
-        : policy_((options.check(), std::move(policy))),
+        : policy_((options.validate(), std::move(policy))),
           coefficient_(static_cast<Scalar>(options.coefficient)),
           stiffness_(static_cast<Scalar>(options.stiffness)) {}
 
@@ -52,7 +52,7 @@ class ContactFriction {
     Vector3<Scalar> anchor_ = Vector3<Scalar>::Zero();  // where the tool sticks [m]
 };
 
-inline void FrictionOptions::check() const {
+inline void FrictionOptions::validate() const {
     constexpr std::string_view component = "ContactFriction";
     detail::check_option(component, coefficient, "coefficient", "1");
     detail::check_option(component, stiffness, "stiffness", "N/m", false);

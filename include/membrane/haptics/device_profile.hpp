@@ -24,7 +24,7 @@ struct DeviceProfile {
     double thermal_time = 10;  ///< time constant of its motors [s]; not published, 5 to 15 for small windings
 
     /// @throws InvalidInput if a number is not finite or out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Compare a profile with the data sheet of your device. Peak forces and stiffnesses agree with the settings of CHAI3D
@@ -77,7 +77,7 @@ inline constexpr DeviceProfile sigma{.name = "sigma", .peak_force = 12, .continu
 
 }  // namespace devices
 
-inline void DeviceProfile::check() const {
+inline void DeviceProfile::validate() const {
     constexpr std::string_view component = "DeviceProfile";
     detail::check_option(component, peak_force, "peak_force", "N", false);
     detail::check_option(component, continuous_force, "continuous_force", "N", false);

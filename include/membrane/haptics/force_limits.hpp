@@ -29,7 +29,7 @@ struct LimitOptions {
     bool thermal_limit = true;  ///< whether hot motors are limited to the continuous force
 
     /// @throws InvalidInput if an option is out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Limits that reduced the force of this tick.
@@ -232,7 +232,7 @@ template <Real Scalar>
 
 }  // namespace detail
 
-inline void LimitOptions::check() const {
+inline void LimitOptions::validate() const {
     constexpr std::string_view component = "ForceLimiter";
     detail::check_option(component, rise_time, "rise_time", "s");
     detail::check_option(component, soft_start, "soft_start", "s");
@@ -272,8 +272,8 @@ inline double MotorThermalModel::max_force() const noexcept {
 }
 
 inline ForceLimiter::ForceLimiter(const DeviceProfile& device, const LimitOptions& options)
-    : device_((device.check(), device)),
-      options_((options.check(), options)),
+    : device_((device.validate(), device)),
+      options_((options.validate(), options)),
       slew_(options.rise_time > 0 ? device.peak_force / options.rise_time : 0),
       watchdog_(options.max_state_age, options.fade_time),
       soft_start_(options.soft_start),

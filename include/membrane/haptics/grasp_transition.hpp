@@ -17,7 +17,7 @@ struct TransitionOptions {
     double duration = 0.1;  ///< of the change from one force law to the other [s]
 
     /// @throws InvalidInput if the duration is not finite and positive
-    void check() const { detail::check_option("GraspTransition", duration, "duration", "s", false); }
+    void validate() const { detail::check_option("GraspTransition", duration, "duration", "s", false); }
 };
 
 /// The force of another policy, continuous at grasp and release: the force first keeps its value, and the difference to
@@ -30,7 +30,7 @@ class GraspTransition {
   public:
     /// @throws InvalidInput if an option is out of its range
     explicit GraspTransition(Policy policy, const TransitionOptions& options = {})
-        : policy_((options.check(), std::move(policy))), duration_(static_cast<Scalar>(options.duration)) {}
+        : policy_((options.validate(), std::move(policy))), duration_(static_cast<Scalar>(options.duration)) {}
 
     /// Force of the policy, continuous where a grasp begins or ends [N]. Once a tick, online.
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& state) noexcept;

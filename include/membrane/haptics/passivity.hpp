@@ -44,7 +44,7 @@ struct SampledLoop {
 
     /// @throws InvalidInput if a number is out of its range; only `negative_stiffness` and `off_potential` may be
     /// infinite
-    void check() const;
+    void validate() const;
 };
 
 /// Dissipation of the loop, in addition to the device's own damping and friction.
@@ -55,7 +55,7 @@ struct Dissipation {
     double max_speed = std::numeric_limits<double>::infinity();
 
     /// @throws InvalidInput if a number is out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Result of `passivity`.
@@ -123,7 +123,7 @@ class PassivityObserver {
     double energy_ = 0, energy_in_ = 0, min_energy_ = 0;
 };
 
-inline void SampledLoop::check() const {
+inline void SampledLoop::validate() const {
     constexpr std::string_view component = "SampledLoop";
     detail::check_option(component, stiffness, "stiffness", "N/m");
     detail::check_option(component, damping, "damping", "N s/m");
@@ -135,15 +135,15 @@ inline void SampledLoop::check() const {
     if (!(off_potential >= 0)) refuse(component, "off_potential must not be negative [N], got ", off_potential);
 }
 
-inline void Dissipation::check() const {
+inline void Dissipation::validate() const {
     detail::check_option("Dissipation", hand_damping, "hand_damping", "N s/m");
     if (!(max_speed > 0)) refuse("Dissipation", "max_speed must be positive [m/s], got ", max_speed);
 }
 
 inline PassivityReport passivity(const SampledLoop& loop, const DeviceProfile& device, const Dissipation& dissipation) {
-    loop.check();
-    device.check();
-    dissipation.check();
+    loop.validate();
+    device.validate();
+    dissipation.validate();
     const double lag = loop.tick / 2, coarse = device.resolution, negative = loop.negative_stiffness;
     const double per_speed = 1 / dissipation.max_speed;
     const double viscous = device.damping + dissipation.hand_damping;

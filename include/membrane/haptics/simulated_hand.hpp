@@ -67,15 +67,15 @@ class SimulatedHand {
 
 template <Real Scalar>
 SimulatedHand<Scalar>::SimulatedHand(const HandOptions& options) {
-    const auto check = [](const char* field, const char* unit, double value, bool allow_zero) {
+    const auto validate = [](const char* field, const char* unit, double value, bool allow_zero) {
         const auto number = static_cast<Scalar>(value);
         if (is_finite(number) && (number > 0 || (allow_zero && number == 0))) return;
         refuse("SimulatedHand", field, " must be finite and ", allow_zero ? "not negative" : "positive", " [", unit,
                "], got ", value);
     };
-    check("mass", "kg", options.mass, false);
-    check("damping", "N s/m", options.damping, true);
-    check("stiffness", "N/m", options.stiffness, false);
+    validate("mass", "kg", options.mass, false);
+    validate("damping", "N s/m", options.damping, true);
+    validate("stiffness", "N/m", options.stiffness, false);
     rate_ = options.damping / options.mass / 2;
     square_ = options.stiffness / options.mass;
     stiffness_ = static_cast<Scalar>(options.stiffness);

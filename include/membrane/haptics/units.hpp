@@ -97,7 +97,7 @@ struct DeviceScale {
     RigidFrame<double> device = {};  ///< the fixed frame of the device in the scene; origin in metres of the scene
 
     /// @throws InvalidInput if a scale is not finite and positive
-    void check() const;
+    void validate() const;
 
     ///@{
     /// From the device to the scene: scaled by `motion`, then transformed by `device`.
@@ -129,7 +129,7 @@ struct DeviceScale {
     }
 };
 
-inline void DeviceScale::check() const {
+inline void DeviceScale::validate() const {
     const auto check_scale = [](double value, std::string_view field) {
         if (!is_finite(value) || !(value > 0)) {
             refuse("DeviceScale", field, " must be finite and positive, got ", value);

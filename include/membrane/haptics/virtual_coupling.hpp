@@ -25,7 +25,7 @@ struct CouplingOptions {
     double scale = 1;    ///< force at the hand over force at the tissue
 
     /// @throws InvalidInput if a number is out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// The `damping` needed for a tissue whose stiffness, after the scale, is `tissue` [N/m]: 0 if the coupling is stiffer.
@@ -42,7 +42,7 @@ class VirtualCoupling {
   public:
     /// @throws InvalidInput if an option is out of its range
     explicit VirtualCoupling(const CouplingOptions& options)
-        : stiffness_((options.check(), static_cast<Scalar>(options.stiffness))),
+        : stiffness_((options.validate(), static_cast<Scalar>(options.stiffness))),
           damping_(static_cast<Scalar>(options.damping)),
           scale_(static_cast<Scalar>(options.scale)) {}
 
@@ -67,7 +67,7 @@ class VirtualCoupling {
     Vector3<Scalar> position_ = Vector3<Scalar>::Zero(), force_ = Vector3<Scalar>::Zero();
 };
 
-inline void CouplingOptions::check() const {
+inline void CouplingOptions::validate() const {
     constexpr std::string_view component = "VirtualCoupling";
     detail::check_option(component, stiffness, "stiffness", "N/m", false);
     detail::check_option(component, damping, "damping", "N s/m");

@@ -37,9 +37,9 @@ inline double winding_number(const Points<double>& x, const Triangles& triangles
     for (const Index f : some) {
         const auto t = triangle_at(x, triangles.col(f));
         const Vector3<double> a = t.a - q, b = t.b - q, c = t.c - q;
-        const double far = norm(a) * norm(b) * norm(c);
+        const double product = norm(a) * norm(b) * norm(c);
         half_angles += std::atan2(dot<double>(a, cross(b, c)),
-                                  far + dot(a, b) * norm(c) + dot(b, c) * norm(a) + dot(c, a) * norm(b));
+                                  product + dot(a, b) * norm(c) + dot(b, c) * norm(a) + dot(c, a) * norm(b));
     }
     return half_angles / (2 * std::numbers::pi);
 }

@@ -162,12 +162,12 @@ class Repair {
 };
 
 inline void Repair::weld(std::span<const Index> points, double distance) {
-    const CoincidentVertices near(x_, points);
+    const CoincidentVertices coincident(x_, points);
     DisjointSets sets(kept_vertices_.size());
     std::size_t v = 0;
-    for (const Index lowest : near.representative()) sets.unite(v++, static_cast<std::size_t>(lowest));
+    for (const Index lowest : coincident.representative()) sets.unite(v++, static_cast<std::size_t>(lowest));
     std::int64_t effort = 1'000'000 + 1000 * x_.cols();
-    report_.complete = distance == 0 || near.for_each_pair(distance, effort, [&](Index i, Index j) {
+    report_.complete = distance == 0 || coincident.for_each_pair(distance, effort, [&](Index i, Index j) {
         sets.unite(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
     });
     for (v = 0; v < kept_vertices_.size(); ++v) {

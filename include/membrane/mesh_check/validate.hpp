@@ -218,8 +218,8 @@ bool check_geometry(const CheckedMesh& mesh, const SurfaceParts& parts, std::spa
                     double mean_edge, const ValidateOptions& options, Found found) {
     const double tolerance = options.tolerance.value_or((std::max)(1e-6 * mean_edge, 4 * mesh.spacing));
     const std::int64_t effort = 1'000'000 + std::int64_t{options.max_pairs_per_triangle} * mesh.triangles.cols();
-    const CoincidentVertices near(mesh.x, mesh.points);
-    const auto& representative = near.representative();
+    const CoincidentVertices coincident(mesh.x, mesh.points);
+    const auto& representative = coincident.representative();
     for (Index v = 0; v < mesh.x.cols(); ++v) {
         const Index lowest = representative[static_cast<std::size_t>(v)];
         if (lowest != v) {
@@ -228,7 +228,7 @@ bool check_geometry(const CheckedMesh& mesh, const SurfaceParts& parts, std::spa
         }
     }
     std::int64_t left = effort;
-    bool complete = near.for_each_pair(tolerance, left, [&](Index v, Index w) {
+    bool complete = coincident.for_each_pair(tolerance, left, [&](Index v, Index w) {
         found(MeshDefect::nearly_coincident_vertices, {v, w}, {}, "vertices ", v, " and ", w, " are ",
               norm<double>(point(mesh.x, v) - point(mesh.x, w)), " [m] apart, expected more than ", tolerance);
     });

@@ -75,11 +75,11 @@ template <class Surface>
                " must be finite, low below high [m], got ", low, " to ", high,
                options.bounds ? "" : "; give bounds where the body has none");
     }
-    const double far = bounds.low.cwiseAbs().cwiseMax(bounds.high.cwiseAbs()).maxCoeff();
+    const double largest_coordinate = bounds.low.cwiseAbs().cwiseMax(bounds.high.cwiseAbs()).maxCoeff();
     const double most = 1e7 * (bounds.high - bounds.low).maxCoeff();
-    if (far > most) {
+    if (largest_coordinate > most) {
         refuse(distmesh_name, "bounds must be within 1e7 times their size of 0, here ", most,
-               " [m], or numbers are too coarse for the surface, got ", far);
+               " [m], or numbers are too coarse for the surface, got ", largest_coordinate);
     }
     return bounds;
 }

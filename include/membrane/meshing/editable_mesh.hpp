@@ -180,25 +180,25 @@ inline Index EditableMesh::split(Index side, const Vector3<double>& p) {
     const Index middle = vertex_count(), other = twin(side), ends[] = {from(side), to(side)};
     positions_.push_back(p);
     side_from_.push_back(no_index);
-    // In a triangle a b c with the side `near` = a b, `near` keeps a m c; the new triangle is m b c.
-    const auto halve = [&](Index near) {
-        const Index b = to(near), c = apex(near), bc = twin(next(near));
-        const Index far = add_triangle(middle, b, c);
-        from_[at(next(near))] = middle;
-        join(next(far), bc);
-        join(prev(far), next(near));
-        begin_at_border(c, prev(far));
-        return far;
+    // In a triangle a b c with the side `first` = a b, `first` keeps a m c; `second` is the new triangle m b c.
+    const auto halve = [&](Index first) {
+        const Index b = to(first), c = apex(first), bc = twin(next(first));
+        const Index second = add_triangle(middle, b, c);
+        from_[at(next(first))] = middle;
+        join(next(second), bc);
+        join(prev(second), next(first));
+        begin_at_border(c, prev(second));
+        return second;
     };
-    const Index far = halve(side);
+    const Index second = halve(side);
     if (other != no_index) {
         const Index far_other = halve(other);
         join(side, far_other);
-        join(other, far);
+        join(other, second);
     }
     begin_at_border(ends[0], side);
-    begin_at_border(ends[1], next(far));
-    begin_at_border(middle, far);
+    begin_at_border(ends[1], next(second));
+    begin_at_border(middle, second);
     return middle;
 }
 
@@ -210,13 +210,13 @@ inline bool EditableMesh::can_collapse(Index side) const {
     bool valid = true;
     int around_a = 0, around_b = 0;
     for_each_outgoing(b, [&](Index) { ++around_b; });
-    const auto check = [&](Index v) {
+    const auto inspect = [&](Index v) {
         if (v != b && v != apex(side) && (!inner || v != apex(other)) && has_edge(v, b)) valid = false;
     };
     for_each_outgoing(a, [&](Index out) {
         ++around_a;
-        check(to(out));
-        if (twin(prev(out)) == no_index) check(apex(out));
+        inspect(to(out));
+        if (twin(prev(out)) == no_index) inspect(apex(out));
     });
     return valid && !(inner && !is_border(b) && around_a == 3 && around_b == 3);
 }

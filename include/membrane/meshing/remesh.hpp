@@ -304,9 +304,9 @@ double Remesher<Surface>::push() {
         if (!mesh_.is_vertex(v)) continue;
         const Vector3<double> force = step * forces_[at(v)];
         const Vector3<double> displacement = force - dot(force, normals_[at(v)]) * normals_[at(v)];
-        const double most = 0.25 * target_length_[at(v)], far = norm(displacement);
+        const double most = 0.25 * target_length_[at(v)], length = norm(displacement);
         const auto projected =
-            project(mesh_.position(v) + (far > most ? most / far : 1) * displacement, mesh_.is_border(v));
+            project(mesh_.position(v) + (length > most ? most / length : 1) * displacement, mesh_.is_border(v));
         if (!projected || !may_move(v, *projected)) continue;
         farthest = (std::max)(farthest, norm<double>(projected->point - mesh_.position(v)) / target_length_[at(v)]);
         mesh_.move(v, projected->point);

@@ -27,7 +27,7 @@ namespace membrane {
 
 /// E t^3 / (12 (1 - nu^2)) [N m]. @throws InvalidInput for a material out of its range
 [[nodiscard]] inline double flexural_rigidity(const Material& material) {
-    material.check();
+    material.validate();
     const double nu = material.poisson_ratio, t = material.thickness;
     return material.young_modulus * (t * t * t) / (12 * (1 - nu * nu));
 }

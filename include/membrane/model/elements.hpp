@@ -482,8 +482,9 @@ Scalar Elements<Scalar, Each>::force_tolerance_of(const Instance& instance, cons
         size = (std::max)(size, norm<Scalar>(corners[i] - corners[0]));
         largest = (std::max)(largest, norm(corner.force));
     }
-    const Scalar epsilon = std::numeric_limits<Scalar>::epsilon(), far = x.cwiseAbs().maxCoeff();
-    return (std::max)(stiffness * (std::max)(size / Scalar(1e9), 64 * epsilon * far), 64 * epsilon * largest);
+    const Scalar epsilon = std::numeric_limits<Scalar>::epsilon(), largest_coordinate = x.cwiseAbs().maxCoeff();
+    return (std::max)(stiffness * (std::max)(size / Scalar(1e9), 64 * epsilon * largest_coordinate),
+                      64 * epsilon * largest);
 }
 
 }  // namespace membrane

@@ -39,7 +39,7 @@ struct FibreMaterial {
 
     /// @throws InvalidInput for a number out of its range, or if stiffening times the square of `strain_limit()`
     /// exceeds 20
-    void check() const;
+    void validate() const;
 };
 
 /// Fibres of one mean direction in a linear triangle of an incompressible sheet, under tension alone: they store
@@ -151,7 +151,7 @@ struct CorneaPose {
 template <Real Scalar>
 [[nodiscard]] std::vector<Points<double>> cornea_fibres(const TriangleMesh<Scalar>& mesh, const CorneaPose& pose = {});
 
-inline void FibreMaterial::check() const {
+inline void FibreMaterial::validate() const {
     constexpr std::string_view component = "FibreMaterial";
     detail::check_option(component, stiffness, "stiffness", "Pa", false);
     detail::check_option(component, stiffening, "stiffening", "1", false);
@@ -290,7 +290,7 @@ Points<double> fibre_directions(const TriangleMesh<Scalar>& mesh, const Directio
 template <Real Scalar>
 Elements<Scalar, FibreTriangle<Scalar>> fibres(const TriangleMesh<Scalar>& mesh, const FibreMaterial& material,
                                                const std::vector<Points<double>>& families, double stretch) {
-    material.check();
+    material.validate();
     detail::check_option("fibres", stretch, "stretch", "1", false);
     for (const auto& directions : families) {
         if (directions.cols() == mesh.triangle_count() && is_finite(directions)) continue;

@@ -31,7 +31,7 @@ struct FungOptions {
     }
 
     /// @throws InvalidInput for an option out of its range, or if stiffening times `strain_limit()` exceeds 20
-    void check() const;
+    void validate() const;
 };
 
 /// A linear triangle of an incompressible isotropic sheet in plane stress whose stiffness grows exponentially
@@ -99,7 +99,7 @@ template <Real Scalar>
 [[nodiscard]] Elements<Scalar, FungTriangle<Scalar>> fung(const TriangleMesh<Scalar>& mesh, const Material& material,
                                                           const FungOptions& options = {}, double stretch = 1);
 
-inline void FungOptions::check() const {
+inline void FungOptions::validate() const {
     constexpr std::string_view component = "FungOptions";
     detail::check_option(component, stiffening, "stiffening", "1", false);
     if (!is_finite(stretch_limit) || !(stretch_limit > 1)) {
@@ -144,8 +144,8 @@ EnergyChange<N> FungTriangle<Scalar>::energy_change(const Corners<N, 3>& x, std:
 template <Real Scalar>
 Elements<Scalar, FungTriangle<Scalar>> fung(const TriangleMesh<Scalar>& mesh, const Material& material,
                                             const FungOptions& options, double stretch) {
-    material.check();
-    options.check();
+    material.validate();
+    options.validate();
     detail::check_option("fung", stretch, "stretch", "1", false);
     const double modulus = material.young_modulus / 3 * material.thickness;
     const auto cast = [](double number) { return static_cast<Scalar>(number); };

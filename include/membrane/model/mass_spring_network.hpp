@@ -244,9 +244,9 @@ struct SpringElement {
                                                 const Vector3<N>& displacement) const noexcept {
         using std::abs;
         const Vector3<N> edge = x[1 - i] - x[i];
-        const N length = norm(edge), far = detail::largest_magnitude(x[i]);
+        const N length = norm(edge), largest_coordinate = detail::largest_magnitude(x[i]);
         const auto before = response(length), after = response(norm<N>(edge - displacement));
-        return {after.energy - before.energy, before.energy + abs(before.tension) * (length + far)};
+        return {after.energy - before.energy, before.energy + abs(before.tension) * (length + largest_coordinate)};
     }
     [[nodiscard]] Eigen::Matrix3d hessian_block(const Corners<double, 2>& x, std::size_t i,
                                                 std::size_t j) const noexcept {
@@ -367,7 +367,7 @@ template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 MassSpringNetwork<Scalar, Law>::MassSpringNetwork(const TriangleMesh<Scalar>& mesh, const Law& law,
                                                   const NetworkOptions<Scalar>& options)
     : law_(law) {
-    if constexpr (requires { law_.check(); }) law_.check();
+    if constexpr (requires { law_.validate(); }) law_.validate();
     const Index vertices = mesh.vertex_count();
     if (options.mass.given())
         mass_ = options.mass.expand(vertices, detail::network_name, "mass", "vertex", "kg", false);

@@ -23,7 +23,7 @@ struct Material {
     [[nodiscard]] double biaxial_stiffness() const noexcept { return young_modulus * thickness / (1 - poisson_ratio); }
 
     /// @throws InvalidInput for a number out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// The layer under a membrane, on rigid ground, as a Winkler foundation: each piece of it carries only the load
@@ -47,7 +47,7 @@ struct FoundationLayer {
     }
 
     /// @throws InvalidInput for a number out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Published constants of a tissue: typical ones, and the range of the measurements.
@@ -107,7 +107,7 @@ inline void check_poisson_ratio(std::string_view component, double value, double
 
 }  // namespace detail
 
-inline void Material::check() const {
+inline void Material::validate() const {
     constexpr std::string_view component = "Material";
     detail::check_option(component, young_modulus, "young_modulus", "Pa", false);
     detail::check_poisson_ratio(component, poisson_ratio, 0.5);
@@ -115,7 +115,7 @@ inline void Material::check() const {
     detail::check_option(component, density, "density", "kg/m^3", false);
 }
 
-inline void FoundationLayer::check() const {
+inline void FoundationLayer::validate() const {
     constexpr std::string_view component = "Foundation";
     detail::check_option(component, young_modulus, "young_modulus", "Pa", false);
     detail::check_poisson_ratio(component, poisson_ratio, 0.49);

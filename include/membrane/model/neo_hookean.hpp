@@ -72,7 +72,7 @@ static_assert(Element<NeoHookeanTriangle<float>> && Element<NeoHookeanTriangle<d
 template <Real Scalar>
 [[nodiscard]] Elements<Scalar, NeoHookeanTriangle<Scalar>> neo_hookean(const TriangleMesh<Scalar>& mesh,
                                                                        const Material& material, double stretch = 1) {
-    material.check();
+    material.validate();
     detail::check_option("neo_hookean", stretch, "stretch", "1", false);
     const double modulus = material.young_modulus / 3 * material.thickness;
     std::vector<ElementInstance<NeoHookeanTriangle<Scalar>>> all;

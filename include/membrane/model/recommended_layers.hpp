@@ -47,8 +47,8 @@ template <Real Scalar>
                                                    const FoundationLayer& foundation);
 
 inline DecayLengths decay_lengths(const Material& material, const FoundationLayer& foundation) {
-    material.check();
-    foundation.check();
+    material.validate();
+    foundation.validate();
     const double stiffness = material.biaxial_stiffness();
     return {std::sqrt(stiffness / foundation.normal_stiffness()),
             std::sqrt(stiffness / foundation.tangential_stiffness())};

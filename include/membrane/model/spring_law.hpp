@@ -109,7 +109,7 @@ struct ExponentialSpring {
     SpringResponse<Scalar> operator()(const SpringState<Scalar>& spring) const noexcept;
 
     /// @throws InvalidInput unless both options are finite and positive, and their product at most 50
-    void check() const;
+    void validate() const;
 };
 
 template <Real Scalar>
@@ -131,7 +131,7 @@ SpringResponse<Scalar> ExponentialSpring::operator()(const SpringState<Scalar>& 
     return {tension + stiffness * beyond, stiffness, energy + (tension + stiffness * beyond / 2) * beyond};
 }
 
-inline void ExponentialSpring::check() const {
+inline void ExponentialSpring::validate() const {
     constexpr std::string_view component = "ExponentialSpring";
     if (!is_finite(stiffening) || !(stiffening > 0)) {
         refuse(component, "stiffening must be finite and positive, got ", stiffening);

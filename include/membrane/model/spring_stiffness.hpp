@@ -93,7 +93,7 @@ template <Real Scalar>
 
 template <Real Scalar>
 std::vector<Scalar> spring_stiffnesses(const TriangleMesh<Scalar>& mesh, const Material& material) {
-    material.check();
+    material.validate();
     const auto scale = static_cast<Scalar>(material.biaxial_stiffness() * 2 / 3);
     std::vector<Scalar> result;
     for_each_edge(half_edges(mesh.triangles()), [&](std::span<const HalfEdge> sides) {
@@ -117,19 +117,19 @@ std::vector<Scalar> vertex_areas(const TriangleMesh<Scalar>& mesh) {
 
 template <Real Scalar>
 std::vector<Scalar> vertex_masses(const TriangleMesh<Scalar>& mesh, const Material& material) {
-    material.check();
+    material.validate();
     return detail::weighted_areas(mesh, material.density * material.thickness);
 }
 
 template <Real Scalar>
 std::vector<Scalar> normal_stiffnesses(const TriangleMesh<Scalar>& mesh, const FoundationLayer& foundation) {
-    foundation.check();
+    foundation.validate();
     return detail::weighted_areas(mesh, foundation.normal_stiffness());
 }
 
 template <Real Scalar>
 std::vector<Scalar> tangential_stiffnesses(const TriangleMesh<Scalar>& mesh, const FoundationLayer& foundation) {
-    foundation.check();
+    foundation.validate();
     return detail::weighted_areas(mesh, foundation.tangential_stiffness());
 }
 

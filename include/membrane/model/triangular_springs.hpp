@@ -191,9 +191,11 @@ EnergyChange<N> TriangularSpring<Scalar>::energy_change(const Corners<N, 3>& x, 
     by[static_cast<Eigen::Index>(other.next)] = dot<N>(displacement, displacement + N(2) * (x[i] - x[other.last]));
     using std::abs;
     const Vector3<N> squares = detail::squares_of_edges(x);
-    const N far = detail::largest_magnitude(x[i]), edge = root_of(larger(larger(squares[0], squares[1]), squares[2]));
+    const N largest_coordinate = detail::largest_magnitude(x[i]),
+            edge = root_of(larger(larger(squares[0], squares[1]), squares[2]));
     const N tension = abs(tensions[0]) + (abs(tensions[1]) + abs(tensions[2]));
-    return {dot<N>(by, tensions + detail::times(stiffness, by) / N(2)), 2 * tension * edge * (edge + far)};
+    return {dot<N>(by, tensions + detail::times(stiffness, by) / N(2)),
+            2 * tension * edge * (edge + largest_coordinate)};
 }
 
 template <Number Scalar>
@@ -229,7 +231,7 @@ N TriangularSpring<Scalar>::mean_tension(const Corners<N, 3>& x) const noexcept 
 template <Real Scalar>
 Elements<Scalar, TriangularSpring<Scalar>> triangular_springs(const TriangleMesh<Scalar>& mesh,
                                                               const Material& material, double stretch) {
-    material.check();
+    material.validate();
     detail::check_option("triangular_springs", stretch, "stretch", "1", false);
     using All = Elements<Scalar, TriangularSpring<Scalar>>;
     std::vector<typename All::Instance> all;

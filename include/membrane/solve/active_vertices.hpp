@@ -256,15 +256,15 @@ void ActiveVertices::find_awake(IsBalanced is_balanced) noexcept {
     }
     queue_balanced_ = true;
     const bool queue_returns = !as_needed_ && !truncated_;  // the next step updates the whole queue
-    const auto check = [&](Index v) {
+    const auto inspect = [&](Index v) {
         activated_.insert(v);
         if (is_balanced(v)) return;
         if (queue_.contains(v)) queue_balanced_ = false;
         if (!queue_returns || !queue_.contains(v)) next_awake_.insert(v);
     };
-    for (const Index v : vertices()) check(v);
+    for (const Index v : vertices()) inspect(v);
     for (const Index v : frontier()) {
-        if (!active_.contains(v)) check(v);
+        if (!active_.contains(v)) inspect(v);
     }
 }
 

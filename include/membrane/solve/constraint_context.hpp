@@ -11,7 +11,7 @@
 /// The interface of a step to its constraints.
 ///
 ///     void begin(membrane::ConstraintContext<double>& context) const noexcept {      // of a constraint of one's own
-///         if (!context.check(v)) return;
+///         if (!context.validate(v)) return;
 ///         context.seed(v);
 ///         context.add_force(v, pressure * area * outward);                           // [N]
 ///     }
@@ -33,7 +33,7 @@ class ConstraintContext {
           is_pinned_([](const void* of, Index v) noexcept { return static_cast<const Network*>(of)->pinned(v); }) {}
 
     /// Whether `v` is a vertex; if not, the step is refused.
-    bool check(Index v) noexcept;
+    bool validate(Index v) noexcept;
 
     /// Puts `v` into layer 0 of the queue: a force enters here.
     void seed(Index v) noexcept {
@@ -210,7 +210,7 @@ class ConstraintContext {
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
 template <Real Scalar>
-bool ConstraintContext<Scalar>::check(Index v) noexcept {
+bool ConstraintContext<Scalar>::validate(Index v) noexcept {
     const bool valid = v >= 0 && v < state_.vertex_count();
     if (!valid) state_.invalid = true;
     return valid;

@@ -233,7 +233,7 @@ struct VertexAttachment {
     [[nodiscard]] bool valid() const noexcept { return is_finite(target); }
     [[nodiscard]] DrivingInput<Scalar> driving_input() const noexcept { return InputSample<Scalar>{target}; }
     void prescribe(ConstraintContext<Scalar>& context) const noexcept {
-        if (context.check(vertex)) context.prescribe(vertex, target);
+        if (context.validate(vertex)) context.prescribe(vertex, target);
     }
     void begin(ConstraintContext<Scalar>& context) const noexcept;
     bool enforce(ConstraintContext<Scalar>&) const noexcept { return false; }
@@ -371,7 +371,7 @@ Vector3<Scalar> PointAttachment<Scalar>::reaction(const ConstraintContext<Scalar
 
 template <Real Scalar>
 void VertexAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
-    if (!context.check(vertex)) return;
+    if (!context.validate(vertex)) return;
     context.seed(vertex);
     context.prescribe(vertex, target);
 }
@@ -379,7 +379,7 @@ void VertexAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const n
 template <Real Scalar>
 void PinnedVertices::prescribe(ConstraintContext<Scalar>& context) const noexcept {
     for (const Index v : vertices) {
-        if (!context.check(v)) return;
+        if (!context.validate(v)) return;
         context.prescribe(v);
     }
 }

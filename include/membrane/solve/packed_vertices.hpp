@@ -173,7 +173,7 @@ class PackedVertices {
         bool damps = false;
     };
     struct Extent {
-        std::size_t members = 0, packs = 0, slots = 0, needed = 0;
+        std::size_t members = 0, packs = 0, slot_count = 0, needed = 0;
     };
 
     template <class Scene>
@@ -314,7 +314,7 @@ void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
     members_.truncate(extent.members);
     packs_.truncate(extent.packs);
     elements_.truncate(extent.packs);
-    slot_count_ = extent.slots;
+    slot_count_ = extent.slot_count;
     needed_.truncate(extent.needed);
 }
 
@@ -330,12 +330,12 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
     pack.own.fill(unused_row_);
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
     if (!elements_.append(vertices, pack.own, network) || !packs_.try_push_back(pack)) return false;
-    const auto slots = std::span(slots_).subspan(slot_count_, springs);
-    for (Slot& slot : slots) slot = {Scalar(0), Scalar(0), pack.own};
+    const auto own_slots = std::span(slots_).subspan(slot_count_, springs);
+    for (Slot& slot : own_slots) slot = {Scalar(0), Scalar(0), pack.own};
     for (std::size_t i = 0; i < vertices.size(); ++i) {
         members_.try_push_back(vertices[i]);
         need(vertices[i]);
-        Slot* slot = slots.data();
+        Slot* slot = own_slots.data();
         for (const auto& spring : network.springs_of(vertices[i])) {
             slot->stiffness.set(i, spring.stiffness);
             slot->rest_length.set(i, spring.rest_length);
@@ -379,11 +379,11 @@ MEMBRANE_INLINE Sum PackedVertices<Scalar>::springs_on(std::size_t p, const Vect
                                                        const Scene& scene) const noexcept {
     Sum sum{};
     const auto* rows = scene.state.position.data();
-    const auto slots = std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count);
+    const auto own_slots = std::span(slots_).subspan(packs_[p].slot, packs_[p].slot_count);
     constexpr std::size_t grain_size = 6;
     std::array<SpringEdge<Wide>, grain_size> edges;
-    for (std::size_t first = 0; first < slots.size(); first += grain_size) {
-        const auto some = slots.subspan(first, (std::min)(grain_size, slots.size() - first));
+    for (std::size_t first = 0; first < own_slots.size(); first += grain_size) {
+        const auto some = own_slots.subspan(first, (std::min)(grain_size, own_slots.size() - first));
         for (std::size_t i = 0; i < some.size(); ++i) {
             edges[i] = SpringEdge<Wide>(gather(rows, some[i].other.data()) - here);
         }

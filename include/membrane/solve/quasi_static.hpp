@@ -206,7 +206,7 @@ template <detail::NetworkOfSolver<Scalar> Network>
 QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const SolverOptions<Scalar>& options,
                                                    const Rule& rule, AnyExecutor executor)
     : rule_(rule),
-      options_((options.check(), options)),
+      options_((options.validate(), options)),
       executor_(std::move(executor)),
       active_(network.vertex_count()),
       packed_(network, detail::max_in_lanes<Scalar, Rule, Network>(options)),
@@ -217,7 +217,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       moved_(static_cast<std::size_t>(network.vertex_count())),
       last_displacements_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
     detail::define_made<QuasiStaticSolver>();
-    if constexpr (requires { rule.check(); }) rule.check();
+    if constexpr (requires { rule.validate(); }) rule.validate();
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
     }

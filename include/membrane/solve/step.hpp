@@ -37,7 +37,7 @@ struct SolverOptions {
     Index max_packed_vertices = 32'768;  ///< capacity in vertices updated by SIMD: 260 bytes each, 460 in double
 
     /// @throws InvalidInput for an option out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Whether a step advanced, or why it was refused.
@@ -73,7 +73,7 @@ struct StepReport {
 };
 
 template <Real Scalar>
-void SolverOptions<Scalar>::check() const {
+void SolverOptions<Scalar>::validate() const {
     constexpr std::string_view component = "QuasiStaticSolver";
     const auto at_least = [&](Index number, Index least, std::string_view name) {
         if (number < least) refuse(component, name, " must be at least ", least, ", got ", number);

@@ -113,7 +113,7 @@ struct SafeStep {
     }
 
     /// @throws InvalidInput for an `omega` out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// Newton's step of a vertex on its own 3 x 3 block, as in vertex block descent [Chen24], with descent guaranteed
@@ -138,7 +138,7 @@ struct BlockStep {
     [[nodiscard]] Symmetric3<Scalar> compliance(const VertexState<Scalar>& vertex) const noexcept;
 
     /// @throws InvalidInput for an `omega` out of its range
-    void check() const;
+    void validate() const;
 };
 
 namespace detail {
@@ -159,9 +159,9 @@ inline void check_omega(std::string_view rule, double omega) {
 
 }  // namespace detail
 
-inline void SafeStep::check() const { detail::check_omega("SafeStep", omega); }
+inline void SafeStep::validate() const { detail::check_omega("SafeStep", omega); }
 
-inline void BlockStep::check() const { detail::check_omega("BlockStep", omega); }
+inline void BlockStep::validate() const { detail::check_omega("BlockStep", omega); }
 
 template <Number Scalar>
 Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) const noexcept {

@@ -23,7 +23,7 @@ template <Real Scalar>
 template <Real Scalar>
 bool seed_corners(ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners) noexcept {
     for (const Index v : corners) {
-        if (!context.check(v)) return false;
+        if (!context.validate(v)) return false;
         context.seed(v);
     }
     return true;

@@ -153,7 +153,7 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
 template <Real Scalar>
 bool ToolContact<Scalar>::seed(Context& context) const noexcept {
     const auto are_vertices = [&](const auto& corners) {
-        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return context.check(v); });
+        return std::all_of(corners.begin(), corners.end(), [&](Index v) { return context.validate(v); });
     };
     if (!are_vertices(contact.corners)) return false;
     const auto all_are_vertices = [&](const auto& items) {

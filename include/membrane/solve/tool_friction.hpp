@@ -27,7 +27,7 @@ struct ToolFrictionOptions {
     Index max_vertices = 4096;  ///< capacity: corners of contact points; of more, those last in order have no friction
 
     /// @throws InvalidInput if a number is out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// A vertex of the membrane that the tool holds, and the friction force on it.
@@ -94,7 +94,7 @@ class ToolFriction {
   public:
     /// Allocates. @throws InvalidInput if an option is out of its range
     explicit ToolFriction(const ToolFrictionOptions& options)
-        : coefficient_((options.check(), static_cast<Scalar>(options.coefficient))),
+        : coefficient_((options.validate(), static_cast<Scalar>(options.coefficient))),
           vertices_(static_cast<std::size_t>(options.max_vertices)),
           kept_(vertices_),
           corners_(3 * vertices_.capacity()) {}
@@ -184,7 +184,7 @@ class ToolFriction {
     double dissipated_ = 0;
 };
 
-inline void ToolFrictionOptions::check() const {
+inline void ToolFrictionOptions::validate() const {
     constexpr std::string_view component = "ToolFriction";
     detail::check_option(component, coefficient, "coefficient", "1");
     if (coefficient > 10) refuse(component, "coefficient must be at most 10, got ", coefficient);

@@ -179,10 +179,10 @@ N CapsuleQuery<Scalar>::entry(const Aabb<N>& box) const noexcept {
     N first = 0, last = 1;
     for (int k = 0; k < 3; ++k) {
         const bool forward = inverse_step_[k] > 0;
-        const N& near = forward ? box.low[k] : box.high[k];
-        const N& far = forward ? box.high[k] : box.low[k];
-        first = larger<N>(first, (near - to_near_[k]) * inverse_step_[k]);
-        last = smaller<N>(last, (far - to_far_[k]) * inverse_step_[k]);
+        const N& entry = forward ? box.low[k] : box.high[k];
+        const N& exit = forward ? box.high[k] : box.low[k];
+        first = larger<N>(first, (entry - to_near_[k]) * inverse_step_[k]);
+        last = smaller<N>(last, (exit - to_far_[k]) * inverse_step_[k]);
     }
     return select<N>(first <= last, first, never);
 }

@@ -79,7 +79,7 @@ class VertexNormals {
     void face(const ConstPointsRef<Scalar>& x, Index count, const VertexAt& vertex) noexcept;
     template <class VertexAt>
     void normalise(const ConstPointsRef<Scalar>& x, const VertexAt& vertex, Index first, Index end) noexcept;
-    void check(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept;
+    void replace_degenerate(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept;
     // Of vertices beyond the first six, if all `triangles` of a vertex are apart.
     [[nodiscard]] static std::size_t overflow_capacity(std::size_t triangles) noexcept {
         const std::size_t all = 3 * triangles + triangles % 2, first = detail::OneRing{}.vertices.size();
@@ -357,12 +357,14 @@ MEMBRANE_INLINE void VertexNormals<Scalar>::normalise(const ConstPointsRef<Scala
     for (std::size_t i = 0; i < vertices.size(); ++i) all += squared[i];
     if (is_finite(all) && !any(squared < (std::numeric_limits<Scalar>::min)())) [[likely]]
         return;
-    for (std::size_t i = 0; i < vertices.size(); ++i) check(point(x, vertices[i]), vertices[i], squared[i]);
+    for (std::size_t i = 0; i < vertices.size(); ++i)
+        replace_degenerate(point(x, vertices[i]), vertices[i], squared[i]);
 }
 
 /// Sets the normal at rest of vertex `v` if it has no other; `squared` is the square of twice its area.
 template <Real Scalar>
-MEMBRANE_NOINLINE void VertexNormals<Scalar>::check(const Vector3<Scalar>& position, Index v, Scalar squared) noexcept {
+MEMBRANE_NOINLINE void VertexNormals<Scalar>::replace_degenerate(const Vector3<Scalar>& position, Index v,
+                                                                 Scalar squared) noexcept {
     const bool measurable = is_finite(squared) && squared >= (std::numeric_limits<Scalar>::min)();
     if (!measurable || !is_finite(position)) values_.col(v) = at_rest_.col(v);
 }

@@ -44,7 +44,7 @@ struct EnergyRelease {
     double thickness;  ///< of the membrane [m]
 
     /// @throws InvalidInput if a number is not positive and finite
-    void check() const {
+    void validate() const {
         detail::check_option("EnergyRelease", toughness, "toughness", "J/m^2", false);
         detail::check_option("EnergyRelease", thickness, "thickness", "m", false);
     }
@@ -70,7 +70,7 @@ struct LargestTension {
     double strength;  ///< force per width [N/m]
 
     /// @throws InvalidInput if the strength is not positive and finite
-    void check() const { detail::check_option("LargestTension", strength, "strength", "N/m", false); }
+    void validate() const { detail::check_option("LargestTension", strength, "strength", "N/m", false); }
 
     ///@{
     /// As `TearCriterion` requires.

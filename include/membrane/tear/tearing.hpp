@@ -41,7 +41,7 @@ struct TearOptions {
     bool move_vertices = true;  ///< onto the tear's direction; if not, it runs along the edges that there are
 
     /// @throws InvalidInput if a number is out of its range
-    void check() const;
+    void validate() const;
 };
 
 /// An end of a tear within the membrane.
@@ -215,7 +215,7 @@ Tearing(const TriangleMesh<Scalar>&, const Criterion&) -> Tearing<Scalar, Criter
 template <Real Scalar, class Criterion>
 Tearing(const TriangleMesh<Scalar>&, const Criterion&, const TearOptions&) -> Tearing<Scalar, Criterion>;
 
-inline void TearOptions::check() const {
+inline void TearOptions::validate() const {
     constexpr std::string_view component = "Tearing";
     if (max_tips < 1) refuse(component, "max_tips must be at least 1, got ", max_tips);
     if (!(patch_radius >= 2 && patch_radius <= 100)) {
@@ -228,7 +228,7 @@ template <Real Scalar, TearCriterion<Scalar> Criterion>
 Tearing<Scalar, Criterion>::Tearing(const TriangleMesh<Scalar>& mesh, const Criterion& criterion,
                                     const TearOptions& options)
     : criterion_(criterion),
-      options_((options.check(), options)),
+      options_((options.validate(), options)),
       surface_(mesh),
       tips_(static_cast<std::size_t>(options.max_tips)),
       opens_(tips_.capacity()),
@@ -238,7 +238,7 @@ Tearing<Scalar, Criterion>::Tearing(const TriangleMesh<Scalar>& mesh, const Crit
       patch_(mesh.triangle_count()),
       patch_values_(is_outer_border_.size()),
       path_(33) {
-    if constexpr (requires { criterion.check(); }) criterion.check();
+    if constexpr (requires { criterion.validate(); }) criterion.validate();
     for (Index v = 0; v < mesh.vertex_count(); ++v) {
         is_outer_border_[static_cast<std::size_t>(v)] = surface_.adjacency().on_border(v) ? 1 : 0;
     }
