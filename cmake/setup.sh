@@ -1,6 +1,9 @@
 # Sourced by tests/run, examples/run, bench/run and .ci/run: sets the machine up, configures, builds.
 # Bash; the caller has `set -euo pipefail`. What is said goes to stderr, so that a program's output stays its own.
 
+# The same in every environment, and in one that sets nothing: dpkg needs a path.
+export LC_ALL=C.UTF-8 PATH
+
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
 say() { printf '== %s\n' "$*" >&2; }

@@ -72,7 +72,7 @@ struct Phase {
         for (std::size_t at = 0; (at = text.find('\'', at)) != text.npos; at += 2) text.insert(at, 1, '\'');
         return "'" + text + "'\n";
     };
-    FILE* gnuplot = popen("gnuplot", "w");
+    FILE* gnuplot = popen("LC_ALL=C.UTF-8 gnuplot", "w");  // others may have no degree sign
     if (gnuplot == nullptr) throw std::runtime_error("cannot run gnuplot");
     const auto load = [&](const std::string& name) {
         return "load " + quoted(MEMBRANE_EXAMPLE_DATA "/../support/" + name + ".gnuplot");

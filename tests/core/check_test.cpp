@@ -4,6 +4,7 @@
 #undef NDEBUG  // the asserts are to be tested in a release build, too
 #include <membrane/core/check.hpp>
 
+#include <clocale>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -28,6 +29,13 @@ TEST_CASE("a refusal puts its parts together", "[core]") {
               refuse("Part", std::numeric_limits<std::uint64_t>::max(), " ", std::numeric_limits<std::int64_t>::min(),
                      " ", std::int8_t{-5}, " ", std::size_t{7});
           }) == "Part: 18446744073709551615 -9223372036854775808 -5 7");
+}
+
+TEST_CASE("a message has its numbers with a point in any locale", "[core]") {
+    const bool german = std::setlocale(LC_ALL, "de_DE.UTF-8") != nullptr;  // where there is one
+    const std::string message = test::refusal([] { refuse("Part", "got ", -0.5, " and ", 12345.5F); });
+    if (german) std::setlocale(LC_ALL, "C");
+    CHECK(message == "Part: got -0.5 and 12345.5");
 }
 
 TEST_CASE("a refusal is an invalid argument", "[core]") {

@@ -2,11 +2,12 @@
 #pragma once
 
 #include <bit>
+#include <charconv>
 #include <cstdint>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -46,8 +47,7 @@ inline examples::Surface tetrahedron() {
 
 inline std::string digits(double value) {
     char text[32];
-    std::snprintf(text, sizeof text, "%.17g", value);
-    return text;
+    return {text, std::to_chars(text, std::end(text), value, std::chars_format::general, 17).ptr};
 }
 
 inline std::string triple(const Eigen::Vector3d& p) {

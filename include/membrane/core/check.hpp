@@ -2,11 +2,13 @@
 #pragma once
 
 #include <atomic>
+#include <charconv>
 #include <concepts>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -107,9 +109,9 @@ void append(std::string& text, Number number) {
     if constexpr (std::integral<Number>) {
         text += std::to_string(number);
     } else {
-        char digits[32];
-        std::snprintf(digits, sizeof digits, "%.9g", static_cast<double>(number));
-        text += digits;
+        char digits[32];  // not by printf, which follows the locale
+        const double value = static_cast<double>(number);
+        text.append(digits, std::to_chars(digits, std::end(digits), value, std::chars_format::general, 9).ptr);
     }
 }
 
