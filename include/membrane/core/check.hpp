@@ -2,13 +2,11 @@
 #pragma once
 
 #include <atomic>
-#include <charconv>
 #include <concepts>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
-#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -109,9 +107,12 @@ void append(std::string& text, Number number) {
     if constexpr (std::integral<Number>) {
         text += std::to_string(number);
     } else {
-        char digits[32];  // not by printf, which follows the locale
-        const double value = static_cast<double>(number);
-        text.append(digits, std::to_chars(digits, std::end(digits), value, std::chars_format::general, 9).ptr);
+        char digits[40];
+        std::snprintf(digits, sizeof digits, "%.9g", static_cast<double>(number));
+        for (const char c : std::string_view(digits)) {  // the decimal separator is the locale's, of one byte or more
+            const bool is_separator = std::string_view("+-0123456789aefin").find(c) == std::string_view::npos;
+            if (!is_separator || text.back() != '.') text += is_separator ? '.' : c;
+        }
     }
 }
 
