@@ -46,20 +46,20 @@ void CommandLine::add(const std::string& name, int& value, const std::string& wh
 
 void CommandLine::add_within(const std::string& name, double& value, double least, double most,
                              const std::string& what) {
-    parser_->add(name, value, what)->validate(CLI::Range(least, most));
+    parser_->add(name, value, what)->check(CLI::Range(least, most));
 }
 
 void CommandLine::add_word(const std::string& name, std::string& value, const std::vector<std::string>& words,
                            const std::string& what) {
-    parser_->add(name, value, what)->validate(CLI::IsMember(words));
+    parser_->add(name, value, what)->check(CLI::IsMember(words));
 }
 
 void CommandLine::add_file(const std::string& name, std::string& file, const std::string& what) {
-    parser_->add(name, file, what)->validate(CLI::ExistingFile);
+    parser_->add(name, file, what)->check(CLI::ExistingFile);
 }
 
 void CommandLine::add_two_files(const std::string& name, std::vector<std::string>& files, const std::string& what) {
-    parser_->add(name, files, what)->expected(2)->validate(CLI::ExistingFile);
+    parser_->add(name, files, what)->expected(2)->check(CLI::ExistingFile);
 }
 
 void CommandLine::add_flag(const std::string& name, const std::function<void()>& act, const std::string& what) {
