@@ -53,6 +53,18 @@ static_assert(
     !UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Opaque<VirtualVolumeSprings<double>>>);
 static_assert(!UpdatesInLanes<double, BlockStep, MassSpringNetwork<double, ExponentialSpring>, NoFoundation>);
 
+/// A linear spring that counts how often a force on one vertex needs it, and how often a pack does.
+struct CountedSpring {
+    static constexpr bool never_stiffens = true;
+    int *alone, *in_packs;
+
+    template <Number N>
+    SpringResponse<N> operator()(const SpringState<N>& spring) const noexcept {
+        ++*(std::same_as<N, Each<N>> ? alone : in_packs);
+        return LinearSpring{}(spring);
+    }
+};
+
 /// A mesh with holes, springs and foundation of all kinds, some left out.
 template <Real S>
 struct Membrane {
@@ -355,6 +367,44 @@ TEMPLATE_TEST_CASE("all vertices of a membrane fit into packs", "[packed]", floa
         PackedVertices<S> packed(network);
         packed.assign(queue.vertices(), queue.colour_ends(), network);
         CHECK(packed.size() == static_cast<std::size_t>(mesh.vertex_count()));
+    }
+}
+
+TEMPLATE_TEST_CASE("a membrane that no tool has touched is updated in packs, whatever moves it", "[packed]", float,
+                   double) {
+    using S = TestType;
+    const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 3});
+    int alone = 0, in_packs = 0;
+    const MassSpringNetwork<S, CountedSpring> network(mesh, {&alone, &in_packs}, {.stiffness = S(1)});
+    const VirtualVolumeSprings<S> foundation(mesh, {.stiffness = S(0.2)});
+    const auto check = [&](const auto& move) {
+        for (const bool touched : {false, true}) {
+            CAPTURE(touched);
+            QuasiStaticSolver<S> solver(network);
+            Points<S> x = mesh.positions();
+            if (touched)
+                CHECK(solver.step(x, S(1e-3), network, foundation, pull(7, Vector3<S>(S(1.01) * point(x, 7)))).status ==
+                      StepStatus::advanced);
+            MovingBody<S> body(mesh);
+            for (int tick = 0; tick < 3; ++tick) {
+                move(solver, body, x, tick);
+                alone = in_packs = 0;
+                CHECK(solver.step(x, S(1e-3), network, on(body, foundation)).moved.size() > 600);
+                CHECK(alone == 0);
+                CHECK(in_packs > 600 * 2 * 3 / static_cast<int>(Lanes<S>::count));
+            }
+        }
+    };
+    SECTION("a body that deforms") {
+        check([&](auto&, auto& body, auto& x, int tick) {
+            REQUIRE(body.move_to(Points<S>(S(1.01 + 0.01 * tick) * mesh.positions()), S(1e-3), x));
+        });
+    }
+    SECTION("its user") {
+        check([&](auto& solver, auto&, auto& x, int) {
+            x *= S(1.01);
+            solver.wake_all();
+        });
     }
 }
 

@@ -248,7 +248,7 @@ class PackedVertices {
     std::vector<unsigned char> is_needed_;
     Extent assigned_;
     std::size_t given_ = 0;
-    bool is_whole_ = false;  // all assigned vertices fit
+    bool is_whole_ = true;  // all assigned vertices fit
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
