@@ -116,7 +116,7 @@ void hand_in_wild_number(int seed) {
         StepReport<S> report;
         bool touching = false, moved = false;
         {
-#ifndef __FAST_MATH__
+#ifndef __NO_MATH_ERRNO__  // -ffast-math may divide by zero in a branch that is not taken
             // What is no number is evaluated before it is refused, and squares of what is too large overflow.
             const FloatingPointTraps traps(FloatingPointTraps::only_division);
 #endif

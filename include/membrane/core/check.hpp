@@ -44,7 +44,7 @@ inline InvalidInputHandler set_invalid_input_handler(InvalidInputHandler handler
 inline AssertHandler set_assert_handler(AssertHandler handler) noexcept;
 ///@}
 
-/// Whether `value` is neither infinite nor NaN, also under `-ffast-math`, where `std::isfinite` may always be true.
+/// Whether `value` is neither infinite nor NaN.
 template <Real Scalar>
 [[nodiscard]] bool is_finite(Scalar value) noexcept;
 

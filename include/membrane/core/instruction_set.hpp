@@ -22,6 +22,10 @@
 #define MEMBRANE_PORTABLE_LANES
 #endif
 
+#if defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__
+#error "membrane: add -fno-finite-math-only after -ffast-math or -Ofast: no check for NaN and infinity works without it"
+#endif
+
 /// Name of the instruction set, and of the inline namespace of the types packed in its registers.
 #if defined(MEMBRANE_PORTABLE_LANES)
 #define MEMBRANE_INSTRUCTION_SET portable
