@@ -70,6 +70,14 @@ void check_friction(const test::WildTear<S>& loop) {
     }
 }
 
+// A normal is that of an update of all.
+template <class S>
+void check_normals(const test::WildTear<S>& loop) {
+    auto all = loop.normals;
+    all.update(loop.x);
+    REQUIRE(test::same_bits(all.values(), loop.normals.values()));
+}
+
 /// The number of ticks, vertices and tears in which something has occurred.
 struct Counts {
     int splits = 0, advances = 0, refused = 0, grasped = 0, slipped = 0, dragged = 0, let_go = 0;
@@ -88,6 +96,7 @@ void checked_tick(test::WildTear<S>& loop, Counts& counts) {
     for (const auto& reaction : report.reactions) REQUIRE(is_finite(reaction));
     REQUIRE(loop.grasps_surface);
     check_friction(loop);
+    check_normals(loop);
     REQUIRE(loop.tear.dissipated() >= taken * (1 - 1e-12));
     REQUIRE(loop.adhesion.dissipated() >= peeled);
     REQUIRE(std::isfinite(loop.tear.dissipated() + loop.adhesion.dissipated()));

@@ -37,8 +37,8 @@ struct OneRing {
 
 /// Unit normals of the vertices, weighted by the area of their triangles. Owns its data: the mesh need not outlive it.
 ///
-/// An update of the moved vertices gives the same bits as an update of all. If the triangles of a vertex have no area
-/// together, are not finite or too large, the vertex gets its normal at rest, or (0, 0, 1) if it had none or has no
+/// An update of the moved vertices gives the same bits as an update of all, after tears too. If the triangles of a vertex
+/// have no area together, are not finite or too large, the vertex gets its normal at rest, or (0, 0, 1) if it had none or has no
 /// triangles: always a finite vector of length 1.
 template <Real Scalar>
 class VertexNormals {
@@ -50,18 +50,24 @@ class VertexNormals {
     /// @pre `x` has a column for each vertex (asserted).
     void update(const ConstPointsRef<Scalar>& x) noexcept;
 
-    /// Updates the normals of the vertices `moved` and their neighbours, each once; `moved` may have duplicates.
-    /// Returns these vertices, valid until the next update. No other normal changes, and only the corners of their
-    /// triangles are read. Linear in their number, no allocation.
+    /// Updates the normals of the vertices `moved` and their neighbours, each once; `moved` may have duplicates. Those
+    /// that a tear has doubled or moved since the last update count as moved. Returns these vertices, valid until the
+    /// next update. No other normal changes, and only the corners of their triangles are read. Linear in their number,
+    /// no allocation.
     /// @pre `x` has a column for each vertex and all `moved` are vertices (asserted).
     std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
     /// 3 x V, unit length.
     [[nodiscard]] const Points<Scalar>& values() const noexcept { return values_; }
 
-    /// A vertex becomes two, with one normal until both are updated. The normal at rest of both stays. Online. Cost:
-    /// the triangles around the vertex and its neighbours.
+    ///@{
+    /// A vertex becomes two, with one normal until the next update; a tear has moved a vertex. The normal at rest of
+    /// each stays. Online. Cost: the triangles around the vertex and its neighbours.
     void split(const VertexSplit& split) noexcept;
+    void reshape(const MovedVertex<Scalar>& moved) noexcept {
+        if (has_reserve_) torn_.insert(moved.vertex);
+    }
+    ///@}
 
     /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles around each vertex.
     /// Then update the normals.
@@ -95,6 +101,7 @@ class VertexNormals {
     IndexSet updated_;                        // by the last call
     std::vector<PaddedPoint<Scalar>> areas_;  // of a batch: twice the areas as z, x, y; then the normals
     bool has_reserve_;
+    IndexSet torn_;                          // vertices doubled or moved by a tear since the last update
     std::vector<std::array<Index, 2>> fan_;  // the other corners of the triangles around a vertex
 };
 
@@ -184,7 +191,8 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
       at_rest_(Vector3<Scalar>::UnitZ().eigen().replicate(1, mesh.vertex_count())),
       updated_(mesh.vertex_count()),
       areas_(static_cast<std::size_t>(batch_size)),
-      has_reserve_(reserve_of(mesh) > 0) {
+      has_reserve_(reserve_of(mesh) > 0),
+      torn_(has_reserve_ ? mesh.vertex_count() : 0) {
     std::vector<std::size_t> capacity(one_rings_.size(), 0);
     if (has_reserve_) {
         for (const Index v : mesh.triangles().reshaped()) ++capacity[static_cast<std::size_t>(v)];
@@ -212,6 +220,7 @@ template <Real Scalar>
 void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
     face(x, static_cast<Index>(values_.cols()), [](Index v) { return v; });
+    torn_.clear();
 }
 
 template <Real Scalar>
@@ -219,9 +228,14 @@ std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar
                                                      std::span<const Index> moved) noexcept {
     MEMBRANE_ASSERT(x.cols() == values_.cols());
     updated_.clear();
-    for (const Index v : moved) updated_.insert(v);
+    for (const auto vertices : {moved, torn_.items()}) {
+        for (const Index v : vertices) updated_.insert(v);
+    }
+    torn_.clear();
     // Neighbours of moved vertices have mostly moved too: one branch for all of them is predicted.
-    for (const Index v : moved) {
+    const Index count = updated_.count();
+    for (Index n = 0; n < count; ++n) {
+        const Index v = updated_.items()[static_cast<std::size_t>(n)];
         const detail::OneRing& ring = one_rings_[static_cast<std::size_t>(v)];
         bool all_in = true;
         for (const Index w : ring.vertices) all_in &= updated_.contains(w);
@@ -265,6 +279,7 @@ void VertexNormals<Scalar>::split(const VertexSplit& split) noexcept {
         }
     }
     for (auto* normals : {&values_, &at_rest_}) normals->col(split.copy) = normals->col(split.vertex);
+    for (const Index v : {split.vertex, split.copy}) torn_.insert(v);
 }
 
 // The triangles around `v`, counter-clockwise: in each its other two corners.
