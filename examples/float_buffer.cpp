@@ -2,13 +2,13 @@
 //
 // An engine's vertices, interleaved and in floats, are deformed in place: the loop copies no position, and writes only
 // the normals that have changed.
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <vector>
 
 #include <membrane/membrane.hpp>
-
-#include "support/specimen.hpp"
 
 /// One vertex as the engine sends it to the graphics card.
 struct EngineVertex {
@@ -21,13 +21,14 @@ struct EngineMesh {
     std::vector<std::uint32_t> indices;
 };
 
-EngineMesh load(const examples::Surface& surface) {
-    EngineMesh mesh{std::vector<EngineVertex>(static_cast<std::size_t>(surface.points.cols())), {}};
+/// A sphere of radius 10 mm, in metres.
+EngineMesh load() {
+    const auto sphere = membrane::icosphere<float>({.radius = 10e-3, .subdivisions = 3});
+    EngineMesh mesh{std::vector<EngineVertex>(static_cast<std::size_t>(sphere.vertex_count())), {}};
     for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-        Eigen::Map<Eigen::Vector3f>(mesh.vertices[v].position) =
-            surface.points.col(static_cast<Eigen::Index>(v)).cast<float>();
+        Eigen::Map<Eigen::Vector3f>(mesh.vertices[v].position) = sphere.positions().col(static_cast<Eigen::Index>(v));
     }
-    for (const auto corner : surface.triangles.reshaped()) mesh.indices.push_back(static_cast<std::uint32_t>(corner));
+    for (const auto corner : sphere.triangles().reshaped()) mesh.indices.push_back(static_cast<std::uint32_t>(corner));
     return mesh;
 }
 
@@ -38,8 +39,8 @@ auto columns(std::vector<EngineVertex>& vertices, float (EngineVertex::*member)[
         vertices.front().*member, 3, static_cast<Eigen::Index>(vertices.size()), Eigen::OuterStride<>(stride));
 }
 
-void press_in_place(const examples::Specimen& specimen) {
-    EngineMesh engine = load(specimen.surface);
+int main() {
+    EngineMesh engine = load();
     auto x = columns(engine.vertices, &EngineVertex::position);
     auto shown_normals = columns(engine.vertices, &EngineVertex::normal);
     const Eigen::Map<const Eigen::Matrix<std::uint32_t, 3, Eigen::Dynamic>> triangles(
@@ -54,11 +55,9 @@ void press_in_place(const examples::Specimen& specimen) {
     auto tracker = membrane::ContactTracker(mesh);
     auto normals = membrane::VertexNormals(mesh);
     shown_normals = normals.values();
-    membrane::ScriptedDevice<float> device(
-        {{0, specimen.above(0.3).cast<float>()}, {0.2F, specimen.above(0).cast<float>()}},
-        {.radius = specimen.tool_radius()});
+    membrane::ScriptedDevice<float> device({{0, {0, 0, 13e-3F}}, {0.2F, {0, 0, 10e-3F}}}, {.radius = 2e-3});
 
-    std::size_t written = 0;
+    std::size_t written = 0;  // most in a tick
     while (device.running()) {
         const auto tool = device.read();
         const auto contact = tracker.update(tree, x, tool);
@@ -74,11 +73,4 @@ void press_in_place(const examples::Specimen& specimen) {
                 sizeof(EngineVertex), written);
     std::printf("vertex %td is now at (%.2f, %.2f, %.2f) mm, pressed with %.1f mN\n", deepest, 1e3F * x(0, deepest),
                 1e3F * x(1, deepest), 1e3F * x(2, deepest), 1e3F * device.force().norm());
-}
-
-int main(int argc, char** argv) {
-    examples::CommandLine command("Presses an engine's interleaved float vertices in place.");
-    examples::MeshOptions options;
-    options.add_to(command);
-    return command.run(argc, argv, [&] { press_in_place(options.specimen(examples::stock_sphere())); });
 }

@@ -13,8 +13,6 @@
 #include <membrane/haptics/simulated_hand.hpp>
 #include <membrane/membrane.hpp>
 
-#include "support/specimen.hpp"
-
 double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 /// Sleeps until the next round, `period` [s] after the one that was due, and returns when it is due. Rounds lost are
@@ -66,10 +64,11 @@ void touch(const membrane::TriangleMesh<double>& mesh, double dt, Loops& loops) 
     }
 }
 
-void run(const examples::Specimen& body, double seconds, double rate, double frame = 1 / 60.0) {
-    const auto mesh = membrane::TriangleMesh(body.surface.points, body.surface.triangles);
-    membrane::ScriptedDevice<double> mouse({{0, body.above(0.3)}, {seconds, body.above(0)}},
-                                           {frame, body.tool_radius()});
+int main() {
+    const double seconds = 1, rate = 1000, frame = 1 / 60.0;
+    const auto mesh = membrane::icosphere({.radius = 10e-3, .subdivisions = 3});
+    membrane::ScriptedDevice<double> mouse({{0, {0, 0, 13e-3}}, {seconds, {0, 0, 10e-3}}},
+                                           {.tick = frame, .radius = 2e-3});
     Loops loops{membrane::MovedPoints<double>(mesh.vertex_count())};
     loops.wanted.publish(mouse.read(), now());
     loops.ticks.reserve(static_cast<std::size_t>(2 * seconds * rate));
@@ -89,15 +88,4 @@ void run(const examples::Specimen& body, double seconds, double rate, double fra
     print("a tick takes        ", loops.ticks);
     print("what is drawn is old", ages);
     std::printf("%zu of %zu ticks were over after the next was due\n", loops.missed, loops.ticks.size());
-}
-
-int main(int argc, char** argv) {
-    double seconds = 1, rate = 1000;
-    examples::MeshOptions mesh;
-    examples::CommandLine command(
-        "Presses a membrane in one loop and draws it in another, and prints how punctual both are.");
-    mesh.add_to(command);
-    command.add_within("--seconds", seconds, 0.1, 3600.0, "how long [s]");
-    command.add_within("--rate", rate, 1.0, 1e5, "of the haptic loop [Hz]");
-    return command.run(argc, argv, [&] { run(mesh.specimen(examples::stock_sphere()), seconds, rate); });
 }

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <iostream>
+#include <memory>
 #include <span>
 #include <sstream>
 #include <thread>
@@ -198,7 +199,39 @@ class OwnDevice {
 static_assert(membrane::Device<OwnDevice, double>);
 // [/own_device]
 
+// [members]
+struct Membrane {
+    membrane::TriangleMesh<float> mesh;  // each part is made from those above it
+    membrane::MassSpringNetwork<float> network{mesh, {}, {.stiffness = 40.0F}};                     // [N/m]
+    membrane::VirtualVolumeSprings<float> foundation{mesh, {.stiffness = 8.0F, .damping = 0.02F}};  // [N/m], [N s/m]
+    membrane::QuasiStaticSolver<float> solver{network, {.layers = 6, .sweeps = 2}};
+    membrane::AabbTree<float> tree{mesh};
+    membrane::ContactTracker<float> tracker{mesh};
+    membrane::VertexNormals<float> normals{mesh};
+    membrane::Points<float> x = mesh.positions();  // [m]
+
+    membrane::Vector3<float> step(const membrane::Tool<float>& tool, float dt) {
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
+        tree.refit(x, report.moved);
+        normals.update(x, report.moved);
+        return report.reactions[0];  // [N]
+    }
+};
+// [/members]
+
 }  // namespace
+
+TEST_CASE("pages: members") {
+    Membrane first{membrane::icosphere<float>({.radius = 0.01, .subdivisions = 2})};
+    CHECK(first.step({.position = {0, 0, 0.0108F}, .radius = 1e-3F}, 1e-3F).z() > 0);
+    auto second = std::make_unique<Membrane>(first);  // owns all that it uses
+    auto third = std::move(*second);
+    second.reset();
+    const membrane::Tool<float> deeper{.position = {0, 0, 0.0106F}, .radius = 1e-3F};
+    CHECK(first.step(deeper, 1e-3F) == third.step(deeper, 1e-3F));
+    CHECK(first.x == third.x);
+}
 
 TEST_CASE_METHOD(Touched, "pages: device of one's own") {
     Driver driver;

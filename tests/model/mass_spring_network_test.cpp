@@ -24,6 +24,9 @@
 using namespace membrane;
 using test::Random;
 
+// A member of a class names no law unless it is its own.
+static_assert(std::is_same_v<MassSpringNetwork<float>, MassSpringNetwork<float, LinearSpring>>);
+
 // A law without numbers of its own takes no memory.
 static_assert(sizeof(MassSpringNetwork<double, LinearSpring>) < sizeof(MassSpringNetwork<double, ExponentialSpring>));
 

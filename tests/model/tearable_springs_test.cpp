@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <set>
+#include <type_traits>
 #include <vector>
 
 #include <membrane/model/bending.hpp>
@@ -26,6 +27,8 @@
 #include "support/refusal.hpp"
 
 using namespace membrane;
+
+static_assert(std::is_same_v<TearableSprings<float>, TearableSprings<float, LinearSpring>>);
 
 namespace {
 

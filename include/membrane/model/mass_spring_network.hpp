@@ -258,7 +258,7 @@ struct SpringElement {
 static_assert(Element<SpringElement<float, LinearSpring>> && Element<SpringElement<double, ExponentialSpring>>);
 
 /// Masses, viscosities, springs and pins of a membrane, [Liu07] 2.2 and (1). Immutable; holds no positions.
-template <Real Scalar_, CheckedSpringLaw<Scalar_> Law>
+template <Real Scalar_, CheckedSpringLaw<Scalar_> Law = LinearSpring>
 class MassSpringNetwork {
   public:
     using Scalar = Scalar_;  ///< of the constants and forces

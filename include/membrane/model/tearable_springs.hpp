@@ -28,7 +28,7 @@ template <Real Scalar>
 /// A `MassSpringNetwork` that follows a tear. The stiffness of a spring between two triangles is the sum of two shares,
 /// in proportion to their areas; when they part, each keeps its own. The order in which a vertex lists its springs then
 /// changes. A doubled vertex has its share of mass and viscosity, and is pinned if the vertex is.
-template <Real Scalar_, CheckedSpringLaw<Scalar_> Law>
+template <Real Scalar_, CheckedSpringLaw<Scalar_> Law = LinearSpring>
 class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
     using Base = MassSpringNetwork<Scalar_, Law>;
 
