@@ -5,12 +5,15 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <sstream>
 #include <vector>
 
 #include <membrane/accuracy/factored_convexity.hpp>
+#include <membrane/accuracy/tangent_stiffness.hpp>
 #include <membrane/model/moving_foundation.hpp>
+#include <membrane/model/tearable_springs.hpp>
 #include <membrane/solve/quasi_static.hpp>
 #include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
@@ -19,6 +22,7 @@
 #include "support/catch.hpp"
 #include "support/newton.hpp"
 #include "support/random.hpp"
+#include "support/random_tear.hpp"
 #include "support/run_to_equilibrium.hpp"
 #include "support/sparse_newton.hpp"
 
@@ -515,4 +519,85 @@ TEST_CASE("a bound remembers nothing, and its copies are their own", "[error_bou
         CHECK(again.reactions.size() == 1);
     }
     CHECK(copy.compute(x, sphere.network, foundation).reactions.data() != first.reactions.data());
+}
+
+namespace {
+
+using Springs = MassSpringNetwork<double, LinearSpring>;
+
+// The network of the torn mesh with the springs of `torn`, in the order of its edges.
+Springs built_anew(const TornSurface<double>& surface, const Springs& torn) {
+    const TriangleMesh<double> mesh(surface.rest_positions(), surface.triangles());
+    std::map<std::array<Index, 2>, Spring<double>> by_ends;
+    for (const auto& spring : torn.springs()) {
+        const auto [low, high] = std::minmax(spring.first, spring.second);
+        by_ends[{low, high}] = spring;
+    }
+    std::vector<Index> pinned;
+    for (Index v = 0; v < mesh.vertex_count(); ++v) {
+        if (torn.pinned(v)) pinned.push_back(v);
+    }
+    const Adjacency adjacency(mesh);
+    std::vector<double> stiffness, rest;
+    for (const auto& edge : adjacency.edges()) {
+        stiffness.push_back(by_ends.at(edge).stiffness);
+        rest.push_back(by_ends.at(edge).rest_length);
+    }
+    REQUIRE(by_ends.size() == stiffness.size());
+    return {mesh, LinearSpring{}, {.stiffness = stiffness, .rest_length = rest, .pinned = pinned}};
+}
+
+void check_equal(const ErrorReport& found, const ErrorReport& expected) {
+    REQUIRE(found.status == expected.status);
+    CHECK(found.convexity == Approx(expected.convexity).epsilon(1e-9));
+    CHECK(found.position == Approx(expected.position).epsilon(1e-6));
+}
+
+}  // namespace
+
+// A foundation per area, or none, has no stiffness at the vertices in reserve.
+TEST_CASE("a membrane that has torn has the bounds and the tangent of the torn mesh that is built anew",
+          "[error_bound][tear]") {
+    int certified = 0, torn_splits = 0;
+    for (int seed = 1; seed <= cases(20); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto flat = disc<double>({.radius = 0.01, .rings = 5});
+        const auto mesh = with_reserve(flat, 20);
+        TearableSprings springs(mesh, Springs(mesh, LinearSpring{}, {.stiffness = 10.0, .pinned = border(flat)}));
+        auto per_area = vertex_areas(mesh);
+        for (double& each : per_area) each *= 1e6;
+        VirtualVolumeSprings<double> foundation(mesh, {.stiffness = per_area});
+        ErrorBound<> quick(springs);
+        ErrorBound<FactoredConvexity> stale(springs);
+        TangentStiffness tangent(springs);
+        Tearing tear(mesh, EnergyRelease{.toughness = 1, .thickness = 1e-4});
+        Points<double> x = mesh.positions();
+        for (int n = 0; n < 4; ++n) {
+            const auto expected = built_anew(tear.surface(), springs);
+            const Points<double> off =
+                x + 1e-6 * Points<double>::NullaryExpr(3, x.cols(), [&] { return random.number(-1.0, 1.0); });
+            ErrorBound<> quick_anew(expected);
+            ErrorBound<FactoredConvexity> sharp(springs), sharp_anew(expected);
+            const auto error = quick.compute(off, springs, foundation);
+            check_equal(error, quick_anew.compute(off, expected, foundation));
+            check_equal(sharp.compute(off, springs, foundation), sharp_anew.compute(off, expected, foundation));
+            certified += error.certified() ? 1 : 0;
+            const auto now = stale.compute(off, springs, foundation);
+            CHECK(now.status == (tear.surface().reserve() == 20 ? BoundStatus::certified : BoundStatus::not_convex));
+            const Index v = random.index(20);
+            const auto held = pull(v, point(x, v));
+            const auto slope = tangent.compute(x, springs, foundation, held);
+            TangentStiffness tangent_anew(expected);
+            const auto right = tangent_anew.compute(x, expected, foundation, held);
+            REQUIRE(slope.status == right.status);
+            CHECK(dense(slope.stiffness).isApprox(dense(right.stiffness), 1e-6));
+            for (const auto& event : test::cut_at_random(random, tear, x)) {
+                follow(event, springs, foundation);
+                ++torn_splits;
+            }
+        }
+    }
+    CHECK(certified > 2 * cases(20));
+    CHECK(torn_splits > cases(20));
 }

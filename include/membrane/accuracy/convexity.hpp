@@ -85,7 +85,7 @@ class BlockConvexity {
 static_assert(ConvexityModel<BlockConvexity>);
 
 inline BlockConvexity::BlockConvexity(const EquilibriumProblem& problem)
-    : pushes_(problem.springs().size()),
+    : pushes_(problem.spring_capacity()),
       own_(static_cast<std::size_t>(problem.vertex_count())),
       blocks_(own_),
       own_sizes_(own_.size()),

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include <membrane/accuracy/point_attachments.hpp>
+#include <membrane/core/fixed_vector.hpp>
 #include <membrane/model/mass_spring_network.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/solve/constraint_term.hpp>
@@ -44,7 +45,8 @@ class EquilibriumProblem {
     template <Real Scalar, class Law>
     explicit EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& network);
 
-    /// Takes the membrane at `x` (3 x V [m]) and its constraints. Online. Cost: O(V + springs).
+    /// Takes the membrane at `x` (3 x V [m]), which may have torn, and its constraints. A vertex on which nothing acts,
+    /// as one in reserve, is fixed. Online. Cost: O(V + springs).
     template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
     [[nodiscard]] ProblemStatus assign(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
                                        const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
@@ -56,8 +58,11 @@ class EquilibriumProblem {
     /// Number of vertices V.
     [[nodiscard]] Index vertex_count() const noexcept { return static_cast<Index>(fixed_.size()); }
 
-    /// The springs of the network, in double.
-    [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_; }
+    ///@{
+    /// The springs of the network, in double, and the most that there may be.
+    [[nodiscard]] std::span<const Spring<double>> springs() const noexcept { return springs_.items(); }
+    [[nodiscard]] std::size_t spring_capacity() const noexcept { return springs_.capacity(); }
+    ///@}
 
     /// Stiffness of the foundation at vertex `v` [N/m].
     [[nodiscard]] double foundation(Index v) const noexcept { return foundation_[at(v)].stiffness; }
@@ -105,8 +110,8 @@ class EquilibriumProblem {
 
     [[nodiscard]] static std::size_t at(Index v) noexcept { return static_cast<std::size_t>(v); }
     [[nodiscard]] bool is_vertex(Index v) const noexcept { return v >= 0 && v < vertex_count(); }
-    template <class Springs>
-    void take_springs(const Springs& springs) noexcept;
+    template <class Network>
+    [[nodiscard]] bool take_springs(const Network& network) noexcept;
     template <class Scalar, class Volume>
     bool take_foundation(const Volume& volume) noexcept;
     void fix(Index v, unsigned char by) noexcept { fixed_[at(v)] = static_cast<unsigned char>(fixed_[at(v)] | by); }
@@ -115,7 +120,7 @@ class EquilibriumProblem {
     [[nodiscard]] ProblemStatus take_term(const ConstraintTerm& term) noexcept;
     [[nodiscard]] ProblemStatus check_places() const noexcept;
 
-    std::vector<Spring<double>> springs_;
+    FixedVector<Spring<double>> springs_;
     std::vector<VolumeSpring<double>> foundation_;
     std::vector<double> softening_;
     std::vector<unsigned char> fixed_;  // bits: by network, constraint, caller
@@ -127,7 +132,7 @@ class EquilibriumProblem {
 
 template <Real Scalar, class Law>
 EquilibriumProblem::EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& network)
-    : springs_(network.springs().size()),
+    : springs_(network.spring_capacity()),
       foundation_(static_cast<std::size_t>(network.vertex_count())),
       softening_(foundation_.size()),
       fixed_(foundation_.size()),
@@ -136,13 +141,7 @@ EquilibriumProblem::EquilibriumProblem(const MassSpringNetwork<Scalar, Law>& net
       centre_(load_) {
     static_assert(std::same_as<Law, LinearSpring>,
                   "the springs must follow LinearSpring: nothing is proven for others");
-    take_springs(network.springs());
-    std::size_t most = 0;
-    for (Index v = 0; v < network.vertex_count(); ++v) most = (std::max)(most, network.springs_of(v).size());
-    // A spring's force is off by at most 13 units of rounding, half an epsilon each, times k (l + r). A sum of n terms
-    // adds n units times all magnitudes. Loads and foundation are two more terms, and the magnitudes are rounded as
-    // well.
-    rounding_ = std::numeric_limits<double>::epsilon() * static_cast<double>(8 + most);
+    static_cast<void>(take_springs(network));
 }
 
 template <Real Scalar, class Law, LinearFoundation Volume, class... Constraints>
@@ -150,8 +149,7 @@ ProblemStatus EquilibriumProblem::assign(const std::type_identity_t<ConstPointsR
                                          const MassSpringNetwork<Scalar, Law>& network, const Volume& volume,
                                          const Constraints&... constraints) noexcept {
     if (x.cols() != vertex_count() || network.vertex_count() != vertex_count()) return ProblemStatus::invalid_input;
-    if (network.springs().size() != springs_.size()) return ProblemStatus::invalid_input;
-    take_springs(network.springs());
+    if (!take_springs(network)) return ProblemStatus::invalid_input;
     for (Index v = 0; v < vertex_count(); ++v) {
         fixed_[at(v)] = network.pinned(v) ? by_network : static_cast<unsigned char>(0);
         given_.col(v) = centre_.col(v) = point(x, v).template cast<double>();
@@ -163,16 +161,29 @@ ProblemStatus EquilibriumProblem::assign(const std::type_identity_t<ConstPointsR
     if (!take_foundation<Scalar>(volume) || !is_finite(given_)) return ProblemStatus::invalid_input;
     ProblemStatus status = ProblemStatus::valid;
     ((status = status == ProblemStatus::valid ? take_constraint(constraints) : status), ...);
+    for (Index v = 0; v < vertex_count(); ++v) {
+        const bool is_joined = !network.springs_of(v).empty() || foundation(v) > 0;
+        if (!is_joined && squared_norm(point(load_, v)) == 0) fix(v, by_network);
+    }
     if (status == ProblemStatus::valid) status = check_places();
     return status == ProblemStatus::valid && has_contact_ ? ProblemStatus::contact : status;
 }
 
-template <class Springs>
-void EquilibriumProblem::take_springs(const Springs& springs) noexcept {
-    std::transform(springs.begin(), springs.end(), springs_.begin(), [](const auto& spring) {
-        return Spring<double>{spring.first, spring.second, static_cast<double>(spring.stiffness),
-                              static_cast<double>(spring.rest_length)};
-    });
+// A spring's force is off by at most 13 units of rounding, half an epsilon each, times k (l + r). A sum of n terms adds n
+// units times all magnitudes. Loads and foundation are two more terms, and the magnitudes are rounded as well.
+template <class Network>
+bool EquilibriumProblem::take_springs(const Network& network) noexcept {
+    springs_.clear();
+    for (const auto& spring : network.springs()) {
+        if (!springs_.try_push_back({spring.first, spring.second, static_cast<double>(spring.stiffness),
+                                     static_cast<double>(spring.rest_length)})) {
+            return false;
+        }
+    }
+    std::size_t most = 0;
+    for (Index v = 0; v < network.vertex_count(); ++v) most = (std::max)(most, network.springs_of(v).size());
+    rounding_ = std::numeric_limits<double>::epsilon() * static_cast<double>(8 + most);
+    return true;
 }
 
 template <class Scalar, class Volume>
@@ -245,7 +256,7 @@ inline void EquilibriumProblem::forces(const Points<double>& y, Points<double>& 
         force.col(v) = pull + load_.col(v);
         magnitude[at(v)] = norm(pull) + norm(point(load_, v));
     }
-    for (const auto& spring : springs_) {
+    for (const auto& spring : springs()) {
         const auto pull = spring_force(LinearSpring{}, edge_vector(spring, y), spring.stiffness, spring.rest_length);
         force.col(spring.first) += pull.force();
         force.col(spring.second) -= pull.force();

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <limits>
+#include <vector>
 
 #include <membrane/accuracy/block_cholesky.hpp>
 #include <membrane/accuracy/convexity.hpp>
@@ -16,12 +18,13 @@ namespace membrane {
 
 /// Assembles the bounds of all springs in one matrix and factorises it. Springs in tension stabilise those in
 /// compression: it shows convexity where the foundation alone does not suffice, and takes about five to ten times as
-/// long as `BlockConvexity`.
+/// long as `BlockConvexity`. After a tear construct another one: until then it finds no bound.
 class FactoredConvexity {
   public:
     /// Offline. Cost for a mesh: O(V log V) memory.
     explicit FactoredConvexity(const EquilibriumProblem& problem)
-        : factors_(problem.vertex_count(), problem.springs()) {}
+        : factors_(problem.vertex_count(), problem.springs()),
+          springs_(problem.springs().begin(), problem.springs().end()) {}
 
     /// Online. Cost for a mesh: O(V^1.5), up to five times.
     [[nodiscard]] double eigenvalue_bound(const EquilibriumProblem& problem, double radius) noexcept;
@@ -30,6 +33,7 @@ class FactoredConvexity {
     bool gather(const EquilibriumProblem& problem, double radius) noexcept;
 
     BlockCholesky factors_;
+    std::vector<Spring<double>> springs_;  // whose ends the factors are ordered for
     double even_ = 0;  // Rayleigh quotient of a uniform displacement: an upper bound of the smallest eigenvalue
 };
 static_assert(ConvexityModel<FactoredConvexity>);
@@ -43,8 +47,13 @@ inline double FactoredConvexity::eigenvalue_bound(const EquilibriumProblem& prob
     return none;
 }
 
-// False if a spring may become too short to bound its stiffness.
+// False if the springs join other vertices, or one may become too short to bound its stiffness.
 inline bool FactoredConvexity::gather(const EquilibriumProblem& problem, double radius) noexcept {
+    const auto joins_same = [](const Spring<double>& a, const Spring<double>& b) {
+        return a.first == b.first && a.second == b.second;
+    };
+    const auto springs = problem.springs();
+    if (!std::equal(springs.begin(), springs.end(), springs_.begin(), springs_.end(), joins_same)) return false;
     factors_.open();
     double sum = 0;
     Index free = 0;
@@ -54,8 +63,8 @@ inline bool FactoredConvexity::gather(const EquilibriumProblem& problem, double 
         sum += 3 * problem.support(v);
         ++free;
     }
-    for (std::size_t s = 0; s < problem.springs().size(); ++s) {
-        const auto& spring = problem.springs()[s];
+    for (std::size_t s = 0; s < springs.size(); ++s) {
+        const auto& spring = springs[s];
         const int ends = problem.free_ends(spring);
         if (ends == 0) continue;
         const auto least = min_stiffness(spring, edge_vector(spring, problem.centre()), ends * radius);

@@ -69,7 +69,7 @@ class StiffnessOperator {
 };
 
 inline StiffnessOperator::StiffnessOperator(const EquilibriumProblem& problem)
-    : blocks_(problem.springs().size()),
+    : blocks_(problem.spring_capacity()),
       scale_(static_cast<std::size_t>(problem.vertex_count())),
       scaled_(Points<double>::Zero(3, problem.vertex_count())),
       direction_(scaled_),
@@ -77,7 +77,7 @@ inline StiffnessOperator::StiffnessOperator(const EquilibriumProblem& problem)
 
 inline void StiffnessOperator::at(const EquilibriumProblem& problem, const Points<double>& y) noexcept {
     for (std::size_t v = 0; v < scale_.size(); ++v) scale_[v] = problem.foundation(static_cast<Index>(v));
-    for (std::size_t s = 0; s < blocks_.size(); ++s) {
+    for (std::size_t s = 0; s < problem.springs().size(); ++s) {
         const auto& spring = problem.springs()[s];
         blocks_[s] = block_of<double>(
             spring_force(LinearSpring{}, edge_vector(spring, y), spring.stiffness, spring.rest_length));
@@ -89,7 +89,7 @@ inline void StiffnessOperator::at(const EquilibriumProblem& problem, const Point
 inline void StiffnessOperator::multiply(const EquilibriumProblem& problem, const Points<double>& displacement,
                                         Points<double>& force) const noexcept {
     for (Index v = 0; v < problem.vertex_count(); ++v) force.col(v) = problem.foundation(v) * displacement.col(v);
-    for (std::size_t s = 0; s < blocks_.size(); ++s) {
+    for (std::size_t s = 0; s < problem.springs().size(); ++s) {
         const auto& spring = problem.springs()[s];
         const Vector3<double> pull = blocks_[s] * edge_vector(spring, displacement);
         force.col(spring.first) -= pull;

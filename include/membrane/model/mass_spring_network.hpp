@@ -12,6 +12,7 @@
 
 #include <membrane/core/compressed_rows.hpp>
 #include <membrane/core/field.hpp>
+#include <membrane/core/fixed_vector.hpp>
 #include <membrane/model/elastic_network.hpp>
 #include <membrane/model/elements.hpp>
 #include <membrane/model/spring_law.hpp>
@@ -274,7 +275,10 @@ class MassSpringNetwork {
     [[nodiscard]] Index vertex_count() const noexcept { return ends_.row_count(); }
 
     /// All springs, by ascending ends; none of stiffness zero.
-    [[nodiscard]] std::span<const Spring<Scalar>> springs() const noexcept { return springs_; }
+    [[nodiscard]] std::span<const Spring<Scalar>> springs() const noexcept { return springs_.items(); }
+
+    /// The most springs that there may be: all, or more if the network may tear.
+    [[nodiscard]] std::size_t spring_capacity() const noexcept { return springs_.capacity(); }
 
     /// The law of all springs.
     [[nodiscard]] const Law& law() const noexcept { return law_; }
@@ -285,7 +289,7 @@ class MassSpringNetwork {
     /// Calls `act(instance)` for each spring: `ElementInstance<SpringElement>`.
     template <class Act>
     void for_each_element(Act act) const {
-        for (const auto& spring : springs_) act(instance(spring));
+        for (const auto& spring : springs()) act(instance(spring));
     }
 
     ///@{
@@ -326,7 +330,7 @@ class MassSpringNetwork {
 
     /// Tension of spring `s` [N].
     [[nodiscard]] Scalar tension(Index s, const ConstPointsRef<Scalar>& x) const noexcept {
-        const auto& spring = springs_[static_cast<std::size_t>(s)];
+        const auto& spring = springs()[static_cast<std::size_t>(s)];
         return instance(spring).element.response(norm(edge_vector(spring, x))).tension;
     }
 
@@ -348,7 +352,7 @@ class MassSpringNetwork {
     }
 
     [[no_unique_address]] Law law_;
-    std::vector<Spring<Scalar>> springs_;
+    FixedVector<Spring<Scalar>> springs_;
     CompressedRows<SpringEnd<Scalar>> ends_;  // each spring twice
     std::vector<Scalar> mass_, viscosity_;
     std::vector<unsigned char> pinned_;
@@ -384,7 +388,7 @@ MassSpringNetwork<Scalar, Law>::MassSpringNetwork(const TriangleMesh<Scalar>& me
     }
     build_springs(Adjacency(mesh), mesh.positions(), options);
     ends_ = CompressedRows<SpringEnd<Scalar>>(vertices, [this](auto put) {
-        for (const auto& s : springs_) {  // ascending, so each row is
+        for (const auto& s : springs()) {  // ascending, so each row is
             put(s.first, SpringEnd<Scalar>{s.second, s.stiffness, s.rest_length});
             put(s.second, SpringEnd<Scalar>{s.first, s.stiffness, s.rest_length});
         }
@@ -395,23 +399,24 @@ template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, const Points<Scalar>& x,
                                                    const NetworkOptions<Scalar>& options) {
     const auto edges = adjacency.edges();
-    const auto count = static_cast<Index>(edges.size());
+    const auto edge_count = static_cast<Index>(edges.size());
     if (!options.stiffness.given()) refuse(detail::network_name, "stiffness of the springs [N/m] is required");
-    const auto stiffness = options.stiffness.expand(count, detail::network_name, "stiffness", "spring", "N/m");
+    const auto stiffness = options.stiffness.expand(edge_count, detail::network_name, "stiffness", "spring", "N/m");
     std::vector<Scalar> rest(edges.size());
     if (options.rest_length.given()) {
-        rest = options.rest_length.expand(count, detail::network_name, "rest length", "spring", "m");
+        rest = options.rest_length.expand(edge_count, detail::network_name, "rest length", "spring", "m");
     } else {
         for (std::size_t s = 0; s < edges.size(); ++s) {
             rest[s] = norm<Scalar>(point(x, edges[s][1]) - point(x, edges[s][0]));
         }
     }
-    springs_.reserve(edges.size());
+    const auto count = std::count_if(stiffness.begin(), stiffness.end(), [](Scalar each) { return each > 0; });
+    springs_ = FixedVector<Spring<Scalar>>(static_cast<std::size_t>(count));
     for (std::size_t s = 0; s < edges.size(); ++s) {
-        if (stiffness[s] > 0) springs_.push_back({edges[s][0], edges[s][1], stiffness[s], rest[s]});
+        if (stiffness[s] > 0) springs_.try_push_back({edges[s][0], edges[s][1], stiffness[s], rest[s]});
     }
     const Scalar spacing = std::numeric_limits<Scalar>::epsilon() * x.cwiseAbs().maxCoeff();
-    for (const auto& s : springs_) {
+    for (const auto& s : springs()) {
         const Scalar force = s.stiffness * (std::max)(s.rest_length / Scalar(1e9), 64 * spacing);
         force_tolerance_ = (std::max)(force_tolerance_, force);
     }

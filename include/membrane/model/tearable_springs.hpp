@@ -38,15 +38,6 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
     /// @throws InvalidInput if the network is not of the mesh. O(F log F).
     TearableSprings(const TriangleMesh<Scalar>& mesh, const Base& network);
 
-    ///@{
-    /// As of a `MassSpringNetwork`.
-    [[nodiscard]] std::span<const Spring<Scalar>> springs() const noexcept { return Base::springs().first(count_); }
-    template <class Act>
-    void for_each_element(Act act) const {
-        for (const auto& spring : springs()) act(this->instance(spring));
-    }
-    ///@}
-
     /// The energy [J] of the shares of triangle `f` with these corners, and their forces on the corners [N].
     [[nodiscard]] TriangleResponse<Scalar> triangle_response(Index f, const std::array<Index, 3>& corners,
                                                              const ConstPointsRef<Scalar>& x) const noexcept;
@@ -66,7 +57,7 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         Base::visit_tear(self, visit);
-        visit(self.sides_, self.shares_, self.capacity_, self.count_);
+        visit(self.sides_, self.shares_, self.capacity_);
     }
 
   private:
@@ -83,9 +74,8 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
     [[nodiscard]] SpringEnd<Scalar>* end_at(Index v, Index other) noexcept;
 
     std::vector<std::array<Index, 3>> sides_;  // springs of a triangle, side k from corner k to the next, or no_index
-    std::vector<Shares> shares_;               // of each spring; the first always has a triangle
-    std::vector<Index> capacity_;              // for springs of each vertex
-    std::size_t count_ = 0;                    // springs in use
+    std::vector<Shares> shares_;   // of each spring, and of those in reserve; the first always has a triangle
+    std::vector<Index> capacity_;  // for springs of each vertex
 };
 
 template <Real Scalar>
@@ -111,7 +101,7 @@ TearableSprings<Scalar, Law>::TearableSprings(const TriangleMesh<Scalar>& mesh, 
     std::size_t s = 0;
     for_each_edge(half_edges(mesh.triangles()), [&](std::span<const HalfEdge> sides) {
         if (s == this->springs_.size()) return;
-        const auto& spring = this->springs_[s];
+        const Spring<Scalar>& spring = this->springs_[s];
         const std::array<Index, 2> ends{spring.first, spring.second};
         if (ends != std::array<Index, 2>{(std::min)(sides[0].first, sides[0].second),
                                          (std::max)(sides[0].first, sides[0].second)}) {
@@ -149,10 +139,11 @@ void TearableSprings<Scalar, Law>::build_rows() {
     }
     this->ends_ = std::move(rows);
     // A vertex that doubles parts two springs at most.
-    count_ = this->springs_.size();
     const auto reserve = static_cast<std::size_t>(std::count(capacity_.begin(), capacity_.end(), 0));
-    this->springs_.resize(count_ + 2 * reserve, {0, 0, 0, 1});
-    shares_.resize(this->springs_.size());
+    FixedVector<Spring<Scalar>> springs(this->springs_.size() + 2 * reserve);
+    for (const auto& spring : this->springs()) springs.try_push_back(spring);
+    this->springs_ = std::move(springs);
+    shares_.resize(this->springs_.capacity());
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
@@ -196,7 +187,7 @@ TriangleResponse<Scalar> TearableSprings<Scalar, Law>::triangle_response(
 // A side of triangle `f`, which gets the copy: its spring goes along, or two triangles share it no more.
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 void TearableSprings<Scalar, Law>::part(const VertexSplit& split, Index f, Index& side) noexcept {
-    auto& spring = this->springs_[at(side)];
+    auto& spring = this->springs_.items()[at(side)];
     if (spring.first == split.copy || spring.second == split.copy) return;  // it went with its other triangle
     const Index other = spring.first == split.vertex ? spring.second : spring.first;
     Shares& shares = shares_[at(side)];
@@ -212,10 +203,10 @@ void TearableSprings<Scalar, Law>::part(const VertexSplit& split, Index f, Index
     spring.stiffness = left.stiffness;
     store(side);
     this->ends_.append(other, {split.copy, share.stiffness, spring.rest_length});
-    MEMBRANE_ASSERT(count_ < shares_.size());
-    side = static_cast<Index>(count_);
-    this->springs_[count_] = {split.copy, other, share.stiffness, spring.rest_length};
-    shares_[count_++] = {share, Share{}};
+    side = static_cast<Index>(this->springs_.size());
+    MEMBRANE_ASSERT(this->springs_.size() < this->springs_.capacity());
+    this->springs_.try_push_back({split.copy, other, share.stiffness, spring.rest_length});
+    shares_[at(side)] = {share, Share{}};
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
@@ -263,7 +254,7 @@ void TearableSprings<Scalar, Law>::reshape(const MovedVertex<Scalar>& moved) noe
             const std::size_t next = (k + 1) % 3;
             const auto before = norm<Scalar>(triangle.before[next] - triangle.before[k]);
             const auto after = norm<Scalar>(triangle.after[next] - triangle.after[k]);
-            auto& spring = this->springs_[at(s)];
+            auto& spring = this->springs_.items()[at(s)];
             Shares& shares = shares_[at(s)];
             const bool is_first = shares[0].triangle == triangle.triangle;
             Share& share = shares[is_first ? 0 : 1];
