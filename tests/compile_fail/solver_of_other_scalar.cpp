@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Float positions for a solver of doubles.
-// expect: (cannot convert|no known conversion).*PointsRef<double>
+// expect: points must be of the scalar of the part
 #include <membrane/solve/quasi_static.hpp>
 
 #ifdef CORRECT

@@ -49,6 +49,26 @@ TEMPLATE_TEST_CASE("references to positions bind to memory of any stride without
     STATIC_REQUIRE(std::is_constructible_v<ConstPointsRef<S>, decltype(x + x)>);
 }
 
+TEMPLATE_TEST_CASE("a matrix of any number of rows but three has no points", "[core][bad]", double, float) {
+    using Matrix = Eigen::Matrix<TestType, Eigen::Dynamic, Eigen::Dynamic>;
+    const auto columns = [](auto&& x) {
+        const auto count = PointsRef<TestType>(x).cols();
+        CHECK(ConstPointsRef<TestType>(x).cols() == count);
+        return count;
+    };
+    Matrix right = Matrix::Random(3, 10), rows = Matrix::Random(10, 3), four = Matrix::Random(4, 10);
+    CHECK(columns(right) == 10);
+    CHECK(columns(rows) == 0);
+    CHECK(columns(four) == 0);
+    CHECK(columns(four.leftCols(5)) == 0);
+    CHECK(columns(four.bottomRows(3)) == 10);
+    CHECK(ConstPointsRef<TestType>(TestType(2) * right) == TestType(2) * right);
+    CHECK(ConstPointsRef<TestType>(TestType(2) * rows).cols() == 0);
+    const Eigen::Matrix<TestType, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> row_major = right;
+    CHECK(ConstPointsRef<TestType>(row_major) == right);  // a copy
+    STATIC_REQUIRE_FALSE(std::is_convertible_v<decltype(row_major), PointsRef<TestType>>);
+}
+
 TEST_CASE("an index has 32 bits", "[core]") {
     STATIC_REQUIRE(sizeof(Index) == 4);
     STATIC_REQUIRE(no_index < 0);
