@@ -22,7 +22,6 @@
 #include "support/cases.hpp"
 #include "support/catch.hpp"
 #include "support/cgal_mesh.hpp"
-#include "support/child_process.hpp"
 #include "support/exact_crossing.hpp"
 #include "support/meshes.hpp"
 #include "support/refusal.hpp"
@@ -708,15 +707,31 @@ TEMPLATE_TEST_CASE("positions that are not finite hide their own triangles at mo
     }
 }
 
-#ifndef NDEBUG
-TEST_CASE("positions of another count and vertices that are not there are broken preconditions", "[tree][bad]") {
-    AabbTree<double> tree(icosphere({.subdivisions = 0}));
-    const Points<double> x = Points<double>::Zero(3, 12), fewer = Points<double>::Zero(3, 11);
-    CHECK(test::in_child([&] { tree.refit(x); }).signal == 0);
-    CHECK(test::in_child([&] { tree.refit(fewer); }).signal == SIGABRT);
-    CHECK(test::in_child([&] { tree.refit(fewer, {}); }).signal == SIGABRT);
-    CHECK(test::in_child([&] { tree.refit(x, std::array{Index{12}}); }).signal == SIGABRT);
-    CHECK(test::in_child([&] { tree.refit(x, std::array{Index{-1}}); }).signal == SIGABRT);
-    CHECK(test::in_child([&] { (void)tree.box(tree.statistics().nodes); }).signal == SIGABRT);
+TEST_CASE("positions of another count are refused, and vertices that are not there ignored", "[tree][bad]") {
+    const auto mesh = icosphere({.subdivisions = 0});
+    AabbTree<double> tree(mesh);
+    const Points<double> x = mesh.positions(), fewer = x.leftCols(11);
+    const Eigen::MatrixXd rows = x.transpose();
+    const Aabb<double> all = tree.box(0);
+    const auto unchanged = [&] { return tree.box(0).low == all.low && tree.box(0).high == all.high; };
+    CHECK(tree.refit(x));
+    CHECK_FALSE(tree.refit(fewer));
+    CHECK_FALSE(tree.refit(fewer, {}));
+    CHECK_FALSE(tree.refit(rows));
+    CHECK_FALSE(tree.refit(rows, std::array<Index, 1>{3}));
+    CHECK(tree.refit(x, std::array<Index, 4>{12, -1, 1'000'000'000, 3}));
+    CHECK(unchanged());
+    for (const Index none : {-1, tree.statistics().nodes}) {
+        CHECK(tree.box(none).low == Aabb<double>{}.low);
+        CHECK(tree.box(none).high == Aabb<double>{}.high);
+    }
+    const Vector3<double> origin(0, 0, 0), far_off(0, 0, 9);
+    const auto none = [](Index) { FAIL("nothing is there"); };
+    for (const ConstPointsRef<double>& wrong : {ConstPointsRef<double>(fewer), ConstPointsRef<double>(rows)}) {
+        CHECK(tree.closest_point(wrong, origin).triangle == no_index);
+        CHECK(tree.first_hit(wrong, origin, far_off).triangle == no_index);
+        tree.overlap_sphere(wrong, origin, 2, none);
+        tree.overlap_box(wrong, -far_off, far_off, none);
+        tree.overlap_capsule(wrong, origin, far_off, 1, none);
+    }
 }
-#endif

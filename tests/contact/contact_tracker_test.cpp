@@ -955,3 +955,20 @@ TEST_CASE("a tool that slides over tears touches both sides at once", "[tear]") 
         }
     }
 }
+
+TEST_CASE("positions and trees of another membrane touch nothing, and the next contact goes on", "[tracker][bad]") {
+    const auto mesh = membrane::icosphere({.radius = 1, .subdivisions = 2}), other = membrane::icosphere({});
+    const Points<double>& x = mesh.positions();
+    const Eigen::MatrixXd rows = x.transpose();
+    const membrane::MovingBody<double> body(other);
+    AabbTree<double> tree(mesh), other_tree(other);
+    ContactTracker<double> tracker(mesh), fresh(mesh);
+    const Tool<double> tool{.position = {0, 0, 1.1}, .radius = 0.2};
+    REQUIRE(tracker.update(tree, x, tool).phase == ContactPhase::began);
+    CHECK_FALSE(tracker.update(tree, rows, tool).touching());
+    CHECK_FALSE(tracker.update(tree, x.leftCols(9), tool).touching());
+    CHECK_FALSE(tracker.update(other_tree, other.positions(), tool).touching());
+    CHECK_FALSE(fresh.update(other_tree, x, tool).touching());
+    CHECK(tracker.update(tree, x, tool).phase == ContactPhase::ongoing);
+    CHECK_FALSE(tracker.update(tree, x, tool, body).touching());
+}

@@ -220,6 +220,14 @@ TEST_CASE("no offset without a ball's force, and what is refused") {
     CHECK(correction(x, contact, {0, 0, 1e-4}).z() > 0);
     CHECK(membrane::is_finite(correction(wild, contact, {0, 0, 1e-4})));
 
+    const Eigen::MatrixXd rows = x.transpose();
+    CHECK(correction(rows, contact, {0, 0, 1e-4}).isZero(0));
+    CHECK(correction(x.leftCols(3), contact, {0, 0, 1e-4}).isZero(0));
+    const membrane::ContactTriangle elsewhere{0, {0, 1, mesh.vertex_count()}};
+    contact.triangles = {&elsewhere, 1};
+    CHECK(correction(x, contact, {0, 0, 1e-4}).isZero(0));
+    contact.triangles = {&listed, 1};
+
     Points<double> flat = x;
     for (const Index v : contact.corners) flat.col(v) = x.col(contact.corners[0]);
     const FacetCorrection<double> degenerate(Mesh(flat, mesh.triangles()), {.tension = 2});

@@ -151,6 +151,25 @@ TEST_CASE("a tool that is no tool takes no hold", "[grasp][bad]") {
     CHECK_FALSE(grasper.update(contact, mesh.positions(), tool).holding());
 }
 
+TEST_CASE("points and contacts of another membrane take no hold and change none", "[grasp][bad]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0}), other = icosphere({.subdivisions = 1});
+    const auto contact = contact_at<double>(mesh, 3, {0.2, 0.3, 0.5});
+    auto elsewhere = contact;
+    elsewhere.corners[1] = 12;
+    const Tool<double> tool{.grasping = true};
+    const MovingBody body(other);
+    const Eigen::MatrixXd rows = mesh.positions().transpose();
+    Grasper<double> grasper(mesh), fresh(mesh);
+    CHECK_FALSE(fresh.update(elsewhere, mesh.positions(), tool).holding());
+    CHECK_FALSE(grasper.update(contact, rows, tool).holding());
+    CHECK_FALSE(grasper.update(contact, other.positions(), tool).holding());
+    const auto grasp = grasper.update(contact, mesh.positions(), tool);  // as none of these was a closing of the jaws
+    REQUIRE(grasp.holding());
+    CHECK(same(grasper.update(contact, rows, Tool<double>{}), grasp));
+    CHECK(same(grasper.update(contact, mesh.positions(), tool, body), grasp));
+    CHECK_FALSE(grasper.slip(rows, tool, Vector3<double>(0, 0, 1e9)));
+}
+
 TEST_CASE("forceps are copied and moved with what they hold", "[grasp]") {
     auto mesh = std::make_unique<TriangleMesh<double>>(icosphere({.radius = 1, .subdivisions = 0}));
     const Points<double> x = mesh->positions();

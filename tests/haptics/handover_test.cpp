@@ -175,7 +175,7 @@ TEMPLATE_TEST_CASE("what a tear changes is read as well: copies, moved vertices,
                 if (random.chance(0.02)) {
                     surface = whole;
                     x = mesh.positions();
-                    moved.replace_all(surface.triangles());
+                    REQUIRE(moved.publish_all(x, surface.triangles(), 0));
                     ++resets;
                 }
                 moved.publish({&v, 1}, x, 0);
@@ -236,6 +236,38 @@ TEST_CASE("two threads share a membrane, and each snapshot is that of its tick",
     CHECK(backward == 0);
     CHECK(stale == 0);
     CHECK(seen > 1);
+}
+
+TEST_CASE("a publish of everything hands over everything, of a membrane that tears or not", "[handover]") {
+    const auto mesh = icosphere({.subdivisions = 1});
+    const Triangles& triangles = mesh.triangles();
+    MovedPoints<double> moved(mesh.vertex_count()), torn(mesh.vertex_count(), mesh.triangle_count());
+    CHECK(moved.publish_all(mesh.positions(), 2));
+    const auto news = moved.read();
+    CHECK(news.moved.size() == 42);
+    CHECK(news.x == mesh.positions());
+    CHECK(news.time == 2);
+    CHECK(torn.publish_all(mesh.positions(), triangles, 3));
+    CHECK(torn.read().corners == triangles);
+}
+
+TEST_CASE("a publish of another number of points or triangles is refused, and the next one is right",
+          "[handover][bad]") {
+    const auto mesh = icosphere({.subdivisions = 1});
+    const Points<double> x = mesh.positions(), fewer = x.leftCols(41);
+    const Eigen::MatrixXd rows = x.transpose();
+    MovedPoints<double> moved(mesh.vertex_count());
+    CHECK_FALSE(moved.publish_all(x, mesh.triangles(), 0));  // no triangles were announced
+    CHECK_FALSE(moved.publish_all(fewer, 0));
+    CHECK_FALSE(moved.publish_all(rows, 0));
+    CHECK_FALSE(moved.publish({}, fewer, 0));
+    CHECK_FALSE(moved.publish({}, rows, 0));
+    CHECK(moved.read().number == 0);
+    CHECK(moved.publish(std::array<Index, 4>{-1, 42, 1'000'000'000, 7}, x, 0));
+    const auto news = moved.read();
+    REQUIRE(news.moved.size() == 1);
+    CHECK(news.moved[0] == 7);
+    CHECK(news.x.col(7) == x.col(7));
 }
 
 TEST_CASE("a membrane of no vertices is not published", "[handover][bad]") {

@@ -268,3 +268,11 @@ TEST_CASE("on a body that moves the contact with the surface at rest goes along"
         CHECK(norm<double>(moved.body_velocity - velocity) < 1e-12);
     }
 }
+
+TEST_CASE("on a body of another membrane there is no contact at rest", "[rest][bad]") {
+    const auto rest = RestContact(icosphere<double>({.radius = 0.01, .subdivisions = 2}));
+    const auto other = icosphere<double>({.radius = 0.01, .subdivisions = 1});
+    const auto tool = ball_at<double>({0, 0, 0.0105});
+    REQUIRE(rest({}, tool).touching());
+    CHECK_FALSE(rest({}, tool, AabbTree(other), MovingBody(other)).touching());
+}

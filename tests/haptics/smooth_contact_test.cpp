@@ -179,6 +179,10 @@ TEST_CASE("what is no contact, or not finite, or has no normal, stays as it is",
     CHECK(smooth(contact).normal == contact.normal);
     contact.axis_point = {0, 0, 0.0105};  // and it goes on
     CHECK(norm<double>(smooth(contact).normal - Vector3<double>(0, 0, 1)) < 1e-12);
+    auto elsewhere = contact;
+    elsewhere.triangle = mesh.triangle_count();
+    CHECK(smooth(elsewhere).normal == contact.normal);
+    CHECK(smooth(contact, MovingBody(icosphere<double>({.subdivisions = 0}))).normal == contact.normal);
 }
 
 TEST_CASE("a body that moves takes its normals along", "[smooth]") {

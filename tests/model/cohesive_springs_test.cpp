@@ -365,3 +365,23 @@ TEST_CASE("cohesive springs refuse constants that make no law", "[cohesion]") {
     CHECK(refused({.stiffness = 2.0, .strength = 1.0, .energy = 1.0, .tangential_energy = 0.0}) ==
           "CohesiveSprings: tangential_energy must be finite and positive [J/m^2], got 0");
 }
+
+TEST_CASE("positions of another membrane damage nothing, and vertices that are not there are ignored",
+          "[cohesion][bad]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
+    CohesiveSprings<double> springs(mesh, {.stiffness = 2.0, .strength = 1.0, .energy = 1.0});
+    Points<double> x = 9 * mesh.positions();
+    const Eigen::MatrixXd rows = x.transpose();
+    const MovingBody<double> body(mesh), other(icosphere({.subdivisions = 1}));
+    const std::array<Index, 4> moved{-1, 12, 1'000'000'000, 5};
+    CHECK_FALSE(springs.update(rows, moved));
+    CHECK_FALSE(springs.update(x.leftCols(11), moved));
+    CHECK_FALSE(springs.update(body, rows, moved));
+    CHECK_FALSE(springs.update(other, x, moved));
+    CHECK(springs.dissipated() == 0);
+    CHECK(springs.update(body, x, moved));
+    CHECK_FALSE(springs.adheres(5));
+    const double once = springs.dissipated();
+    CHECK(springs.update(x, moved));
+    CHECK(springs.dissipated() == once);
+}

@@ -235,7 +235,7 @@ TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", doub
     static_cast<void>([](MovedPoints<S>& moved, Latest<Tool<S>>& pose, std::span<const Index> vertices,
                          const ConstPointsRef<S>& x, const Tool<S>& tool) {
         static_assert(noexcept(moved.publish(vertices, x, 0.0))&& noexcept(moved.read()));
-        static_assert(is_noexcept<decltype(&MovedPoints<S>::replace_all)>);
+        static_assert(noexcept(moved.publish_all(x, 0.0))&& noexcept(moved.publish_all(x, Triangles(), 0.0)));
         static_assert(noexcept(pose.publish(tool, 0.0))&& noexcept(pose.read())&& noexcept(pose.read().age(0.0)));
     });
     static_cast<void>([](const DeviceScale& scale, const Millimetres& place, const MillimetresPerSecond& speed,

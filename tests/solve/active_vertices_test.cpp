@@ -233,10 +233,6 @@ TEST_CASE("with little capacity layer 0 comes first, and those awake keep a turn
     }
 }
 
-TEST_CASE("to wake what is no vertex is a broken precondition", "[active][bad]") {
-#ifndef NDEBUG
-    CHECK(test::in_child([] { ActiveVertices(12).wake(12); }).signal == SIGABRT);
-    CHECK(test::in_child([] { ActiveVertices(12).wake(-1); }).signal == SIGABRT);
-#endif
-    CHECK(test::in_child([] { ActiveVertices(12).wake(11); }).signal == 0);
+TEST_CASE("to wake what is no vertex is ignored", "[active][bad]") {
+    for (const Index v : {12, -1, 11}) CHECK(test::in_child([&] { ActiveVertices(12).wake(v); }).signal == 0);
 }

@@ -15,7 +15,6 @@
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
-#include "support/child_process.hpp"
 #include "support/meshes.hpp"
 
 using namespace membrane;
@@ -176,16 +175,14 @@ TEST_CASE("a queue is copied and moved with all it holds", "[queue]") {
     STATIC_REQUIRE(noexcept(copy.build(network, std::span<const Index>{}, 0)));
 }
 
-#ifndef NDEBUG
-TEST_CASE("a layer that there is not is a broken precondition", "[queue][bad]") {
+TEST_CASE("a layer that there is not is empty", "[queue][bad]") {
     const MassSpringNetwork network(sheet({.columns = 2, .rows = 2}), LinearSpring{}, {.stiffness = 1.0});
     PropagationQueue queue(9);
     queue.build(network, std::vector<Index>{2}, 1);
-    CHECK(test::in_child([&] { (void)queue.layer(1); }).signal == 0);
-    CHECK(test::in_child([&] { (void)queue.layer(2); }).signal == SIGABRT);
-    CHECK(test::in_child([&] { (void)queue.layer(-1); }).signal == SIGABRT);
+    CHECK_FALSE(queue.layer(1).empty());
+    CHECK(queue.layer(2).empty());
+    CHECK(queue.layer(-1).empty());
 }
-#endif
 
 TEST_CASE("every layer is ordered in groups, whatever was there before", "[queue]") {
     for (int seed = 1; seed <= cases(500); ++seed) {

@@ -115,7 +115,7 @@ struct TornLoop {
     void refresh() {
         tree.refit(x);
         normals.update(x);
-        moved.replace_all(tear.surface().triangles());
+        moved.publish_all(x, tear.surface().triangles(), 0);
     }
 
     /// What a snapshot holds: the tool is in the recording.

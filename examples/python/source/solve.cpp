@@ -41,7 +41,8 @@ void bind_report(py::module_& module) {
         .value("invalid_input", StepStatus::invalid_input, doc("StepStatus::invalid_input"))
         .value("unstable", StepStatus::unstable, doc("StepStatus::unstable"))
         .value("too_many_contact_points", StepStatus::too_many_contact_points,
-               doc("StepStatus::too_many_contact_points"));
+               doc("StepStatus::too_many_contact_points"))
+        .value("wrong_vertex_count", StepStatus::wrong_vertex_count, doc("StepStatus::wrong_vertex_count"));
     auto report = py::class_<StepReport>(module, "StepReport", doc("StepReport"));
     report.def_readonly("status", &StepReport::status, doc("StepReport::status"))
         .def_readonly("converged", &StepReport::converged, doc("StepReport::converged"))

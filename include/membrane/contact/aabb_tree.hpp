@@ -54,15 +54,16 @@ class AabbTree {
     /// @throws InvalidInput if `balance_threshold` is below 1
     explicit AabbTree(const TriangleMesh<Scalar>& mesh, const TreeOptions& options = {}) : boxes_(mesh, options) {}
 
-    /// Refits all boxes to the positions `x`, 3 x V [m]. O(F), no allocation.
-    /// @pre `x` has as many points as the mesh (asserted)
-    void refit(const ConstPointsRef<Scalar>& x) noexcept { boxes_.refit(x); }
+    /// Refits all boxes to the positions `x`, 3 x V [m]. Returns false, and changes nothing, if `x` does not have as
+    /// many points as the mesh. O(F), no allocation.
+    bool refit(const ConstPointsRef<Scalar>& x) noexcept { return boxes_.refit(x); }
 
     /// Refits the boxes around the vertices `moved`, each box once. `moved` may have any order and repetitions. If no
     /// other vertex has moved since the last refit, the boxes equal those of a full refit bit for bit.
-    /// O(moved * depth), plus one bit a node; no allocation.
-    /// @pre `x` has as many points as the mesh, and `moved` holds indices of these (asserted)
-    void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept { boxes_.refit(x, moved); }
+    /// Ignores an index that is no vertex. O(moved * depth), plus one bit a node; no allocation.
+    bool refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
+        return boxes_.refit(x, moved);
+    }
 
     /// A vertex becomes two, at one position until the next refit. Boxes keep their triangles: a flap that moves far
     /// away makes those that have triangles on either side of a tear larger. The memory is there if the mesh of the
@@ -73,8 +74,8 @@ class AabbTree {
     /// A vertex has moved as a tear has moved it: the next refit includes it. Online. Cost: the leaves around it.
     void reshape(const MovedVertex<Scalar>& moved) noexcept { boxes_.reshape(moved); }
 
-    // All queries take the positions of the last refit. They do not allocate. They report the number of boxes visited:
-    // O(log F) for a small query near the surface, all boxes at worst.
+    // All queries take the positions of the last refit, and find nothing if their number is another. They do not
+    // allocate. They report the number of boxes visited: O(log F) for a small query near the surface, all at worst.
 
     /// The point of the surface nearest to `q`. If several points are equally near, returns one, always the same one.
     [[nodiscard]] SurfacePoint<Scalar> closest_point(const ConstPointsRef<Scalar>& x,
@@ -103,8 +104,8 @@ class AabbTree {
     /// Size and shape of the tree.
     [[nodiscard]] const TreeStatistics& statistics() const noexcept { return boxes_.statistics(); }
 
-    /// The box around all triangles below a node of `tree_shape`; node 0: around the surface.
-    /// @pre 0 <= `node` < `statistics().nodes` (asserted)
+    /// The box around all triangles below a node of `tree_shape`; node 0: around the surface. Empty if there is no such
+    /// node.
     [[nodiscard]] Aabb<Scalar> box(Index node) const noexcept { return boxes_.box(node); }
 
     /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles. Then refit the

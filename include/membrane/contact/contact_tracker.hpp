@@ -65,10 +65,10 @@ class ContactTracker {
     /// @throws InvalidInput for options out of range. Cost: O(V + F log F).
     explicit ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options = {});
 
-    /// The contact of `tool` with the surface at `x` (3 x V [m]). If the tool is not valid, returns no contact and
-    /// leaves the state unchanged. Online. Cost: one or two segment casts, and a query of the tree or, in contact, the
-    /// triangles within detection distance and their neighbours. A tool behind the surface adds ray casts if the
-    /// surface is open, and winding numbers if it is closed.
+    /// The contact of `tool` with the surface at `x` (3 x V [m]). If the tool is not valid, or `x` has another number of
+    /// vertices, returns no contact and leaves the state unchanged. Online. Cost: one or two segment casts, and a query
+    /// of the tree or, in contact, the triangles within detection distance and their neighbours. A tool behind the
+    /// surface adds ray casts if the surface is open, and winding numbers if it is closed.
     /// @pre `tree` was refitted to `x`
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool) noexcept {
@@ -267,8 +267,8 @@ template <Real Scalar>
 Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                               const Tool<Scalar>& tool,
                                               const ConstPointsRef<Scalar>& anchors) noexcept {
-    MEMBRANE_ASSERT(x.cols() == origins_.cols() && anchors.cols() == origins_.cols());
-    if (!is_valid(tool)) return Contact<Scalar>::none();
+    if (!is_valid(tool) || x.cols() != origins_.cols() || anchors.cols() != origins_.cols())
+        return Contact<Scalar>::none();
     const Scene scene = scene_of(tree, x, tool, anchors);
     const bool before = last_.touching();
     Contact<Scalar> contact;

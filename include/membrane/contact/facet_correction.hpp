@@ -59,8 +59,8 @@ class FacetCorrection {
     FacetCorrection(const TriangleMesh<Scalar>& mesh, const FacetCorrectionOptions& options);
 
     /// The displacement of the tool from where it is to where it must press, along `reaction`, the force on it [N];
-    /// zero without a contact or a force, or if a number is not finite. `contact` is the one that the step had, `x` the
-    /// positions [m].
+    /// zero without a contact or a force, or if a number is not finite or a vertex not there. `contact` is the one that
+    /// the step had, `x` the positions [m].
     /// Online. Cost: linear in `contact.triangles`.
     [[nodiscard]] Vector3<Scalar> operator()(const ConstPointsRef<Scalar>& x, const Contact<Scalar>& contact,
                                              const Vector3<Scalar>& reaction) const noexcept;
@@ -202,6 +202,10 @@ Vector3<Scalar> FacetCorrection<Scalar>::operator()(const ConstPointsRef<Scalar>
                                                     const Vector3<Scalar>& reaction) const noexcept {
     const Scalar force = norm(reaction);
     if (!contact.touching() || !is_finite(force) || !(force > 0)) return Vector3<Scalar>::Zero();
+    const auto is_here = [&](const auto& at) { return are_vertices(at.corners, x.cols()); };
+    const bool fits = static_cast<std::size_t>(x.cols()) == edge_.size() && is_here(contact) &&
+                      std::all_of(contact.triangles.begin(), contact.triangles.end(), is_here);
+    if (!fits) return Vector3<Scalar>::Zero();
     const Vector3<Scalar> direction = reaction / force;
     const auto foot = detail::foot_of(x, contact, direction);
     double edge = 0;

@@ -63,7 +63,8 @@ class Grasper {
         : origins_(mesh.positions()), options_((options.validate(), options)), has_reserve_(reserve_of(mesh) > 0) {}
 
     /// The present grasp. Forceps that closed before the contact hold no point; those that are closed at the first
-    /// update count as closing then.
+    /// update count as closing then. If `x` or the body is not of V vertices, nothing changes; a contact of other
+    /// vertices is no contact.
     [[nodiscard]] Grasp<Scalar> update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                        const Tool<Scalar>& tool) noexcept;
 
@@ -125,10 +126,11 @@ inline void GraspOptions::validate() const {
 template <Real Scalar>
 Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                       const Tool<Scalar>& tool) noexcept {
+    if (x.cols() != origins_.cols()) return grasp_;
     const bool closes = tool.grasping && !closed_;
     closed_ = tool.grasping;
     if (!tool.grasping) grasp_ = {};
-    if (!closes || !contact.touching() || !is_valid(tool)) return grasp_;
+    if (!closes || !contact.touching() || !is_valid(tool) || !are_vertices(contact.corners, x.cols())) return grasp_;
 
     slipped_ = 0;
     grasp_.holding_force = static_cast<Scalar>(options_.holding_force);
@@ -150,6 +152,7 @@ bool Grasper<Scalar>::slip(const ConstPointsRef<Scalar>& x, const Tool<Scalar>& 
     constexpr Scalar rounding = Scalar(64) * std::numeric_limits<Scalar>::epsilon();
     if (!grasp_.holding() || !(norm(reaction) >= (1 - rounding) * grasp_.holding_force) || !is_valid(tool))
         return false;
+    if (x.cols() != origins_.cols()) return false;
     const Vector3<Scalar> now = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
     const Vector3<Scalar> by = now - grasp_.offset;
     slipped_ += norm(by);
@@ -181,6 +184,7 @@ void Grasper<Scalar>::reshape(const MovedVertex<Scalar>& moved) noexcept {
 template <Real Scalar>
 Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
                                       const Tool<Scalar>& tool, const MovingBody<Scalar>& body) noexcept {
+    if (x.cols() != origins_.cols() || body.anchors().cols() != x.cols()) return grasp_;
     if (!body.pose().same_pose(pose_)) {
         grasp_.offset = motion_between(pose_, body.pose()).vector_to_world(grasp_.offset);
         pose_ = body.pose();

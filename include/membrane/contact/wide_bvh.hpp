@@ -45,8 +45,8 @@ class WideBvh {
 
     ///@{
     /// Refits all boxes, or those around the vertices `moved`: see `AabbTree`.
-    void refit(const ConstPointsRef<Scalar>& x) noexcept;
-    void refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
+    bool refit(const ConstPointsRef<Scalar>& x) noexcept;
+    bool refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
     ///@}
 
     ///@{
@@ -70,7 +70,7 @@ class WideBvh {
     /// The box around all triangles.
     [[nodiscard]] const Aabb<Scalar>& surface() const noexcept { return surface_; }
 
-    /// The box around the triangles below a node of `tree_shape`. @pre 0 <= `node` < `statistics().nodes` (asserted)
+    /// The box around the triangles below a node of `tree_shape`; empty if there is no such node.
     [[nodiscard]] Aabb<Scalar> box(Index node) const noexcept;
 
     /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles.
@@ -364,18 +364,20 @@ Triangle<Lanes<Scalar>> WideBvh<Scalar>::triangles_at(const ConstPointsRef<Scala
 }
 
 template <Real Scalar>
-void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x) noexcept {
-    MEMBRANE_ASSERT(x.cols() == leaves_of_.row_count());
+bool WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x) noexcept {
+    if (x.cols() != leaves_of_.row_count()) return false;
     for (Index leaf = 0; leaf < statistics_.leaves; ++leaf) fit_leaf(x, leaf);
     for (Index n = node_count(); n-- > 0;) fit_node(n);  // children come after their parent
     stale_leaves_.clear();
+    return true;
 }
 
 template <Real Scalar>
-void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
-    MEMBRANE_ASSERT(x.cols() == leaves_of_.row_count());
+bool WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
+    if (x.cols() != leaves_of_.row_count()) return false;
     if (moved.size() >= static_cast<std::size_t>(x.cols()) / 2) return refit(x);  // cheaper from here on
     for (const Index v : moved) {
+        if (v < 0 || v >= x.cols()) continue;
         for (const Index leaf : leaves_of_[v]) stale_leaves_.insert(leaf);
     }
     for (const Index leaf : stale_leaves_.items()) {
@@ -393,6 +395,7 @@ void WideBvh<Scalar>::refit(const ConstPointsRef<Scalar>& x, std::span<const Ind
         }
     }
     stale_leaves_.clear();
+    return true;
 }
 
 template <Real Scalar>
@@ -405,7 +408,7 @@ Index WideBvh<Scalar>::search(const ConstPointsRef<Scalar>& x, Key key, const Sc
     std::array<Index, max_waiting> parts;
     std::size_t waiting = 0;
     Index visited = 1, part = 0;
-    if (!(key(surface_) < limit)) return visited;
+    if (!(key(surface_) < limit) || x.cols() != leaves_of_.row_count()) return visited;
     while (true) {
         if (part >= node_count()) {
             examine_leaf(x, items_of(part - node_count()), key, limit, examine);
@@ -451,7 +454,7 @@ void WideBvh<Scalar>::examine_leaf(const ConstPointsRef<Scalar>& x, std::span<co
 
 template <Real Scalar>
 Aabb<Scalar> WideBvh<Scalar>::box(Index node) const noexcept {
-    MEMBRANE_ASSERT(node >= 0 && node < statistics_.nodes);
+    if (node < 0 || node >= statistics_.nodes) return {};
     if (node == 0) return surface_;
     const Index slot = slot_of_node_[static_cast<std::size_t>(node)];
     if (slot != no_index) return box_in(slot);

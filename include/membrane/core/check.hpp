@@ -16,8 +16,8 @@
 
 /// Error handling.
 ///
-/// Offline code checks the caller's input in every build and throws `InvalidInput`. Online code returns expected errors
-/// as values in a report. Its preconditions are `MEMBRANE_ASSERT`s, which only debug builds check.
+/// Offline code checks the caller's input in every build and throws `InvalidInput`. Online code returns errors as
+/// values. The preconditions of accessors are `MEMBRANE_ASSERT`s, which only debug builds check.
 ///
 ///     try { membrane::MassSpringNetwork network(mesh, law, options); }
 ///     catch (const membrane::InvalidInput& e) { std::puts(e.what()); }

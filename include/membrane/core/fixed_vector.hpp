@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -32,11 +33,8 @@ class FixedVector {
     /// Removes all items; the capacity stays.
     void clear() noexcept { count_ = 0; }
 
-    /// Keeps the first `count` items. @pre `count` <= size() (asserted)
-    void truncate(std::size_t count) noexcept {
-        MEMBRANE_ASSERT(count <= count_);
-        count_ = count;
-    }
+    /// Keeps the first `count` items, all if there are fewer.
+    void truncate(std::size_t count) noexcept { count_ = (std::min)(count, count_); }
 
     ///@{
     /// Number of items: the largest possible, the present one, and whether that is 0.

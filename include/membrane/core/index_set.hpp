@@ -23,17 +23,20 @@ class IndexSet {
     /// An empty set for indices from 0 to `size` - 1; allocates all its memory.
     explicit IndexSet(Index size) : mark_(static_cast<std::size_t>(size), 0), items_(mark_.size()) {}
 
-    /// Inserts `i`; returns whether it was new. @pre 0 <= `i` < size (asserted)
+    /// Inserts `i`; returns whether it was new. Ignores an index outside 0 .. size - 1.
     bool insert(Index i) noexcept {
-        if (contains(i)) return false;
+        if (!has(i) || contains(i)) return false;
         mark_[static_cast<std::size_t>(i)] = current_;
         items_.try_push_back(i);
         return true;
     }
 
+    /// Whether `i` is an index that may be inserted.
+    [[nodiscard]] bool has(Index i) const noexcept { return static_cast<std::size_t>(i) < mark_.size(); }
+
     /// Whether `i` is in the set. @pre 0 <= `i` < size (asserted)
     [[nodiscard]] bool contains(Index i) const noexcept {
-        MEMBRANE_ASSERT(i >= 0 && static_cast<std::size_t>(i) < mark_.size());
+        MEMBRANE_ASSERT(has(i));
         return mark_[static_cast<std::size_t>(i)] == current_;
     }
 

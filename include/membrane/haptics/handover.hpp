@@ -110,20 +110,23 @@ class MovedPoints {
           corners_(Triangles::Zero(3, triangle_count)) {}
 
     /// Called by the writer: `moved` are all vertices moved since the last publish, but for those that a tear has
-    /// moved.
-    /// @pre `x` is 3 x V [m], `moved` in 0 .. V - 1 (asserted)
-    void publish(std::span<const Index> moved, const ConstPointsRef<Scalar>& x, double time) noexcept;
+    /// moved. Returns false, and publishes nothing, if `x` is not 3 x V [m]. Ignores an index that is no vertex.
+    bool publish(std::span<const Index> moved, const ConstPointsRef<Scalar>& x, double time) noexcept;
+
+    ///@{
+    /// Called by the writer: publishes all vertices, as after a reset; of a membrane that tears, the corners of all
+    /// triangles too. Returns false, and publishes nothing, if `x` is not 3 x V [m] or `triangles` not 3 x F. Cost:
+    /// O(V + F).
+    bool publish_all(const ConstPointsRef<Scalar>& x, double time) noexcept;
+    bool publish_all(const ConstPointsRef<Scalar>& x, const Triangles& triangles, double time) noexcept;
+    ///@}
 
     ///@{
     /// Called by the writer: the membrane has torn. The next publish hands over the position of the copy, or of the
-    /// vertex that a tear has moved, and the corners. @pre there are as many triangles (asserted)
+    /// vertex that a tear has moved, and the corners. Ignores triangles that there are not.
     void split(const VertexSplit& split) noexcept;
     void reshape(const MovedVertex<Scalar>& moved) noexcept { now_.vertices.insert(moved.vertex); }
     ///@}
-
-    /// Called by the writer: the membrane is another one, as after a reset. The next publish hands over all positions,
-    /// and these corners of all triangles. Cost: O(V + F). @pre `triangles` is 3 x F (asserted)
-    void replace_all(const Triangles& triangles) noexcept;
 
     /// Called by the reader; valid until its next `read`.
     [[nodiscard]] MovedSnapshot<Scalar> read() noexcept {
@@ -184,8 +187,8 @@ class MovedPoints {
 };
 
 template <Real Scalar>
-void MovedPoints<Scalar>::publish(std::span<const Index> moved, const ConstPointsRef<Scalar>& x, double time) noexcept {
-    MEMBRANE_ASSERT(x.cols() == slots_.back().x.cols());
+bool MovedPoints<Scalar>::publish(std::span<const Index> moved, const ConstPointsRef<Scalar>& x, double time) noexcept {
+    if (x.cols() != slots_.back().x.cols()) return false;
     for (const Index v : moved) now_.vertices.insert(v);
     slots_.back().add(now_, x, corners_);
     slots_.back().stamp = {++published_, time};
@@ -197,6 +200,23 @@ void MovedPoints<Scalar>::publish(std::span<const Index> moved, const ConstPoint
     std::swap(before_, now_);
     now_.clear();
     taken_ = taken;
+    return true;
+}
+
+template <Real Scalar>
+bool MovedPoints<Scalar>::publish_all(const ConstPointsRef<Scalar>& x, double time) noexcept {
+    if (x.cols() != slots_.back().x.cols()) return false;
+    for (Index v = 0; v < slots_.back().x.cols(); ++v) now_.vertices.insert(v);
+    return publish({}, x, time);
+}
+
+template <Real Scalar>
+bool MovedPoints<Scalar>::publish_all(const ConstPointsRef<Scalar>& x, const Triangles& triangles,
+                                      double time) noexcept {
+    if (triangles.cols() != corners_.cols() || x.cols() != slots_.back().x.cols()) return false;
+    corners_ = triangles;
+    for (Index f = 0; f < triangles.cols(); ++f) now_.triangles.insert(f);
+    return publish_all(x, time);
 }
 
 template <Real Scalar>
@@ -204,19 +224,12 @@ void MovedPoints<Scalar>::split(const VertexSplit& split) noexcept {
     now_.vertices.insert(split.copy);
     for (std::size_t i = 0; i < split.triangles.size(); ++i) {
         const Index f = split.triangles[i];
+        if (!now_.triangles.has(f)) continue;
         auto corners = split.corners[i];
         split.replace_in(corners);
         now_.triangles.insert(f);
         for (std::size_t k = 0; k < 3; ++k) corners_(static_cast<Eigen::Index>(k), f) = corners[k];
     }
-}
-
-template <Real Scalar>
-void MovedPoints<Scalar>::replace_all(const Triangles& triangles) noexcept {
-    MEMBRANE_ASSERT(triangles.cols() == corners_.cols());
-    for (Index v = 0; v < slots_.back().x.cols(); ++v) now_.vertices.insert(v);
-    for (Index f = 0; f < triangles.cols(); ++f) now_.triangles.insert(f);
-    corners_ = triangles;
 }
 
 }  // namespace membrane

@@ -91,10 +91,9 @@ template <Real Scalar>
 Contact<Scalar> RestContact<Scalar>::contact_with(const ConstPointsRef<Scalar>& anchors, const AabbTree<Scalar>& tree,
                                                   const Contact<Scalar>& contact,
                                                   const Tool<Scalar>& tool) const noexcept {
-    MEMBRANE_ASSERT(anchors.cols() == at_rest_.cols());
     Contact<Scalar> lowest;
     const bool closed = surface_.closed() && !torn_;
-    if (!is_valid(tool) || (!closed && !contact.touching())) return lowest;
+    if (anchors.cols() != at_rest_.cols() || !is_valid(tool) || (!closed && !contact.touching())) return lowest;
     const Scalar side = closed ? Scalar(1) : contact.side;
     const int points = feature_pairs(tool) == 1 ? 1 : points_along_shaft;
     for (int i = 0; i < points; ++i) {

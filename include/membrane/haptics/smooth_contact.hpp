@@ -40,13 +40,13 @@ class SmoothContact {
           at_rest_(mesh.positions()),
           normals_(VertexNormals<Scalar>(mesh).values()) {}
 
-    /// Online. Cost: a few triangles, from the contact's to the proxy's.
-    /// @pre the contact is with this mesh (asserted)
+    /// A contact on a triangle that the mesh does not have stays as it is. Online. Cost: a few triangles, from the
+    /// contact's to the proxy's.
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact) const noexcept {
         return over(contact, at_rest_, normals_);
     }
 
-    /// The contact on a moving body.
+    /// The contact on a moving body; as it is if the body has another number of vertices.
     [[nodiscard]] Contact<Scalar> operator()(const Contact<Scalar>& contact,
                                              const MovingBody<Scalar>& body) const noexcept {
         return over(contact, body.anchors(), body.normals());
@@ -112,9 +112,8 @@ template <Real Scalar>
 template <Real Scalar>
 Contact<Scalar> SmoothContact<Scalar>::over(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& anchors,
                                             const ConstPointsRef<Scalar>& normals) const noexcept {
-    MEMBRANE_ASSERT(anchors.cols() == at_rest_.cols() && normals.cols() == at_rest_.cols());
-    MEMBRANE_ASSERT(!contact.touching() || contact.triangle < static_cast<Index>(triangles_.cols()));
-    if (!contact.touching() || !is_valid(contact)) return contact;
+    if (!contact.touching() || !is_valid(contact) || contact.triangle >= triangles_.cols()) return contact;
+    if (anchors.cols() != at_rest_.cols() || normals.cols() != at_rest_.cols()) return contact;
     Contact<Scalar> smooth = contact;
     const Vector3<Scalar> normal = normal_at(contact.triangle, contact.axis_point, anchors, normals);
     if (is_finite(normal)) smooth.normal = direction<Scalar>(contact.side * normal, contact.normal);

@@ -172,9 +172,10 @@ class CohesiveSprings {
 
     ///@{
     /// Damages the springs of the vertices `moved` by their separation at `x`, on a body that has moved by `body`.
+    /// Returns false, and changes nothing, if `x` or the body is not of V vertices. Ignores an index that is no vertex.
     /// Online. Cost: O(moved).
-    void update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
-    void update(const MovingBody<Scalar>& body, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
+    bool update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
+    bool update(const MovingBody<Scalar>& body, const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
     ///@}
 
     /// Whether vertex `v` adheres: its spring has not failed.
@@ -266,14 +267,22 @@ void CohesiveSprings<Scalar>::set_constants(const TriangleMesh<Scalar>& mesh, co
 }
 
 template <Real Scalar>
-void CohesiveSprings<Scalar>::update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
-    for (const Index v : moved) damage_at(v, point(x, v));
+bool CohesiveSprings<Scalar>::update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept {
+    if (x.cols() != anchors_.cols()) return false;
+    for (const Index v : moved) {
+        if (v >= 0 && v < x.cols()) damage_at(v, point(x, v));
+    }
+    return true;
 }
 
 template <Real Scalar>
-void CohesiveSprings<Scalar>::update(const MovingBody<Scalar>& body, const ConstPointsRef<Scalar>& x,
+bool CohesiveSprings<Scalar>::update(const MovingBody<Scalar>& body, const ConstPointsRef<Scalar>& x,
                                      std::span<const Index> moved) noexcept {
-    for (const Index v : moved) damage_at(v, FrameOnBody(body, v).point_to_body(point(x, v)));
+    if (x.cols() != anchors_.cols() || body.anchors().cols() != x.cols()) return false;
+    for (const Index v : moved) {
+        if (v >= 0 && v < x.cols()) damage_at(v, FrameOnBody(body, v).point_to_body(point(x, v)));
+    }
+    return true;
 }
 
 template <Real Scalar>

@@ -122,6 +122,13 @@ struct VolumeSpring {
     }
 };
 
+/// Whether the foundation is of `count` vertices, as far as it has anchors.
+template <class Volume>
+[[nodiscard]] bool has_vertices([[maybe_unused]] const Volume& volume, [[maybe_unused]] Eigen::Index count) noexcept {
+    if constexpr (requires { volume.anchors().cols(); }) return volume.anchors().cols() == count;
+    return true;
+}
+
 /// A model whose force on a vertex is that of a spring with constants for the length of a tick: such as `VolumeSpring`,
 /// with its member functions.
 template <class Volume, class Scalar>

@@ -27,7 +27,8 @@ class ExplicitEuler {
     }
 
     /// One step of `dt` [s] under the springs, the viscosity and the foundation. `x` [m] and `velocity` [m/s] are 3 x
-    /// V; pinned vertices stay. If the result is not finite or dt is not positive, returns false with both unchanged.
+    /// V; pinned vertices stay. If the result is not finite, dt is not positive or V is not that of the network at
+    /// construction, returns false with both unchanged.
     /// Online. Cost: all springs.
     template <ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume>
     [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt, const Network& network,
@@ -40,6 +41,7 @@ class ExplicitEuler {
     template <ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume>
     [[nodiscard]] bool step(PointsRef<Scalar> x, PointsRef<Scalar> velocity, Scalar dt, const Network& network,
                             const Volume& volume, const ConstPointsRef<Scalar>& external) noexcept {
+        if (external.cols() != force_.cols()) return false;
         force_ = external;
         return advance(x, velocity, dt, network, volume);
     }
@@ -63,7 +65,9 @@ template <Real Scalar>
 template <class Network, class Volume>
 bool ExplicitEuler<Scalar>::advance(PointsRef<Scalar>& x, PointsRef<Scalar>& velocity, Scalar dt,
                                     const Network& network, const Volume& volume) noexcept {
-    MEMBRANE_ASSERT(x.cols() == network.vertex_count() && velocity.cols() == network.vertex_count());
+    const Eigen::Index count = force_.cols();
+    if (x.cols() != count || velocity.cols() != count || network.vertex_count() != count) return false;
+    if (!has_vertices(volume, count)) return false;
     if (!is_finite(dt) || !(dt > 0)) return false;
     previous_ = x;
     previous_velocity_ = velocity;

@@ -52,9 +52,9 @@ class PropagationQueue {
     /// Number of layers: at most one more than `layers`, fewer if the mesh ends before.
     [[nodiscard]] Index layer_count() const noexcept { return static_cast<Index>(layer_ends_.size()); }
 
-    /// The vertices of layer `k`. @pre 0 <= `k` < layer_count() (asserted)
+    /// The vertices of layer `k`; none beyond the last layer.
     [[nodiscard]] std::span<const Index> layer(Index k) const noexcept {
-        MEMBRANE_ASSERT(k >= 0 && k < layer_count());
+        if (k < 0 || k >= layer_count()) return {};
         const auto at = static_cast<std::size_t>(k);
         const std::size_t begin = k == 0 ? 0 : layer_ends_[at - 1];
         return vertices().subspan(begin, layer_ends_[at] - begin);

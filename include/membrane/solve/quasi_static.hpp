@@ -72,7 +72,7 @@ class QuasiStaticSolver {
 
     /// Brings `x` (3 x V [m]) nearer to equilibrium in a tick of `dt` [s] under up to 16 constraints. Online.
     /// Cost: `sweeps` + 1 evaluations of each active vertex; in layer 0, up to `sweeps` times `contact_iterations` + 1.
-    /// An evaluation costs the vertex's springs. @pre `x` and `network` are of the solver's vertices (asserted)
+    /// An evaluation costs the vertex's springs.
     template <CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
@@ -230,11 +230,13 @@ template <class Network, class Volume>
 StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt,
                                                             const Network& network, const Volume& volume,
                                                             Constraints constraints) noexcept {
-    MEMBRANE_ASSERT(x.cols() == state_.vertex_count() && network.vertex_count() == state_.vertex_count());
     detail::require_made<QuasiStaticSolver>();
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {};
     report_.reactions = {reactions_.data(), constraints.size()};
+    const Index count = state_.vertex_count();
+    if (x.cols() != count || network.vertex_count() != count || !has_vertices(volume, count))
+        return refuse_step(StepStatus::wrong_vertex_count);
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
     follow_body(volume);  // uses the vertices loaded by the last step
     state_.begin_step();

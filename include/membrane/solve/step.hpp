@@ -47,6 +47,7 @@ enum class StepStatus {
     invalid_input,  ///< a tool, target, load, anchor, index or position is not valid, or too far off: nothing has moved
     unstable,       ///< the rule may diverge for this dt, or a force is unbounded: nothing has moved
     too_many_contact_points,  ///< more contact points than the capacity: nothing has moved
+    wrong_vertex_count,       ///< `x`, network or foundation is not of the solver's vertices: nothing has moved
 };
 
 /// The report of a step. The spans are the solver's and valid until its next step.

@@ -31,7 +31,7 @@ auto by_threes(std::string_view component, std::span<Number, n> numbers, std::st
     if (numbers.size() % 3 != 0) {
         refuse(component, what, " must be a multiple of 3 numbers, got ", numbers.size());
     }
-    using Columns = Eigen::Matrix<std::remove_const_t<Number>, 3, Eigen::Dynamic>;
+    using Columns = Eigen::Matrix<std::remove_const_t<Number>, 3, Eigen::Dynamic, Eigen::ColMajor>;
     return Eigen::Map<const Columns>(numbers.data(), 3, static_cast<Eigen::Index>(numbers.size() / 3));
 }
 

@@ -54,13 +54,13 @@ class MovingBody {
     /// Moves the body to `pose`, relative to the mesh, and with it `x` (3 x V [m]). Call it in every tick: velocities
     /// are those of the last call. Then refit the whole tree.
     ///
-    /// If a number in `pose`, in `x` or in the result is not finite, returns false and changes nothing. Online. Cost:
-    /// O(V). @pre `x` has a column for each vertex, and the rotation of the pose is orthonormal (asserted)
+    /// If a number in `pose`, in `x` or in the result is not finite, the rotation is not orthonormal, or `x` does not
+    /// have a column for each vertex, returns false and changes nothing. Online. Cost: O(V).
     [[nodiscard]] bool move_to(const RigidFrame<Scalar>& pose, PointsRef<Scalar> x) noexcept;
 
     /// Moves a body of any motion: its anchors are now at `anchors` (3 x V [m]), after a motion of `dt` [s]. The pose
     /// is the least-squares fit, by quaternions [Horn87]. A motion whose velocity is not finite is refused as well. The
-    /// anchor given for a copy of a vertex is not used. Cost: O(F). @pre as many anchors as vertices (asserted)
+    /// anchor given for a copy of a vertex is not used. Cost: O(F).
     [[nodiscard]] bool move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept;
 
     /// Present anchors, 3 x V [m].
@@ -210,10 +210,9 @@ MovingBody<Scalar>::MovingBody(const TriangleMesh<Scalar>& mesh)
 
 template <Real Scalar>
 bool MovingBody<Scalar>::move_to(const RigidFrame<Scalar>& pose, PointsRef<Scalar> x) noexcept {
-    MEMBRANE_ASSERT(x.cols() == anchors_.cols());
-    if (!is_finite(pose.rotation) || !is_finite(pose.origin)) return false;
+    if (x.cols() != anchors_.cols() || !is_finite(pose.rotation) || !is_finite(pose.origin)) return false;
     if (!is_finite(pose.velocity) || !is_finite(pose.angular_velocity)) return false;
-    MEMBRANE_ASSERT(detail::is_rotation(pose.rotation));
+    if (!detail::is_rotation(pose.rotation)) return false;
     for (Index v = 0; v < anchors_.cols(); ++v) next_.col(v) = pose.point_to_world(point(at_rest_, v));
     const bool was_deformed = deformed_;
     if (!carry(pose, x)) return false;
@@ -226,7 +225,7 @@ bool MovingBody<Scalar>::move_to(const RigidFrame<Scalar>& pose, PointsRef<Scala
 
 template <Real Scalar>
 bool MovingBody<Scalar>::move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept {
-    MEMBRANE_ASSERT(x.cols() == anchors_.cols() && anchors.cols() == anchors_.cols());
+    if (x.cols() != anchors_.cols() || anchors.cols() != anchors_.cols()) return false;
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)()) || !is_finite(anchors)) return false;
     RigidFrame<Scalar> pose = fit(anchors);
     const auto motion = motion_between(pose_, pose);

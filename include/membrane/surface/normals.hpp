@@ -46,15 +46,14 @@ class VertexNormals {
     /// The normals of the mesh at rest. O(F log F).
     explicit VertexNormals(const TriangleMesh<Scalar>& mesh);
 
-    /// Updates the normals of all vertices, at the positions `x`, 3 x V [m]. O(F), no allocation.
-    /// @pre `x` has a column for each vertex (asserted).
-    void update(const ConstPointsRef<Scalar>& x) noexcept;
+    /// Updates the normals of all vertices, at the positions `x`, 3 x V [m]. Returns false, and changes nothing, if `x`
+    /// does not have V columns. O(F), no allocation.
+    bool update(const ConstPointsRef<Scalar>& x) noexcept;
 
     /// Updates the normals of the vertices `moved` and their neighbours, each once; `moved` may have duplicates. Those
     /// that a tear has doubled or moved since the last update count as moved. Returns these vertices, valid until the
-    /// next update. No other normal changes, and only the corners of their triangles are read. Linear in their number,
-    /// no allocation.
-    /// @pre `x` has a column for each vertex and all `moved` are vertices (asserted).
+    /// next update. No other normal changes, and only the corners of their triangles are read. Ignores an index that is
+    /// no vertex; returns none if `x` does not have V columns. Linear in their number, no allocation.
     std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
 
     /// 3 x V, unit length.
@@ -108,8 +107,7 @@ class VertexNormals {
 /// The angle-weighted normal of the face, edge or corner at `barycentric`. If this is the surface point nearest to a
 /// point q, the sign of its dot product with the vector to q separates inside from outside [Baerentzen05].
 /// `barycentric` must be exactly zero at the corners not involved, as from `closest_point`. Unit length, or zero if the
-/// triangles around it have no area. No allocation; linear in the triangles of a corner.
-/// @pre `f` is a triangle (asserted).
+/// triangles around it have no area, or `f` is no triangle. No allocation; linear in the triangles of a corner.
 template <class Positions>
 [[nodiscard]] Vector3<typename Positions::Scalar> pseudo_normal(
     const Positions& x, const Triangles& triangles, const TriangleAdjacency& adjacency, Index f,
@@ -217,25 +215,25 @@ VertexNormals<Scalar>::VertexNormals(const TriangleMesh<Scalar>& mesh)
 }
 
 template <Real Scalar>
-void VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
-    MEMBRANE_ASSERT(x.cols() == values_.cols());
+bool VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
+    if (x.cols() != values_.cols()) return false;
     face(x, static_cast<Index>(values_.cols()), [](Index v) { return v; });
     torn_.clear();
+    return true;
 }
 
 template <Real Scalar>
 std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x,
                                                      std::span<const Index> moved) noexcept {
-    MEMBRANE_ASSERT(x.cols() == values_.cols());
     updated_.clear();
+    if (x.cols() != values_.cols()) return {};
     for (const auto vertices : {moved, torn_.items()}) {
         for (const Index v : vertices) updated_.insert(v);
     }
     torn_.clear();
     // Neighbours of moved vertices have mostly moved too: one branch for all of them is predicted.
-    const Index count = updated_.count();
-    for (Index n = 0; n < count; ++n) {
-        const Index v = updated_.items()[static_cast<std::size_t>(n)];
+    const auto own = updated_.items();
+    for (const Index v : own) {
         const detail::OneRing& ring = one_rings_[static_cast<std::size_t>(v)];
         bool all_in = true;
         for (const Index w : ring.vertices) all_in &= updated_.contains(w);
@@ -389,8 +387,8 @@ Vector3<typename Positions::Scalar> pseudo_normal(const Positions& x, const Tria
                                                   const TriangleAdjacency& adjacency, Index f,
                                                   const Vector3<typename Positions::Scalar>& barycentric) noexcept {
     using Scalar = typename Positions::Scalar;
-    MEMBRANE_ASSERT(f >= 0 && f < triangles.cols());
     const Vector3<Scalar> none(0, 0, 0);
+    if (f < 0 || f >= triangles.cols()) return none;
     const auto face_normal = [&](Index g) {
         return detail::unit_or(area_vector(triangle_at(x, triangles.col(g))), none);
     };

@@ -79,7 +79,9 @@ ReorderedMesh<Scalar> reordered(const TriangleMesh<Scalar>& mesh) {
     std::vector<Index> first;
     for (const auto& corners : renamed.colwise()) first.push_back(corners.minCoeff());
     const std::vector<Index> triangles = detail::sorted_by(first);
-    return {TriangleMesh<Scalar>(x(Eigen::all, vertices), renamed(Eigen::all, triangles)), vertices, triangles};
+    // Eigen 3.4 calls the placeholder of all rows Eigen::all, Eigen 5 no more.
+    return {TriangleMesh<Scalar>(x(Eigen::seqN(0, 3), vertices), renamed(Eigen::seqN(0, 3), triangles)), vertices,
+            triangles};
 }
 
 }  // namespace membrane
