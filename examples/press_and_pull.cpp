@@ -33,7 +33,7 @@ Record run(const Scene& scene, const Volume& foundation, const Motion& motion, c
     auto normals = membrane::VertexNormals(scene.mesh);
     membrane::ScriptedDevice<double> device(motion.script, {.tick = dt, .radius = scene.tool_radius});
     auto x = scene.mesh.positions();  // 3 x V [m]
-    Record record{.phases = motion.phases};
+    Record record{.phases = motion.phases, .film_interval = scene.film_interval};
     while (device.running()) {
         const auto tool = device.read();
         Stopwatch watch;

@@ -58,6 +58,10 @@ class Output {
                 drawings.push_back(draw(outcome));
                 save(folder_ / (drawings.back().name + ".svg"), drawings.back().svg);
             }
+            if (outcome.scene.film_interval > 0) {
+                drawings.push_back(moving(outcome));
+                save(folder_ / (drawings.back().name + ".svg"), drawings.back().svg);
+            }
             const auto file = folder_ / (outcome.scene.key + "_force");
             std::cout << plot(file, curves(outcome), "press_and_pull", settings(outcome)) << '\n';
             std::ifstream svg(file.string() + ".svg");

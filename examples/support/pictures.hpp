@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "support/figure.hpp"
+#include "support/film.hpp"
 #include "support/page.hpp"
 #include "support/plot.hpp"
 #include "support/record.hpp"
@@ -66,6 +67,13 @@ inline std::string after_figure(const std::string& number) {
                 ": at rest (a), pressed by the tool (b), grasped and pulled by it (c), with virtual volume springs. "
                 "Arrows: force of the membrane on the tool. Sections through the tool: dashed the membrane at rest.",
             drawn(figure)};
+}
+
+/// The run with volume springs, moving.
+[[nodiscard]] inline Drawing moving(const Outcome& outcome) {
+    return {outcome.scene.key + "_moving",
+            "The " + outcome.scene.name + ", pressed, let go, grasped and pulled. The tool is transparent.",
+            film(outcome.scene, outcome.with)};
 }
 
 /// After press and after pull, without and with volume springs: figure 5 of the paper.

@@ -59,6 +59,8 @@ struct Record {
     std::vector<Phase> phases;
     std::vector<Frame> frames = {};
     std::vector<Snapshot> snapshots = {};  ///< The last of each phase.
+    std::size_t film_interval = 0;         ///< Frames from one state of the film to the next; 0: no film.
+    std::vector<Snapshot> film = {};
 
     void add(const Frame& frame, const membrane::Points<double>& x) {
         const double time = frame.tool.time + 1e-9;  // phases end on ticks, up to rounding
@@ -66,6 +68,7 @@ struct Record {
             snapshots.emplace_back();
         }
         snapshots.back() = {x, frame};
+        if (film_interval > 0 && frames.size() % film_interval == 0) film.push_back(snapshots.back());
         frames.push_back(frame);
     }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,12 +34,14 @@ struct Scene {
     Vector3d pressed, slid;              ///< Unit vectors to the point of the press, and to the end of the slide.
     Camera::Options camera;              ///< Sees the tool from the side.
     Camera::Options camera_after;        ///< Sees the point of the press.
+    Camera::Options film_camera = {};    ///< Sees both.
     double stiffness = 40;               ///< Of the springs [N/m].
     double foundation_stiffness = 4;     ///< Of the volume springs [N/m],
     double foundation_damping = 0.02;    ///< and their damping [N s/m].
     double picture_height;               ///< [px]
     std::string paper_figure = {};       ///< Empty where the paper has no such scene.
     double paper_frames = 0;             ///< A second, in [Liu07] 3; zero where the paper has no such scene.
+    std::size_t film_interval = 0;       ///< Frames between the states of the film; 0: no film.
     bool uneven = false;                 ///< Not everywhere `radius` from the origin.
     Vector3d origin = Vector3d::Zero();  ///< Position of the scene's origin in the file of the mesh [m].
 
@@ -78,9 +81,11 @@ inline double Scene::surface(const Vector3d& direction) const {
             .slid = Camera(camera).seen(0.62, 0.72, 0.36),
             .camera = camera,
             .camera_after = above,
+            .film_camera = {.azimuth = 30, .elevation = 42, .distance = 0.08},
             .picture_height = 236,
             .paper_figure = paper_figure,
-            .paper_frames = paper_frames};
+            .paper_frames = paper_frames,
+            .film_interval = 50};
 }
 
 /// A cap with a cornea's measures, its rim clamped.
