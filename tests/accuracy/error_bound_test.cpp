@@ -286,7 +286,7 @@ TEST_CASE("bounds with pins, loads, several held vertices and anchors that moved
         test::Random random(static_cast<std::uint64_t>(seed));
         const auto mesh = disc<double>({.radius = 1, .rings = 6});
         std::vector<double> stiffnesses;
-        for (std::size_t s = 0; s < Adjacency(mesh).edges().size(); ++s) stiffnesses.push_back(random.number(0.5, 2.0));
+        for (std::size_t s = 0; s < edges(mesh).size(); ++s) stiffnesses.push_back(random.number(0.5, 2.0));
         const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = stiffnesses, .pinned = border(mesh)});
         const VirtualVolumeSprings foundation(mesh, {.stiffness = 1.0, .damping = 2e-4});
         const Points<double> anchors = test::jittered(mesh.positions(), 0.004, random);

@@ -32,11 +32,21 @@ class Name(typing.NamedTuple):
     name: str  # qualified
     signature: str  # as it is declared
     commented: bool
+    dangles: bool = False  # of a temporary: a function that returns a span of its data, or a reference to it
 
 
 def has_comment(element):
     parts = (element.find(part) for part in ("briefdescription", "detaileddescription"))
     return any("".join(part.itertext()).strip() for part in parts if part is not None)
+
+
+def is_view(member):
+    """Whether a member function returns a span or a reference and may be called of a temporary."""
+    if member.get("kind") != "function" or member.get("static") == "yes" or member.findtext("name").startswith("operator"):
+        return False
+    returned = "".join(member.find("type").itertext()).strip()
+    for_all = member.get("refqual") is None or member.get("const") == "yes"
+    return for_all and bool(re.match(r"std::span\b|.*&$", returned))
 
 
 def names_in(compound):
@@ -48,14 +58,18 @@ def names_in(compound):
     if compound.get("kind") in ("class", "struct", "union", "concept", "namespace"):
         yield Name(location.get("file"), int(location.get("line")), scope, scope, has_comment(compound))
     scope = "" if compound.get("kind") == "file" else f"{scope}::"
+    for_temporaries = {member.findtext("name") for member in compound.iter("memberdef") if member.get("refqual") == "rvalue"}
     for member in compound.iter("memberdef"):
         signature = (member.findtext("definition") or member.findtext("name")) + (member.findtext("argsstring") or "")
         is_class = member.get("kind") == "friend" and signature.startswith(("friend class", "friend struct", "class"))
         if member.get("prot") != "public" or is_class or re.search(r"= ?(default|delete)$", signature):
             continue
+        if member.get("refqual") == "rvalue":  # as the overload for all others
+            continue
         file, line = (member.find("location").get(key) for key in ("file", "line"))
         name = member.findtext("name")
-        yield Name(file, int(line), scope + name, signature, has_comment(member))
+        yield Name(file, int(line), scope + name, signature, has_comment(member),
+                   is_view(member) and name not in for_temporaries)
         for value in member.findall("enumvalue"):
             enumerator = f"{name}::{value.findtext('name')}"
             yield Name(file, int(line), scope + enumerator, enumerator, has_comment(value))

@@ -44,7 +44,8 @@ TEST_CASE("rows hold their items in the order they were put", "[core]") {
 
 TEST_CASE("there may be no rows, and rows without items", "[core]") {
     CHECK(CompressedRows<int>().row_count() == 0);
-    CHECK(CompressedRows<int>().items().empty());
+    const CompressedRows<int> none;
+    CHECK(none.items().empty());
     const CompressedRows<int> rows(3, [](auto) {});
     CHECK(rows.row_count() == 3);
     CHECK(rows[0].empty());

@@ -36,6 +36,8 @@ constexpr bool is_noexcept = false;
 template <class Result, class Class, class... Arguments>
 constexpr bool is_noexcept<Result (Class::*)(Arguments...) noexcept> = true;
 template <class Result, class Class, class... Arguments>
+constexpr bool is_noexcept<Result (Class::*)(Arguments...)& noexcept> = true;
+template <class Result, class Class, class... Arguments>
 constexpr bool is_noexcept<Result (Class::*)(Arguments...) const noexcept> = true;
 
 }  // namespace
@@ -233,9 +235,9 @@ TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", doub
         static_assert(noexcept(device.running())&& noexcept(device.read())&& noexcept(device.write(p)));
     });
     static_cast<void>([](MovedPoints<S>& moved, Latest<Tool<S>>& pose, std::span<const Index> vertices,
-                         const ConstPointsRef<S>& x, const Tool<S>& tool) {
+                         const ConstPointsRef<S>& x, const Triangles& triangles, const Tool<S>& tool) {
         static_assert(noexcept(moved.publish(vertices, x, 0.0))&& noexcept(moved.read()));
-        static_assert(noexcept(moved.publish_all(x, 0.0))&& noexcept(moved.publish_all(x, Triangles(), 0.0)));
+        static_assert(noexcept(moved.publish_all(x, 0.0))&& noexcept(moved.publish_all(x, triangles, 0.0)));
         static_assert(noexcept(pose.publish(tool, 0.0))&& noexcept(pose.read())&& noexcept(pose.read().age(0.0)));
     });
     static_cast<void>([](const DeviceScale& scale, const Millimetres& place, const MillimetresPerSecond& speed,

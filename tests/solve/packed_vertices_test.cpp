@@ -78,7 +78,7 @@ struct Membrane {
         return random.chance(0.2) ? test::fan<S>(3 + random.index(20)) : test::random_surface<S>(random);
     }
     NetworkOptions<S> springs(Random& random) const {
-        std::vector<S> stiffness(Adjacency(mesh).edges().size());
+        std::vector<S> stiffness(edges(mesh).size());
         for (S& k : stiffness) k = random.chance(0.1) ? S(0) : random.number(S(1), S(10));
         std::vector<S> mass(static_cast<std::size_t>(mesh.vertex_count()));
         // Near to what is stable at 1 ms, on either side.

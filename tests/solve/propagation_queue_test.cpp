@@ -29,7 +29,7 @@ std::set<Index> set_of(std::span<const Index> vertices) { return {vertices.begin
 /// A mesh with holes, springs left out, and pinned vertices.
 MassSpringNetwork<double, LinearSpring> random_network(Random& random) {
     const auto mesh = test::with_holes(test::random_surface<double>(random), random).mesh();
-    std::vector<double> stiffness(Adjacency(mesh).edges().size(), 1.0);
+    std::vector<double> stiffness(edges(mesh).size(), 1.0);
     for (double& k : stiffness) {
         if (random.chance(0.1)) k = 0;
     }

@@ -184,7 +184,7 @@ TEST_CASE("in a step from rest nothing outside the queue moves by a bit", "[solv
         Random random(static_cast<std::uint64_t>(seed));
         auto surface = test::random_surface<double>(random);
         const auto mesh = surface.mesh();
-        std::vector<double> stiffness(Adjacency(mesh).edges().size(), 1.0);
+        std::vector<double> stiffness(edges(mesh).size(), 1.0);
         for (double& k : stiffness) {
             if (random.chance(0.1)) k = 0;
         }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/surface/adjacency.hpp>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "support/cases.hpp"
@@ -144,6 +146,20 @@ TEST_CASE("a vertex may have a hundred thousand neighbours", "[mesh]") {
     CHECK(adjacency.edges().size() == 200'000);
     CHECK(adjacency.border_vertices().size() == 100'000);
     CHECK(as_vector(adjacency.neighbours(5)) == std::vector<Index>{0, 4, 6});
+}
+
+TEST_CASE("the edges of a mesh are those of its adjacency, and views of a temporary are not to be had", "[mesh]") {
+    const auto mesh = sheet({.columns = 3, .rows = 2});
+    const Adjacency adjacency(mesh);
+    const auto all = edges(mesh);
+    CHECK(std::equal(all.begin(), all.end(), adjacency.edges().begin(), adjacency.edges().end()));
+    const auto has_views = []<class A>(A&& a) {
+        return requires { std::forward<A>(a).neighbours(0); };
+    };
+    CHECK(has_views(adjacency));
+    CHECK_FALSE(has_views(Adjacency(mesh)));
+    const auto& positions = sheet({.columns = 3, .rows = 2}).positions();  // moved out of the temporary
+    CHECK(positions == mesh.positions());
 }
 
 #ifndef NDEBUG

@@ -154,7 +154,7 @@ TEMPLATE_TEST_CASE("sheets are flat, of their size, and face up", "[shapes][cgal
             CHECK(mesh.positions().row(axis).maxCoeff() == size / 2);
             CHECK(mesh.positions().row(axis).minCoeff() == -size / 2);
         }
-        CHECK(Adjacency(mesh).border_vertices().size() == static_cast<std::size_t>(2 * (columns + rows)));
+        CHECK(border(mesh).size() == static_cast<std::size_t>(2 * (columns + rows)));
         const S across = S(0.3) / S(columns), up = S(0.2) / S(rows), diagonal = std::sqrt(across * across + up * up);
         CHECK(EdgeLengths(mesh).shortest == Approx(std::min(across, up)));
         CHECK(EdgeLengths(mesh).longest == Approx(diagonal));

@@ -53,7 +53,7 @@ class Indentation {
                                                  std::span<const double> depths) const;
 
     /// The tool at first contact.
-    [[nodiscard]] const Tool<Scalar>& touching() const noexcept { return tool_; }
+    [[nodiscard]] Tool<Scalar> touching() const noexcept { return tool_; }
 
   private:
     const TriangleMesh<Scalar>* mesh_;

@@ -102,7 +102,7 @@ class AabbTree {
     ///@}
 
     /// Size and shape of the tree.
-    [[nodiscard]] const TreeStatistics& statistics() const noexcept { return boxes_.statistics(); }
+    [[nodiscard]] TreeStatistics statistics() const noexcept { return boxes_.statistics(); }
 
     /// The box around all triangles below a node of `tree_shape`; node 0: around the surface. Empty if there is no such
     /// node.

@@ -49,7 +49,8 @@ class LocalSurface {
     }
 
     /// Triangles with the corner `v`, in ascending order.
-    [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return adjacency_.triangles_of(v); }
+    [[nodiscard]] std::span<const Index> triangles_of(Index v) const& noexcept { return adjacency_.triangles_of(v); }
+    void triangles_of(Index) && = delete;
 
     ///@{
     /// Calls `visit(g)` once for each triangle that shares a side with `f`; or a corner, including `f` itself.

@@ -45,7 +45,8 @@ class CompressedRows {
     ///@}
 
     /// All items, row by row, as they were put.
-    [[nodiscard]] std::span<const Item> items() const noexcept { return items_; }
+    [[nodiscard]] std::span<const Item> items() const& noexcept { return items_; }
+    void items() && = delete;
 
     ///@{
     /// Online, for rows that change. Row `from` is divided: the items for which `goes(item)` become row `to`, which

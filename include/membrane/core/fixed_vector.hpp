@@ -45,8 +45,9 @@ class FixedVector {
 
     ///@{
     /// All items. Valid until the vector is assigned to or destroyed.
-    [[nodiscard]] std::span<Item> items() noexcept { return {slots_.data(), count_}; }
-    [[nodiscard]] std::span<const Item> items() const noexcept { return {slots_.data(), count_}; }
+    [[nodiscard]] std::span<Item> items() & noexcept { return {slots_.data(), count_}; }
+    [[nodiscard]] std::span<const Item> items() const& noexcept { return {slots_.data(), count_}; }
+    void items() && = delete;
     ///@}
 
     /// Item number `i`. @pre `i` < size() (asserted)

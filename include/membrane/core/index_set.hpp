@@ -41,7 +41,8 @@ class IndexSet {
     }
 
     /// Indices in order of insertion; valid until the next change.
-    [[nodiscard]] std::span<const Index> items() const noexcept { return items_.items(); }
+    [[nodiscard]] std::span<const Index> items() const& noexcept { return items_.items(); }
+    void items() && = delete;
 
     ///@{
     /// Number of items, and whether it is 0.

@@ -158,8 +158,8 @@ class IdealHand {
 
     ///@{
     /// Position [m] and velocity [m/s] of the last target.
-    [[nodiscard]] const Vector3<Scalar>& position() const noexcept { return position_; }
-    [[nodiscard]] const Vector3<Scalar>& velocity() const noexcept { return velocity_; }
+    [[nodiscard]] Vector3<Scalar> position() const noexcept { return position_; }
+    [[nodiscard]] Vector3<Scalar> velocity() const noexcept { return velocity_; }
     ///@}
 
   private:
@@ -189,7 +189,7 @@ class ScriptedDevice {
     void write(const Vector3<Scalar>& force) noexcept { force_ = force; }
 
     /// The last written force [N].
-    [[nodiscard]] const Vector3<Scalar>& force() const noexcept { return force_; }
+    [[nodiscard]] Vector3<Scalar> force() const noexcept { return force_; }
 
     /// Time of the next `read` [s].
     [[nodiscard]] Scalar time() const noexcept { return script_.front().time + static_cast<Scalar>(ticks_) * tick_; }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include <membrane/haptics/device_profile.hpp>
 
@@ -156,14 +157,15 @@ class ForceLimiter {
     [[nodiscard]] Vector3<Scalar> operator()(const Vector3<Scalar>& force, double now, std::uint64_t state) noexcept;
 
     /// Limits that reduced the last force.
-    [[nodiscard]] const ActiveLimits& active_limits() const noexcept { return active_limits_; }
+    [[nodiscard]] ActiveLimits active_limits() const noexcept { return active_limits_; }
     /// Thermal load of the motors: 0 cold, 1 the final value under the continuous force; see `MotorThermalModel`.
     [[nodiscard]] double thermal_load() const noexcept { return heat_.thermal_load(); }
     /// Factor of watchdog and soft start on the force, 0 to 1.
     [[nodiscard]] double gain() const noexcept { return soft_start_.gain(); }
 
     /// The device whose limits apply.
-    [[nodiscard]] const DeviceProfile& device() const noexcept { return device_; }
+    [[nodiscard]] const DeviceProfile& device() const& noexcept { return device_; }
+    [[nodiscard]] DeviceProfile device() && noexcept { return std::move(device_); }
 
     /// As new, except for the thermal load. For a replay construct a new limiter.
     void reset() noexcept;

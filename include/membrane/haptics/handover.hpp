@@ -67,7 +67,7 @@ class Latest {
     }
 
     /// Called by the reader; valid until its next `read`.
-    [[nodiscard]] const Snapshot<T>& read() noexcept {
+    [[nodiscard]] const Snapshot<T>& read() & noexcept {
         slots_.acquire();
         return slots_.front();
     }
@@ -129,7 +129,7 @@ class MovedPoints {
     ///@}
 
     /// Called by the reader; valid until its next `read`.
-    [[nodiscard]] MovedSnapshot<Scalar> read() noexcept {
+    [[nodiscard]] MovedSnapshot<Scalar> read() & noexcept {
         const bool newer = slots_.acquire();
         const Slot& slot = slots_.front();
         const auto none = std::span<const Index>();

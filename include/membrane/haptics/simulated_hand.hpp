@@ -49,8 +49,8 @@ class SimulatedHand {
     /// nothing.
     bool advance(const Vector3<Scalar>& force, Scalar dt) noexcept;
 
-    [[nodiscard]] const Vector3<Scalar>& position() const noexcept { return position_; }  ///< [m]
-    [[nodiscard]] const Vector3<Scalar>& velocity() const noexcept { return velocity_; }  ///< [m/s]
+    [[nodiscard]] Vector3<Scalar> position() const noexcept { return position_; }  ///< [m]
+    [[nodiscard]] Vector3<Scalar> velocity() const noexcept { return velocity_; }  ///< [m/s]
 
   private:
     /// Free response after a time: to an initial displacement of 1 and to an initial velocity of 1.

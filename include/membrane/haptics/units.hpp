@@ -25,7 +25,7 @@ class In {
     explicit In(Value value) noexcept : value_(std::move(value)) {}
 
     /// The number, without its unit.
-    [[nodiscard]] const Value& value() const noexcept { return value_; }
+    [[nodiscard]] Value value() const noexcept { return value_; }
 
     ///@{
     /// Sums, multiples and comparison of one unit.

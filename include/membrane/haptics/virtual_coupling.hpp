@@ -51,7 +51,7 @@ class VirtualCoupling {
     Tool<Scalar> update(const Tool<Scalar>& hand, const Vector3<Scalar>& reaction, Scalar dt) noexcept;
 
     /// Force on the hand [N].
-    [[nodiscard]] const Vector3<Scalar>& force() const noexcept { return force_; }
+    [[nodiscard]] Vector3<Scalar> force() const noexcept { return force_; }
     /// `force()` as a force policy.
     [[nodiscard]] Vector3<Scalar> operator()(const HapticState<Scalar>& /*state*/) const noexcept { return force_; }
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <span>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/types.hpp>
@@ -24,7 +25,8 @@ class CoincidentVertices {
     inline CoincidentVertices(const Points<double>& x, std::span<const Index> vertices);
 
     /// For each vertex the lowest vertex at exactly the same position.
-    [[nodiscard]] const std::vector<Index>& representative() const noexcept { return representative_; }
+    [[nodiscard]] const std::vector<Index>& representative() const& noexcept { return representative_; }
+    [[nodiscard]] std::vector<Index> representative() && noexcept { return std::move(representative_); }
 
     /// Calls `visit(v, w)`, v < w, for each pair of representatives at most `distance` [m] apart. Each pair tested
     /// subtracts 1 from `effort`. If `effort` falls below 0, the search stops and returns false; if it completes,

@@ -62,7 +62,7 @@ class EditableMesh {
     [[nodiscard]] inline bool has_edge(Index v, Index w) const;
 
     /// Position of vertex `v` [m].
-    [[nodiscard]] const Vector3<double>& position(Index v) const noexcept { return positions_[at(v)]; }
+    [[nodiscard]] Vector3<double> position(Index v) const noexcept { return positions_[at(v)]; }
 
     /// Moves vertex `v` to the position `to` [m].
     void move(Index v, const Vector3<double>& to) noexcept { positions_[at(v)] = to; }

@@ -271,7 +271,8 @@ class Elements {
     [[nodiscard]] Index vertex_count() const noexcept { return at_vertex_.row_count(); }
 
     /// All elements, in the order in which they were given.
-    [[nodiscard]] std::span<const Instance> all() const noexcept { return all_; }
+    [[nodiscard]] std::span<const Instance> all() const& noexcept { return all_; }
+    void all() && = delete;
 
     /// Calls `act(instance)` for each element.
     template <class Act>
@@ -288,13 +289,15 @@ class Elements {
 
     ///@{
     /// The elements of vertex `v`, by their `place`; and those where it has one `place`.
-    [[nodiscard]] std::span<const AtVertex> at(Index v) const noexcept { return at_vertex_[v]; }
-    [[nodiscard]] std::span<const AtVertex> at(Index v, std::size_t place) const noexcept {
+    [[nodiscard]] std::span<const AtVertex> at(Index v) const& noexcept { return at_vertex_[v]; }
+    void at(Index) && = delete;
+    [[nodiscard]] std::span<const AtVertex> at(Index v, std::size_t place) const& noexcept {
         const auto all = at_vertex_[v];
         const auto first = std::find_if(all.begin(), all.end(), [&](const auto& at) { return at.place >= place; });
         const auto end = std::find_if(first, all.end(), [&](const auto& at) { return at.place > place; });
         return {first, end};
     }
+    void at(Index, std::size_t) && = delete;
     ///@}
 
     /// Calls `act(instance, x, place)` for each element of vertex `v`: `x` are the positions of its corners, number

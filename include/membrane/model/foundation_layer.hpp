@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/field.hpp>
@@ -89,8 +90,10 @@ class FoundationSprings {
 
     ///@{
     /// Positions [m] and unit normals of the mesh, 3 x V.
-    [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
-    [[nodiscard]] const Points<Scalar>& normals() const noexcept { return normals_; }
+    [[nodiscard]] const Points<Scalar>& anchors() const& noexcept { return anchors_; }
+    [[nodiscard]] Points<Scalar> anchors() && noexcept { return std::move(anchors_); }
+    [[nodiscard]] const Points<Scalar>& normals() const& noexcept { return normals_; }
+    [[nodiscard]] Points<Scalar> normals() && noexcept { return std::move(normals_); }
     ///@}
 
     ///@{

@@ -8,6 +8,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
@@ -275,16 +276,19 @@ class MassSpringNetwork {
     [[nodiscard]] Index vertex_count() const noexcept { return ends_.row_count(); }
 
     /// All springs, by ascending ends; none of stiffness zero.
-    [[nodiscard]] std::span<const Spring<Scalar>> springs() const noexcept { return springs_.items(); }
+    [[nodiscard]] std::span<const Spring<Scalar>> springs() const& noexcept { return springs_.items(); }
+    void springs() && = delete;
 
     /// The most springs that there may be: all, or more if the network may tear.
     [[nodiscard]] std::size_t spring_capacity() const noexcept { return springs_.capacity(); }
 
     /// The law of all springs.
-    [[nodiscard]] const Law& law() const noexcept { return law_; }
+    [[nodiscard]] const Law& law() const& noexcept { return law_; }
+    [[nodiscard]] Law law() && noexcept { return std::move(law_); }
 
     /// The springs of vertex `v`, by ascending vertex at the other end.
-    [[nodiscard]] std::span<const SpringEnd<Scalar>> springs_of(Index v) const noexcept { return ends_[v]; }
+    [[nodiscard]] std::span<const SpringEnd<Scalar>> springs_of(Index v) const& noexcept { return ends_[v]; }
+    void springs_of(Index) && = delete;
 
     /// Calls `act(instance)` for each spring: `ElementInstance<SpringElement>`.
     template <class Act>
@@ -294,7 +298,8 @@ class MassSpringNetwork {
 
     ///@{
     /// As `ElasticNetwork` requires: constants of vertex `v`. @pre `has_masses()` for `mass`
-    [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const noexcept { return ends_[v]; }
+    [[nodiscard]] std::span<const SpringEnd<Scalar>> neighbours(Index v) const& noexcept { return ends_[v]; }
+    void neighbours(Index) && = delete;
 
     [[nodiscard]] bool pinned(Index v) const noexcept { return pinned_[static_cast<std::size_t>(v)] != 0; }
     [[nodiscard]] bool has_masses() const noexcept { return !mass_.empty(); }

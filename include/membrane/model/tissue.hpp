@@ -38,11 +38,13 @@ class Tissue {
     explicit Tissue(const Springs& springs, const Kinds&... kinds);
 
     /// The springs, without the elements.
-    [[nodiscard]] const Springs& springs() const noexcept { return springs_; }
+    [[nodiscard]] const Springs& springs() const& noexcept { return springs_; }
+    [[nodiscard]] Springs springs() && noexcept { return std::move(springs_); }
 
     ///@{
     /// As of the springs.
-    [[nodiscard]] const auto& law() const noexcept { return springs_.law(); }
+    [[nodiscard]] const auto& law() const& noexcept { return springs_.law(); }
+    void law() && = delete;
     [[nodiscard]] auto springs_of(Index v) const noexcept { return springs_.springs_of(v); }
     ///@}
 
@@ -65,12 +67,14 @@ class Tissue {
     };
 
     /// The neighbours of vertex `v` that a spring or an edge of an element joins to it.
-    [[nodiscard]] std::span<const Neighbour> joined(Index v) const noexcept { return joined_[v]; }
+    [[nodiscard]] std::span<const Neighbour> joined(Index v) const& noexcept { return joined_[v]; }
+    void joined(Index) && = delete;
 
     ///@{
     /// As `ElasticNetwork` requires. Masses, viscosities and pins are those of the springs. The tolerance is the
     /// largest of springs and elements.
-    [[nodiscard]] std::span<const Neighbour> neighbours(Index v) const noexcept { return neighbours_[v]; }
+    [[nodiscard]] std::span<const Neighbour> neighbours(Index v) const& noexcept { return neighbours_[v]; }
+    void neighbours(Index) && = delete;
     [[nodiscard]] Index vertex_count() const noexcept { return springs_.vertex_count(); }
     [[nodiscard]] bool pinned(Index v) const noexcept { return springs_.pinned(v); }
     [[nodiscard]] bool has_masses() const noexcept { return springs_.has_masses(); }

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/field.hpp>
@@ -169,7 +170,8 @@ class VirtualVolumeSprings {
     VirtualVolumeSprings(const TriangleMesh<Scalar>& mesh, const VolumeSpringOptions<Scalar>& options);
 
     /// Anchors, 3 x V [m].
-    [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
+    [[nodiscard]] const Points<Scalar>& anchors() const& noexcept { return anchors_; }
+    [[nodiscard]] Points<Scalar> anchors() && noexcept { return std::move(anchors_); }
 
     ///@{
     /// Constants of vertex `v`: k'_s [N/m] and k'_d [N s/m].

@@ -41,10 +41,12 @@ class PropagationQueue {
     void group(const Network& network, bool together = false) noexcept;
 
     /// Ends of the groups in `vertices`; empty before `group` is called.
-    [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return colouring_.ends(); }
+    [[nodiscard]] std::span<const std::size_t> colour_ends() const& noexcept { return colouring_.ends(); }
+    void colour_ends() && = delete;
 
     /// All vertices of the queue, layer by layer.
-    [[nodiscard]] std::span<const Index> vertices() const noexcept { return reached_.items(); }
+    [[nodiscard]] std::span<const Index> vertices() const& noexcept { return reached_.items(); }
+    void vertices() && = delete;
 
     /// Whether `v` is in the queue.
     [[nodiscard]] bool contains(Index v) const noexcept { return reached_.contains(v); }
@@ -53,12 +55,13 @@ class PropagationQueue {
     [[nodiscard]] Index layer_count() const noexcept { return static_cast<Index>(layer_ends_.size()); }
 
     /// The vertices of layer `k`; none beyond the last layer.
-    [[nodiscard]] std::span<const Index> layer(Index k) const noexcept {
+    [[nodiscard]] std::span<const Index> layer(Index k) const& noexcept {
         if (k < 0 || k >= layer_count()) return {};
         const auto at = static_cast<std::size_t>(k);
         const std::size_t begin = k == 0 ? 0 : layer_ends_[at - 1];
         return vertices().subspan(begin, layer_ends_[at] - begin);
     }
+    void layer(Index) && = delete;
 
     /// Removes all vertices.
     void clear() noexcept {

@@ -120,13 +120,15 @@ class QuasiStaticSolver {
     /// The contact points of constraint number `i` in the last step that advanced, with the force on each [N], whose
     /// sum is its reaction. Empty for a constraint without contact points, and after a
     /// step with unstable or infinite forces. Valid until the next step.
-    [[nodiscard]] std::span<const ContactPoint<Scalar>> contact_points(std::size_t i) const noexcept {
+    [[nodiscard]] std::span<const ContactPoint<Scalar>> contact_points(std::size_t i) const& noexcept {
         if (i >= state_.previous_ranges.size()) return {};
         return state_.previous_ranges[i].of(state_.previous_points.items());
     }
+    void contact_points(std::size_t) && = delete;
 
     /// The propagation queue of the last step.
-    [[nodiscard]] const PropagationQueue& queue() const noexcept { return active_.queue(); }
+    [[nodiscard]] const PropagationQueue& queue() const& noexcept { return active_.queue(); }
+    void queue() && = delete;
 
   private:
     // Whether the volume springs are on a body that may move, see `on`.

@@ -107,7 +107,8 @@ class ToolFriction {
     }
 
     /// The vertices in contact in the last step that are not fixed, with their friction, in increasing order.
-    [[nodiscard]] std::span<const StickingVertex<Scalar>> vertices() const noexcept { return kept_.items(); }
+    [[nodiscard]] std::span<const StickingVertex<Scalar>> vertices() const& noexcept { return kept_.items(); }
+    void vertices() && = delete;
 
     /// Whether a vertex with a normal force slips in the last step.
     [[nodiscard]] bool slips() const noexcept {

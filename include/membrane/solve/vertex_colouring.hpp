@@ -32,7 +32,8 @@ class VertexColouring {
     void add(const Network& network, IndexSet& set, std::size_t begin, std::size_t end) noexcept;
 
     /// End of each group in the set, where the next one begins.
-    [[nodiscard]] std::span<const std::size_t> ends() const noexcept { return ends_.items(); }
+    [[nodiscard]] std::span<const std::size_t> ends() const& noexcept { return ends_.items(); }
+    void ends() && = delete;
 
     /// Removes all groups.
     void clear() noexcept { ends_.clear(); }

@@ -28,23 +28,27 @@ class Adjacency {
 
     /// Vertices that an edge joins to `v`, ascending.
     /// @pre `v` is a vertex (asserted).
-    [[nodiscard]] std::span<const Index> neighbours(Index v) const noexcept { return neighbours_[v]; }
+    [[nodiscard]] std::span<const Index> neighbours(Index v) const& noexcept { return neighbours_[v]; }
+    void neighbours(Index) && = delete;
 
     /// Triangles that have `v` as a corner, ascending.
     /// @pre `v` is a vertex (asserted).
-    [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return around_.triangles_of(v); }
+    [[nodiscard]] std::span<const Index> triangles_of(Index v) const& noexcept { return around_.triangles_of(v); }
+    void triangles_of(Index) && = delete;
 
     /// The triangle across each side of `f`, side k running from corner k to the next; `no_index` at a border.
     /// @pre `f` is a triangle (asserted).
-    [[nodiscard]] const std::array<Index, 3>& triangle_neighbours(Index f) const noexcept {
+    [[nodiscard]] std::array<Index, 3> triangle_neighbours(Index f) const noexcept {
         return around_.triangle_neighbours(f);
     }
 
     /// The two vertices of each edge, the lower first; ascending.
-    [[nodiscard]] std::span<const std::array<Index, 2>> edges() const noexcept { return edges_; }
+    [[nodiscard]] std::span<const std::array<Index, 2>> edges() const& noexcept { return edges_; }
+    void edges() && = delete;
 
     /// Vertices on an edge that has one triangle only, ascending; empty if the surface is closed.
-    [[nodiscard]] std::span<const Index> border_vertices() const noexcept { return border_vertices_; }
+    [[nodiscard]] std::span<const Index> border_vertices() const& noexcept { return border_vertices_; }
+    void border_vertices() && = delete;
 
     /// Whether every edge has two triangles.
     [[nodiscard]] bool closed() const noexcept { return border_vertices_.empty(); }
@@ -61,6 +65,16 @@ class Adjacency {
     std::vector<Index> border_vertices_;
     CompressedRows<Index> neighbours_;
 };
+
+/// The two vertices of each edge of `mesh`, the lower first; ascending. O(F log F).
+template <Real Scalar>
+[[nodiscard]] std::vector<std::array<Index, 2>> edges(const TriangleMesh<Scalar>& mesh) {
+    std::vector<std::array<Index, 2>> all;
+    for_each_edge(half_edges(mesh.triangles()), [&](std::span<const HalfEdge> edge) {
+        all.push_back({edge[0].first, edge[0].second});
+    });
+    return all;
+}
 
 /// The vertices on the border of `mesh`, ascending, for example to pin a rim. O(F log F).
 template <Real Scalar>

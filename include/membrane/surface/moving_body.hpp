@@ -64,13 +64,16 @@ class MovingBody {
     [[nodiscard]] bool move_to(const ConstPointsRef<Scalar>& anchors, Scalar dt, PointsRef<Scalar> x) noexcept;
 
     /// Present anchors, 3 x V [m].
-    [[nodiscard]] const Points<Scalar>& anchors() const noexcept { return anchors_; }
+    [[nodiscard]] const Points<Scalar>& anchors() const& noexcept { return anchors_; }
+    [[nodiscard]] Points<Scalar> anchors() && noexcept { return std::move(anchors_); }
 
     /// Unit normals at the vertices of the surface of the anchors, 3 x V.
-    [[nodiscard]] const Points<Scalar>& normals() const noexcept { return normals_; }
+    [[nodiscard]] const Points<Scalar>& normals() const& noexcept { return normals_; }
+    [[nodiscard]] Points<Scalar> normals() && noexcept { return std::move(normals_); }
 
     /// The rigid motion from the mesh to the anchors, with the velocities of the last motion.
-    [[nodiscard]] const RigidFrame<Scalar>& pose() const noexcept { return pose_; }
+    [[nodiscard]] const RigidFrame<Scalar>& pose() const& noexcept { return pose_; }
+    [[nodiscard]] RigidFrame<Scalar> pose() && noexcept { return std::move(pose_); }
 
     /// Number of motions of the anchors that were not rigid. Each takes a membrane out of equilibrium.
     [[nodiscard]] std::uint64_t deformations() const noexcept { return deformations_; }
@@ -85,7 +88,8 @@ class MovingBody {
     [[nodiscard]] Eigen::Matrix<Scalar, 3, 3> rotation_at(Index v) const noexcept;
 
     /// The anchors of the undeformed body: the positions of the mesh.
-    [[nodiscard]] const Points<Scalar>& anchors_at_rest() const noexcept { return at_rest_; }
+    [[nodiscard]] const Points<Scalar>& anchors_at_rest() const& noexcept { return at_rest_; }
+    [[nodiscard]] Points<Scalar> anchors_at_rest() && noexcept { return std::move(at_rest_); }
 
     ///@{
     /// A vertex becomes two; a vertex moves at rest, and its anchor with it: do not move one if `move_to` gets anchors.

@@ -7,6 +7,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/arctangent.hpp>
@@ -54,10 +55,11 @@ class VertexNormals {
     /// that a tear has doubled or moved since the last update count as moved. Returns these vertices, valid until the
     /// next update. No other normal changes, and only the corners of their triangles are read. Ignores an index that is
     /// no vertex; returns none if `x` does not have V columns. Linear in their number, no allocation.
-    std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) noexcept;
+    std::span<const Index> update(const ConstPointsRef<Scalar>& x, std::span<const Index> moved) & noexcept;
 
     /// 3 x V, unit length.
-    [[nodiscard]] const Points<Scalar>& values() const noexcept { return values_; }
+    [[nodiscard]] const Points<Scalar>& values() const& noexcept { return values_; }
+    [[nodiscard]] Points<Scalar> values() && noexcept { return std::move(values_); }
 
     ///@{
     /// A vertex becomes two, with one normal until the next update; a tear has moved a vertex. The normal at rest of
@@ -224,7 +226,7 @@ bool VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x) noexcept {
 
 template <Real Scalar>
 std::span<const Index> VertexNormals<Scalar>::update(const ConstPointsRef<Scalar>& x,
-                                                     std::span<const Index> moved) noexcept {
+                                                     std::span<const Index> moved) & noexcept {
     updated_.clear();
     if (x.cols() != values_.cols()) return {};
     for (const auto vertices : {moved, torn_.items()}) {

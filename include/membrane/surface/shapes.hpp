@@ -143,7 +143,7 @@ TriangleMesh<Scalar> concentric(Index rings, Position position) {
 template <Real Scalar, class Between>
 TriangleMesh<Scalar> refined(const TriangleMesh<Scalar>& mesh, Between between) {
     Index vertex_count = mesh.vertex_count();
-    Points<double> x(3, vertex_count + static_cast<Index>(Adjacency(mesh).edges().size()));
+    Points<double> x(3, vertex_count + static_cast<Index>(edges(mesh).size()));
     x.leftCols(vertex_count) = mesh.positions().template cast<double>();
     const Triangles triangles = detail::subdivided(mesh.triangles(), x, vertex_count, between);
     return TriangleMesh<Scalar>(x.cast<Scalar>(), triangles);

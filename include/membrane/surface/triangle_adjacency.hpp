@@ -32,11 +32,12 @@ class TriangleAdjacency {
     TriangleAdjacency(const TriangleMesh<Scalar>& mesh, std::span<const HalfEdge> sides);
 
     /// Triangles that have `v` as a corner, ascending. @pre `v` is a vertex (asserted).
-    [[nodiscard]] std::span<const Index> triangles_of(Index v) const noexcept { return triangles_of_[v]; }
+    [[nodiscard]] std::span<const Index> triangles_of(Index v) const& noexcept { return triangles_of_[v]; }
+    void triangles_of(Index) && = delete;
 
     /// The triangle across each side of `f`, side k running from corner k to the next; `no_index` at a border.
     /// @pre `f` is a triangle (asserted).
-    [[nodiscard]] const std::array<Index, 3>& triangle_neighbours(Index f) const noexcept {
+    [[nodiscard]] std::array<Index, 3> triangle_neighbours(Index f) const noexcept {
         MEMBRANE_ASSERT(f >= 0 && static_cast<std::size_t>(f) < neighbours_.size());
         return neighbours_[static_cast<std::size_t>(f)];
     }

@@ -6,6 +6,7 @@
 #include <span>
 #include <string_view>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <membrane/core/check.hpp>
@@ -51,10 +52,12 @@ class TriangleMesh {
     ///@}
 
     /// 3 x V [m].
-    [[nodiscard]] const Points<Scalar>& positions() const noexcept { return positions_; }
+    [[nodiscard]] const Points<Scalar>& positions() const& noexcept { return positions_; }
+    [[nodiscard]] Points<Scalar> positions() && noexcept { return std::move(positions_); }
 
     /// 3 x F.
-    [[nodiscard]] const Triangles& triangles() const noexcept { return triangles_; }
+    [[nodiscard]] const Triangles& triangles() const& noexcept { return triangles_; }
+    [[nodiscard]] Triangles triangles() && noexcept { return std::move(triangles_); }
 
   private:
     Points<Scalar> positions_;

@@ -34,7 +34,7 @@ struct VertexSplit {
     }
 
     /// The corners of triangle `f` until now. @pre takes(f)
-    [[nodiscard]] const std::array<Index, 3>& corners_of(Index f) const noexcept {
+    [[nodiscard]] std::array<Index, 3> corners_of(Index f) const noexcept {
         return corners[static_cast<std::size_t>(std::find(triangles.begin(), triangles.end(), f) - triangles.begin())];
     }
 

@@ -119,7 +119,7 @@ class Tearing {
     /// triangles around the path.
     template <class Network>
     [[nodiscard]] std::span<const Index> start_at(Index v, Scalar flaw, const ConstPointsRef<Scalar>& x,
-                                                  const Network& network) noexcept;
+                                                  const Network& network) & noexcept;
 
     /// The forces across opening edges: a constraint of the step.
     [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items()}; }
@@ -131,10 +131,12 @@ class Tearing {
                                 std::span<const Index> held = {}) noexcept;
 
     /// The tips within the membrane.
-    [[nodiscard]] std::span<const TearTip<Scalar>> tips() const noexcept { return tips_.items(); }
+    [[nodiscard]] std::span<const TearTip<Scalar>> tips() const& noexcept { return tips_.items(); }
+    void tips() && = delete;
 
     /// Triangles and rest positions by now.
-    [[nodiscard]] const TornSurface<Scalar>& surface() const noexcept { return surface_; }
+    [[nodiscard]] const TornSurface<Scalar>& surface() const& noexcept { return surface_; }
+    void surface() && = delete;
 
     /// Whether a tear did not advance in the last call because the reserve was too small.
     [[nodiscard]] bool reserve_used_up() const noexcept { return used_up_; }
@@ -382,7 +384,7 @@ Scalar Tearing<Scalar, Criterion>::list_start(const BorderState<Scalar>& border,
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 template <class Network>
 std::span<const Index> Tearing<Scalar, Criterion>::start_at(Index v, Scalar flaw, const ConstPointsRef<Scalar>& x,
-                                                            const Network& network) noexcept {
+                                                            const Network& network) & noexcept {
     used_up_ = false;
     if (v < 0 || v >= surface_.rest_positions().cols() || !(is_finite(flaw) && flaw > 0)) return {};
     if (!surface_.adjacency().on_border(v) || is_outer_border_[static_cast<std::size_t>(v)] == 0) return {};

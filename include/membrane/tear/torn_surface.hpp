@@ -34,9 +34,12 @@ class TornSurface {
 
     ///@{
     /// Triangles by now, 3 x F; rest positions by now, 3 x V [m]; neighbours.
-    [[nodiscard]] const Triangles& triangles() const noexcept { return triangles_; }
-    [[nodiscard]] const Points<Scalar>& rest_positions() const noexcept { return rest_; }
-    [[nodiscard]] const TriangleAdjacency& adjacency() const noexcept { return adjacency_; }
+    [[nodiscard]] const Triangles& triangles() const& noexcept { return triangles_; }
+    [[nodiscard]] Triangles triangles() && noexcept { return std::move(triangles_); }
+    [[nodiscard]] const Points<Scalar>& rest_positions() const& noexcept { return rest_; }
+    [[nodiscard]] Points<Scalar> rest_positions() && noexcept { return std::move(rest_); }
+    [[nodiscard]] const TriangleAdjacency& adjacency() const& noexcept { return adjacency_; }
+    void adjacency() && = delete;
     ///@}
 
     /// Vertices of triangle `f`.
@@ -75,7 +78,8 @@ class TornSurface {
 
     ///@{
     /// The changes since `begin`.
-    [[nodiscard]] std::span<const TearEvent<Scalar>> events() const noexcept { return events_.items(); }
+    [[nodiscard]] std::span<const TearEvent<Scalar>> events() const& noexcept { return events_.items(); }
+    void events() && = delete;
     void begin() noexcept;
     ///@}
 
