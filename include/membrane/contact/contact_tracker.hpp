@@ -67,8 +67,8 @@ class ContactTracker {
 
     /// The contact of `tool` with the surface at `x` (3 x V [m]). If the tool is not valid, or `x` has another number
     /// of vertices, returns no contact and leaves the state unchanged. Online. Cost: one or two segment casts, and a
-    /// query of the tree or, in contact, the triangles within detection distance and their neighbours. A tool behind the
-    /// surface adds ray casts if the surface is open, and winding numbers if it is closed.
+    /// query of the tree or, in contact, the triangles within detection distance and their neighbours. A tool behind
+    /// the surface adds ray casts if the surface is open, and winding numbers if it is closed.
     /// @pre `tree` was refitted to `x`
     [[nodiscard]] Contact<Scalar> update(const AabbTree<Scalar>& tree, const ConstPointsRef<Scalar>& x,
                                          const Tool<Scalar>& tool) noexcept {
