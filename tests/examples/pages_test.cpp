@@ -758,8 +758,8 @@ TEST_CASE_METHOD(Touched, "pages: equilibrium") {
     const auto report = solver.step(x, dt, network, foundation, press(tool, contact));
     // [equilibrium]
     const auto equilibrium = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact));
-    const double displacement = (x - equilibrium.x).colwise().norm().maxCoeff();   // error of the positions [m]
-    const double force = (report.reactions[0] - equilibrium.reactions[0]).norm();  // and of the force [N]
+    const double displacement = (x - equilibrium.x).colwise().norm().maxCoeff();   // of the positions [m]
+    const double force = (report.reactions[0] - equilibrium.reactions[0]).norm();  // of the force [N]
     // [/equilibrium]
     CHECK(equilibrium.converged);
     CHECK(displacement < 1e-5);

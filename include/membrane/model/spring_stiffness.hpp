@@ -12,7 +12,8 @@
 #include <membrane/surface/triangle.hpp>
 #include <membrane/surface/triangle_mesh.hpp>
 
-/// Constants of springs from those of a material, so that a force does not depend on the mesh.
+/// Constants of springs from those of a material, so that a force does not depend on the mesh, if the mesh resolves the
+/// tool: see `tool_radius`.
 ///
 ///     const auto network = membrane::MassSpringNetwork(mesh, membrane::LinearSpring{},
 ///                                                      {.stiffness = membrane::spring_stiffnesses(mesh, tissue),
