@@ -144,7 +144,7 @@ inline SoftTissue::SoftTissue(const membrane::RepairedMesh<float>& welded, std::
       rest_(solver_, tracker_, x_),
       last_tool_(tool),
       tool_(tool),
-      moved_(mesh_.vertex_count(), mesh_.triangle_count()),
+      moved_(mesh_.vertex_count()),
       shown_(x_),
       normals_(mesh_),
       copies_(static_cast<std::size_t>(mesh_.vertex_count())) {
@@ -180,8 +180,7 @@ inline void SoftTissue::tick() noexcept {
 
 inline void SoftTissue::show_all() noexcept {
     tree_.refit(x_);
-    moved_.replace_all(mesh_.triangles());
-    moved_.publish({}, x_, now());
+    moved_.publish_all(x_, now());
 }
 
 inline std::size_t SoftTissue::draw(std::span<EngineVertex> vertices) {
