@@ -14,6 +14,11 @@ if(MEMBRANE_USUAL_TYPES)
     target_precompile_headers(membrane_usual_types PRIVATE ${folder}/usual_types.hpp)
 endif()
 
+# Fewer collections of garbage: a tenth of the time of g++, for more memory.
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    string(APPEND CMAKE_CXX_FLAGS " --param=ggc-min-expand=100 --param=ggc-min-heapsize=1000000")
+endif()
+
 # membrane_program(<name> <source>...): an executable with the library, the warnings and the includes of its folder.
 function(membrane_program name)
     add_executable(${name} ${ARGN})

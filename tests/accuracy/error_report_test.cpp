@@ -18,7 +18,7 @@ TEST_CASE("nothing is known until something is", "[error_bound]") {
     CHECK(ForceEnclosure{}.max_distance_to(Vector3<double>(1, 2, 3)) == std::numeric_limits<double>::infinity());
 }
 
-TEMPLATE_TEST_CASE("no force that is enclosed is farther off than said", "[error_bound]", double, float) {
+TEMPLATE_TEST_CASE("no force that is enclosed is farther off than said", "[error_bound]", TEST_SCALARS) {
     test::Random random(1);
     for (int i = 0; i < 1000; ++i) {
         CAPTURE(i);

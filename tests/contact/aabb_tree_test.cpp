@@ -195,7 +195,7 @@ TEST_CASE("the nearest point is as near as the nearest of all triangles", "[tree
 
 TEST_CASE("the same in single precision", "[tree]") { compare_closest_points<float>(40, 5, 100); }
 
-TEMPLATE_TEST_CASE("a sphere touches the triangles that are near enough", "[tree]", float, double) {
+TEMPLATE_TEST_CASE("a sphere touches the triangles that are near enough", "[tree]", TEST_SCALARS) {
     using S = TestType;
     int touching = 0;
     for_each_query<S>(cases(1000), 20, [&](const Scene<S>& scene, Random& random, int) {
@@ -214,7 +214,7 @@ TEMPLATE_TEST_CASE("a sphere touches the triangles that are near enough", "[tree
     CHECK(touching > cases(100'000));
 }
 
-TEMPLATE_TEST_CASE("a box touches the triangles that it leaves something of", "[tree]", float, double) {
+TEMPLATE_TEST_CASE("a box touches the triangles that it leaves something of", "[tree]", TEST_SCALARS) {
     using S = TestType;
     int touching = 0;
     for_each_query<S>(cases(400), 10, [&](const Scene<S>& scene, Random& random, int) {
@@ -235,7 +235,7 @@ TEMPLATE_TEST_CASE("a box touches the triangles that it leaves something of", "[
     CHECK(touching > cases(10'000));
 }
 
-TEMPLATE_TEST_CASE("a capsule touches the triangles that are near enough to its axis", "[tree]", float, double) {
+TEMPLATE_TEST_CASE("a capsule touches the triangles that are near enough to its axis", "[tree]", TEST_SCALARS) {
     using S = TestType;
     int touching = 0;
     for_each_query<S>(cases(40), 4, [&](const Scene<S>& scene, Random& random, int i) {
@@ -255,7 +255,7 @@ TEMPLATE_TEST_CASE("a capsule touches the triangles that are near enough to its 
     CHECK(touching > cases(200));
 }
 
-TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tree]", float, double) {
+TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tree]", TEST_SCALARS) {
     using S = TestType;
     int hits = 0;
     for_each_query<S>(cases(1000), 20, [&](const Scene<S>& scene, Random& random, int) {
@@ -284,7 +284,7 @@ TEMPLATE_TEST_CASE("a segment first hits what no other triangle is before", "[tr
     CHECK(hits > cases(5000));
 }
 
-TEMPLATE_TEST_CASE("what touches only just, touches", "[tree]", float, double) {
+TEMPLATE_TEST_CASE("what touches only just, touches", "[tree]", TEST_SCALARS) {
     using S = TestType;
     // Squares of side 1; vertex v at (v % 9 - 4, v / 9 - 4), each inner one with six triangles.
     const auto mesh = sheet<S>({.width = 8, .height = 8, .columns = 8, .rows = 8});
@@ -327,7 +327,7 @@ TEMPLATE_TEST_CASE("what touches only just, touches", "[tree]", float, double) {
     }
 }
 
-TEMPLATE_TEST_CASE("a refit of what moved gives the bits of a refit of all", "[tree]", float, double) {
+TEMPLATE_TEST_CASE("a refit of what moved gives the bits of a refit of all", "[tree]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);
@@ -360,7 +360,7 @@ TEMPLATE_TEST_CASE("a refit of what moved gives the bits of a refit of all", "[t
     }
 }
 
-TEMPLATE_TEST_CASE("after random tears a tree equals one that is built anew", "[tree][tear]", float, double) {
+TEMPLATE_TEST_CASE("after random tears a tree equals one that is built anew", "[tree][tear]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
@@ -464,7 +464,7 @@ TEST_CASE("copies give equal results, and are independent", "[tree]") {
                   std::is_copy_assignable_v<AabbTree<double>>);
 }
 
-TEMPLATE_TEST_CASE("an engine's buffer is searched in place", "[tree]", float, double) {
+TEMPLATE_TEST_CASE("an engine's buffer is searched in place", "[tree]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 2});
     std::vector<S> buffer(static_cast<std::size_t>(8 * mesh.vertex_count()), S(99));
@@ -612,7 +612,7 @@ TEST_CASE("a threshold below 1 is refused by name", "[tree][bad]") {
           "AabbTree: balance_threshold must be at least 1, got 0");
 }
 
-TEMPLATE_TEST_CASE("a query that makes no sense finds nothing", "[tree][bad]", float, double) {
+TEMPLATE_TEST_CASE("a query that makes no sense finds nothing", "[tree][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
@@ -661,7 +661,7 @@ TEMPLATE_TEST_CASE("a query that makes no sense finds nothing", "[tree][bad]", f
     CHECK(all == mesh.triangle_count());
 }
 
-TEMPLATE_TEST_CASE("positions that are not finite hide their own triangles at most", "[tree][bad]", float, double) {
+TEMPLATE_TEST_CASE("positions that are not finite hide their own triangles at most", "[tree][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     for (int seed = 1; seed <= cases(400); ++seed) {

@@ -30,7 +30,7 @@ S sampled_distance(const Triangle<S>& triangle, const Tool<S>& tool) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("a contact point is where its feature is nearest, and the least gap is that of the tool",
-                   "[contact_point]", double, float) {
+                   "[contact_point]", TEST_SCALARS) {
     using S = TestType;
     constexpr std::array<Index, 3> corners{3, 1, 4};
     int none = 0;

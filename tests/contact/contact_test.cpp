@@ -7,7 +7,7 @@
 
 using namespace membrane;
 
-TEMPLATE_TEST_CASE("no contact touches nothing", "[contact]", double, float) {
+TEMPLATE_TEST_CASE("no contact touches nothing", "[contact]", TEST_SCALARS) {
     using S = TestType;
     const auto contact = Contact<S>::none();
     CHECK(contact.phase == ContactPhase::none);
@@ -32,7 +32,7 @@ TEST_CASE("a contact touches from its beginning to before its end", "[contact]")
     }
 }
 
-TEMPLATE_TEST_CASE("a contact is valid if its numbers are, or if it touches nothing", "[contact]", double, float) {
+TEMPLATE_TEST_CASE("a contact is valid if its numbers are, or if it touches nothing", "[contact]", TEST_SCALARS) {
     using S = TestType;
     const S bad = std::numeric_limits<S>::quiet_NaN();
     Contact<S> contact;

@@ -311,7 +311,7 @@ TEST_CASE("an open sheet is touched from either side, and the side of first cont
 }
 
 TEMPLATE_TEST_CASE("a shaft across a valley of a sheet, one end beyond the border, is behind it by its other end", "",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     const auto mesh = membrane::sheet<S>({.width = 1, .height = 1, .columns = 10, .rows = 10});
     for (const S side : {S(1), S(-1)}) {
@@ -445,8 +445,8 @@ std::vector<membrane::ContactPoint<S>> points_of(const TriangleMesh<S>& mesh, co
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("the contact points are those of all triangles within reach, each with its gap", "[tracker]", double,
-                   float) {
+TEMPLATE_TEST_CASE("the contact points are those of all triangles within reach, each with its gap", "[tracker]",
+                   TEST_SCALARS) {
     using S = TestType;
     const auto mesh = membrane::icosphere<S>({.radius = 1, .subdivisions = 3});
     const AabbTree<S> tree(mesh);

@@ -242,8 +242,8 @@ TEST_CASE("no offset without a ball's force, and what is refused") {
           "FacetCorrection: stiffness must be finite and not negative [N/m], got inf");
 }
 
-TEMPLATE_TEST_CASE("a ball that slides in the loop has a force that does not depend on the triangles", "", double,
-                   float) {
+TEMPLATE_TEST_CASE("a ball that slides in the loop has a force that does not depend on the triangles", "",
+                   TEST_SCALARS) {
     using S = TestType;
     const auto mesh = membrane::disc<S>({.radius = S(disc_radius), .rings = 8});
     const double edge = disc_radius / 8, radius = 2 * edge;

@@ -38,7 +38,7 @@ bool same(const Grasp<S>& a, const Grasp<S>& b) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("forceps take hold of the point they touch, and it goes with them", "[grasp]", double, float) {
+TEMPLATE_TEST_CASE("forceps take hold of the point they touch, and it goes with them", "[grasp]", TEST_SCALARS) {
     using S = TestType;
     const S tolerance = 16 * std::numeric_limits<S>::epsilon();
     for (int seed = 1; seed <= cases(50); ++seed) {

@@ -47,7 +47,7 @@ long double distance_from_axis(const Triangle<S>& triangle, const Tool<S>& tool)
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a tool is valid if all its numbers are and its radius is not negative", "[tool]", double, float) {
+TEMPLATE_TEST_CASE("a tool is valid if all its numbers are and its radius is not negative", "[tool]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const Tool<S> good{.position = {1, 2, 3}, .axis = {0, 0, 1}, .radius = S(0.1), .velocity = {1, 0, 0}, .time = 5};
@@ -76,7 +76,7 @@ TEMPLATE_TEST_CASE("a tool is valid if all its numbers are and its radius is not
     CHECK(is_valid(tool));
 }
 
-TEMPLATE_TEST_CASE("a tool is carried into a body's frame with all its parts", "[tool]", double, float) {
+TEMPLATE_TEST_CASE("a tool is carried into a body's frame with all its parts", "[tool]", TEST_SCALARS) {
     using S = TestType;
     const S tolerance = 32 * std::numeric_limits<S>::epsilon();
     for (int seed = 1; seed <= cases(100); ++seed) {
@@ -97,14 +97,14 @@ TEMPLATE_TEST_CASE("a tool is carried into a body's frame with all its parts", "
     }
 }
 
-TEMPLATE_TEST_CASE("a sphere comes near a triangle in one way, a capsule in five", "[tool]", double, float) {
+TEMPLATE_TEST_CASE("a sphere comes near a triangle in one way, a capsule in five", "[tool]", TEST_SCALARS) {
     using S = TestType;
     CHECK(feature_pairs(Tool<S>{}) == 1);
     CHECK(feature_pairs(Tool<S>{.radius = 1}) == 1);
     CHECK(feature_pairs(Tool<S>{.axis = {0, 0, std::numeric_limits<S>::denorm_min()}}) == 5);
 }
 
-TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangle", "[tool]", double, float) {
+TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangle", "[tool]", TEST_SCALARS) {
     using S = TestType;
     const S tolerance = sizeof(S) == 4 ? S(2e-6) : S(1e-11);
     int edges = 0, ends = 0, stuck = 0;
@@ -151,7 +151,7 @@ TEMPLATE_TEST_CASE("the nearest of all pairs is the distance of tool and triangl
     }
 }
 
-TEMPLATE_TEST_CASE("a shaft along a triangle, by hand", "[tool]", double, float) {
+TEMPLATE_TEST_CASE("a shaft along a triangle, by hand", "[tool]", TEST_SCALARS) {
     using S = TestType;
     const Triangle<S> triangle{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}};
     // Across the corner, one unit above: both ends are beyond the edges, the axis over two of them.

@@ -117,7 +117,7 @@ TriangleMesh<double> separate(Index count, Place place) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("sets are split at the middle, or shared out evenly", "[tree_topology]", float, double) {
+TEMPLATE_TEST_CASE("sets are split at the middle, or shared out evenly", "[tree_topology]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);

@@ -53,7 +53,7 @@ struct LetGo {
 }  // namespace
 
 TEMPLATE_TEST_CASE("a membrane that is let go in a fluid comes to rest, and the drag takes its energy", "[fluid]",
-                   double, float) {
+                   TEST_SCALARS) {
     const double rate = 20 * stiffness;
     LetGo<TestType, NoFoundation> alone(rate);
     LetGo<TestType, VirtualVolumeSprings<TestType>> on_body(rate);

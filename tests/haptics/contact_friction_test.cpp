@@ -32,7 +32,7 @@ HapticState<S> touching(const Vector3<S>& position, const Vector3<S>& normal, S 
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a tool sticks up to the cone, slips on it, and sticks again", "[friction]", double, float) {
+TEMPLATE_TEST_CASE("a tool sticks up to the cone, slips on it, and sticks again", "[friction]", TEST_SCALARS) {
     using S = TestType;
     // 1 N along the normal, so 0.2 N along the surface at most: 2 mm of sticking.
     ContactFriction<SpringDamperForce, S> feel({.stiffness = 100}, {.coefficient = 0.2, .stiffness = 100});

@@ -28,7 +28,7 @@ std::vector<Waypoint<S>> simple_script() {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("the tool follows its script in straight lines", "[device]", double, float) {
+TEMPLATE_TEST_CASE("the tool follows its script in straight lines", "[device]", TEST_SCALARS) {
     using S = TestType;
     ScriptedDevice<S> device(simple_script<S>(), {.tick = 0.25, .radius = 0.125});
     const S tolerance = 8 * std::numeric_limits<S>::epsilon();
@@ -119,7 +119,7 @@ TEST_CASE("a script of one waypoint lasts a tick", "[device]") {
     CHECK_FALSE(device.running());
 }
 
-TEMPLATE_TEST_CASE("the device keeps the last force, and restarts as it began", "[device]", double, float) {
+TEMPLATE_TEST_CASE("the device keeps the last force, and restarts as it began", "[device]", TEST_SCALARS) {
     using S = TestType;
     ScriptedDevice<S> device(simple_script<S>(), {.tick = 0.25});
     CHECK(device.force() == Vector3<S>(0, 0, 0));
@@ -149,7 +149,7 @@ TEST_CASE("a device is copied and moved in the middle of its script", "[device]"
     STATIC_REQUIRE_FALSE(Device<ScriptedDevice<float>, double>);
 }
 
-TEMPLATE_TEST_CASE("scripts and options that make no sense are refused by name", "[device][bad]", double, float) {
+TEMPLATE_TEST_CASE("scripts and options that make no sense are refused by name", "[device][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const auto refused = [](const std::vector<Waypoint<S>>& script, const ScriptedDeviceOptions& options = {}) {

@@ -27,7 +27,7 @@ HapticState<S> touching(const Vector3<S>& position, const Vector3<S>& normal) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("between solves the reaction goes on as the tangent says", "[extrapolated]", double, float) {
+TEMPLATE_TEST_CASE("between solves the reaction goes on as the tangent says", "[extrapolated]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);

@@ -89,7 +89,7 @@ class FaultInjector {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew", "[limits]", double, float) {
+TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew", "[limits]", TEST_SCALARS) {
     using S = TestType;
     const auto device = devices::touch;
     const LimitOptions options;
@@ -135,8 +135,8 @@ TEMPLATE_TEST_CASE("whatever goes wrong, each tick keeps within device and slew"
     CHECK(limit.thermal_load() < 1);
 }
 
-TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the device bears", "[limits]", double,
-                   float) {
+TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the device bears", "[limits]",
+                   TEST_SCALARS) {
     using S = TestType;
     const LimitOptions options;
     test::HapticLoop<S> loop(11);
@@ -184,7 +184,7 @@ TEMPLATE_TEST_CASE("whatever goes wrong in a whole loop, the hand gets what the 
     CHECK(loop.refused > 0);
 }
 
-TEMPLATE_TEST_CASE("inside the limits a force passes with the same bits", "[limits]", double, float) {
+TEMPLATE_TEST_CASE("inside the limits a force passes with the same bits", "[limits]", TEST_SCALARS) {
     using S = TestType;
     const auto device = devices::phantom_desktop;
     for (int seed = 1; seed <= cases(200); ++seed) {
@@ -318,8 +318,8 @@ TEST_CASE("a force that turns about goes through zero", "[limits]") {
     for (int i = 0; i < 100; ++i) REQUIRE(size_of(loop.tick({0, 0, i % 2 == 0 ? 1.0 : -1.0})) <= 0.165);
 }
 
-TEMPLATE_TEST_CASE("however a force jumps and turns, its change is bounded but for a fall to zero", "[limits]", double,
-                   float) {
+TEMPLATE_TEST_CASE("however a force jumps and turns, its change is bounded but for a fall to zero", "[limits]",
+                   TEST_SCALARS) {
     using S = TestType;
     const double slew = devices::touch.peak_force / LimitOptions{}.rise_time;
     constexpr double rounding = 8 * static_cast<double>(std::numeric_limits<S>::epsilon());

@@ -42,7 +42,7 @@ HapticState<S> pulling(const Vector3<S>& displacement, const Vector3<S>& velocit
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("touching, the force is depth and velocity along the normal", "[force]", double, float) {
+TEMPLATE_TEST_CASE("touching, the force is depth and velocity along the normal", "[force]", TEST_SCALARS) {
     using S = TestType;
     const SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
     for (int seed = 1; seed <= cases(300); ++seed) {
@@ -63,7 +63,7 @@ TEMPLATE_TEST_CASE("touching, the force is depth and velocity along the normal",
     CHECK(stiff(touching<S>(S(0.5), {0, 0, 1}, {5, 5, 5})) == Vector3<S>(0, 0, 100));
 }
 
-TEMPLATE_TEST_CASE("touching nothing and holding nothing there is no force", "[force]", double, float) {
+TEMPLATE_TEST_CASE("touching nothing and holding nothing there is no force", "[force]", TEST_SCALARS) {
     using S = TestType;
     const SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
     for (const auto phase : {ContactPhase::none, ContactPhase::ended}) {
@@ -76,7 +76,7 @@ TEMPLATE_TEST_CASE("touching nothing and holding nothing there is no force", "[f
     CHECK(feel(state).z() == Approx(10));
 }
 
-TEMPLATE_TEST_CASE("pulling, the force opposes the displacement of the held point", "[force]", double, float) {
+TEMPLATE_TEST_CASE("pulling, the force opposes the displacement of the held point", "[force]", TEST_SCALARS) {
     using S = TestType;
     const SpringDamperForce feel{.stiffness = 100, .damping = 0.5};
     for (int seed = 1; seed <= cases(300); ++seed) {
@@ -95,7 +95,7 @@ TEMPLATE_TEST_CASE("pulling, the force opposes the displacement of the held poin
     CHECK(feel(pulling<S>({0, 0, 0}, {1, 1, 1})) == Vector3<S>(0, 0, 0));  // where it was at first: no direction
 }
 
-TEMPLATE_TEST_CASE("the reaction is fed back, all of it, scaled", "[force]", double, float) {
+TEMPLATE_TEST_CASE("the reaction is fed back, all of it, scaled", "[force]", TEST_SCALARS) {
     using S = TestType;
     HapticState<S> state{};
     CHECK(ReactionForce{}(state) == Vector3<S>(0, 0, 0));
@@ -106,7 +106,7 @@ TEMPLATE_TEST_CASE("the reaction is fed back, all of it, scaled", "[force]", dou
     CHECK(ReactionForce{.scale = 0}(state) == Vector3<S>(0, 0, 0));
 }
 
-TEMPLATE_TEST_CASE("no force is ever no number", "[force][bad]", double, float) {
+TEMPLATE_TEST_CASE("no force is ever no number", "[force][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const std::vector<S> wild{0,

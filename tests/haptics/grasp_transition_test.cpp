@@ -20,7 +20,7 @@ using test::Random;
 static_assert(ForcePolicy<GraspTransition<SpringDamperForce>, double>);
 static_assert(ForcePolicy<GraspTransition<SpringDamperForce, float>, float>);
 
-TEMPLATE_TEST_CASE("taking hold and letting go, the force does not jump", "[transition]", double, float) {
+TEMPLATE_TEST_CASE("taking hold and letting go, the force does not jump", "[transition]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);

@@ -117,7 +117,7 @@ TEST_CASE("nothing is torn, goes back or is older than the last complete publish
     CHECK(seen > 1);
 }
 
-TEMPLATE_TEST_CASE("all that has moved since the last read is read, and hardly more", "[handover]", double, float) {
+TEMPLATE_TEST_CASE("all that has moved since the last read is read, and hardly more", "[handover]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
@@ -152,7 +152,7 @@ TEMPLATE_TEST_CASE("all that has moved since the last read is read, and hardly m
 }
 
 TEMPLATE_TEST_CASE("what a tear changes is read as well: copies, moved vertices, corners of triangles", "[handover]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     const auto mesh = with_reserve(disc<S>({.radius = 1, .rings = 5}), 30);
     const TornSurface<S> whole(mesh);

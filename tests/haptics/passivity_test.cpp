@@ -475,7 +475,7 @@ TEST_CASE("friction and a coarse position are counted rightly on any path", "[pa
     }
 }
 
-TEMPLATE_TEST_CASE("the observer counts what a held force does", "[passivity]", double, float) {
+TEMPLATE_TEST_CASE("the observer counts what a held force does", "[passivity]", TEST_SCALARS) {
     using S = TestType;
     PassivityObserver observer;
     observer.update<S>({0, 0, 0}, {0, 0, 2}, 1e-3);

@@ -74,7 +74,7 @@ struct German : std::numpunct<char> {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a recording comes back from its file to the bit", "[recording]", double, float) {
+TEMPLATE_TEST_CASE("a recording comes back from its file to the bit", "[recording]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -186,8 +186,8 @@ TEST_CASE("a tick that is not right is refused with its number", "[recording][ba
     CHECK(refused(head + tick) == "read_recording: grasping must be 0 or 1, got 2");
 }
 
-TEMPLATE_TEST_CASE("any bit of a recording that is flipped, and any cut, is refused", "[recording][bad]", double,
-                   float) {
+TEMPLATE_TEST_CASE("any bit of a recording that is flipped, and any cut, is refused", "[recording][bad]",
+                   TEST_SCALARS) {
     using S = TestType;
     Random random(2);
     auto recording = test::wild_recording<S>(random, 4);
@@ -220,7 +220,7 @@ TEST_CASE("random damage to a recording is refused", "[recording][bad]") {
     }
 }
 
-TEMPLATE_TEST_CASE("every number of a recording can be read from its table", "[recording]", double, float) {
+TEMPLATE_TEST_CASE("every number of a recording can be read from its table", "[recording]", TEST_SCALARS) {
     using S = TestType;
     Random random(3);
     Recording<S> recording{.vertex_count = 12};

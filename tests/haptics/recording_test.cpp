@@ -99,7 +99,7 @@ std::size_t differing(Loop<S>& loop, const Recording<S>& recording) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a replay from reset gives the same forces to the bit", "[recording]", double, float) {
+TEMPLATE_TEST_CASE("a replay from reset gives the same forces to the bit", "[recording]", TEST_SCALARS) {
     using S = TestType;
     const int ticks = cases(10'000, 100'000);
     Loop<S> loop;
@@ -135,7 +135,7 @@ TEST_CASE("a replay that is not the same run is reported", "[recording]") {
     CHECK(device.first_difference() == 1234);
 }
 
-TEMPLATE_TEST_CASE("a recorder keeps the first ticks and counts the others", "[recording]", double, float) {
+TEMPLATE_TEST_CASE("a recorder keeps the first ticks and counts the others", "[recording]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -159,7 +159,7 @@ TEMPLATE_TEST_CASE("a recorder keeps the first ticks and counts the others", "[r
     }
 }
 
-TEMPLATE_TEST_CASE("a replay returns tools to the bit and compares forces", "[recording]", double, float) {
+TEMPLATE_TEST_CASE("a replay returns tools to the bit and compares forces", "[recording]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -191,7 +191,7 @@ TEMPLATE_TEST_CASE("a replay returns tools to the bit and compares forces", "[re
     }
 }
 
-TEMPLATE_TEST_CASE("ticks are identical if all of their bits are", "[recording]", double, float) {
+TEMPLATE_TEST_CASE("ticks are identical if all of their bits are", "[recording]", TEST_SCALARS) {
     using S = TestType;
     const RecordedTick<S> zero;
     CHECK(identical(zero, zero));

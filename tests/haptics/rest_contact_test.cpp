@@ -77,7 +77,7 @@ double lost_on_a_turn(const ClosedPath& path, Feel feel) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("depth and normal are distance to the surface at rest and its gradient", "[rest]", double, float) {
+TEMPLATE_TEST_CASE("depth and normal are distance to the surface at rest and its gradient", "[rest]", TEST_SCALARS) {
     using S = TestType;
     const S rounding = S(4e-2) * std::numeric_limits<S>::epsilon();  // [m]
     for (int seed = 1; seed <= cases(20); ++seed) {
@@ -175,7 +175,7 @@ TEST_CASE("a shaft is felt where it is deepest, an open surface from its side an
     CHECK_FALSE(flat(above, at(0, 2e-3)).touching());
 }
 
-TEMPLATE_TEST_CASE("what is no tool is not felt", "[rest][bad]", double, float) {
+TEMPLATE_TEST_CASE("what is no tool is not felt", "[rest][bad]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = S(0.01), .subdivisions = 1});
     const auto rest = RestContact(mesh);

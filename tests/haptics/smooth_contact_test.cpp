@@ -42,7 +42,7 @@ TriangleMesh<S> uneven_ball(Random& random, Index subdivisions, double unevennes
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("the proxy has the tool along its normal, above and below the surface", "[smooth]", double, float) {
+TEMPLATE_TEST_CASE("the proxy has the tool along its normal, above and below the surface", "[smooth]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -115,7 +115,7 @@ TEST_CASE("however small the steps of a tool, its normal turns in proportion", "
     }
 }
 
-TEMPLATE_TEST_CASE("at a vertex its normal, on an edge both, beyond a border the border's", "[smooth]", double, float) {
+TEMPLATE_TEST_CASE("at a vertex its normal, on an edge both, beyond a border the border's", "[smooth]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = sheet<S>({.width = 2, .height = 2, .columns = 1, .rows = 1});  // two triangles
     const auto smooth = SmoothContact(mesh);

@@ -28,7 +28,7 @@ Vector3<S> wall(const Tool<S>& tool, S stiffness) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("at rest two springs in a row are felt", "[coupling]", double, float) {
+TEMPLATE_TEST_CASE("at rest two springs in a row are felt", "[coupling]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);

@@ -9,7 +9,7 @@
 
 using namespace membrane;
 
-TEMPLATE_TEST_CASE("quality is that of closed forms on regular surfaces", "[quality]", double, float) {
+TEMPLATE_TEST_CASE("quality is that of closed forms on regular surfaces", "[quality]", TEST_SCALARS) {
     using S = TestType;
     const auto regular = quality_of(icosphere<S>({.radius = 2, .subdivisions = 0}));
     CHECK(regular.smallest_angle == Approx(60));

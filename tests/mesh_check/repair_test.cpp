@@ -67,7 +67,7 @@ Surface<S> broken_surface(Random& random) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("repair does nothing unasked", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("repair does nothing unasked", "[mesh]", TEST_SCALARS) {
     using S = TestType;
     const RepairOptions everything{.weld = 0.0,
                                    .drop_repeated = true,
@@ -95,7 +95,7 @@ TEMPLATE_TEST_CASE("repair does nothing unasked", "[mesh]", double, float) {
     }
 }
 
-TEMPLATE_TEST_CASE("each kind that can be repaired is, and nothing else", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("each kind that can be repaired is, and nothing else", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= cases(40) + 8; ++seed) {
@@ -171,7 +171,7 @@ TEMPLATE_TEST_CASE("each kind that can be repaired is, and nothing else", "[mesh
     }
 }
 
-TEMPLATE_TEST_CASE("whole components are turned outward, and fans parted", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("whole components are turned outward, and fans parted", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= cases(40) + 8; ++seed) {
@@ -211,7 +211,7 @@ TEMPLATE_TEST_CASE("whole components are turned outward, and fans parted", "[mes
 }
 
 TEMPLATE_TEST_CASE("triangles of a closed component are turned to face outward, however many are wrong", "[mesh][bad]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(60) + 8; ++seed) {
         CAPTURE(seed);
@@ -265,7 +265,7 @@ TEMPLATE_TEST_CASE("triangles of a closed component are turned to face outward, 
     }
 }
 
-TEMPLATE_TEST_CASE("whatever is broken, repair comes back with what it says", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("whatever is broken, repair comes back with what it says", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= cases(300); ++seed) {

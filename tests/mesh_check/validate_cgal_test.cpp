@@ -70,8 +70,8 @@ Surface<S> random_crossing(Random& random) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("repeated, duplicate, isolated and coincident are those of CGAL", "[mesh][cgal][bad]", double,
-                   float) {
+TEMPLATE_TEST_CASE("repeated, duplicate, isolated and coincident are those of CGAL", "[mesh][cgal][bad]",
+                   TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);
@@ -109,8 +109,8 @@ TEMPLATE_TEST_CASE("repeated, duplicate, isolated and coincident are those of CG
     }
 }
 
-TEMPLATE_TEST_CASE("a mesh of whole triangles is valid where CGAL takes it for one", "[mesh][cgal][bad]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a mesh of whole triangles is valid where CGAL takes it for one", "[mesh][cgal][bad]",
+                   TEST_SCALARS) {
     using S = TestType;
     std::array<int, 2> counts{};
     for (int seed = 1; seed <= cases(500); ++seed) {
@@ -189,7 +189,7 @@ TEST_CASE("vertices that join fans are those that CGAL calls non-manifold", "[me
     }
 }
 
-TEMPLATE_TEST_CASE("degenerate triangles, needles and caps are those of CGAL", "[mesh][cgal][bad]", double, float) {
+TEMPLATE_TEST_CASE("degenerate triangles, needles and caps are those of CGAL", "[mesh][cgal][bad]", TEST_SCALARS) {
     using S = TestType;
     std::array<int, 3> counts{};
     const double flattest = 179.999 * std::numbers::pi / 180;
@@ -228,7 +228,7 @@ TEMPLATE_TEST_CASE("degenerate triangles, needles and caps are those of CGAL", "
     for (const int count : counts) CHECK(count >= cases(20));
 }
 
-TEMPLATE_TEST_CASE("triangles that meet are those that CGAL finds", "[mesh][cgal][bad]", double, float) {
+TEMPLATE_TEST_CASE("triangles that meet are those that CGAL finds", "[mesh][cgal][bad]", TEST_SCALARS) {
     using S = TestType;
     std::array<int, 2> counts{};
     for (int seed = 1; seed <= cases(150) + 8; ++seed) {
@@ -276,7 +276,7 @@ TEST_CASE("triangles on a coarse grid meet as CGAL says", "[mesh][cgal][bad]") {
     for (const int count : shared) CHECK(count > cases(20));
 }
 
-TEMPLATE_TEST_CASE("facts are those of CGAL", "[mesh][cgal]", double, float) {
+TEMPLATE_TEST_CASE("facts are those of CGAL", "[mesh][cgal]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(100) + 8; ++seed) {
         CAPTURE(seed);

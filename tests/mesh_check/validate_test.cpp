@@ -96,7 +96,7 @@ const int variants = std::max(12, cases(12, 10));  // each kind must be seen oft
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("what is missing or names no vertex is reported", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("what is missing or names no vertex is reported", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= variants; ++seed) {
@@ -137,7 +137,7 @@ TEMPLATE_TEST_CASE("what is missing or names no vertex is reported", "[mesh][bad
     }
 }
 
-TEMPLATE_TEST_CASE("shapes that are none are refused by validation as by the mesh", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("shapes that are none are refused by validation as by the mesh", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     const Surface<S> t = test::tetrahedron<S>();
     using Any = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic>;
@@ -178,7 +178,7 @@ TEMPLATE_TEST_CASE("shapes that are none are refused by validation as by the mes
     CHECK(validate(Eigen::Matrix<S, 3, 4>(t.x), t.triangles).empty());
 }
 
-TEMPLATE_TEST_CASE("what is odd about the numbers is reported", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("what is odd about the numbers is reported", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     using Limits = std::numeric_limits<S>;
@@ -216,7 +216,7 @@ TEMPLATE_TEST_CASE("what is odd about the numbers is reported", "[mesh][bad]", d
     }
 }
 
-TEMPLATE_TEST_CASE("what is odd about edges and fans is reported", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("what is odd about edges and fans is reported", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= variants; ++seed) {
@@ -279,7 +279,7 @@ TEMPLATE_TEST_CASE("what is odd about edges and fans is reported", "[mesh][bad]"
     }
 }
 
-TEMPLATE_TEST_CASE("vertices at one place, and nearly so, are reported", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("vertices at one place, and nearly so, are reported", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= variants; ++seed) {
@@ -311,7 +311,7 @@ TEMPLATE_TEST_CASE("vertices at one place, and nearly so, are reported", "[mesh]
     }
 }
 
-TEMPLATE_TEST_CASE("triangles of a bad shape are reported", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("triangles of a bad shape are reported", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= variants; ++seed) {
@@ -353,7 +353,7 @@ TEMPLATE_TEST_CASE("triangles of a bad shape are reported", "[mesh][bad]", doubl
     }
 }
 
-TEMPLATE_TEST_CASE("what is odd about whole surfaces is reported", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("what is odd about whole surfaces is reported", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
     for (int seed = 1; seed <= variants; ++seed) {
@@ -431,7 +431,7 @@ TEMPLATE_TEST_CASE("what is odd about whole surfaces is reported", "[mesh][bad]"
     }
 }
 
-TEMPLATE_TEST_CASE("what is odd but as it may be is not reported", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("what is odd but as it may be is not reported", "[mesh]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= variants; ++seed) {
         CAPTURE(seed);
@@ -454,7 +454,7 @@ TEMPLATE_TEST_CASE("what is odd but as it may be is not reported", "[mesh]", dou
     }
 }
 
-TEMPLATE_TEST_CASE("a thousand valid meshes give an empty report", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("a thousand valid meshes give an empty report", "[mesh]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(500); ++seed) {
         CAPTURE(seed);
@@ -469,7 +469,7 @@ TEMPLATE_TEST_CASE("a thousand valid meshes give an empty report", "[mesh]", dou
     }
 }
 
-TEMPLATE_TEST_CASE("validation and the mesh agree on meshes changed at random", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("validation and the mesh agree on meshes changed at random", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     int refused = 0;
     for (int seed = 1; seed <= cases(1500); ++seed) {
@@ -497,7 +497,7 @@ TEMPLATE_TEST_CASE("validation and the mesh agree on meshes changed at random", 
     CHECK(refused < cases(1200));
 }
 
-TEMPLATE_TEST_CASE("garbage ends in a report", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("garbage ends in a report", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(5000, 5000); ++seed) {
         CAPTURE(seed);
@@ -528,7 +528,7 @@ TEMPLATE_TEST_CASE("garbage ends in a report", "[mesh][bad]", double, float) {
     }
 }
 
-TEMPLATE_TEST_CASE("a fan all pairs of which meet is tested in part, and taken", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("a fan all pairs of which meet is tested in part, and taken", "[mesh]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= variants; ++seed) {  // row 40
         CAPTURE(seed);
@@ -574,7 +574,7 @@ TEST_CASE("a vertex beside an edge is on it within the tolerance, to any side", 
     }
 }
 
-TEMPLATE_TEST_CASE("what has an unusable corner has no edge for another's vertex", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("what has an unusable corner has no edge for another's vertex", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     const S far = std::sqrt(std::sqrt((std::numeric_limits<S>::max)()));
     for (const auto& [end, expected] : {std::pair(far, 0U), std::pair(S(20), 1U)}) {

@@ -95,8 +95,8 @@ struct Bonded {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("drawn off, a cohesive spring follows the bilinear law in each direction", "[cohesion]", double,
-                   float) {
+TEMPLATE_TEST_CASE("drawn off, a cohesive spring follows the bilinear law in each direction", "[cohesion]",
+                   TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -209,7 +209,7 @@ TEST_CASE("the stiffness bounds the energy that is stored and taken", "[cohesion
     CHECK(beyond > cases(5000) / 3);
 }
 
-TEMPLATE_TEST_CASE("cohesive springs in lanes have the same bits as alone", "[cohesion]", double, float) {
+TEMPLATE_TEST_CASE("cohesive springs in lanes have the same bits as alone", "[cohesion]", TEST_SCALARS) {
     using S = TestType;
     using Wide = Lanes<S>;
     for (int seed = 1; seed <= cases(100); ++seed) {
@@ -237,8 +237,8 @@ TEMPLATE_TEST_CASE("cohesive springs in lanes have the same bits as alone", "[co
     }
 }
 
-TEMPLATE_TEST_CASE("on a moving body springs are damaged by the displacement relative to it", "[cohesion]", double,
-                   float) {
+TEMPLATE_TEST_CASE("on a moving body springs are damaged by the displacement relative to it", "[cohesion]",
+                   TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(50); ++seed) {
         CAPTURE(seed);

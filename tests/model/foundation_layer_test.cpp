@@ -73,8 +73,8 @@ double recovery(const Capsule& capsule, Points<double> x, double begin, double e
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a foundation pulls with a stiffness along the normal and one across", "[foundation]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a foundation pulls with a stiffness along the normal and one across", "[foundation]",
+                   TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
     for (int seed = 1; seed <= cases(300); ++seed) {
@@ -202,7 +202,7 @@ TEST_CASE("foundation springs own what they know", "[foundation]") {
     CHECK(moved.force_on(7, {1, 2, 3}, {0, 0, 0}, 0.5).force == expected);
 }
 
-TEMPLATE_TEST_CASE("foundation springs that make no sense are refused by name", "[foundation][bad]", double, float) {
+TEMPLATE_TEST_CASE("foundation springs that make no sense are refused by name", "[foundation][bad]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
     const auto refused = [&](const FoundationOptions<S>& options) {

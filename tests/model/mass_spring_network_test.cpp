@@ -134,7 +134,7 @@ TEST_CASE("spring forces have zero sum and zero moment", "[network]") {
     SECTION("of one's own") { check(test::CubicSpring{}); }
 }
 
-TEMPLATE_TEST_CASE("a rigid motion causes no tension", "[network]", double, float) {
+TEMPLATE_TEST_CASE("a rigid motion causes no tension", "[network]", TEST_SCALARS) {
     using S = TestType;
     const auto check = [](const auto& law) {
         for (int seed = 1; seed <= cases(100); ++seed) {
@@ -162,7 +162,7 @@ TEMPLATE_TEST_CASE("a rigid motion causes no tension", "[network]", double, floa
     SECTION("exponential") { check(ExponentialSpring{}); }
 }
 
-TEMPLATE_TEST_CASE("one spring, by hand", "[network]", double, float) {
+TEMPLATE_TEST_CASE("one spring, by hand", "[network]", TEST_SCALARS) {
     using S = TestType;
     Points<S> x(3, 3);
     x << 0, 3, 0,  //
@@ -233,8 +233,7 @@ TEST_CASE("springs are the mesh's edges, seen alike from both ends", "[network]"
     }
 }
 
-TEMPLATE_TEST_CASE("a spring of length zero has no direction, no force, and its stiffness", "[network]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a spring of length zero has no direction, no force, and its stiffness", "[network]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
     for (const S rest : {S(0), S(1)}) {
@@ -263,7 +262,7 @@ TEST_CASE("forces are read from anybody's memory", "[network]") {
     CHECK(network.energy(interleaved) == network.energy(x));
 }
 
-TEMPLATE_TEST_CASE("masses, viscosities and pins are as given", "[network]", double, float) {
+TEMPLATE_TEST_CASE("masses, viscosities and pins are as given", "[network]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
     const MassSpringNetwork bare(mesh, LinearSpring{}, {.stiffness = S(1)});
@@ -289,8 +288,8 @@ TEMPLATE_TEST_CASE("masses, viscosities and pins are as given", "[network]", dou
     for (Index v = 0; v < 12; ++v) CHECK(clamped.pinned(v));
 }
 
-TEMPLATE_TEST_CASE("a negligible force is small beside the springs' and large beside rounding", "[network]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a negligible force is small beside the springs' and large beside rounding", "[network]",
+                   TEST_SCALARS) {
     using S = TestType;
     const S epsilon = std::numeric_limits<S>::epsilon();
     for (const S radius : {S(1e-3), S(1), S(1e3)}) {
@@ -356,7 +355,7 @@ TEST_CASE("a network owns what it knows", "[network]") {
     STATIC_REQUIRE(noexcept(copy.energy(std::declval<const ConstPointsRef<double>&>())));
 }
 
-TEMPLATE_TEST_CASE("a network that makes no sense is refused by name", "[network][bad]", double, float) {
+TEMPLATE_TEST_CASE("a network that makes no sense is refused by name", "[network][bad]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});  // 12 vertices, 30 edges
     const auto refused = [&](const NetworkOptions<S>& options) {

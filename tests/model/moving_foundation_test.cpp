@@ -37,8 +37,8 @@ Symmetric3<S> outward_stiffness(S normal, S tangential, const Vector3<S>& n) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("on a body that moves rigidly every model pulls as at rest, turned", "[moving_foundation]", double,
-                   float) {
+TEMPLATE_TEST_CASE("on a body that moves rigidly every model pulls as at rest, turned", "[moving_foundation]",
+                   TEST_SCALARS) {
     using S = TestType;
     const S tolerance = 3000 * std::numeric_limits<S>::epsilon();
     for (int seed = 1; seed <= cases(50); ++seed) {

@@ -11,8 +11,8 @@
 #include "support/catch.hpp"
 #include "support/hand_work.hpp"
 
-TEMPLATE_TEST_CASE("a 90 degree peel takes the adhesion energy per area, on three meshes", "[cohesion][peel]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a 90 degree peel takes the adhesion energy per area, on three meshes", "[cohesion][peel]",
+                   TEST_SCALARS) {
     for (const double edge : {12e-6, 8e-6, 6e-6}) {
         if (cases_are_slow && edge < 12e-6) continue;
         CAPTURE(edge);
@@ -26,7 +26,7 @@ TEMPLATE_TEST_CASE("a 90 degree peel takes the adhesion energy per area, on thre
 // The front is not straight: its vertices let go one by one, and the flap wrinkles. As in the example `peel`, the steps
 // are too few for an equilibrium, and take some energy.
 TEMPLATE_TEST_CASE("what peels a disc off is stored, or taken by what has let go and by the steps", "[cohesion][peel]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     using Vector = membrane::Vector3<S>;
     const membrane::Material material{.young_modulus = 3e6, .poisson_ratio = 1.0 / 3, .thickness = 2e-6};

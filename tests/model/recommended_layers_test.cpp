@@ -120,7 +120,7 @@ TEST_CASE("a chain of springs on a foundation falls as fast as is said", "[layer
 }
 
 TEMPLATE_TEST_CASE("a finer mesh needs as many more layers as it has shorter edges, and no mesh less than one",
-                   "[layers]", double, float) {
+                   "[layers]", TEST_SCALARS) {
     using S = TestType;
     const Material material{.young_modulus = 3e6, .poisson_ratio = 0.47, .thickness = 13e-6};
     const FoundationLayer soft{.young_modulus = 2e3, .poisson_ratio = 0.45, .thickness = 1e-3};

@@ -82,7 +82,7 @@ TEST_CASE("the check of spring laws finds what is wrong", "[network]") {
     CHECK_THAT(test::check_spring_law(Overflows{}), ContainsSubstring("response at"));
 }
 
-TEMPLATE_TEST_CASE("a linear spring is k (l - r)", "[network]", double, float) {
+TEMPLATE_TEST_CASE("a linear spring is k (l - r)", "[network]", TEST_SCALARS) {
     using S = TestType;
     const auto stretched = LinearSpring{}(SpringState<S>{40, 2, 3});
     CHECK(stretched.tension == 40);
@@ -96,8 +96,8 @@ TEMPLATE_TEST_CASE("a linear spring is k (l - r)", "[network]", double, float) {
     CHECK(point_like.energy == 5);
 }
 
-TEMPLATE_TEST_CASE("a spring of tension only is linear while it is stretched, and else not there", "[network]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a spring of tension only is linear while it is stretched, and else not there", "[network]",
+                   TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(1000); ++seed) {
         CAPTURE(seed);
@@ -117,7 +117,7 @@ TEMPLATE_TEST_CASE("a spring of tension only is linear while it is stretched, an
     CHECK((in_lanes(1).tension[0] == 0 && in_lanes(1).stiffness[0] == 0));
 }
 
-TEMPLATE_TEST_CASE("an exponential spring is the exponential, whatever the strain", "[network]", double, float) {
+TEMPLATE_TEST_CASE("an exponential spring is the exponential, whatever the strain", "[network]", TEST_SCALARS) {
     using S = TestType;
     const long double tolerance = 40 * static_cast<long double>(std::numeric_limits<S>::epsilon());
     for (int seed = 1; seed <= cases(3000); ++seed) {
@@ -148,8 +148,8 @@ TEMPLATE_TEST_CASE("an exponential spring is the exponential, whatever the strai
     }
 }
 
-TEMPLATE_TEST_CASE("beyond its strain limit an exponential spring goes on along its tangent", "[network]", double,
-                   float) {
+TEMPLATE_TEST_CASE("beyond its strain limit an exponential spring goes on along its tangent", "[network]",
+                   TEST_SCALARS) {
     using S = TestType;
     const S epsilon = std::numeric_limits<S>::epsilon();
     for (int seed = 1; seed <= cases(300); ++seed) {
@@ -176,7 +176,7 @@ TEMPLATE_TEST_CASE("beyond its strain limit an exponential spring goes on along 
     }
 }
 
-TEMPLATE_TEST_CASE("a spring that hardly stiffens is linear", "[network]", double, float) {
+TEMPLATE_TEST_CASE("a spring that hardly stiffens is linear", "[network]", TEST_SCALARS) {
     using S = TestType;
     const ExponentialSpring law{.stiffening = 1e-9, .strain_limit = 1};
     for (int seed = 1; seed <= cases(100); ++seed) {
@@ -191,8 +191,7 @@ TEMPLATE_TEST_CASE("a spring that hardly stiffens is linear", "[network]", doubl
     }
 }
 
-TEMPLATE_TEST_CASE("an exponential spring of rest length zero has no strain and is linear", "[network]", double,
-                   float) {
+TEMPLATE_TEST_CASE("an exponential spring of rest length zero has no strain and is linear", "[network]", TEST_SCALARS) {
     using S = TestType;
     const auto found = ExponentialSpring{}(SpringState<S>{40, 0, S(0.5)});
     CHECK(found.tension == 20);
@@ -200,7 +199,7 @@ TEMPLATE_TEST_CASE("an exponential spring of rest length zero has no strain and 
     CHECK(found.energy == 5);
 }
 
-TEMPLATE_TEST_CASE("wild lengths give finite results", "[network]", double, float) {
+TEMPLATE_TEST_CASE("wild lengths give finite results", "[network]", TEST_SCALARS) {
     using S = TestType;
     const S largest = std::sqrt(std::numeric_limits<S>::max()) / S(1e6);
     const ExponentialSpring hardest{.stiffening = 50, .strain_limit = sizeof(S) == 4 ? 0.6 : 1.0};

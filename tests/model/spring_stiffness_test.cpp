@@ -161,7 +161,7 @@ TEST_CASE("squares cut by a diagonal are a third too soft in shear, however smal
 }
 
 TEMPLATE_TEST_CASE("stiffnesses are those of the edges, areas and masses those of the vertices", "[calibration]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     Random random(1);
     const auto regular = spherical_cap<S>({.radius = 1, .diameter = 1.5, .rings = 5});

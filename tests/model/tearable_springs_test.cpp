@@ -201,7 +201,7 @@ void check_same(const auto& found, const auto& expected, const TornSurface<Scala
 }  // namespace
 
 TEMPLATE_TEST_CASE("vertices that split and move in any order leave springs and elements those of the torn mesh",
-                   "[tear]", double, float) {
+                   "[tear]", TEST_SCALARS) {
     const double tolerance = 3e4 * static_cast<double>(std::numeric_limits<TestType>::epsilon());
     int splits = 0, moves = 0;
     for (int seed = 1; seed <= cases(40); ++seed) {
@@ -321,8 +321,8 @@ TEST_CASE("foundations divide a vertex by area", "[tear]") {
     }
 }
 
-TEMPLATE_TEST_CASE("a solver that follows a cut finds the equilibrium that a new solver keeps", "[tear]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a solver that follows a cut finds the equilibrium that a new solver keeps", "[tear]",
+                   TEST_SCALARS) {
     const auto mesh = with_reserve(disc<TestType>({.radius = 1, .rings = 8}), 10);
     const auto pinned = border(mesh);
     const auto make = [&](const TriangleMesh<TestType>& of) {

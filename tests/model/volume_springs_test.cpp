@@ -37,7 +37,7 @@ Vector3<S> velocity_along(const Vector3<S>& u, const Vector3<S>& before, S dt) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a volume spring pulls as (5) says", "[network]", double, float) {
+TEMPLATE_TEST_CASE("a volume spring pulls as (5) says", "[network]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
     for (int seed = 1; seed <= cases(300); ++seed) {
@@ -115,7 +115,7 @@ TEST_CASE("without damping the force is the negative gradient of the energy", "[
     }
 }
 
-TEMPLATE_TEST_CASE("a spring without length does not act", "[network]", double, float) {
+TEMPLATE_TEST_CASE("a spring without length does not act", "[network]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
     const VirtualVolumeSprings foundation(mesh, {.stiffness = S(3), .damping = S(2)});
@@ -139,7 +139,7 @@ TEST_CASE("a volume spring without constants does not act", "[network]") {
     CHECK(none.force_on({1, 2, 3}).stiffness == 0);
 }
 
-TEMPLATE_TEST_CASE("no volume springs, no pull", "[network]", double, float) {
+TEMPLATE_TEST_CASE("no volume springs, no pull", "[network]", TEST_SCALARS) {
     using S = TestType;
     const auto pull = NoFoundation{}.force_on<S>(3, {1, 2, 3}, {4, 5, 6}, S(0.1));
     CHECK(pull.force == Vector3<S>(0, 0, 0));
@@ -147,7 +147,7 @@ TEMPLATE_TEST_CASE("no volume springs, no pull", "[network]", double, float) {
     STATIC_REQUIRE(std::is_empty_v<NoFoundation>);
 }
 
-TEMPLATE_TEST_CASE("beside springs that damp, one that does not is as it is alone", "[network]", double, float) {
+TEMPLATE_TEST_CASE("beside springs that damp, one that does not is as it is alone", "[network]", TEST_SCALARS) {
     using Wide = Lanes<TestType>;
     const auto lanes = [](auto number_of) { return Wide::of([&](std::size_t i) { return TestType(number_of(i)); }); };
     VolumeSpring<Wide> springs;
@@ -175,7 +175,7 @@ TEST_CASE("volume springs own what they know", "[network]") {
     CHECK(moved.force_on(7, {1, 2, 3}, {0, 0, 0}, 0.5).force == expected);
 }
 
-TEMPLATE_TEST_CASE("volume springs that make no sense are refused by name", "[network][bad]", double, float) {
+TEMPLATE_TEST_CASE("volume springs that make no sense are refused by name", "[network][bad]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 0});
     const auto refused = [&](const VolumeSpringOptions<S>& options) {

@@ -114,7 +114,7 @@ TEST_CASE("a million ticks allocate nothing", "[allocation]") {
 }
 
 TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand allocate nothing, whatever goes wrong",
-                   "[allocation]", double, float) {
+                   "[allocation]", TEST_SCALARS) {
     test::HapticLoop<TestType> loop(8);
     test::FaultInjector faults(9);
     const int ticks = cases(6'000, 500'000);  // of each scalar
@@ -149,7 +149,7 @@ TEST_CASE("nor does a step that several threads share", "[allocation]") {
     CHECK(moved > 0);
 }
 
-TEMPLATE_TEST_CASE("nor does whatever else a loop can hold", "[allocation]", double, float) {
+TEMPLATE_TEST_CASE("nor does whatever else a loop can hold", "[allocation]", TEST_SCALARS) {
     test::WholeLoop<TestType> usual(2);
     test::OddLoop<TestType> odd(3);
     const long allocated = allocated_by([&] {
@@ -164,7 +164,7 @@ TEMPLATE_TEST_CASE("nor does whatever else a loop can hold", "[allocation]", dou
     CHECK(odd.x.allFinite());
 }
 
-TEMPLATE_TEST_CASE("nor do bounds of the error and slopes of the force", "[allocation]", double, float) {
+TEMPLATE_TEST_CASE("nor do bounds of the error and slopes of the force", "[allocation]", TEST_SCALARS) {
     using S = TestType;
     test::WholeLoop<S> loop(7);
     ErrorBound quick(loop.network);

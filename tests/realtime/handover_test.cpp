@@ -46,8 +46,8 @@ struct BothLoops {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a hand-over allocates nothing and calls no system, and a hand neither", "[handover]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a hand-over allocates nothing and calls no system, and a hand neither", "[handover]",
+                   TEST_SCALARS) {
     const auto loops = std::make_unique<BothLoops<TestType>>();
     const int ticks = cases(100'000);
     const test::AllocationCount count;

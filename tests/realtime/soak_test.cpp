@@ -109,7 +109,7 @@ Stroke<S> stroke_after_reset(test::HapticLoop<S>& loop) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("a day of a hand leaves no trace: no memory, no drift, and each force within the profile", "[soak]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     const int ticks = cases(20'000, 432'000), hour = (std::max)(ticks / 24, 1);
     test::HapticLoop<S> new_loop(1);

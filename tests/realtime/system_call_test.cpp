@@ -59,7 +59,7 @@ TEST_CASE("a million ticks do not call the system", "[system_call]") {
 }
 
 TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand do not call the system, whatever goes wrong",
-                   "[system_call]", double, float) {
+                   "[system_call]", TEST_SCALARS) {
     test::HapticLoop<TestType> loop(10);
     test::FaultInjector faults(11);
     const auto child = without_system_calls([&] {
@@ -70,8 +70,8 @@ TEMPLATE_TEST_CASE("a million ticks of the complete loop of a hand do not call t
     CHECK(child.code == 0);
 }
 
-TEMPLATE_TEST_CASE("the loop of a membrane that tears off its body does not call the system", "[system_call]", double,
-                   float) {
+TEMPLATE_TEST_CASE("the loop of a membrane that tears off its body does not call the system", "[system_call]",
+                   TEST_SCALARS) {
     test::TearingHand<TestType> hand(12);
     test::TornLoop<TestType> loop;
     const auto child = without_system_calls([&] {

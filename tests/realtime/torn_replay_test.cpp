@@ -64,7 +64,7 @@ void check_same(const test::TornLoop<S>& a, const test::TornLoop<S>& b) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("a loop that tears is replayed to the bit, from its start and from any snapshot",
-                   "[recording][snapshot][tear]", double, float) {
+                   "[recording][snapshot][tear]", TEST_SCALARS) {
     using S = TestType;
     int torn_before = 0, torn_after = 0;
     for (int seed = 1; seed <= cases(3); ++seed) {

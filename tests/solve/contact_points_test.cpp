@@ -102,7 +102,7 @@ Vector3<S> rocking_of_one(const Triangle<S>& t, const Vector3<S>& weights, S mom
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("located points are the nearest ones of their features", "[contact]", float, double) {
+TEMPLATE_TEST_CASE("located points are the nearest ones of their features", "[contact]", TEST_SCALARS) {
     using S = TestType;
     const S slack = sizeof(S) == 4 ? S(1e-4) : S(1e-12);
     for (int seed = 1; seed <= cases(500); ++seed) {
@@ -129,7 +129,7 @@ TEMPLATE_TEST_CASE("located points are the nearest ones of their features", "[co
 }
 
 TEMPLATE_TEST_CASE("on a triangle too thin for its normal to be known a point is off by at most its thickness",
-                   "[contact]", float, double) {
+                   "[contact]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(500); ++seed) {
         CAPTURE(seed);
@@ -155,8 +155,8 @@ TEMPLATE_TEST_CASE("on a triangle too thin for its normal to be known a point is
     }
 }
 
-TEMPLATE_TEST_CASE("forces that act add the stiffness of rocking faces, and take it back with them", "[contact]", float,
-                   double) {
+TEMPLATE_TEST_CASE("forces that act add the stiffness of rocking faces, and take it back with them", "[contact]",
+                   TEST_SCALARS) {
     using S = TestType;
     const S slack = sizeof(S) == 4 ? S(1e-4) : S(1e-12);
     for (int seed = 1; seed <= cases(500); ++seed) {
@@ -188,8 +188,8 @@ TEMPLATE_TEST_CASE("forces that act add the stiffness of rocking faces, and take
     }
 }
 
-TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by what pushes them", "[contact]", float,
-                   double) {
+TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by what pushes them", "[contact]",
+                   TEST_SCALARS) {
     using S = TestType;
     const S slack = sizeof(S) == 4 ? S(1e-3) : S(1e-10);
     int touching = 0;
@@ -220,7 +220,7 @@ TEMPLATE_TEST_CASE("solved contacts push, never pull, and their corners move by 
     CHECK(touching > 0);
 }
 
-TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corners says", "[contact]", float, double) {
+TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corners says", "[contact]", TEST_SCALARS) {
     using S = TestType;
     const S slack = sizeof(S) == 4 ? S(1e-4) : S(1e-12);
     for (int seed = 1; seed <= cases(500); ++seed) {
@@ -251,7 +251,7 @@ TEMPLATE_TEST_CASE("one pass closes the gap as far as the compliance of the corn
     }
 }
 
-TEMPLATE_TEST_CASE("a point that presses far harder than what resists at it is let go", "[contact]", float, double) {
+TEMPLATE_TEST_CASE("a point that presses far harder than what resists at it is let go", "[contact]", TEST_SCALARS) {
     using S = TestType;
     Random random(1);
     Patch<S> patch(random, 4, random_tool<S>(random, false));
@@ -263,7 +263,7 @@ TEMPLATE_TEST_CASE("a point that presses far harder than what resists at it is l
     for (const auto& point : patch.unpacked()) CHECK(point.force.isZero(0));
 }
 
-TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals", "[contact]", float, double) {
+TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals", "[contact]", TEST_SCALARS) {
     using S = TestType;
     const S slack = sizeof(S) == 4 ? S(1e-5) : S(1e-12);
     for (int seed = 1; seed <= cases(500); ++seed) {
@@ -284,7 +284,7 @@ TEMPLATE_TEST_CASE("what is pushed out is outside, and moves along the normals",
 }
 
 TEMPLATE_TEST_CASE("beside a fixed corner that has no stiffness yet the free ones are pushed out as far as any",
-                   "[contact]", float, double) {
+                   "[contact]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);

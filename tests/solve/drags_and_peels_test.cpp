@@ -153,7 +153,7 @@ struct Loop {
 TEMPLATE_TEST_CASE(
     "random drags and peels, with nonsense among them, keep positions finite and forces in their cones, "
     "and replay to the bit",
-    "[cohesion][friction]", double, float) {
+    "[cohesion][friction]", TEST_SCALARS) {
     int let_go = 0, held = 0, slipped = 0;
     for (int seed = 1; seed <= cases(100, 2000); ++seed) {
         CAPTURE(seed);

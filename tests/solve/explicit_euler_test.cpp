@@ -119,8 +119,8 @@ TEST_CASE("a damped volume spring follows its closed form, too", "[euler]") {
         0.3);  // where it passes its anchor, the length has a kink
 }
 
-TEMPLATE_TEST_CASE("(2) and (3): the force changes the velocity, the new velocity moves the point", "[euler]", double,
-                   float) {
+TEMPLATE_TEST_CASE("(2) and (3): the force changes the velocity, the new velocity moves the point", "[euler]",
+                   TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(50); ++seed) {
         CAPTURE(seed);
@@ -197,7 +197,7 @@ TEST_CASE("anchors that move take the membrane along", "[euler]") {
     CHECK((x - anchors).cwiseAbs().maxCoeff() < 1e-9);
 }
 
-TEMPLATE_TEST_CASE("a step that cannot be made leaves everything as it was", "[euler][bad]", double, float) {
+TEMPLATE_TEST_CASE("a step that cannot be made leaves everything as it was", "[euler][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     Random random(1);

@@ -71,7 +71,7 @@ TEST_CASE("largest curvature of a vertex is that of its forces, for every law", 
     SECTION("of one's own") { largest_curvature_is_that_of_the_forces(test::CubicSpring{}); }
 }
 
-TEMPLATE_TEST_CASE("largest curvature by hand", "[curvature]", double, float) {
+TEMPLATE_TEST_CASE("largest curvature by hand", "[curvature]", TEST_SCALARS) {
     using S = TestType;
     // A flat star of six equal springs at rest: 3 k in the plane, nothing across.
     const auto mesh = disc<S>({.radius = 1, .rings = 1});

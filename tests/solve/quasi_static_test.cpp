@@ -139,7 +139,7 @@ void sweep_by_hand(Points<S>& x, S dt, const Linear<S>& network, const Volume& v
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a step is the sweeps over the queue, with either rule", "[solver]", double, float) {
+TEMPLATE_TEST_CASE("a step is the sweeps over the queue, with either rule", "[solver]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);
@@ -540,7 +540,7 @@ struct OneOfEach {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a bad time step is refused, and nothing has moved", "[solver][bad]", double, float) {
+TEMPLATE_TEST_CASE("a bad time step is refused, and nothing has moved", "[solver][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const Sphere<S> sphere;
@@ -553,7 +553,7 @@ TEMPLATE_TEST_CASE("a bad time step is refused, and nothing has moved", "[solver
 }
 
 TEMPLATE_TEST_CASE("a step whose residual force is beyond the range of numbers is refused, and nothing has moved",
-                   "[solver][bad]", double, float) {
+                   "[solver][bad]", TEST_SCALARS) {
     using S = TestType;
     const Sphere<S> sphere;
     const VirtualVolumeSprings<S> damped(sphere.mesh, {.stiffness = S(8), .damping = S(0.02)});
@@ -581,8 +581,7 @@ TEMPLATE_TEST_CASE("a step whose residual force is beyond the range of numbers i
     CHECK(refused > 0);
 }
 
-TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has moved", "[solver][bad]", double,
-                   float) {
+TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has moved", "[solver][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const Sphere<S> sphere;
@@ -648,7 +647,7 @@ TEMPLATE_TEST_CASE("constraints that make no sense are refused, and nothing has 
     CHECK(refused(PointAttachment<S>{0, {3, 4, 5}, Vector3<S>(S(0.5), S(0.5), S(0.5)), somewhere}));
 }
 
-TEMPLATE_TEST_CASE("positions that are no numbers are refused, and nothing has moved", "[solver][bad]", double, float) {
+TEMPLATE_TEST_CASE("positions that are no numbers are refused, and nothing has moved", "[solver][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const Sphere<S> sphere;
@@ -667,7 +666,7 @@ TEMPLATE_TEST_CASE("positions that are no numbers are refused, and nothing has m
     }
 }
 
-TEMPLATE_TEST_CASE("a target so far off that forces are no numbers is bad input", "[solver][bad]", double, float) {
+TEMPLATE_TEST_CASE("a target so far off that forces are no numbers is bad input", "[solver][bad]", TEST_SCALARS) {
     using S = TestType;
     const Sphere<S> sphere;
     const Vector3<S> far(0, (std::numeric_limits<S>::max)(), 0);
@@ -690,7 +689,7 @@ struct Runaway {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a rule that runs away is called unstable, and nothing has moved", "[solver][bad]", double, float) {
+TEMPLATE_TEST_CASE("a rule that runs away is called unstable, and nothing has moved", "[solver][bad]", TEST_SCALARS) {
     using S = TestType;
     const Sphere<S> sphere;
     const MassSpringNetwork network(sphere.mesh, Runaway{}, NetworkOptions<S>{.stiffness = S(1)});
@@ -733,8 +732,8 @@ TEST_CASE("waking what is no vertex wakes no vertex", "[solver][bad]") {
     CHECK(solver.step(x, 1e-3, sphere.network, sphere.foundation).vertex_updates == 0);
 }
 
-TEMPLATE_TEST_CASE("more contact points than the capacity are refused, and nothing has moved", "[solver][bad]", double,
-                   float) {
+TEMPLATE_TEST_CASE("more contact points than the capacity are refused, and nothing has moved", "[solver][bad]",
+                   TEST_SCALARS) {
     using S = TestType;
     const Sphere<S> sphere;
     const PointAttachment<S> first{0, {3, 4, 5}, {S(0.2), S(0.3), S(0.5)}, {0, 0, 1}};
@@ -748,7 +747,7 @@ TEMPLATE_TEST_CASE("more contact points than the capacity are refused, and nothi
     CHECK(roomy.step(x, S(0.1), sphere.network, sphere.foundation, first, second).status == StepStatus::advanced);
 }
 
-TEMPLATE_TEST_CASE("wild targets come to a safe outcome", "[solver][bad]", double, float) {
+TEMPLATE_TEST_CASE("wild targets come to a safe outcome", "[solver][bad]", TEST_SCALARS) {
     using S = TestType;
     const Sphere<S> sphere;
     for (const S far :
@@ -772,7 +771,7 @@ TEMPLATE_TEST_CASE("wild targets come to a safe outcome", "[solver][bad]", doubl
     }
 }
 
-TEMPLATE_TEST_CASE("options out of range are refused by name", "[solver][bad]", double, float) {
+TEMPLATE_TEST_CASE("options out of range are refused by name", "[solver][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const auto mesh = icosphere<S>({.subdivisions = 0});
@@ -877,7 +876,7 @@ void check_scales(const Rule& rule) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("stiffer or larger, it is the same membrane", "[solver]", double, float) {
+TEMPLATE_TEST_CASE("stiffer or larger, it is the same membrane", "[solver]", TEST_SCALARS) {
     SECTION("safe steps") { check_scales<TestType>(SafeStep{.omega = 1.3}); }
     SECTION("the rule as published") { check_scales<TestType>(MassStep{}); }
 }

@@ -179,7 +179,7 @@ void check_resets(const AnyExecutor& executor = {}) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("what is reset does what is new does, to the bit", "[reset]", double, float) {
+TEMPLATE_TEST_CASE("what is reset does what is new does, to the bit", "[reset]", TEST_SCALARS) {
     SECTION("block") { check_resets<TestType, BlockStep>(); }
     SECTION("safe") { check_resets<TestType, SafeStep>(); }
     SECTION("as published") { check_resets<TestType, MassStep>(); }

@@ -209,8 +209,8 @@ TEST_CASE("a point tool is held by what is fixed, however small the sphere that 
     }
 }
 
-TEMPLATE_TEST_CASE("the force is continuous where a tool slides over a pinned rim, and still when it is", "", double,
-                   float) {
+TEMPLATE_TEST_CASE("the force is continuous where a tool slides over a pinned rim, and still when it is", "",
+                   TEST_SCALARS) {
     for (const Index squares : {10, 20}) {
         for (const double radius : {0.0, 0.0005, 0.002}) {
             for (const double depth : {0.00005, 0.0003}) {

@@ -55,8 +55,8 @@ struct HeldDisc : test::SoftDisc<S> {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("jaws hold up to their force, then the tissue slips at that force", "[grasper][friction]", double,
-                   float) {
+TEMPLATE_TEST_CASE("jaws hold up to their force, then the tissue slips at that force", "[grasper][friction]",
+                   TEST_SCALARS) {
     const double holds = 2e-3, step = 2e-6;  // [N], [m]
     HeldDisc<TestType> limited({.holding_force = holds}), firm({});
     const double rounding = 1000 * std::numeric_limits<TestType>::epsilon();
@@ -92,7 +92,7 @@ TEMPLATE_TEST_CASE("jaws hold up to their force, then the tissue slips at that f
 }
 
 TEMPLATE_TEST_CASE("what the hand gives is stored in the tissue, or taken by slip in the jaws", "[grasper][friction]",
-                   double, float) {
+                   TEST_SCALARS) {
     HeldDisc<TestType> pull({.holding_force = 2e-3});
     const double before = pull.stored(pull.x);
     Vector3<double> last = pull.move_to(pull.height(0)), at = pull.height(0);

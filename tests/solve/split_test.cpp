@@ -184,7 +184,7 @@ void check_follows(int& splits) {
 
 // Newton's method on parts that are built of the torn triangles.
 TEMPLATE_TEST_CASE("a solver that follows a tear finds the equilibrium of parts that are built anew", "[step][tear]",
-                   double, float) {
+                   TEST_SCALARS) {
     int splits = 0;
     SECTION("springs") { check_follows<TestType, SpringsAlone<TestType>>(splits); }
     SECTION("triangles") { check_follows<TestType, WithTriangles<TestType>>(splits); }
@@ -282,7 +282,7 @@ void check_restores(int seed) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("parts restored from a snapshot go on with the same bits, torn or sewn up again", "[snapshot][tear]",
-                   double, float) {
+                   TEST_SCALARS) {
     for (int seed = 1; seed <= cases(30); ++seed) {
         check_restores<TestType, SpringsAlone<TestType>>(seed);
         check_restores<TestType, WithTriangles<TestType>>(seed);

@@ -30,7 +30,7 @@ static_assert(StepRule<MassStep, float> && StepRule<MassStep, double>);
 static_assert(StepRule<SafeStep, float> && StepRule<SafeStep, double>);
 static_assert(StepRule<BlockStep, float> && StepRule<BlockStep, double>);
 
-TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", double, float) {
+TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", TEST_SCALARS) {
     using S = TestType;
     VertexState<S> vertex;
     vertex.stiffness = 8;
@@ -52,7 +52,7 @@ TEMPLATE_TEST_CASE("the rules are what they say", "[rule]", double, float) {
     STATIC_REQUIRE_FALSE(StepRule<int, S>);
 }
 
-TEMPLATE_TEST_CASE("a contact stiffens a block along its normal alone", "[rule]", double, float) {
+TEMPLATE_TEST_CASE("a contact stiffens a block along its normal alone", "[rule]", TEST_SCALARS) {
     using S = TestType;
     const S slack = sizeof(S) == 4 ? S(1e-3) : S(1e-10);
     for (int seed = 1; seed <= cases(500); ++seed) {
@@ -260,7 +260,7 @@ S limit_of(const MassSpringNetwork<S, LinearSpring>& network, Index v, const Poi
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("the rule as published converges up to its limit, and is refused beyond", "[rule]", double, float) {
+TEMPLATE_TEST_CASE("the rule as published converges up to its limit, and is refused beyond", "[rule]", TEST_SCALARS) {
     using S = TestType;
     const S dt = S(1e-3), volume = S(0.4);
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 2});

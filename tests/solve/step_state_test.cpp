@@ -26,7 +26,7 @@ ContactPoint<double> point_at_corner(Index triangle, int feature, Index corner) 
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a vertex is loaded once in a step, with its pin", "[state]", float, double) {
+TEMPLATE_TEST_CASE("a vertex is loaded once in a step, with its pin", "[state]", TEST_SCALARS) {
     using S = TestType;
     Points<S> x = Points<S>::Random(3, 8);
     const Points<S> before = x;

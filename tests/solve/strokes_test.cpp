@@ -100,7 +100,7 @@ Outcome play(const Membrane<S>& membrane, const Stroke& stroke, const SolverOpti
 
 TEMPLATE_TEST_CASE(
     "strokes of every depth and speed stay outside, below twice the exact force, and leave nothing behind", "[strokes]",
-    double, float) {
+    TEST_SCALARS) {
     using S = TestType;
     constexpr std::array shapes{Shape::sphere, Shape::shaft, Shape::point};
     constexpr std::array depths{0.5e-3, 1e-3, 1.5e-3, 2e-3};
@@ -137,7 +137,7 @@ TEMPLATE_TEST_CASE(
 }
 
 // Its end is beside triangles far smaller than it, which turn over.
-TEMPLATE_TEST_CASE("a shaft dragged through a mesh much finer than itself stays outside", "[strokes]", double, float) {
+TEMPLATE_TEST_CASE("a shaft dragged through a mesh much finer than itself stays outside", "[strokes]", TEST_SCALARS) {
     using S = TestType;
     const Membrane<S> membrane(cases_are_slow ? 5 : 6);
     for (const auto& [depth, speed] : {std::pair{1.5e-3, 0.1}, {2e-3, 0.05}}) {

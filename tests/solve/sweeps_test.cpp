@@ -104,7 +104,7 @@ TEST_CASE("under a deadline the cost of an update is the time of all over their 
 }
 
 TEMPLATE_TEST_CASE("a force that comes beyond layer 0 while constraints are enforced moves what is in a pack",
-                   "[solver]", float, double) {
+                   "[solver]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 3});
     const MassSpringNetwork<S, LinearSpring> network(mesh, {}, {.stiffness = S(1)});

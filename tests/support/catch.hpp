@@ -12,3 +12,11 @@ using Catch::Matchers::ContainsSubstring;
 #include <catch2/catch.hpp>
 inline auto ContainsSubstring(const std::string& text) { return Catch::Matchers::Contains(text); }
 #endif
+
+// For `TEMPLATE_TEST_CASE("...", "[...]", TEST_SCALARS)`. Where float differs from double by more than roundings, as in
+// lanes and ranges, a test names both itself.
+#ifdef MEMBRANE_TEST_FLOAT
+#define TEST_SCALARS double, float
+#else
+#define TEST_SCALARS double
+#endif

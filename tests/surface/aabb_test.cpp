@@ -27,7 +27,7 @@ Aabb<S> random_box(Random& random) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[aabb]", float, double) {
+TEMPLATE_TEST_CASE("a box is the smallest around what it includes", "[aabb]", TEST_SCALARS) {
     using S = TestType;
     Aabb<S> box;
     CHECK((box.low.eigen().array() > box.high.eigen().array()).all());
@@ -72,7 +72,7 @@ TEST_CASE("boxes overlap when no axis separates them, borders included", "[aabb]
 }
 
 TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther than its farthest corner", "[aabb]",
-                   float, double) {
+                   TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(2000); ++seed) {
         CAPTURE(seed);
@@ -93,7 +93,7 @@ TEMPLATE_TEST_CASE("no point of a box is nearer than its distance, nor farther t
     CHECK(squared_distance(Aabb<S>{}, Vector3<S>(0, 0, 0)) == std::numeric_limits<S>::infinity());
 }
 
-TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[aabb]", float, double) {
+TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[aabb]", TEST_SCALARS) {
     using S = TestType;
     int touching = 0, missing = 0;
     for (int seed = 1; seed <= cases(20'000); ++seed) {
@@ -135,7 +135,7 @@ TEMPLATE_TEST_CASE("a capsule never misses a box that it touches", "[aabb]", flo
     CHECK(missing > cases(3000));
 }
 
-TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[aabb][lanes]", float, double) {
+TEMPLATE_TEST_CASE("several boxes at once come to what each comes to", "[aabb][lanes]", TEST_SCALARS) {
     using S = TestType;
     using Wide = Lanes<S>;
     for (int seed = 1; seed <= cases(2000); ++seed) {

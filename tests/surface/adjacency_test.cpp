@@ -82,7 +82,7 @@ void check_against_brute_force(const Adjacency& adjacency, Index vertex_count, c
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("adjacency of random surfaces is that of a search through all triangles", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("adjacency of random surfaces is that of a search through all triangles", "[mesh]", TEST_SCALARS) {
     int closed = 0;
     for (int seed = 1; seed <= cases(120); ++seed) {
         CAPTURE(seed);

@@ -60,7 +60,7 @@ TEST_CASE("checks go on after what they have found", "[mesh][bad]") {
 }
 
 TEMPLATE_TEST_CASE("the largest coordinates have finite squares of areas, larger ones are refused", "[mesh][bad]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     const S most = std::sqrt(std::sqrt((std::numeric_limits<S>::max)())) / 4;
     for (const bool is_too_large : {false, true}) {

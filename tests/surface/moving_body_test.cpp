@@ -46,7 +46,7 @@ double misfit(const Points<double>& rest, const Points<double>& now, const Rigid
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("given by a pose or by the anchors, the body is in the same place", "[body]", double, float) {
+TEMPLATE_TEST_CASE("given by a pose or by the anchors, the body is in the same place", "[body]", TEST_SCALARS) {
     using S = TestType;
     const S tolerance = 64 * std::numeric_limits<S>::epsilon();
     for (int seed = 1; seed <= cases(60); ++seed) {
@@ -171,7 +171,7 @@ TEST_CASE("velocities are the pose's, or those of the anchors", "[body]") {
     }
 }
 
-TEMPLATE_TEST_CASE("a number that is not finite is refused, and nothing has moved", "[body][bad]", double, float) {
+TEMPLATE_TEST_CASE("a number that is not finite is refused, and nothing has moved", "[body][bad]", TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     Random random(1);
@@ -231,7 +231,7 @@ TEMPLATE_TEST_CASE("a number that is not finite is refused, and nothing has move
     check_unmoved();
 }
 
-TEMPLATE_TEST_CASE("where no return has a finite velocity, a pose returns the body", "[body][bad]", double, float) {
+TEMPLATE_TEST_CASE("where no return has a finite velocity, a pose returns the body", "[body][bad]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = some_mesh<S>(0);
     MovingBody<S> body(mesh);

@@ -63,7 +63,7 @@ bool all_unit(const Points<S>& normals) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("normals of closed forms", "[normals]", double, float) {
+TEMPLATE_TEST_CASE("normals of closed forms", "[normals]", TEST_SCALARS) {
     using S = TestType;
     const S epsilon = std::numeric_limits<S>::epsilon();
     const VertexNormals<S> flat(sheet<S>({.columns = 5, .rows = 3}));
@@ -87,7 +87,7 @@ TEMPLATE_TEST_CASE("normals of closed forms", "[normals]", double, float) {
     CHECK(norm<S>(point(corner.values(), 0) - expected) < 4 * epsilon);
 }
 
-TEMPLATE_TEST_CASE("normals are the area-weighted mean of the triangles'", "[normals]", double, float) {
+TEMPLATE_TEST_CASE("normals are the area-weighted mean of the triangles'", "[normals]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(300); ++seed) {
         CAPTURE(seed);
@@ -110,7 +110,7 @@ TEMPLATE_TEST_CASE("normals are the area-weighted mean of the triangles'", "[nor
     }
 }
 
-TEMPLATE_TEST_CASE("an update of the moved vertices equals one of all, bit for bit", "[normals]", double, float) {
+TEMPLATE_TEST_CASE("an update of the moved vertices equals one of all, bit for bit", "[normals]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
@@ -158,8 +158,8 @@ TEST_CASE("an update of the moved vertices changes these and their neighbours on
     }
 }
 
-TEMPLATE_TEST_CASE("a vertex of any number of triangles has their normal, closed around it or not", "[normals]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a vertex of any number of triangles has their normal, closed around it or not", "[normals]",
+                   TEST_SCALARS) {
     using S = TestType;
     for (const Index count : {1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 15, 100, 1001}) {
         for (const bool closed : {false, true}) {
@@ -191,7 +191,7 @@ TEMPLATE_TEST_CASE("a vertex of any number of triangles has their normal, closed
     }
 }
 
-TEMPLATE_TEST_CASE("normals read no number behind the last position", "[normals]", double, float) {
+TEMPLATE_TEST_CASE("normals read no number behind the last position", "[normals]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = 1, .subdivisions = 1});
     const auto memory = std::make_unique<S[]>(3 * 42);  // whose end the address sanitizer watches
@@ -219,8 +219,8 @@ TEST_CASE("normals take positions from anybody's memory", "[normals]") {
     CHECK(same_bits(normals.values(), other.values()));
 }
 
-TEMPLATE_TEST_CASE("a vertex without a measurable area gets its normal at rest, never a NaN", "[normals][bad]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a vertex without a measurable area gets its normal at rest, never a NaN", "[normals][bad]",
+                   TEST_SCALARS) {
     using S = TestType;
     using Limits = std::numeric_limits<S>;
     const auto mesh = icosphere<S>({.radius = 0.01, .subdivisions = 2});
@@ -300,7 +300,7 @@ TEST_CASE("normals outlive the mesh and what they were copied from, to the same 
     STATIC_REQUIRE(noexcept(copy.values()));
 }
 
-TEMPLATE_TEST_CASE("pseudo-normals of face, edge and corner", "[normals]", double, float) {
+TEMPLATE_TEST_CASE("pseudo-normals of face, edge and corner", "[normals]", TEST_SCALARS) {
     using S = TestType;
     const S epsilon = std::numeric_limits<S>::epsilon();
     // A pyramid's corner with three triangles at right angles; angle weights ignore how large they are.
@@ -350,7 +350,7 @@ TEMPLATE_TEST_CASE("pseudo-normals of face, edge and corner", "[normals]", doubl
 }
 
 TEMPLATE_TEST_CASE("after random tears the normals are those of a mesh that is built anew, bit for bit",
-                   "[normals][tear]", double, float) {
+                   "[normals][tear]", TEST_SCALARS) {
     using S = TestType;
     const S tolerance = 100 * std::numeric_limits<S>::epsilon();
     for (int seed = 1; seed <= cases(100); ++seed) {

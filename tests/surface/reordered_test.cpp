@@ -53,8 +53,7 @@ Index median_distance(const TriangleMesh<S>& mesh) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a reordered mesh is the same surface, each vertex and triangle once", "[reordered]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a reordered mesh is the same surface, each vertex and triangle once", "[reordered]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -82,7 +81,7 @@ TEMPLATE_TEST_CASE("a reordered mesh is the same surface, each vertex and triang
     }
 }
 
-TEMPLATE_TEST_CASE("triangles are in the order of the first of their vertices", "[reordered]", double, float) {
+TEMPLATE_TEST_CASE("triangles are in the order of the first of their vertices", "[reordered]", TEST_SCALARS) {
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
@@ -94,7 +93,7 @@ TEMPLATE_TEST_CASE("triangles are in the order of the first of their vertices", 
 }
 
 TEMPLATE_TEST_CASE("the curve fills cubes of the longest side, also of a surface without thickness", "[reordered]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     Random random(1);
     // Of eight cubes the curve goes through one after the other, along x first; a sheet this low is in two of them.

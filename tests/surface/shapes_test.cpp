@@ -78,7 +78,7 @@ bool faces_up(const TriangleMesh<S>& mesh) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("icospheres are closed, outward and on the sphere", "[shapes][cgal]", double, float) {
+TEMPLATE_TEST_CASE("icospheres are closed, outward and on the sphere", "[shapes][cgal]", TEST_SCALARS) {
     using S = TestType;
     const double epsilon = std::numeric_limits<S>::epsilon();
     for (Index level = 0; level <= 4; ++level) {
@@ -139,7 +139,7 @@ TEST_CASE("the icosphere is the one that the reference equilibria were computed 
     }
 }
 
-TEMPLATE_TEST_CASE("sheets are flat, of their size, and face up", "[shapes][cgal]", double, float) {
+TEMPLATE_TEST_CASE("sheets are flat, of their size, and face up", "[shapes][cgal]", TEST_SCALARS) {
     using S = TestType;
     for (const auto& [columns, rows] : {std::array{1, 1}, {1, 7}, {12, 5}, {20, 20}}) {
         CAPTURE(columns, rows);
@@ -161,7 +161,7 @@ TEMPLATE_TEST_CASE("sheets are flat, of their size, and face up", "[shapes][cgal
     }
 }
 
-TEMPLATE_TEST_CASE("discs are flat, round, and face up", "[shapes][cgal]", double, float) {
+TEMPLATE_TEST_CASE("discs are flat, round, and face up", "[shapes][cgal]", TEST_SCALARS) {
     using S = TestType;
     const double radius = 0.05, pi = std::numbers::pi;
     for (const Index rings : {1, 2, 3, 8, 20}) {
@@ -188,7 +188,7 @@ TEMPLATE_TEST_CASE("discs are flat, round, and face up", "[shapes][cgal]", doubl
     }
 }
 
-TEMPLATE_TEST_CASE("spherical caps lie on their sphere, with the rim asked for", "[shapes][cgal]", double, float) {
+TEMPLATE_TEST_CASE("spherical caps lie on their sphere, with the rim asked for", "[shapes][cgal]", TEST_SCALARS) {
     using S = TestType;
     const double pi = std::numbers::pi;
     struct Case {
@@ -237,7 +237,7 @@ TEST_CASE("shapes are of double unless asked otherwise, with defaults that work"
     CHECK(spherical_cap<float>().positions() == spherical_cap<double>().positions().cast<float>());
 }
 
-TEMPLATE_TEST_CASE("a refined mesh halves each edge and keeps the vertices", "[shapes]", double, float) {
+TEMPLATE_TEST_CASE("a refined mesh halves each edge and keeps the vertices", "[shapes]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = sheet<S>({.width = 0.1, .height = 0.06, .columns = 5, .rows = 4});
     const auto finer = refined(mesh);
@@ -264,7 +264,7 @@ TEMPLATE_TEST_CASE("a refined mesh halves each edge and keeps the vertices", "[s
     CHECK_FALSE(test::refusal([&] { (void)refined(mesh, nowhere); }).empty());
 }
 
-TEMPLATE_TEST_CASE("options that make no shape are refused", "[shapes][bad]", double, float) {
+TEMPLATE_TEST_CASE("options that make no shape are refused", "[shapes][bad]", TEST_SCALARS) {
     using S = TestType;
     using test::refusal;
     const double infinity = std::numeric_limits<double>::infinity(), not_a_number = std::nan("");

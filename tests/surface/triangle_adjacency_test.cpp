@@ -34,7 +34,7 @@ void check_equal(const TriangleAdjacency& found, const Adjacency& expected, Inde
 
 // `Adjacency` is compared with a search through all triangles in a test of its own.
 TEMPLATE_TEST_CASE("after random tears the triangles are adjacent as in a mesh that is built anew", "[mesh][tear]",
-                   double, float) {
+                   TEST_SCALARS) {
     int tears = 0;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);

@@ -57,7 +57,7 @@ std::string vertices_of(const Surface<S>& surface, Index f) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a mesh holds what it was given", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("a mesh holds what it was given", "[mesh]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -67,7 +67,7 @@ TEMPLATE_TEST_CASE("a mesh holds what it was given", "[mesh]", double, float) {
     }
 }
 
-TEMPLATE_TEST_CASE("a mesh takes every layout of positions", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("a mesh takes every layout of positions", "[mesh]", TEST_SCALARS) {
     using S = TestType;
     const Surface<S> given = test::tetrahedron<S>();
     const auto same = [&](const TriangleMesh<S>& mesh) {
@@ -137,7 +137,7 @@ TEST_CASE("a mesh can be copied and moved", "[mesh]") {
     CHECK(copy.triangles() == moved.triangles());
 }
 
-TEMPLATE_TEST_CASE("missing and misshapen matrices are refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("missing and misshapen matrices are refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     const Surface<S> t = test::tetrahedron<S>();
     using Any = Eigen::Matrix<S, Eigen::Dynamic, Eigen::Dynamic>;
@@ -183,7 +183,7 @@ TEST_CASE("more vertices or triangles than can be numbered are refused before an
           "TriangleMesh: at most 715827882 triangles can be numbered, got 715827883");
 }
 
-TEMPLATE_TEST_CASE("an index that is not a vertex is refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("an index that is not a vertex is refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
@@ -212,7 +212,7 @@ TEMPLATE_TEST_CASE("an index that is not a vertex is refused", "[mesh][bad]", do
     }
 }
 
-TEMPLATE_TEST_CASE("a vertex named twice by a triangle is refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("a vertex named twice by a triangle is refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
@@ -228,7 +228,7 @@ TEMPLATE_TEST_CASE("a vertex named twice by a triangle is refused", "[mesh][bad]
     }
 }
 
-TEMPLATE_TEST_CASE("coordinates that numbers cannot carry are refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("coordinates that numbers cannot carry are refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     const S most = std::sqrt(std::sqrt(std::numeric_limits<S>::max())) / 4;
     for (int seed = 1; seed <= cases(100); ++seed) {
@@ -254,8 +254,7 @@ TEMPLATE_TEST_CASE("coordinates that numbers cannot carry are refused", "[mesh][
     }
 }
 
-TEMPLATE_TEST_CASE("a mesh that is too small or too far away for its numbers is refused", "[mesh][bad]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a mesh that is too small or too far away for its numbers is refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     const double least = 4 * std::sqrt(std::sqrt(static_cast<double>(std::numeric_limits<S>::min())));
     for (int seed = 1; seed <= cases(100); ++seed) {
@@ -281,8 +280,8 @@ TEMPLATE_TEST_CASE("a mesh that is too small or too far away for its numbers is 
     }
 }
 
-TEMPLATE_TEST_CASE("the spacing of numbers may be a hundredth of the mean edge and not more", "[mesh][bad]", double,
-                   float) {
+TEMPLATE_TEST_CASE("the spacing of numbers may be a hundredth of the mean edge and not more", "[mesh][bad]",
+                   TEST_SCALARS) {
     using S = TestType;
     const S epsilon = std::numeric_limits<S>::epsilon();
     for (const S edge : {S(1e-3), S(1), S(1e3)}) {
@@ -302,7 +301,7 @@ TEMPLATE_TEST_CASE("the spacing of numbers may be a hundredth of the mean edge a
     }
 }
 
-TEMPLATE_TEST_CASE("meshes of a micrometre to a thousand kilometres are accepted", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("meshes of a micrometre to a thousand kilometres are accepted", "[mesh]", TEST_SCALARS) {
     using S = TestType;
     for (const double size : {1e-6, 1e-3, 1.0, 1e3, 1e6}) {
         CAPTURE(size);
@@ -315,7 +314,7 @@ TEMPLATE_TEST_CASE("meshes of a micrometre to a thousand kilometres are accepted
     }
 }
 
-TEMPLATE_TEST_CASE("a mesh without any area is refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("a mesh without any area is refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -335,7 +334,7 @@ TEMPLATE_TEST_CASE("a mesh without any area is refused", "[mesh][bad]", double, 
     }
 }
 
-TEMPLATE_TEST_CASE("two triangles with the same vertices are refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("two triangles with the same vertices are refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -358,7 +357,7 @@ TEMPLATE_TEST_CASE("two triangles with the same vertices are refused", "[mesh][b
           "TriangleMesh: triangles 0 and 1 name the same vertices 0, 1 and 2, expected one of them");
 }
 
-TEMPLATE_TEST_CASE("an edge with more than two triangles is refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("an edge with more than two triangles is refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -380,7 +379,7 @@ TEMPLATE_TEST_CASE("an edge with more than two triangles is refused", "[mesh][ba
     }
 }
 
-TEMPLATE_TEST_CASE("a triangle that is turned against its neighbours is refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("a triangle that is turned against its neighbours is refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -396,7 +395,7 @@ TEMPLATE_TEST_CASE("a triangle that is turned against its neighbours is refused"
     }
 }
 
-TEMPLATE_TEST_CASE("a one-sided surface is refused as such", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("a one-sided surface is refused as such", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     const std::string message = "TriangleMesh: the surface is one-sided (a Moebius strip), expected two sides";
     for (int seed = 1; seed <= cases(100); ++seed) {
@@ -415,7 +414,7 @@ TEMPLATE_TEST_CASE("a one-sided surface is refused as such", "[mesh][bad]", doub
     CHECK(accepted_unchanged(test::klein_bottle<S>(8, 5, false)));
 }
 
-TEMPLATE_TEST_CASE("a vertex that joins surfaces without an edge is refused", "[mesh][bad]", double, float) {
+TEMPLATE_TEST_CASE("a vertex that joins surfaces without an edge is refused", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -479,7 +478,7 @@ TEST_CASE("what is accepted is what CGAL takes for a mesh", "[mesh][cgal]") {
     CHECK(counts[1] > cases(500));
 }
 
-TEMPLATE_TEST_CASE("what is odd but valid is accepted as it is", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("what is odd but valid is accepted as it is", "[mesh]", TEST_SCALARS) {
     using S = TestType;
     Surface<S> one = test::tetrahedron<S>();
     one.triangles.conservativeResize(3, 1);
@@ -531,7 +530,7 @@ TEMPLATE_TEST_CASE("what is odd but valid is accepted as it is", "[mesh]", doubl
     }
 }
 
-TEMPLATE_TEST_CASE("a vertex may have a hundred thousand triangles", "[mesh]", double, float) {
+TEMPLATE_TEST_CASE("a vertex may have a hundred thousand triangles", "[mesh]", TEST_SCALARS) {
     auto fan = test::fan<TestType>(100'000);
     CHECK(accepted_unchanged(fan));
     Random random(1);

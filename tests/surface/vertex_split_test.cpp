@@ -27,7 +27,7 @@ TEST_CASE("triangles that get the copy are found by number or by their other cor
     CHECK(triangles == Triangles{{4, 9}, {5, 1}, {6, 2}});
 }
 
-TEMPLATE_TEST_CASE("a constant is divided, and none of it is lost", "[tear]", double, float) {
+TEMPLATE_TEST_CASE("a constant is divided, and none of it is lost", "[tear]", TEST_SCALARS) {
     TestType vertex = 12, copy = 1;
     divide(vertex, copy, 0.25);
     CHECK(copy == 3);

@@ -97,7 +97,7 @@ constexpr double rounding = std::is_same_v<Scalar, double> ? 1e-9 : 2e-3;
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("the state of a border in simple extension is that of the closed forms", "[tear]", double, float) {
+TEMPLATE_TEST_CASE("the state of a border in simple extension is that of the closed forms", "[tear]", TEST_SCALARS) {
     for (int seed = 1; seed <= cases(20); ++seed) {
         CAPTURE(seed);
         test::Random random(static_cast<std::uint64_t>(seed));
@@ -121,7 +121,7 @@ TEMPLATE_TEST_CASE("the state of a border in simple extension is that of the clo
 }
 
 TEMPLATE_TEST_CASE("a flaw of the border starts to tear at the stretch of the closed form, on any mesh", "[tear]",
-                   double, float) {
+                   TEST_SCALARS) {
     constexpr double toughness = 500, flaw = 0.8e-3;
     const double expected = SimpleExtension::critical(toughness, flaw);
     for (const double edge : {2e-3, 1e-3, 0.7e-3}) {
@@ -140,7 +140,7 @@ TEMPLATE_TEST_CASE("a flaw of the border starts to tear at the stretch of the cl
     }
 }
 
-TEMPLATE_TEST_CASE("a border starts to tear above the closed form's stretch, never below", "[tear]", double, float) {
+TEMPLATE_TEST_CASE("a border starts to tear above the closed form's stretch, never below", "[tear]", TEST_SCALARS) {
     int starts = 0;
     for (int seed = 1; seed <= cases(200); ++seed) {
         CAPTURE(seed);
@@ -174,7 +174,7 @@ TEMPLATE_TEST_CASE("a border starts to tear above the closed form's stretch, nev
 }
 
 TEMPLATE_TEST_CASE("a border that is slack, in compression, or stretched across only does not start to tear", "[tear]",
-                   double, float) {
+                   TEST_SCALARS) {
     for (const double turn : {0.0, 0.2, 0.5}) {
         CAPTURE(turn);
         Sheet<TestType> sheet(turn, 1e-3, 1e-3);
@@ -222,7 +222,7 @@ TEST_CASE("the border runs along the sides of a sheet, next to its corners too, 
     CHECK(starts >= 2 * 15);
 }
 
-TEMPLATE_TEST_CASE("a start from nonsense is none", "[tear]", double, float) {
+TEMPLATE_TEST_CASE("a start from nonsense is none", "[tear]", TEST_SCALARS) {
     using Limits = std::numeric_limits<TestType>;
     Sheet<TestType> sheet(0.2, 1e-3, 100, 2);
     sheet.stretch(1.3);

@@ -122,7 +122,7 @@ std::array<double, 2> foundation_of(const test::WildTear<S>& loop) {
 
 // Pulls of up to the numbers' range: a step is refused, or all that moves is finite.
 TEMPLATE_TEST_CASE("random tears, peels and drags with nonsense keep positions finite, the surface a mesh, and repeat",
-                   "[tear]", double, float) {
+                   "[tear]", TEST_SCALARS) {
     using Loop = test::WildTear<TestType>;
     constexpr int ticks = cases_are_slow ? 100 : 500;
     const double rounding = std::is_same_v<TestType, float> ? 1e-4 : 1e-10;
@@ -164,7 +164,7 @@ TEMPLATE_TEST_CASE("random tears, peels and drags with nonsense keep positions f
 
 TEMPLATE_TEST_CASE(
     "a loop that tears goes on from a snapshot in other parts with the same bits, and is reset to the whole membrane",
-    "[snapshot][tear]", double, float) {
+    "[snapshot][tear]", TEST_SCALARS) {
     int splits = 0;
     for (int seed = 1; seed <= cases(20); ++seed) {
         CAPTURE(seed);

@@ -123,7 +123,7 @@ std::vector<std::byte> state_of(const Parts&... parts) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("vertices that split and move at random keep every list that of the torn triangles", "[tear]",
-                   double, float) {
+                   TEST_SCALARS) {
     int splits = 0, refused = 0, moves = 0;
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);
@@ -213,7 +213,7 @@ TEMPLATE_TEST_CASE("vertices that split and move at random keep every list that 
     CHECK(moves > cases(60));
 }
 
-TEMPLATE_TEST_CASE("a surface that is cut at random is a mesh with the same triangles", "[tear]", double, float) {
+TEMPLATE_TEST_CASE("a surface that is cut at random is a mesh with the same triangles", "[tear]", TEST_SCALARS) {
     int splits = 0;
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);
@@ -340,8 +340,8 @@ void check_cut(const TornSurface<Scalar>& surface, const Triangles& whole,
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a cut parts the edges of its path and nothing else, another path changes nothing", "[tear]", double,
-                   float) {
+TEMPLATE_TEST_CASE("a cut parts the edges of its path and nothing else, another path changes nothing", "[tear]",
+                   TEST_SCALARS) {
     int cuts = 0, refused = 0, used_up = 0, across = 0, joined = 0;
     for (int seed = 1; seed <= cases(100); ++seed) {
         CAPTURE(seed);
