@@ -22,6 +22,7 @@ using membrane::Real;
 /// Straight in at one point, then along a great circle.
 struct Slide {
     static constexpr Index ticks_in = 60, ticks = ticks_in + 240;
+    static constexpr Index late_ticks = 1500;    // of a slide that leaves a long trail
     static constexpr Index first_measured = 80;  // the transient of the press is over
     static constexpr double speed = 0.05;        // [m/s]
 

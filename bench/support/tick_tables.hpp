@@ -24,6 +24,7 @@ inline Table tick_table(const std::string& topic, const std::string& title) {
             add("contact" + of, Row::counter, "contact", "s");
             add("sweep" + of, Row::counter, "sweep", "s");
             add("other" + of, Row::counter, "other", "s");
+            add("after 1,500 ticks" + of, Row::counter, "late", "s");
             add("error, %" + of, Row::percent, "force_error", "");
             add("largest force" + of, Row::counter, "largest_force", "");
             add("penetration, %" + of, Row::percent, "penetration", "");

@@ -74,9 +74,11 @@ class ActiveVertices {
     }
 
     /// Ends a step: awake are now the active and frontier vertices for which `is_balanced(v)` is false, the vertices
-    /// that had to wait, and the neighbours of those that `moved`. Returns whether the forces on all vertices balance.
+    /// that had to wait, and the neighbours of those that `moved`; if `recheck`, because a vertex now counts as balanced
+    /// under smaller forces only, also vertices that fell asleep. Returns whether the forces on all vertices balance.
     template <class Network, class IsBalanced>
-    [[nodiscard]] bool end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept;
+    [[nodiscard]] bool end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved,
+                                bool recheck = false) noexcept;
 
     /// Other vertices are neighbours, or other forces join them: the next step builds the queue anew.
     void network_changed() noexcept { has_changed_ = true; }
@@ -236,9 +238,13 @@ void ActiveVertices::extend(const Network& network, const Options& options) noex
 }
 
 template <class Network, class IsBalanced>
-bool ActiveVertices::end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved) noexcept {
+bool ActiveVertices::end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved,
+                              bool recheck) noexcept {
     find_awake(is_balanced);
     for (const Index v : moved) wake_neighbours(network, v);
+    for (const Index v : recheck ? activated_.items() : std::span<const Index>()) {
+        if (!active_.contains(v) && !is_balanced(v)) next_awake_.insert(v);
+    }
     std::swap(seeds_, next_seeds_);
     std::swap(awake_, next_awake_);
     if (awake_.empty() && seeds_.empty()) activated_.clear();

@@ -482,7 +482,8 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
-    const auto move = move_of(rule, at.vertex, rows.force_tolerance);
+    const bool in_queue = in_contact || p < assigned_.packs;
+    const auto move = move_of(rule, at.vertex, in_queue ? rows.force_tolerance : rows.outside_tolerance());
     if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
         if (!allowed && any(move.may_overshoot & may_move)) {
             const auto springs = springs_on<CurvedSum<Wide>>(p, at.here, scene).total();

@@ -154,7 +154,8 @@ class QuasiStaticSolver {
     template <class Network>
     void select(const Network& network, const ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
-    void write_back(PointsRef<Scalar>& x, const Network& network, bool constraints_changed) noexcept;
+    void write_back(PointsRef<Scalar>& x, const Network& network, Scalar queue_residual,
+                    bool constraints_changed) noexcept;
     [[nodiscard]] bool has_moved(Index v) const noexcept {
         const auto moved = moved_.items();
         return std::find(moved.begin(), moved.end(), v) != moved.end();
@@ -269,7 +270,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     if (report_.status != StepStatus::advanced) return refuse_step(report_.status);
     acting.end();
     resume_ = sweeps.resume;
-    write_back(x, network, sweeps.constraints_changed);
+    write_back(x, network, options_.adaptive_layers ? Scalar(0) : sweeps.queue_residual, sweeps.constraints_changed);
     sweeps.budget.end();
     return report_;
 }
@@ -291,8 +292,9 @@ void QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume&
     }
 }
 
-// Adds the extrapolated displacements to vertices that moved in the last step. An incomplete step is not extrapolated:
-// on vertices without update the extrapolation would be extrapolated again, and grow from step to step.
+// Adds the extrapolated displacements to vertices of the queue that moved in the last step: those that a contact has
+// left come to rest. An incomplete step is not extrapolated: on vertices without update the extrapolation would be
+// extrapolated again, and grow from step to step.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Volume>
 void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& acting,
@@ -308,7 +310,7 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
     const Scalar factor = predictor_.extrapolation_factor(inputs);
     if (factor == 0 || !complete_) return;
     for (const Index v : moved_.items()) {
-        if (context.fixed(v)) continue;
+        if (context.fixed(v) || !active_.queue().contains(v)) continue;
         context.move(v, factor * point(last_displacements_, v));
         active_.wake(v);
     }
@@ -337,7 +339,7 @@ void QuasiStaticSolver<Scalar, Rule>::select(const Network& network,
 // Writes the positions of moved vertices, and wakes their neighbours.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
-void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Network& network,
+void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Network& network, Scalar queue_residual,
                                                  bool constraints_changed) noexcept {
     moved_.clear();
     for (const Index v : state_.loaded.items()) {
@@ -354,11 +356,17 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     }
     placed_.clear();
     report_.moved = moved_.items();
+    state_.queue_residual = queue_residual;
+    const Scalar tolerance = state_.force_tolerance, outside = state_.outside_tolerance();
     const auto is_balanced = [&](Index v) {
-        return state_.is_fixed(v) || state_.unbalanced_force(v) <= state_.force_tolerance;
+        const Scalar largest = active_.queue().contains(v) ? tolerance : outside;
+        return state_.is_fixed(v) || state_.unbalanced_force(v) <= largest;
     };
-    report_.converged = active_.end_step(network, is_balanced, report_.moved) && !constraints_changed &&
-                        report_.residual <= state_.force_tolerance;
+    // Now and then, as this costs all that has moved since the last equilibrium.
+    const bool recheck = outside < state_.asleep_below && (outside == tolerance || outside < state_.asleep_below / 4);
+    state_.asleep_below = recheck ? outside : (std::max)(state_.asleep_below, outside);
+    report_.converged = active_.end_step(network, is_balanced, report_.moved, recheck) && !constraints_changed &&
+                        report_.residual <= tolerance && state_.asleep_below <= tolerance;
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
     state_.end_step();

@@ -73,7 +73,7 @@ struct StepState {
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.reset();
         visit(self.position, self.response, self.support, self.residual, self.loaded, self.pressed_supports,
-              self.previous_points, self.previous_ranges);
+              self.previous_points, self.previous_ranges, self.queue_residual, self.asleep_below);
         if constexpr (Visit::restores) self.index_previous_points();
     }
 
@@ -104,6 +104,10 @@ struct StepState {
 
     /// Whether a loaded vertex is pinned or prescribed.
     [[nodiscard]] bool is_fixed(Index v) const noexcept { return fixed[static_cast<std::size_t>(v)] != 0; }
+
+    /// Tolerance of vertices outside the queue [N]: a step does not solve the queue any better than its residual, so
+    /// vertices that the contact has left wait for the forces far below it.
+    [[nodiscard]] Scalar outside_tolerance() const noexcept { return (std::max)(force_tolerance, queue_residual / 10); }
 
     ///@{
     /// The row of vertex `v`.
@@ -214,6 +218,8 @@ struct StepState {
     IndexSet candidates;                                   ///< vertices that must not pass a tool: they are kept
 
     Scalar force_tolerance = 0;  ///< a negligible change of force [N]
+    Scalar queue_residual = 0;   ///< largest residual force in the queue after the last step [N]
+    Scalar asleep_below = 0;     ///< no vertex that has moved is asleep under a larger force than this [N]
     ///@{
     /// A constraint found its input invalid; the contact points exceed the capacity.
     bool invalid = false, full = false;
@@ -291,6 +297,7 @@ template <Real Scalar>
 void StepState<Scalar>::reset() noexcept {
     begin_step();
     reset_points();
+    queue_residual = asleep_below = 0;
     for (Rows* rows : {&position, &response, &support, &residual})
         std::fill(rows->begin(), rows->end(), PaddedPoint<Scalar>{});
 }

@@ -45,6 +45,7 @@ struct Sweeps {
 
     std::size_t in_packs = 0;          ///< number of active vertices in packs
     std::size_t forces_seen = 0;       ///< number of vertices with a force of a constraint so far
+    Scalar queue_residual = 0;         ///< largest residual force in the queue [N]
     bool constraints_hold = false;     ///< the last enforcement found no violation, and nothing has moved since
     bool constraints_changed = false;  ///< by the final enforcement, or there was no time for it
     bool stopped = false;              ///< time ran out beyond layer 0
@@ -72,6 +73,8 @@ struct Sweeps {
             if (!advances()) return;
             if (moved) constraints_hold = false;
             changed |= moved;
+            // The queue needs no more: vertices outside have waited for it.
+            if (!changed) changed = std::exchange(scene.state.queue_residual, Scalar(0)) > 0;
         }
         if ((changed || report.out_of_time) && !constraints_hold) {
             if (!budget.has_time_to_enforce()) report.out_of_time = true;
@@ -89,7 +92,10 @@ struct Sweeps {
         const auto count = [&](Index v) {
             const Vector3<Scalar> force = scene.state.residual_force(v);
             ++report.vertex_updates;
-            if (!scene.state.is_fixed(v)) report.residual = (std::max)(report.residual, norm(force));
+            if (!scene.state.is_fixed(v)) {
+                report.residual = (std::max)(report.residual, norm(force));
+                if (active.queue().contains(v)) queue_residual = (std::max)(queue_residual, norm(force));
+            }
             squares += squared_norm(force) + squared_norm<Scalar>(force - scene.state.constraint_force(v)) +
                        squared_norm(scene.state.position_of(v));
         };
@@ -280,7 +286,8 @@ struct Sweeps {
         if (state.is_fixed(v) || !advances()) return false;
         ++report.vertex_updates;
         const auto vertex = state_of<Rule>(scene, v);
-        const auto move = move_of(rule, vertex, state.force_tolerance);
+        const bool in_queue = active.queue().contains(v);
+        const auto move = move_of(rule, vertex, in_queue ? state.force_tolerance : state.outside_tolerance());
         if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
             if (move.may_overshoot && diverges(scene, v, move.compliance)) {
                 report.status = StepStatus::unstable;
