@@ -303,6 +303,18 @@ TEMPLATE_TEST_CASE("a negligible force is small beside the springs' and large be
                   Approx(k * std::max(longest * S(1e-9), 64 * epsilon * largest)).epsilon(1e-6));
         }
     }
+    for (int seed = 1; seed <= cases(50); ++seed) {  // away from the origin: half a spacing in each coordinate
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto sphere = icosphere<S>({.radius = 1, .subdivisions = 2});  // a vertex has six springs
+        const S far = random.number<S>(S(2), S(100));
+        const Points<S> x = sphere.positions().colwise() + (far * random.unit_vector<S>()).eigen();
+        const S force = MassSpringNetwork(TriangleMesh<S>(x, sphere.triangles()), LinearSpring{}, {.stiffness = S(40)})
+                            .force_tolerance();
+        const S spacing = epsilon * x.cwiseAbs().maxCoeff();
+        CHECK(force >= 40 * 6 * std::sqrt(S(0.75)) * spacing);
+        CHECK(force <= 40 * std::max({6 * S(0.88) * spacing, 65 * epsilon, S(1e-9)}));
+    }
     const auto mesh = icosphere<S>({.subdivisions = 1});
     CHECK(MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = S(0)}).force_tolerance() == 0);
     const MassSpringNetwork slack(mesh, LinearSpring{}, {.stiffness = S(0)});

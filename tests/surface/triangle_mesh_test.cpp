@@ -275,12 +275,12 @@ TEMPLATE_TEST_CASE("a mesh that is too small or too far away for its numbers is 
         far.x.colwise() += S(0.1) * size / std::numeric_limits<S>::epsilon() * random.unit_vector<S>().eigen();
         const std::string message = refusal_of(far);
         CHECK_THAT(message,
-                   ContainsSubstring("a hundred times the spacing of numbers at the largest coordinate, got "));
+                   ContainsSubstring("a thousand times the spacing of numbers at the largest coordinate, got "));
         CHECK_THAT(message, ContainsSubstring("; move the mesh to the origin, or use double"));
     }
 }
 
-TEMPLATE_TEST_CASE("the spacing of numbers may be a hundredth of the mean edge and not more", "[mesh][bad]",
+TEMPLATE_TEST_CASE("the spacing of numbers may be a thousandth of the mean edge and not more", "[mesh][bad]",
                    TEST_SCALARS) {
     using S = TestType;
     const S epsilon = std::numeric_limits<S>::epsilon();
@@ -288,7 +288,7 @@ TEMPLATE_TEST_CASE("the spacing of numbers may be a hundredth of the mean edge a
         for (const int exponent : {-3, 0, 2}) {
             CAPTURE(edge, exponent);
             const S size = edge * static_cast<S>(std::pow(2, exponent));
-            const S limit = size / (100 * epsilon);
+            const S limit = size / (1000 * epsilon);
             for (const S factor : {S(0.5), S(0.95), S(1.05), S(2)}) {
                 Surface<S> triangle;  // equilateral: the mean edge is `size`, up to the coarse coordinate
                 triangle.add(Vector3<S>(factor * limit, 0, 0));

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <concepts>
+#include <cstddef>
 #include <limits>
+#include <vector>
 
 #include <membrane/core/lanes.hpp>
 #include <membrane/core/symmetric3.hpp>
@@ -105,6 +108,30 @@ concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, 
 };
 
 namespace detail {
+
+/// The force that is negligible on every vertex of a mesh, by the stiffness of all springs or elements at it.
+template <Real Scalar>
+struct NegligibleForce {
+    /// Of a mesh with positions `x`, 3 x V [m]. Cost: O(V).
+    explicit NegligibleForce(const Points<Scalar>& x) : at_vertex(static_cast<std::size_t>(x.cols()), 0) {
+        constexpr Scalar epsilon = std::numeric_limits<Scalar>::epsilon();
+        const auto width = [&](Index k) { return x.row(k).maxCoeff() - x.row(k).minCoeff(); };
+        in_size = 64 * epsilon * ((std::max)({width(0), width(1), width(2)}) / 2);
+        // A vertex is at most half a spacing of numbers in each coordinate from where an update would move it.
+        in_position = Scalar(0.87) * epsilon * x.cwiseAbs().maxCoeff();
+    }
+
+    /// Adds a spring or element at vertex `v` [N/m], [m].
+    void add(Index v, Scalar stiffness, Scalar length) noexcept {
+        Scalar& sum = at_vertex[static_cast<std::size_t>(v)];
+        sum += stiffness;
+        force = (std::max)({force, stiffness * (std::max)(length / Scalar(1e9), in_size), sum * in_position});
+    }
+
+    std::vector<Scalar> at_vertex;  ///< sum of stiffnesses [N/m]
+    Scalar in_size, in_position;    ///< rounding errors [m]
+    Scalar force = 0;               ///< [N]
+};
 
 template <class Network, class Scalar>
 consteval bool check_elastic_network() noexcept {  // NOLINT(readability-function-size): a sentence for each requirement

@@ -334,7 +334,8 @@ class Elements {
     }
 
   private:
-    [[nodiscard]] Scalar force_tolerance_of(const Instance& instance, const Points<Scalar>& x) const noexcept;
+    [[nodiscard]] static bool add_element(const Instance& instance, const Points<Scalar>& x,
+                                          detail::NegligibleForce<Scalar>& negligible);
     template <class Act>
     void for_each_copy(Index number, Act act) noexcept;
     [[nodiscard]] Index number_of(const std::array<Index, 3>& corners) const noexcept;
@@ -346,19 +347,19 @@ class Elements {
 
 template <Real Scalar, CheckedElement Each>
 Elements<Scalar, Each>::Elements(const TriangleMesh<Scalar>& mesh, std::vector<Instance> all) : all_(std::move(all)) {
+    detail::NegligibleForce<Scalar> negligible(mesh.positions());
     for (std::size_t i = 0; i < all_.size(); ++i) {
         for (const Index v : all_[i].corners) {
             if (v >= 0 && v < mesh.vertex_count()) continue;
             refuse("Elements", "element ", i, " names vertex ", v, ", expected 0 to ", mesh.vertex_count() - 1);
         }
-        const Scalar negligible = force_tolerance_of(all_[i], mesh.positions());
-        if (!is_finite(negligible)) {
+        if (!add_element(all_[i], mesh.positions(), negligible)) {
             refuse("Elements", "element ", i, " at vertex ", all_[i].corners[0],
                    " must pull with a finite force and stiffness at rest: its triangle is too thin, or a constant too "
                    "large");
         }
-        force_tolerance_ = (std::max)(force_tolerance_, negligible);
     }
+    force_tolerance_ = negligible.force;
     at_vertex_ = CompressedRows<AtVertex>(mesh.vertex_count(), [this](auto put) {
         for (std::size_t place = 0; place < corner_count; ++place) {
             for (std::size_t n = 0; n < all_.size(); ++n) {
@@ -473,21 +474,22 @@ Index Elements<Scalar, Each>::number_of(const std::array<Index, 3>& corners) con
     return no_index;
 }
 
+// Adds the rounding errors of an element's forces; false if a force or stiffness is not finite.
 template <Real Scalar, CheckedElement Each>
-Scalar Elements<Scalar, Each>::force_tolerance_of(const Instance& instance, const Points<Scalar>& x) const noexcept {
+bool Elements<Scalar, Each>::add_element(const Instance& instance, const Points<Scalar>& x,
+                                         detail::NegligibleForce<Scalar>& negligible) {
     const auto corners = instance.where(x);
     Scalar largest = 0, stiffness = 0, size = 0;
     for (std::size_t i = 0; i < corner_count; ++i) {
         const auto corner = instance.element.force_on(corners, i);
-        if (!is_finite(corner.force) || !is_finite(corner.hessian.trace()))
-            return std::numeric_limits<Scalar>::infinity();
+        if (!is_finite(corner.force) || !is_finite(corner.hessian.trace())) return false;
         stiffness = (std::max)(stiffness, corner.hessian.trace());
         size = (std::max)(size, norm<Scalar>(corners[i] - corners[0]));
         largest = (std::max)(largest, norm(corner.force));
     }
-    const Scalar epsilon = std::numeric_limits<Scalar>::epsilon(), largest_coordinate = x.cwiseAbs().maxCoeff();
-    return (std::max)(stiffness * (std::max)(size / Scalar(1e9), 64 * epsilon * largest_coordinate),
-                      64 * epsilon * largest);
+    for (const Index v : instance.corners) negligible.add(v, stiffness, size);
+    negligible.force = (std::max)(negligible.force, 64 * std::numeric_limits<Scalar>::epsilon() * largest);
+    return is_finite(negligible.force);
 }
 
 }  // namespace membrane

@@ -342,8 +342,9 @@ class MassSpringNetwork {
     /// Energy stored in all springs [J]. Cost: O(springs).
     [[nodiscard]] Scalar energy(const ConstPointsRef<Scalar>& x) const noexcept;
 
-    /// A negligible residual force [N]: 1e-9 of the force of the stiffest spring stretched by its own length, or its
-    /// stiffness times 64 roundings of a coordinate if that is larger.
+    /// A negligible residual force [N]. The largest of: 1e-9 of the force of the stiffest spring stretched by its own
+    /// length; its stiffness times 64 roundings of half the mesh's size; and the stiffness at a vertex times the
+    /// rounding of its position in the mesh, which grows with the distance from the origin.
     [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 
   protected:  // for networks that tear
@@ -420,11 +421,11 @@ void MassSpringNetwork<Scalar, Law>::build_springs(const Adjacency& adjacency, c
     for (std::size_t s = 0; s < edges.size(); ++s) {
         if (stiffness[s] > 0) springs_.try_push_back({edges[s][0], edges[s][1], stiffness[s], rest[s]});
     }
-    const Scalar spacing = std::numeric_limits<Scalar>::epsilon() * x.cwiseAbs().maxCoeff();
+    detail::NegligibleForce<Scalar> negligible(x);
     for (const auto& s : springs()) {
-        const Scalar force = s.stiffness * (std::max)(s.rest_length / Scalar(1e9), 64 * spacing);
-        force_tolerance_ = (std::max)(force_tolerance_, force);
+        for (const Index v : {s.first, s.second}) negligible.add(v, s.stiffness, s.rest_length);
     }
+    force_tolerance_ = negligible.force;
 }
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>

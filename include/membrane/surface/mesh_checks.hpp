@@ -139,9 +139,9 @@ bool check_size(const Points<Scalar>& x, const Triangles& triangles, Scalar larg
     } else if (mean_edge < least) {
         found(MeshDefect::too_small, {}, {}, "the mean edge must be at least ", least,
               " [m], or squares of areas vanish, got ", mean_edge);
-    } else if (mean_edge < 100 * spacing) {
-        found(MeshDefect::too_coarse, {}, {}, "the mean edge must be at least ", 100 * spacing,
-              " [m], a hundred times the spacing of numbers at the largest coordinate, got ", mean_edge,
+    } else if (mean_edge < 1000 * spacing) {
+        found(MeshDefect::too_coarse, {}, {}, "the mean edge must be at least ", 1000 * spacing,
+              " [m], a thousand times the spacing of numbers at the largest coordinate, got ", mean_edge,
               "; move the mesh to the origin, or use double");
     } else if (largest_height <= 4 * spacing) {
         found(MeshDefect::all_on_one_line, {}, {}, "all vertices of each triangle are on one line, expected a surface");
