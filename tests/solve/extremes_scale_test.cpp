@@ -272,7 +272,7 @@ TEST_CASE("a membrane in float away from the origin is off by what roundings of 
             return (a.template cast<double>() - b.template cast<double>()).colwise().norm().maxCoeff();
         };
         REQUIRE(off(single.left, x) < dent);
-        // Of the force and the displacement of each vertex; independent, so the sum grows with the root of their number.
+        // Of forces and displacements of the vertices, independent: the sum grows with the root of their number.
         const double error = 2 * std::sqrt(static_cast<double>(mesh.vertex_count())) * force;
         REQUIRE(std::abs(static_cast<double>(single.force) - exact.force) < error);
     }
