@@ -162,7 +162,7 @@ TEST_CASE("with balancing loads the mesh is the shape at rest, to the bit", "[pr
 TEST_CASE("a pressure that is none, and a network of another mesh, are refused", "[pressure][bad]") {
     const auto mesh = icosphere({.subdivisions = 1});
     CHECK(refusal([&] { (void)pressure(mesh, std::numeric_limits<double>::infinity()); }) ==
-          "pressure: pascal must be finite [Pa], got inf");
+          "pressure: value must be finite [Pa], got inf");
     const auto other = MassSpringNetwork(icosphere({.subdivisions = 0}), LinearSpring{}, {.stiffness = 1.0});
     CHECK(refusal([&] { (void)balancing_loads(mesh, other); }) ==
           "balancing_loads: the network must have as many vertices as the mesh, 42, got 12");

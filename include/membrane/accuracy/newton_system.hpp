@@ -147,7 +147,8 @@ inline void NewtonSystem::factorise(double scale) {
     Sparse matrix(size_, size_);
     matrix.setFromTriplets(triplets_.begin(), triplets_.end());
     const auto is_definite = [&] {
-        return factors_.info() == Eigen::Success && factors_.vectorD().minCoeff() > 1e-12 * scale;
+        const bool succeeded = factors_.info() == Eigen::ComputationInfo{};  // Eigen::Success, a macro in Xlib.h
+        return succeeded && factors_.vectorD().minCoeff() > 1e-12 * scale;
     };
     factors_.setShift(0);
     factors_.compute(matrix);

@@ -84,10 +84,10 @@ struct DeadLoad {
     ///@}
 };
 
-/// `pascal` on every triangle of `mesh`. By Laplace's law a sphere of radius r balances it with a tension of
-/// pascal r / 2 [N/m]. @throws InvalidInput for a pressure that is not finite
+/// A pressure of `value` [Pa] on every triangle of `mesh`. By Laplace's law a sphere of radius r balances it with a
+/// tension of value r / 2 [N/m]. @throws InvalidInput for a pressure that is not finite
 template <Real Scalar>
-[[nodiscard]] Elements<Scalar, PressureLoad<Scalar>> pressure(const TriangleMesh<Scalar>& mesh, double pascal);
+[[nodiscard]] Elements<Scalar, PressureLoad<Scalar>> pressure(const TriangleMesh<Scalar>& mesh, double value);
 
 /// The loads for which the shape of `mesh` is an equilibrium of `network`, to the last bit: on each vertex the negative
 /// of the force of the network. They stand for pressure, anchors and surrounding tissue that are not modelled.
@@ -110,12 +110,12 @@ Eigen::Matrix3d PressureLoad<Scalar>::hessian_block(const Corners<double, 3>& x,
 }
 
 template <Real Scalar>
-Elements<Scalar, PressureLoad<Scalar>> pressure(const TriangleMesh<Scalar>& mesh, double pascal) {
-    if (!is_finite(pascal)) refuse("pressure", "pascal must be finite [Pa], got ", pascal);
+Elements<Scalar, PressureLoad<Scalar>> pressure(const TriangleMesh<Scalar>& mesh, double value) {
+    if (!is_finite(value)) refuse("pressure", "value must be finite [Pa], got ", value);
     using All = Elements<Scalar, PressureLoad<Scalar>>;
     std::vector<typename All::Instance> all;
     for (const auto& corners : mesh.triangles().colwise()) {
-        all.push_back({{corners[0], corners[1], corners[2]}, {static_cast<Scalar>(pascal)}});
+        all.push_back({{corners[0], corners[1], corners[2]}, {static_cast<Scalar>(value)}});
     }
     return All(mesh, std::move(all));
 }

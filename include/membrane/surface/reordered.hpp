@@ -79,7 +79,7 @@ ReorderedMesh<Scalar> reordered(const TriangleMesh<Scalar>& mesh) {
     std::vector<Index> first;
     for (const auto& corners : renamed.colwise()) first.push_back(corners.minCoeff());
     const std::vector<Index> triangles = detail::sorted_by(first);
-    // Eigen 3.4 calls the placeholder of all rows Eigen::all, Eigen 5 no more.
+    // The placeholder of all rows has another name in Eigen 5.
     return {TriangleMesh<Scalar>(x(Eigen::seqN(0, 3), vertices), renamed(Eigen::seqN(0, 3), triangles)), vertices,
             triangles};
 }
