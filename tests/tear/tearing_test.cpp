@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <numeric>
 #include <span>
 #include <type_traits>
 #include <vector>
@@ -814,4 +816,118 @@ TEST_CASE("the driving forces of both ends of a short slit do not cancel", "[tea
         CHECK(tips[0].driving_force[0] > 0);
         CHECK(tips[1].driving_force[0] < 0);
     }
+}
+
+namespace {
+
+/// A scene turned, mirrored and with other numbers: `number` of each vertex.
+struct OtherView {
+    explicit OtherView(Index vertex_count) : number(static_cast<std::size_t>(vertex_count)) {
+        std::iota(number.begin(), number.end(), Index{0});
+    }
+    OtherView(Index vertex_count, test::Random& random) : OtherView(vertex_count) {
+        if (random.chance(0.5)) std::shuffle(number.begin(), number.end(), random.engine());
+        mirrored = random.chance(0.5);
+        rotation = random.rotation();
+        if (mirrored) rotation.col(0) *= -1;
+    }
+
+    TriangleMesh<double> operator()(const Points<double>& x, const Triangles& triangles) const {
+        Points<double> moved(3, x.cols());
+        for (Index v = 0; v < x.cols(); ++v) moved.col(number[static_cast<std::size_t>(v)]) = rotation * x.col(v);
+        Triangles renamed = triangles.unaryExpr([&](Index v) { return number[static_cast<std::size_t>(v)]; });
+        if (mirrored) renamed.row(1).swap(renamed.row(2));
+        return {moved, renamed};
+    }
+
+    std::vector<Index> number;
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    bool mirrored = false;
+};
+
+/// A sheet of vertices here and there, slightly bulged, that is cut twice: the tip of one cut is often beside the other
+/// one. Then it tears.
+struct CutSheet {
+    explicit CutSheet(test::Random& random) : x(grid.positions()) {
+        for (Index v = 0; v < x.cols(); ++v) x.col(v) += random.vector(-5e-5, 5e-5).eigen();
+        const TornSurface<double> surface(TriangleMesh<double>(x, grid.triangles()));
+        const auto from_border = border(grid);
+        for (auto& path : cuts) {
+            path.push_back(from_border[static_cast<std::size_t>(random.index(static_cast<Index>(from_border.size())))]);
+            const Vector3<double> inward = random.vector(-1e-3, 1e-3) - point(x, path[0]);
+            const auto length = static_cast<std::size_t>(5 + random.index(5));
+            while (path.size() < length) {
+                const Index next = surface.nearest_in_direction(path.back(), inward);
+                const bool meets = std::find(cuts[0].begin(), cuts[0].end(), next) != cuts[0].end();
+                if (next == no_index || meets || surface.adjacency().on_border(next)) break;
+                path.push_back(next);
+            }
+        }
+    }
+
+    /// The driving force at each tip at equilibrium, then places where vertices have doubled, as seen from here.
+    struct Seen {
+        std::vector<double> forces;
+        std::vector<Vector3<double>> doubled;
+    };
+    Seen tears(const OtherView& view, double toughness) const {
+        const auto mesh = with_reserve(view(x, grid.triangles()), 60);
+        auto net = Tissue(TearableSprings(
+            mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 10.0, .pinned = border(mesh)})));
+        QuasiStaticSolver solver(net, {.layers = unlimited, .sweeps = 20000, .force_tolerance = 1e-11});
+        Tearing tear(mesh, EnergyRelease{.toughness = toughness, .thickness = 1e-5});
+        Points<double> now = 1.2 * mesh.positions();
+        Seen seen;
+        const auto follow_all = [&](const auto& events) {
+            for (const auto& event : events) follow(event, net, solver);
+        };
+        for (auto path : cuts) {
+            for (Index& v : path) v = view.number[static_cast<std::size_t>(v)];
+            follow_all(tear.cut_along(path, now));
+        }
+        for (int tick = 0; tick < 4; ++tick) {
+            solver.wake_all();
+            REQUIRE(solver.step(now, 1e-3, net, NoFoundation(), tear.ligaments()).status == StepStatus::advanced);
+            const auto events = tear.update(now, 1e-3, net, NoFoundation());
+            for (const auto& event : events) {
+                if (event.split.vertex == no_index) continue;
+                const Vector3<double> at = point(tear.surface().rest_positions(), event.split.vertex);
+                seen.doubled.push_back(view.rotation.transpose() * at.eigen());
+            }
+            follow_all(events);
+            for (const auto& tip : tear.tips()) seen.forces.push_back(norm(tip.driving_force));
+        }
+        return seen;
+    }
+
+    TriangleMesh<double> grid = sheet({.width = 0.014, .height = 0.014, .columns = 14, .rows = 14});
+    Points<double> x;
+    std::array<std::vector<Index>, 2> cuts;
+};
+
+}  // namespace
+
+// Folds beside a cut may have two equilibria, whose forces differ by less than 1e-3.
+TEST_CASE("a sheet turned, mirrored and numbered otherwise has the same driving forces and tears along the same edges",
+          "[tear]") {
+    int torn = 0;
+    for (int seed = 1; seed <= cases(4, 400); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const CutSheet sheet(random);
+        const auto expected = sheet.tears(OtherView(static_cast<Index>(sheet.x.cols())), 600);
+        torn += expected.doubled.empty() ? 0 : 1;
+        for (int i = 0; i < 3; ++i) {
+            const auto seen = sheet.tears(OtherView(static_cast<Index>(sheet.x.cols()), random), 600);
+            REQUIRE(seen.forces.size() == expected.forces.size());
+            for (std::size_t k = 0; k < seen.forces.size(); ++k) {
+                CHECK(seen.forces[k] == Approx(expected.forces[k]).epsilon(1e-3));
+            }
+            REQUIRE(seen.doubled.size() == expected.doubled.size());
+            for (std::size_t k = 0; k < seen.doubled.size(); ++k) {
+                CHECK(norm<double>(seen.doubled[k] - expected.doubled[k]) < 1e-9);
+            }
+        }
+    }
+    CHECK(torn > cases(4, 400) / 4);
 }

@@ -474,30 +474,35 @@ auto Tearing<Scalar, Criterion>::update(PointsRef<Scalar> x, Scalar dt, const Ne
     return surface_.events();
 }
 
-// Whether a triangle around `v` has changed since `begin`: the network does not know it.
+// Whether a corner of a triangle around `v` has doubled or moved since `begin`: the network does not know it. Whichever
+// side of a tear the triangle is on: the copy could as well be on the other one.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 bool Tearing<Scalar, Criterion>::has_changed_around(Index v) const noexcept {
     const auto around = surface_.adjacency().triangles_of(v);
-    const auto is_around = [&](Index f) { return std::find(around.begin(), around.end(), f) != around.end(); };
+    const auto is_around = [&](Index w) {
+        return w != no_index && std::any_of(around.begin(), around.end(), [&](Index f) {
+                   const auto corners = surface_.corners(f);
+                   return std::find(corners.begin(), corners.end(), w) != corners.end();
+               });
+    };
     const auto events = surface_.events();
     return std::any_of(events.begin(), events.end(), [&](const auto& event) {
-        const auto& split = event.split.triangles;
-        const auto& moved = event.moved.triangles;
-        return std::any_of(split.begin(), split.end(), is_around) ||
-               std::any_of(moved.begin(), moved.end(), [&](const auto& one) { return is_around(one.triangle); });
+        return is_around(event.split.vertex) || is_around(event.split.copy) || is_around(event.moved.vertex);
     });
 }
 
-// The triangles with a corner within `radius` of vertex `v` at rest [m], over triangles that share a corner.
+// The triangles with a corner within `radius` of vertex `v` at rest [m], over triangles that share a corner. A vertex at
+// the radius is not within it, however that is rounded: often it is the next tip, which joins the two sides of its tear.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 void Tearing<Scalar, Criterion>::list_patch(Index v, Scalar radius) noexcept {
     patch_.clear();
     patch_vertices_.clear();
     patch_vertices_.insert(v);
     const auto& rest = surface_.rest_positions();
+    const Scalar squared_limit = Scalar(0.999) * (radius * radius);
     for (std::size_t i = 0; i < patch_vertices_.items().size(); ++i) {
         const Index at = patch_vertices_.items()[i];
-        if (!(squared_norm<Scalar>(point(rest, at) - point(rest, v)) < radius * radius)) continue;
+        if (!(squared_norm<Scalar>(point(rest, at) - point(rest, v)) < squared_limit)) continue;
         for (const Index f : surface_.adjacency().triangles_of(at)) {
             if (!patch_.insert(f)) continue;
             for (const Index corner : surface_.corners(f)) patch_vertices_.insert(corner);
