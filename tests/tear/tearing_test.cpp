@@ -931,3 +931,65 @@ TEST_CASE("a sheet turned, mirrored and numbered otherwise has the same driving 
     }
     CHECK(torn > cases(4, 400) / 4);
 }
+
+// A user forgets one part in `follow`.
+TEST_CASE("a part that has missed a split is refused by name, and nothing moves", "[tear]") {
+    enum class Part { none, network, foundation, solver, tree, tracker, all };
+    const auto status_without = [](Part missing) {
+        const auto mesh = with_reserve(disc<double>({.radius = 0.01, .rings = 6}), 20);
+        auto net =
+            Tissue(TearableSprings(mesh, MassSpringNetwork(mesh, LinearSpring{}, {.stiffness = 20.0, .pinned = {0}})));
+        VirtualVolumeSprings foundation(mesh, {.stiffness = 5.0});
+        QuasiStaticSolver solver(net);
+        AabbTree tree(mesh);
+        ContactTracker tracker(mesh);
+        Tearing tear(mesh, EnergyRelease{.toughness = 1, .thickness = 1e-4});
+        Points<double> x = mesh.positions();
+        const std::array path{Index{1}, Index{0}, Index{4}};
+        for (const auto& event : tear.cut_along(path, x)) {
+            const auto follow_unless = [&](Part part, auto& of) {
+                if (missing != part && missing != Part::all) follow(event, of);
+            };
+            follow_unless(Part::network, net);
+            follow_unless(Part::foundation, foundation);
+            follow_unless(Part::solver, solver);
+            follow_unless(Part::tree, tree);
+            follow_unless(Part::tracker, tracker);
+        }
+        const Points<double> before = x;
+        const Tool<double> tool{.position = {0.004, 0, 0.0008}, .radius = 1e-3};
+        const auto contact = tracker.update(tree, x, tool);
+        const auto report = solver.step(x, 1e-3, net, foundation, press(tool, contact), tear.ligaments());
+        CHECK((report.status == StepStatus::advanced) == (x != before));
+        return report.status;
+    };
+    CHECK(status_without(Part::none) == StepStatus::advanced);
+    CHECK(status_without(Part::network) == StepStatus::network_missed_split);
+    CHECK(status_without(Part::foundation) == StepStatus::foundation_missed_split);
+    CHECK(status_without(Part::solver) == StepStatus::solver_missed_split);
+    CHECK(status_without(Part::tree) == StepStatus::contact_missed_split);
+    CHECK(status_without(Part::tracker) == StepStatus::contact_missed_split);
+    CHECK(status_without(Part::all) == StepStatus::solver_missed_split);
+}
+
+TEST_CASE("a cut that is none says why", "[tear]") {
+    const auto flat = sheet({.width = 4, .height = 4, .columns = 4, .rows = 4});  // 5 vertices in a row
+    const auto status = [&](Index reserve, const std::vector<Index>& path) {
+        const auto mesh = with_reserve(flat, reserve);
+        Tearing tear(mesh, EnergyRelease{.toughness = 1, .thickness = 1});
+        Points<double> x = mesh.positions();
+        const auto cut = tear.cut_along(path, x);
+        CHECK(cut.empty() == (cut.status != CutStatus::cut));
+        CHECK(tear.reserve_used_up() == (cut.status == CutStatus::reserve_too_small));
+        return cut.status;
+    };
+    CHECK(status(2, {11, 12, 13}) == CutStatus::cut);
+    CHECK(status(2, {12}) == CutStatus::no_path);
+    CHECK(status(2, {12, 99}) == CutStatus::no_path);
+    CHECK(status(2, {11, 12, 11}) == CutStatus::no_path);
+    CHECK(status(2, {11, 13}) == CutStatus::not_joined);
+    CHECK(status(2, {10, 15}) == CutStatus::not_joined);  // a border edge
+    CHECK(status(2, {12, 11, 10, 6}) == CutStatus::crosses_border);
+    CHECK(status(2, {11, 12}) == CutStatus::one_edge_within);
+    CHECK(status(1, {10, 11, 12, 13}) == CutStatus::reserve_too_small);
+}

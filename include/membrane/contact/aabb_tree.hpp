@@ -74,6 +74,9 @@ class AabbTree {
     /// A vertex has moved as a tear has moved it: the next refit includes it. Online. Cost: the leaves around it.
     void reshape(const MovedVertex<Scalar>& moved) noexcept { boxes_.reshape(moved); }
 
+    /// Number of splits that it has followed.
+    [[nodiscard]] Index splits() const noexcept { return boxes_.splits(); }
+
     // All queries take the positions of the last refit, and find nothing if their number is another. They do not
     // allocate. They report the number of boxes visited: O(log F) for a small query near the surface, all at worst.
 

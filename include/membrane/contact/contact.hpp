@@ -53,6 +53,7 @@ struct Contact {
     std::span<const ContactTriangle> candidates;  ///< `triangles`, then those around them
     bool has_all_points = true;  ///< false if `points` exceeded its capacity: a step refuses this contact
     bool closed = false;         ///< whether the surface is closed: its back is its inside
+    Index splits = no_index;  ///< of a tear, that tracker and tree have followed; a step refuses a contact with fewer
 
     /// No contact: the phase is `none`, there are no triangles and no points.
     [[nodiscard]] static Contact none() noexcept { return {}; }

@@ -16,6 +16,7 @@
 #include <membrane/core/fixed_vector.hpp>
 #include <membrane/core/index_set.hpp>
 #include <membrane/core/lanes.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Contact detection: position, depth and phase of the tool's contact with the surface.
 ///
@@ -60,7 +61,7 @@ struct TrackerOptions {
 /// against it. If the tool is outside the rest surface and the membrane lies farther out, there is no contact: a
 /// contact must not pull.
 template <Real Scalar>
-class ContactTracker {
+class ContactTracker : public SplitCount {
   public:
     /// @throws InvalidInput for options out of range. Cost: O(V + F log F).
     explicit ContactTracker(const TriangleMesh<Scalar>& mesh, TrackerOptions options = {});
@@ -95,7 +96,7 @@ class ContactTracker {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.surface_);
-        if (self.surface_.has_reserve()) visit(self.origins_, self.torn_);
+        if (self.surface_.has_reserve()) visit(self.origins_, self.torn_, self.splits_);
         visit(self.near_, self.nearest_, self.nearest_square_, self.last_, self.last_tool_, self.pose_, self.side_,
               self.slid_off_, self.origin_triangles_, self.ticks_, self.full_query_count_, self.rebound_ticks_);
     }
@@ -219,6 +220,7 @@ ContactTracker<Scalar>::ContactTracker(const TriangleMesh<Scalar>& mesh, Tracker
 template <Real Scalar>
 void ContactTracker<Scalar>::split(const VertexSplit& split) noexcept {
     torn_ = true;
+    ++splits_;
     surface_.split(split);
     origins_.col(split.copy) = origins_.col(split.vertex);
     if (split.takes(last_.triangle)) split.replace_in(last_.corners);
@@ -290,6 +292,7 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
         contact = {};
         contact.phase = before ? ContactPhase::ended : ContactPhase::none;
     }
+    contact.splits = (std::min)(tree.splits(), splits_);
     last_tool_ = tool;
     last_ = contact;
     last_.triangles = last_.candidates = {};  // valid until the next update only

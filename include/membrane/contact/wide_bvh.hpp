@@ -38,7 +38,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The splits are those of `tree_shape`, collapsed so that a node has up to one child for each of the `Lanes`.
 template <Real Scalar>
-class WideBvh {
+class WideBvh : public SplitCount {
   public:
     /// O(F log F) for usual shapes. @throws InvalidInput if `balance_threshold` is below 1
     explicit WideBvh(const TriangleMesh<Scalar>& mesh, const TreeOptions& options = {});
@@ -76,7 +76,7 @@ class WideBvh {
     /// Visits what a tear changes, see `core/snapshot.hpp`: of a mesh with a reserve, the triangles.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        if (self.has_reserve_) visit(self.items_, self.vertices_of_, self.leaves_of_);
+        if (self.has_reserve_) visit(self.items_, self.vertices_of_, self.leaves_of_, self.splits_);
     }
 
   private:
@@ -254,6 +254,7 @@ void WideBvh<Scalar>::reserve_vertices() {
 // The leaves of the vertex stay those of both.
 template <Real Scalar>
 void WideBvh<Scalar>::split(const VertexSplit& split) noexcept {
+    ++splits_;
     for (const Index leaf : std::as_const(leaves_of_)[split.vertex]) {
         bool goes = false, stays = false;
         for (Item& item : items_of(leaf)) {

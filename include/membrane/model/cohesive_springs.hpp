@@ -16,6 +16,7 @@
 #include <membrane/model/spring_stiffness.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/surface/normals.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// Adhesion of the membrane to the body under it, which peeling overcomes.
 ///
@@ -143,7 +144,7 @@ struct CohesiveSpring {
 /// A 90 degree peel takes the force G per width, whatever the strength, if the edges resolve the zone where the stress
 /// decreases: at most G / (3 S). On a coarser mesh the front moves in jumps; reduce the strength.
 template <Real Scalar>
-class CohesiveSprings {
+class CohesiveSprings : public SplitCount {
   public:
     /// Anchors and normals are those of `mesh`. @throws InvalidInput for a constant that is negative, not finite,
     /// missing, or of the wrong count, and if a strength is reached only beyond the failure: it must be S^2 < 2 G K.
@@ -203,7 +204,7 @@ class CohesiveSprings {
     /// Visits damage, and what a tear changes, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.anchors_, self.normals_, self.constants_, self.reached_, self.dissipated_);
+        visit(self.anchors_, self.normals_, self.constants_, self.reached_, self.dissipated_, self.splits_);
     }
 
   private:
@@ -307,6 +308,7 @@ void CohesiveSprings<Scalar>::reset() noexcept {
 
 template <Real Scalar>
 void CohesiveSprings<Scalar>::split(const VertexSplit& split) noexcept {
+    ++splits_;
     const auto from = static_cast<std::size_t>(split.vertex), to = static_cast<std::size_t>(split.copy);
     for (auto* points : {&anchors_, &normals_}) points->col(split.copy) = points->col(split.vertex);
     constants_[to] = constants_[from];

@@ -12,6 +12,7 @@
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/model/volume_springs.hpp>
 #include <membrane/surface/normals.hpp>
+#include <membrane/surface/vertex_split.hpp>
 
 /// A foundation with one stiffness along the normal and another along the surface.
 ///
@@ -82,7 +83,7 @@ struct FoundationSpring {
 /// A tick reduces an indentation by the factor 1 / (1 + dt / T): in ticks of T / 10 the recovery takes 5 % longer than
 /// T.
 template <Real Scalar>
-class FoundationSprings {
+class FoundationSprings : public SplitCount {
   public:
     /// Anchors and normals are those of `mesh`.
     /// @throws InvalidInput for a constant that is negative, not finite, missing, or of the wrong count
@@ -141,7 +142,7 @@ class FoundationSprings {
     /// Visits what a tear changes, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.anchors_, self.normals_, self.constants_);
+        visit(self.anchors_, self.normals_, self.constants_, self.splits_);
     }
 
   private:
@@ -174,6 +175,7 @@ FoundationSprings<Scalar>::FoundationSprings(const TriangleMesh<Scalar>& mesh, c
 
 template <Real Scalar>
 void FoundationSprings<Scalar>::split(const VertexSplit& split) noexcept {
+    ++splits_;
     for (auto* points : {&anchors_, &normals_}) points->col(split.copy) = points->col(split.vertex);
     Constants& of_vertex = constants_[static_cast<std::size_t>(split.vertex)];
     Constants& of_copy = constants_[static_cast<std::size_t>(split.copy)];

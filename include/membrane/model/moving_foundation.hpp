@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <concepts>
 #include <type_traits>
 
 #include <membrane/core/symmetric3.hpp>
@@ -111,6 +112,11 @@ class MovingFoundation {
         volume.energy(v, position);
     }
     { return volume_->energy(v, FrameOnBody<Scalar>(*body_, v).point_to_body(position)); }
+
+    /// Of the model, if it counts the splits that it has followed.
+    [[nodiscard]] Index splits() const noexcept requires std::derived_from<Volume, SplitCount> {
+        return volume_->splits();
+    }
 
   private:
     const MovingBody<Scalar>* body_;

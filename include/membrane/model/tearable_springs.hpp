@@ -29,7 +29,7 @@ template <Real Scalar>
 /// in proportion to their areas; when they part, each keeps its own. The order in which a vertex lists its springs then
 /// changes. A doubled vertex has its share of mass and viscosity, and is pinned if the vertex is.
 template <Real Scalar_, CheckedSpringLaw<Scalar_> Law = LinearSpring>
-class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
+class TearableSprings : public MassSpringNetwork<Scalar_, Law>, public SplitCount {
     using Base = MassSpringNetwork<Scalar_, Law>;
 
   public:
@@ -57,7 +57,7 @@ class TearableSprings : public MassSpringNetwork<Scalar_, Law> {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         Base::visit_tear(self, visit);
-        visit(self.sides_, self.shares_, self.capacity_);
+        visit(self.sides_, self.shares_, self.capacity_, self.splits_);
     }
 
   private:
@@ -211,6 +211,7 @@ void TearableSprings<Scalar, Law>::part(const VertexSplit& split, Index f, Index
 
 template <Real Scalar, CheckedSpringLaw<Scalar> Law>
 void TearableSprings<Scalar, Law>::split(const VertexSplit& split) noexcept {
+    ++splits_;
     const Index v = split.vertex, copy = split.copy;
     for (std::size_t n = 0; n < split.triangles.size(); ++n) {
         const Index f = split.triangles[n];

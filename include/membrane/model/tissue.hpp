@@ -88,6 +88,7 @@ class Tissue {
     /// elements around the vertex and its neighbours.
     void split(const VertexSplit& split) noexcept requires FollowsSplit<Springs>;
     void reshape(const MovedVertex<Scalar>& moved) noexcept requires FollowsSplit<Springs>;
+    [[nodiscard]] Index splits() const noexcept requires FollowsSplit<Springs> { return springs_.splits(); }
     ///@}
 
     /// Of `TearableSprings`: the energy [J] of triangle `f` with these corners, and its forces on them [N]: of springs,

@@ -163,7 +163,7 @@ class MovingFoundation;  // of moving_foundation.hpp
 
 /// Virtual volume springs, [Liu07] (5): one for each vertex, of rest length zero, from the anchor to the vertex.
 template <Real Scalar>
-class VirtualVolumeSprings {
+class VirtualVolumeSprings : public SplitCount {
   public:
     /// Anchors are the positions of `mesh`.
     /// @throws InvalidInput for a constant that is negative, not finite, missing, or of the wrong count
@@ -217,7 +217,7 @@ class VirtualVolumeSprings {
     /// Visits what a tear changes, see `core/snapshot.hpp`.
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
-        visit(self.anchors_, self.stiffness_, self.damping_);
+        visit(self.anchors_, self.stiffness_, self.damping_, self.splits_);
     }
 
   private:
@@ -239,6 +239,7 @@ VirtualVolumeSprings<Scalar>::VirtualVolumeSprings(const TriangleMesh<Scalar>& m
 
 template <Real Scalar>
 void VirtualVolumeSprings<Scalar>::split(const VertexSplit& split) noexcept {
+    ++splits_;
     anchors_.col(split.copy) = anchors_.col(split.vertex);
     for (auto* constants : {&stiffness_, &damping_}) {
         if (!constants->empty())

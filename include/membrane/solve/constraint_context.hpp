@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <span>
 
+#include <membrane/solve/step.hpp>
 #include <membrane/solve/step_state.hpp>
 #include <membrane/surface/triangle.hpp>
 
@@ -34,6 +35,12 @@ class ConstraintContext {
 
     /// Whether `v` is a vertex; if not, the step is refused.
     bool validate(Index v) noexcept;
+
+    /// Compares the splits of a tear that a part has followed with the solver's: the step is refused with `missed`, or
+    /// names the solver, if one has followed fewer.
+    void compare_splits(Index splits, StepStatus missed) noexcept {
+        if (splits != state_.splits) state_.missed = splits < state_.splits ? missed : StepStatus::solver_missed_split;
+    }
 
     /// Puts `v` into layer 0 of the queue: a force enters here.
     void seed(Index v) noexcept {

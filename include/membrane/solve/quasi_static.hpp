@@ -221,6 +221,7 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       last_displacements_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
     detail::define_made<QuasiStaticSolver>();
     if constexpr (requires { rule.validate(); }) rule.validate();
+    if constexpr (requires { network.splits(); }) state_.splits = network.splits();
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
     }
@@ -250,7 +251,13 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     const ConstraintList<Scalar> acting(context, constraints);
     if (!acting.valid()) return refuse_step(StepStatus::invalid_input);
     extrapolate<Volume>(acting, context);
-    acting.begin();
+    const auto compare_splits = [&](const auto& part, StepStatus missed) {
+        if constexpr (requires { part.splits(); }) context.compare_splits(part.splits(), missed);
+    };
+    compare_splits(volume, StepStatus::foundation_missed_split);
+    compare_splits(network, StepStatus::network_missed_split);
+    if (state_.missed == StepStatus::advanced) acting.begin();
+    if (state_.missed != StepStatus::advanced) return refuse_step(state_.missed);
     if (state_.invalid) return refuse_step(StepStatus::invalid_input);
     if (state_.full) return refuse_step(StepStatus::too_many_contact_points);
 

@@ -14,6 +14,7 @@
 #include <membrane/core/rigid_frame.hpp>
 #include <membrane/core/symmetric3.hpp>
 #include <membrane/solve/contact_pack.hpp>
+#include <membrane/solve/step.hpp>
 #include <membrane/surface/vertex_split.hpp>
 
 namespace membrane {
@@ -73,7 +74,7 @@ struct StepState {
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.reset();
         visit(self.position, self.response, self.support, self.residual, self.loaded, self.pressed_supports,
-              self.previous_points, self.previous_ranges, self.queue_residual, self.asleep_below);
+              self.previous_points, self.previous_ranges, self.queue_residual, self.asleep_below, self.splits);
         if constexpr (Visit::restores) self.index_previous_points();
     }
 
@@ -223,6 +224,8 @@ struct StepState {
     ///@{
     /// A constraint found its input invalid; the contact points exceed the capacity.
     bool invalid = false, full = false;
+    Index splits = 0;                          ///< of a tear, until now
+    StepStatus missed = StepStatus::advanced;  ///< a part has followed fewer
     ///@}
 };
 
@@ -264,6 +267,7 @@ void StepState<Scalar>::begin_step() noexcept {
     point_ranges = {};
     pack_ranges = {};
     invalid = full = false;
+    missed = StepStatus::advanced;
 }
 
 template <Real Scalar>
@@ -304,6 +308,7 @@ void StepState<Scalar>::reset() noexcept {
 
 template <Real Scalar>
 void StepState<Scalar>::split(const VertexSplit& split) noexcept {
+    ++splits;
     for (Rows* rows : {&position, &support, &residual}) row(*rows, split.copy) = row(*rows, split.vertex);
     for (const Index i : {0, 1}) row(response, 2 * split.copy + i) = row(response, 2 * split.vertex + i);
     if (loaded.contains(split.vertex)) loaded.insert(split.copy);

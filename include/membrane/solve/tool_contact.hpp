@@ -124,6 +124,7 @@ inline constexpr int all_contact_passes = 8, deep_contact_passes = 16;
 
 template <Real Scalar>
 void ToolContact<Scalar>::begin(Context& context) const noexcept {
+    if (contact.splits != no_index) context.compare_splits(contact.splits, StepStatus::contact_missed_split);
     if (!contact.touching() || !seed(context)) return;
     if (!contact.has_all_points) {
         context.state().full = true;

@@ -93,6 +93,16 @@ concept FollowsSplit = requires(Part& part, const VertexSplit& split) {
     noexcept;
 };
 
+/// Counts the splits that a part has followed: the parts of a step must have followed the same ones.
+class SplitCount {
+  public:
+    /// Splits until now.
+    [[nodiscard]] Index splits() const noexcept { return splits_; }
+
+  protected:
+    Index splits_ = 0;  // of the part's own `split`; a snapshot holds it
+};
+
 /// A part that depends on the shape at rest.
 template <class Part, class Scalar>
 concept FollowsMovedVertex = requires(Part& part, const MovedVertex<Scalar>& moved) {

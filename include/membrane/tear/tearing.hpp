@@ -54,6 +54,32 @@ struct TearTip {
     Vector3<Scalar> driving_force = Vector3<Scalar>::Zero();  ///< by the last update [N]
 };
 
+/// Whether a path was cut, or why not.
+enum class CutStatus {
+    cut,                ///< all of it
+    no_path,            ///< fewer than two vertices, one that is none of the mesh, or one twice
+    not_joined,         ///< no edge with two triangles joins a vertex to the next one
+    crosses_border,     ///< a vertex between the ends is on a border, as that of a tear
+    one_edge_within,    ///< a single edge that does not begin at a border cannot open: take two
+    reserve_too_small,  ///< the mesh has too few vertices left to double others
+};
+
+/// Result of `Tearing::cut_along`: the events that parts are to follow. Valid until the tear's next call.
+template <Real Scalar>
+struct Cut {
+    CutStatus status = CutStatus::cut;               ///< whether it was cut, or why there are no events
+    std::span<const TearEvent<Scalar>> events = {};  ///< in order
+
+    ///@{
+    /// Of the events, which a loop over the cut visits.
+    [[nodiscard]] auto begin() const noexcept { return events.begin(); }
+    [[nodiscard]] auto end() const noexcept { return events.end(); }
+    [[nodiscard]] std::size_t size() const noexcept { return events.size(); }
+    [[nodiscard]] bool empty() const noexcept { return events.empty(); }
+    operator std::span<const TearEvent<Scalar>>() const noexcept { return events; }  // as of `Tearing::update`
+    ///@}
+};
+
 /// Follows an event with all parts: those that have `reshape` or `split`.
 template <Real Scalar, class... Parts>
 void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
@@ -94,9 +120,9 @@ class Tearing {
     explicit Tearing(const TriangleMesh<Scalar>& mesh, const Criterion& criterion, const TearOptions& options = {});
 
     /// Cuts along the edges between these vertices, each joined to the next by an edge with two triangles; those
-    /// between the ends are not on a border. Nothing is cut, and there is no event, if `path` is not so, or if the
-    /// reserve is too small. Ends that are not on a border become tips, up to the capacity.
-    [[nodiscard]] Events cut_along(std::span<const Index> path, PointsRef<Scalar> x) noexcept;
+    /// between the ends are not on a border. If `path` is not so, or the reserve too small, nothing is cut: the status
+    /// says why. Ends that are not on a border become tips, up to the capacity.
+    [[nodiscard]] Cut<Scalar> cut_along(std::span<const Index> path, PointsRef<Scalar> x) noexcept;
 
     /// The path of two edges through `v`, as nearly as possible along `direction` at rest: where a sharp tool
     /// perforates the membrane. All are `no_index` if there is none.
@@ -122,7 +148,7 @@ class Tearing {
                                                   const Network& network) & noexcept;
 
     /// The forces across opening edges: a constraint of the step.
-    [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items()}; }
+    [[nodiscard]] LigamentForces<Scalar> ligaments() const noexcept { return {ligaments_.items(), surface_.splits()}; }
 
     /// After a step of `dt` [s]: edges open, tips advance. `held`: the few vertices on which tools act, as the corners
     /// of a triangle in forceps; they do not count in the driving force.
@@ -160,7 +186,7 @@ class Tearing {
         Scalar weight;   // in the driving force, 0 to 1
         Scalar density;  // of the foundation's energy [J/m^2]
     };
-    [[nodiscard]] bool is_path(std::span<const Index> path) const noexcept;
+    [[nodiscard]] CutStatus check_path(std::span<const Index> path) const noexcept;
     void add_tip(Index v, Index behind, Index copy) noexcept;
     [[nodiscard]] bool is_beside_tip(Index v) const noexcept;
     [[nodiscard]] Scalar list_start(const BorderState<Scalar>& border, Index v, Scalar length) noexcept;
@@ -247,33 +273,33 @@ Tearing<Scalar, Criterion>::Tearing(const TriangleMesh<Scalar>& mesh, const Crit
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
-bool Tearing<Scalar, Criterion>::is_path(std::span<const Index> path) const noexcept {
+CutStatus Tearing<Scalar, Criterion>::check_path(std::span<const Index> path) const noexcept {
     const auto vertices = static_cast<Index>(surface_.rest_positions().cols());
-    if (path.size() < 2) return false;
-    for (std::size_t i = 0; i < path.size(); ++i) {
-        if (path[i] < 0 || path[i] >= vertices) return false;
-        if (std::find(path.begin(), path.begin() + static_cast<std::ptrdiff_t>(i), path[i]) !=
-            path.begin() + static_cast<std::ptrdiff_t>(i)) {
-            return false;
-        }
-        const bool is_end = i == 0 || i + 1 == path.size();
-        if (!is_end && surface_.adjacency().on_border(path[i])) return false;
-        if (i > 0 && !surface_.has_inner_edge(path[i - 1], path[i])) return false;
+    const auto on_border = [&](Index v) { return surface_.adjacency().on_border(v); };
+    if (path.size() < 2) return CutStatus::no_path;
+    for (auto v = path.begin(); v != path.end(); ++v) {
+        if (*v < 0 || *v >= vertices || std::find(path.begin(), v, *v) != v) return CutStatus::no_path;
     }
-    return path.size() > 2 || surface_.adjacency().on_border(path[0]) || surface_.adjacency().on_border(path[1]);
+    for (std::size_t i = 1; i < path.size(); ++i) {
+        if (!surface_.has_inner_edge(path[i - 1], path[i])) return CutStatus::not_joined;
+        if (i + 1 < path.size() && on_border(path[i])) return CutStatus::crosses_border;
+    }
+    const bool opens = path.size() > 2 || on_border(path[0]) || on_border(path[1]);
+    return opens ? CutStatus::cut : CutStatus::one_edge_within;
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>
-auto Tearing<Scalar, Criterion>::cut_along(std::span<const Index> path, PointsRef<Scalar> x) noexcept -> Events {
+Cut<Scalar> Tearing<Scalar, Criterion>::cut_along(std::span<const Index> path, PointsRef<Scalar> x) noexcept {
     surface_.begin();
     used_up_ = false;
-    if (!is_path(path)) return {};
+    const CutStatus status = check_path(path);
+    if (status != CutStatus::cut) return {status};
     const std::size_t last = path.size() - 1;
     const bool from_border = surface_.adjacency().on_border(path[0]),
                to_border = surface_.adjacency().on_border(path[last]);
     const std::size_t needed = last - 1 + (from_border ? 1 : 0) + (to_border ? 1 : 0);
     used_up_ = needed > static_cast<std::size_t>(surface_.reserve());
-    if (used_up_) return {};
+    if (used_up_) return {CutStatus::reserve_too_small};
     const auto split = [&](std::size_t i, Index out, Index back) {
         const Index copy = surface_.split(x, path[i], out, back);
         if (copy == no_index) return copy;
@@ -291,7 +317,7 @@ auto Tearing<Scalar, Criterion>::cut_along(std::span<const Index> path, PointsRe
     drop_tips();
     if (!from_border) add_tip(path[0], path[1], first == no_index ? at_border : first);
     if (!to_border) add_tip(path[last], path[last - 1], copy);
-    return surface_.events();
+    return {status, surface_.events()};
 }
 
 template <Real Scalar, TearCriterion<Scalar> Criterion>

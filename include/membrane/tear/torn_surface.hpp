@@ -57,6 +57,9 @@ class TornSurface {
     /// Number of vertices left to double others.
     [[nodiscard]] Index reserve() const noexcept { return static_cast<Index>(reserve_.size() - used_); }
 
+    /// Number of vertices that have become two.
+    [[nodiscard]] Index splits() const noexcept { return static_cast<Index>(used_); }
+
     /// Whether an edge joins `v` to `other`, with a triangle on either side.
     [[nodiscard]] bool has_inner_edge(Index v, Index other) const noexcept;
 
