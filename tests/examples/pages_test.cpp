@@ -199,6 +199,19 @@ class OwnDevice {
 static_assert(membrane::Device<OwnDevice, double>);
 // [/own_device]
 
+// [below]
+/// A firm, smooth body below the plane z = 0, that holds nothing: a foundation of your own.
+struct Below {
+    double stiffness = 1;  // for each vertex [N/m]
+
+    membrane::VertexForce<double> force_on(membrane::Index, const membrane::Vector3<double>& position,
+                                           const membrane::Vector3<double>&, double) const noexcept {
+        return {{0, 0, std::max(0.0, -stiffness * position.z())}, stiffness};
+    }
+};
+static_assert(membrane::FoundationModel<Below, double>);
+// [/below]
+
 // [members]
 struct Membrane {
     membrane::TriangleMesh<float> mesh;  // each part is made from those above it
@@ -431,6 +444,37 @@ TEST_CASE_METHOD(Touched, "pages: constraints") {
     CHECK(report.status == membrane::StepStatus::advanced);
     CHECK(report.reactions.size() == 4);
     CHECK((report.reactions[2] + force).norm() < 1e-15);
+}
+
+TEST_CASE_METHOD(Touched, "pages: forces in balance") {
+    const std::vector<membrane::Index> rim{30, 31, 32};
+    solver = membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited, .sweeps = 16});
+    tool.grasping = true;
+    membrane::Tool<double> second{.position = {0.0108, 0, 0}, .radius = 1e-3};
+    auto second_tracker = membrane::ContactTracker(mesh);
+    membrane::Vector3<double> difference = membrane::Vector3<double>::Zero();
+    double force = 0;
+    for (int i = 0; i < 200; ++i) {
+        const auto contact = tracker.update(tree, x, tool);
+        const auto grasp = grasper.update(contact, x, tool);
+        const auto second_contact = second_tracker.update(tree, x, second);
+        tool.position.z() += 2e-6;
+        // [balance]
+        const auto start = x;  // damping acts on what moves in the tick
+        const auto report = solver.step(x, dt, network, foundation, press(tool, contact, grasp), pull(tool, grasp),
+                                        press(second, second_contact), membrane::pin(rim));
+        auto unbalanced = report.total_reaction();  // on tools and pins [N]
+        for (membrane::Index v = 0; v < mesh.vertex_count(); ++v) {
+            const auto on_membrane = foundation.force_on(v, membrane::point(x, v), membrane::point(start, v), dt).force;
+            unbalanced -= on_membrane;
+        }
+        // [/balance]
+        tree.refit(x, report.moved);
+        difference = unbalanced;
+        force = report.reactions[1].norm();
+    }
+    CHECK(force > 1e-3);
+    CHECK(difference.norm() < 1e-3 * force);
 }
 
 TEST_CASE_METHOD(Touched, "pages: deadline") {
@@ -704,6 +748,60 @@ TEST_CASE("pages: tear") {
     // [/tear]
     CHECK(report.status == membrane::StepStatus::advanced);
     CHECK(tear.tips().size() == 2);
+}
+
+TEST_CASE("pages: a flap that forceps tear") {
+    const auto mesh = membrane::with_reserve(membrane::disc<double>({.radius = 0.005, .rings = 12}), 200);
+    const auto capsule = membrane::materials::lens_capsule().typical;
+    const auto network = membrane::MassSpringNetwork(
+        mesh, membrane::LinearSpring{},
+        {.stiffness = membrane::spring_stiffnesses(mesh, capsule), .pinned = membrane::border(mesh)});
+    auto tissue = membrane::Tissue(membrane::TearableSprings(mesh, network));
+    auto solver = membrane::QuasiStaticSolver(tissue, {.layers = membrane::unlimited, .sweeps = 4});
+    auto tree = membrane::AabbTree(mesh);
+    auto tracker = membrane::ContactTracker(mesh);
+    auto grasper = membrane::Grasper(mesh);
+    auto tear = membrane::Tearing(mesh, membrane::EnergyRelease{.toughness = 300, .thickness = capsule.thickness});
+    auto x = mesh.positions();
+    const double dt = 1e-3, edge = membrane::mean_edge(mesh);
+    // [flap]
+    // A slit from the middle along x, then along y. The tissue between its two parts is the flap.
+    const Below support{.stiffness = 10};
+    std::vector<membrane::Index> path{0};
+    while (path.size() < 6) path.push_back(tear.surface().nearest_in_direction(path.back(), {1, 0, 0}));
+    while (path.size() < 10) path.push_back(tear.surface().nearest_in_direction(path.back(), {0, 1, 0}));
+    for (const auto& event : tear.cut_along(path, x)) follow(event, tissue, solver, tree, tracker, grasper);
+
+    std::vector<membrane::Vector3<double>> torn;  // where it has torn, on the membrane at rest [m]
+    const auto tick = [&](const membrane::Tool<double>& tool) {
+        const auto contact = tracker.update(tree, x, tool);
+        const auto grasp = grasper.update(contact, x, tool);
+        const auto report =
+            solver.step(x, dt, tissue, support, press(tool, contact, grasp), pull(tool, grasp), tear.ligaments());
+        const auto held = std::span<const membrane::Index>(grasp.corners).first(grasp.holding() ? 3 : 0);
+        for (const auto& event : tear.update(x, dt, tissue, support, held)) {
+            if (event.split.vertex != membrane::no_index)
+                torn.push_back(membrane::point(tear.surface().rest_positions(), event.split.vertex));
+            follow(event, tissue, solver, tree, tracker, grasper);
+        }
+        tree.refit(x, report.moved);
+        return report.reactions[0] + report.reactions[1];  // on the forceps [N]
+    };
+    // [/flap]
+    REQUIRE(tear.tips().size() == 2);
+    membrane::Tool<double> tool{.position = {3.5 * edge, 0.9 * edge, 2e-4}, .radius = 1e-4};
+    double largest = 0;
+    for (int i = 0; i < 600; ++i) {
+        if (i < 100) tool.position.z() -= 1.2e-6;  // touches
+        tool.grasping = i >= 100;
+        if (i >= 100) tool.position += Eigen::Vector3d(-4e-6, 4e-6, 1.5e-6);
+        largest = std::max(largest, tick(tool).norm());
+    }
+    CHECK(grasper.update(tracker.update(tree, x, tool), x, tool).holding());
+    CHECK(largest > 1e-3);
+    CHECK(largest < 0.1);
+    CHECK_FALSE(torn.empty());
+    CHECK(tear.torn_length() > edge);
 }
 
 TEST_CASE("pages: tear_reset") {
