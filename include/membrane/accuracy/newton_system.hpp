@@ -261,9 +261,9 @@ namespace detail {
 
 /// Minimises y.Wy / 2 + q.y over the y that are zero where `active` is 0.
 [[nodiscard]] inline Eigen::VectorXd min_over_active(Eigen::MatrixXd coupling, Eigen::VectorXd q,
-                                                     const std::vector<unsigned char>& active) {
+                                                     const Eigen::VectorXd& active) {
     for (Eigen::Index i = 0; i < q.size(); ++i) {
-        if (active[static_cast<std::size_t>(i)] != 0) continue;
+        if (active[i] != 0) continue;
         coupling.row(i).setZero();
         coupling.col(i).setZero();
         coupling(i, i) = 1;
@@ -278,7 +278,8 @@ inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, co
                                              const std::vector<unsigned char>& equality) {
     const double slack = 1e-15 * q.lpNorm<Eigen::Infinity>();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(q.size());
-    std::vector<unsigned char> active = equality;
+    Eigen::VectorXd active(q.size());  // 1, or 0 where y stays zero
+    for (Eigen::Index i = 0; i < q.size(); ++i) active[i] = equality[static_cast<std::size_t>(i)] != 0 ? 1 : 0;
     for (Eigen::Index round = 0; round < 10 * (q.size() + 1); ++round) {
         const Eigen::VectorXd best = detail::min_over_active(coupling, q, active);
         double part = 1;
@@ -291,14 +292,13 @@ inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, co
         y += part * (best - y);
         if (first != no_index) {
             y[first] = 0;
-            active[static_cast<std::size_t>(first)] = 0;
+            active[first] = 0;
             continue;
         }
-        Eigen::VectorXd slope = coupling * y + q;
-        for (Eigen::Index i = 0; i < q.size(); ++i) slope[i] *= active[static_cast<std::size_t>(i)] != 0 ? 0 : 1;
+        const Eigen::VectorXd slope = (coupling * y + q).array() * (1 - active.array());
         Eigen::Index next = 0;
         if (slope.minCoeff(&next) >= -slack) break;
-        active[static_cast<std::size_t>(next)] = 1;
+        active[next] = 1;
     }
     return y;
 }
