@@ -268,11 +268,12 @@ TEMPLATE_TEST_CASE("triangles of a closed component are turned to face outward, 
 TEMPLATE_TEST_CASE("whatever is broken, repair comes back with what it says", "[mesh][bad]", TEST_SCALARS) {
     using S = TestType;
     using enum MeshDefect;
-    for (int seed = 1; seed <= cases(300); ++seed) {
+    for (int seed = 1; seed <= cases(1000); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Surface<S> broken = broken_surface<S>(random);
-        const RepairOptions options{.weld = random.chance(0.5) ? std::optional<double>(0.0) : std::nullopt,
+        const double distance = random.chance(0.5) ? 0.0 : 1e-3;
+        const RepairOptions options{.weld = random.chance(0.5) ? std::optional<double>(distance) : std::nullopt,
                                     .drop_repeated = random.chance(0.5),
                                     .drop_zero_area = random.chance(0.5),
                                     .drop_duplicates = random.chance(0.5),
@@ -297,6 +298,26 @@ TEMPLATE_TEST_CASE("whatever is broken, repair comes back with what it says", "[
         for (std::size_t v = 0; v < result.vertices.size(); ++v) {
             const Points<S> from = broken.x.col(result.vertices[v]);
             REQUIRE(test::same_bits(Points<S>(result.positions.col(static_cast<Index>(v))), from));
+        }
+        // A second repair changes nothing, no bad coordinate is doubled, and no vertex is left without triangle.
+        const auto again = repair(result.positions, result.triangles, options);
+        REQUIRE(test::same_bits(again.positions, result.positions));
+        REQUIRE(again.triangles == result.triangles);
+        REQUIRE(after.count(coordinate_not_finite) <= before.count(coordinate_not_finite));
+        const auto is_named = [](const auto& triangles, Index v) { return (triangles.array() == v).any(); };
+        REQUIRE(result.new_vertices.size() == static_cast<std::size_t>(broken.vertex_count()));
+        for (Index v = 0; v < broken.vertex_count(); ++v) {
+            const Index now = result.new_vertices[static_cast<std::size_t>(v)];
+            if (now == no_index) continue;
+            const Index from = result.vertices[static_cast<std::size_t>(now)];
+            REQUIRE((from == v || options.weld));
+            if (from == v && is_named(broken.triangles, v)) REQUIRE(is_named(result.triangles, now));
+            if (options.weld == 0.0)
+                REQUIRE((!(broken.x.col(v).array() == broken.x.col(v).array()).all() ||
+                         broken.x.col(from) == broken.x.col(v)));
+        }
+        for (Index v = 0; options.drop_isolated && v < result.positions.cols(); ++v) {
+            REQUIRE(is_named(result.triangles, v));
         }
         const auto dropped = result.report.repeated + result.report.zero_area + result.report.duplicates;
         REQUIRE(result.triangles.cols() == broken.triangle_count() - dropped);

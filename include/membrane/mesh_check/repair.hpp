@@ -28,7 +28,9 @@
 ///     const membrane::TriangleMesh mesh(repaired.positions, repaired.triangles);
 namespace membrane {
 
-/// The repairs, in the order of their application; all are off by default.
+/// The repairs, in the order of their application; all are off by default. Those after welding are repeated until none
+/// changes anything, so that a second repair changes nothing. Welding and dropping may show that triangles are oriented
+/// inconsistently, where an edge of three triangles did not count: ask for `orient` as well.
 struct RepairOptions {
     /// Weld distance [m]. Vertices at most this far apart become one, that of lowest index, which keeps its position.
     /// The ends of a chain of welded vertices may be farther apart. 0: only identical positions. Unset: no welding.
@@ -43,9 +45,10 @@ struct RepairOptions {
     /// component is treated separately: one inside another faces outward too, even if it is meant as the wall of a
     /// cavity.
     bool orient = false;
-    bool split_vertices = false;  ///< Gives each fan of triangles at a vertex, except the first, its own vertex.
-    bool flip_inward = false;     ///< Reverses closed components that face inward.
-    bool drop_isolated = false;   ///< Drops vertices that no triangle references.
+    /// Gives each fan of triangles at a vertex, except the first, its own vertex; not where a coordinate is not finite.
+    bool split_vertices = false;
+    bool flip_inward = false;    ///< Reverses closed components that face inward.
+    bool drop_isolated = false;  ///< Drops vertices that no triangle references; those that a repair left, always.
 };
 
 /// Number of vertices or triangles that each option has changed.
@@ -67,6 +70,9 @@ struct RepairedMesh {
     /// Index in the input of each vertex (welded: the lowest; split off: the one it was split from) and triangle.
     std::vector<Index> vertices, source_triangles;
     ///@}
+    /// Index in the result of each vertex of the input: welded, that of the vertex it became one with; split, that of
+    /// its first fan; dropped, `no_index`. So `positions.col(new_vertices[v])` moves vertex v of a seam.
+    std::vector<Index> new_vertices;
     RepairReport report;  ///< What was changed.
 };
 
@@ -118,16 +124,19 @@ class Repair {
           origin_(static_cast<std::size_t>(x_.cols())) {
         std::iota(kept_.begin(), kept_.end(), Index{0});
         std::iota(origin_.begin(), origin_.end(), Index{0});
+        welded_to_ = origin_;
+        referenced_ = references();
     }
 
     inline void weld(std::span<const Index> points, double distance);
+    inline void apply(const RepairOptions& options, const std::vector<bool>& usable);
     inline void drop_repeated();
     inline void drop_zero_area(const std::vector<bool>& usable);
     inline void drop_duplicates();
     inline void orient(const std::vector<bool>& usable);
-    inline void split_vertices();
+    inline void split_vertices(const std::vector<bool>& usable);
     inline void flip_inward(const std::vector<bool>& usable);
-    inline void drop_isolated();
+    inline void drop_isolated(bool all);
 
     template <Real Scalar>
     [[nodiscard]] RepairedMesh<Scalar> result(const Points<Scalar>& given) const;
@@ -146,6 +155,14 @@ class Repair {
         }
         return half_edges_of(triangles_, some);
     }
+    /// Of each vertex, whether a kept triangle references it.
+    [[nodiscard]] std::vector<bool> references() const {
+        std::vector<bool> referenced(static_cast<std::size_t>(x_.cols()), false);
+        for (const Index f : kept_) {
+            for (const Index v : corners(f)) referenced[static_cast<std::size_t>(v)] = true;
+        }
+        return referenced;
+    }
     [[nodiscard]] bool repeats(Index f) const {
         const auto [a, b, c] = corners(f);
         return a == b || b == c || c == a;
@@ -155,9 +172,10 @@ class Repair {
 
     Points<double> x_;
     Triangles triangles_;
-    std::vector<bool> kept_vertices_;
-    std::vector<Index> kept_;    // triangles
-    std::vector<Index> origin_;  // of each vertex: itself, or the vertex it was split from
+    std::vector<bool> kept_vertices_, referenced_;  // `referenced_`: of the vertices given, before any repair
+    std::vector<Index> kept_;                       // triangles
+    std::vector<Index> welded_to_;                  // of each vertex given: itself, or the vertex it became one with
+    std::vector<Index> origin_;                     // of each vertex: itself, or the vertex it was split from
     RepairReport report_;
 };
 
@@ -171,6 +189,7 @@ inline void Repair::weld(std::span<const Index> points, double distance) {
         sets.unite(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
     });
     for (v = 0; v < kept_vertices_.size(); ++v) {
+        welded_to_[v] = static_cast<Index>(sets.find(v));
         kept_vertices_[v] = sets.find(v) == v;
         report_.welded += kept_vertices_[v] ? 0 : 1;
     }
@@ -178,8 +197,24 @@ inline void Repair::weld(std::span<const Index> points, double distance) {
     for (Index& corner : triangles_.reshaped()) corner = one(corner);
 }
 
+// What a split or a dropped triangle leaves may need an earlier repair again.
+inline void Repair::apply(const RepairOptions& options, const std::vector<bool>& usable) {
+    constexpr int most = 100;
+    for (int turn = 0; turn < most; ++turn) {
+        const auto before = std::pair(triangles_, kept_);
+        if (options.drop_repeated) drop_repeated();
+        if (options.drop_zero_area) drop_zero_area(usable);
+        if (options.drop_duplicates) drop_duplicates();
+        if (options.orient) orient(usable);
+        if (options.split_vertices) split_vertices(usable);
+        if (options.flip_inward) flip_inward(usable);
+        if (std::pair(triangles_, kept_) == before) break;
+    }
+    drop_isolated(options.drop_isolated);
+}
+
 inline void Repair::drop_repeated() {
-    report_.repeated = static_cast<Index>(std::erase_if(kept_, [&](Index f) { return repeats(f); }));
+    report_.repeated += static_cast<Index>(std::erase_if(kept_, [&](Index f) { return repeats(f); }));
 }
 
 inline void Repair::drop_zero_area(const std::vector<bool>& usable) {
@@ -190,7 +225,7 @@ inline void Repair::drop_zero_area(const std::vector<bool>& usable) {
         return !repeats(f) &&
                on_one_line(point(x_, triangles_(0, f)), point(x_, triangles_(1, f)), point(x_, triangles_(2, f)));
     };
-    report_.zero_area = static_cast<Index>(std::erase_if(kept_, flat));
+    report_.zero_area += static_cast<Index>(std::erase_if(kept_, flat));
 }
 
 inline void Repair::drop_duplicates() {
@@ -201,7 +236,7 @@ inline void Repair::drop_duplicates() {
             if (edge[i].apex == edge[i - 1].apex) is_duplicate[static_cast<std::size_t>(edge[i].triangle)] = true;
         }
     });
-    report_.duplicates =
+    report_.duplicates +=
         static_cast<Index>(std::erase_if(kept_, [&](Index f) { return is_duplicate[static_cast<std::size_t>(f)]; }));
 }
 
@@ -242,10 +277,10 @@ inline void Repair::orient(const std::vector<bool>& usable) {
         const SurfaceComponent& part = now.parts[static_cast<std::size_t>(p)];
         if (part.closed && part.volume < 0) turn_over(f);
     }
-    report_.reversed = static_cast<Index>(std::count(turned.begin(), turned.end(), true));
+    report_.reversed += static_cast<Index>(std::count(turned.begin(), turned.end(), true));
 }
 
-inline void Repair::split_vertices() {
+inline void Repair::split_vertices(const std::vector<bool>& usable) {
     const std::vector<HalfEdge> all = sides();
     DisjointSets sets = fans(triangles_, all);
     constexpr auto none = static_cast<std::size_t>(-1);
@@ -257,13 +292,14 @@ inline void Repair::split_vertices() {
         for (Index k = 0; k < 3; ++k) {
             Index& corner = triangles_(k, f);
             const auto v = static_cast<std::size_t>(corner);
+            if (!usable[static_cast<std::size_t>(origin_[v])]) continue;
             const std::size_t fan = sets.find(3 * static_cast<std::size_t>(f) + static_cast<std::size_t>(k));
             if (first_fan[v] == none) first_fan[v] = fan;
             if (first_fan[v] == fan) continue;
             Index& own = vertex_of_fan[fan];
             if (own == no_index) {
                 own = static_cast<Index>(origin_.size());
-                origin_.push_back(corner);
+                origin_.push_back(origin_[v]);
                 ++report_.split;
             }
             corner = own;
@@ -298,13 +334,12 @@ inline void Repair::flip_inward(const std::vector<bool>& usable) {
     }
 }
 
-inline void Repair::drop_isolated() {
-    std::vector<bool> referenced(kept_vertices_.size(), false);
-    for (const Index f : kept_) {
-        for (const Index v : corners(f)) referenced[static_cast<std::size_t>(v)] = true;
-    }
+// All, or those that had a triangle.
+inline void Repair::drop_isolated(bool all) {
+    const std::vector<bool> referenced = references();
     for (std::size_t v = 0; v < referenced.size(); ++v) {
         if (!kept_vertices_[v] || referenced[v]) continue;
+        if (!all && (v >= referenced_.size() || !referenced_[v])) continue;
         kept_vertices_[v] = false;
         ++report_.isolated;
     }
@@ -319,6 +354,7 @@ RepairedMesh<Scalar> Repair::result(const Points<Scalar>& given) const {
         number[v] = static_cast<Index>(mesh.vertices.size());
         mesh.vertices.push_back(origin_[v]);
     }
+    for (const Index v : welded_to_) mesh.new_vertices.push_back(number[static_cast<std::size_t>(v)]);
     mesh.positions.resize(3, static_cast<Eigen::Index>(mesh.vertices.size()));
     for (Eigen::Index v = 0; v < mesh.positions.cols(); ++v) {
         mesh.positions.col(v) = given.col(mesh.vertices[static_cast<std::size_t>(v)]);
@@ -352,13 +388,7 @@ RepairedMesh<typename P::Scalar> repair(const Eigen::MatrixBase<P>& positions, c
     const detail::StoredPoints<Scalar> stored(positions.derived(), found);
     detail::Repair work(stored.x.template cast<double>(), std::move(corners));
     if (options.weld) work.weld(stored.points, *options.weld);
-    if (options.drop_repeated) work.drop_repeated();
-    if (options.drop_zero_area) work.drop_zero_area(stored.usable);
-    if (options.drop_duplicates) work.drop_duplicates();
-    if (options.orient) work.orient(stored.usable);
-    if (options.split_vertices) work.split_vertices();
-    if (options.flip_inward) work.flip_inward(stored.usable);
-    if (options.drop_isolated) work.drop_isolated();
+    work.apply(options, stored.usable);
     return work.result(stored.x);
 }
 
