@@ -122,15 +122,17 @@ struct Type {
     bool is_signed = false;
 };
 
-/// Numbers of a vertex or a face in a PLY; a list of corners has a count.
+/// Numbers of a vertex or a face in a PLY; a list has a count. The library gets coordinates and corners alone.
 struct Property {
     Type type = {}, count = {};
+    bool is_corners = false, is_kept = true;
 };
 
 struct Element {
     std::string name;
     std::int64_t count;
     std::vector<Property> properties = {};
+    std::string header = {}, body = {};  ///< what the library gets
 };
 
 Type type_of(const std::string& name, bool integer, const Lines& lines) {
@@ -146,18 +148,23 @@ Type type_of(const std::string& name, bool integer, const Lines& lines) {
     lines.refuse(integer ? "a type of integers" : "a type of numbers", name);
 }
 
-/// The rest of a line that begins with `property`, of the last of `elements`; notes which coordinates a vertex has.
-Property property_of(Lines& lines, std::size_t elements, std::string& coordinates) {
+/// The rest of a line that begins with `property`, of `element`; notes which coordinates a vertex has.
+Property property_of(Lines& lines, const Element& element, std::string& coordinates) {
     std::string type(lines.keep(lines.word()));
     Property property;
-    if (type == "list") {
-        if (elements != 2) lines.refuse("a list of face alone, the second element", type);
+    const bool is_list = type == "list";
+    if (is_list) {
         property.count = type_of(std::string(lines.keep(lines.word())), true, lines);
         type = lines.keep(lines.word());
     }
-    property.type = type_of(type, property.count.size > 0, lines);
+    property.type = type_of(type, false, lines);
     const std::string_view name = lines.keep(lines.word());
-    if (elements == 1 && (name == "x" || name == "y" || name == "z")) coordinates += name;
+    const bool is_coordinate = element.name == "vertex" && (name == "x" || name == "y" || name == "z");
+    if (is_coordinate) coordinates += name;
+    property.is_corners = element.name == "face" && (name == "vertex_indices" || name == "vertex_index");
+    if (property.is_corners) static_cast<void>(type_of(type, true, lines));
+    if (is_list ? is_coordinate : property.is_corners) lines.refuse("corners as a list, and other numbers alone", name);
+    property.is_kept = is_coordinate || property.is_corners;
     return property;
 }
 
@@ -166,6 +173,7 @@ struct TextRows {
     Lines& lines;
     bool off;
 
+    [[nodiscard]] std::string& kept() { return lines.kept; }
     void begin(const Element& element) { lines.expect(element.name); }
     void number(const Type&) { lines.number(); }
     std::int64_t integer(const Type&, std::int64_t least, std::int64_t most) {
@@ -185,11 +193,14 @@ struct BinaryRows {
     std::string_view bytes;
     std::size_t at;
     bool big_endian;
+    std::string text = {};
 
+    [[nodiscard]] std::string& kept() { return text; }
     void begin(const Element&) {}
     void number(const Type& type) {
         if (bytes.size() - at < type.size)
             refuse(file, "the file ends after ", bytes.size(), " bytes, within an element");
+        text += bytes.substr(at, type.size);
         at += type.size;
     }
     std::int64_t integer(const Type& type, std::int64_t least, std::int64_t most) {
@@ -209,23 +220,29 @@ struct BinaryRows {
     }
 };
 
-/// Checks all rows of the elements, the first of which are the vertices.
+/// Checks all rows of the elements, and keeps those of the vertices and faces.
 template <class Rows>
-void check_rows(const std::vector<Element>& elements, Rows rows) {
-    for (const Element& element : elements) {
+void check_rows(std::vector<Element>& elements, std::int64_t vertices, Rows rows) {
+    for (Element& element : elements) {
+        rows.kept().clear();
         for (std::int64_t row = 0; row < element.count; ++row) {
             rows.begin(element);
             for (const Property& property : element.properties) {
-                if (property.count.size == 0) {
-                    rows.number(property.type);
-                    continue;
+                const std::size_t before = rows.kept().size();
+                const std::int64_t least = property.is_corners ? 3 : 0;
+                auto count = property.count.size == 0 ? 1 : rows.integer(property.count, least, max_corners);
+                for (; count > 0; --count) {
+                    if (property.is_corners) {
+                        static_cast<void>(rows.integer(property.type, 0, vertices - 1));
+                    } else {
+                        rows.number(property.type);
+                    }
                 }
-                for (auto corners = rows.integer(property.count, 3, max_corners); corners > 0; --corners) {
-                    static_cast<void>(rows.integer(property.type, 0, elements[0].count - 1));
-                }
+                if (!property.is_kept) rows.kept().resize(before);
             }
             rows.end(element);
         }
+        element.body = rows.kept();
     }
     rows.end_file();
 }
@@ -273,23 +290,31 @@ std::string checked_off(const std::string& file, std::string_view bytes) {
     const std::int64_t vertices = lines.integer(lines.word(), 1, most), faces = lines.integer(lines.word(), 1, most);
     lines.number();
     lines.end_line();
-    check_rows({{"vertex", vertices, std::vector<Property>(3)}, {"face", faces, {{{}, {1}}}}}, TextRows{lines, true});
-    return lines.kept;
+    const std::string header = lines.kept;
+    std::vector<Element> elements{{"vertex", vertices, std::vector<Property>(3)}, {"face", faces, {{{}, {1}, true}}}};
+    check_rows(elements, vertices, TextRows{lines, true});
+    return header + elements[0].body + elements[1].body;
 }
 
-/// ASCII in lower case and without the names, in which assimp searches for keywords.
+/// ASCII in lower case and without the names, in which assimp searches for keywords; normals are 0.
 std::string checked_stl(const std::string& file, std::string_view bytes) {
     std::uint64_t count = 0;
     if (bytes.size() >= 84) {
         for (std::size_t i = 4; i-- > 0;) count = count << 8 | static_cast<unsigned char>(bytes[80 + i]);
-        if (bytes.size() == 84 + 50 * count) return std::string(bytes);
+        const std::uint64_t size = 84 + 50 * count;
+        // Some programs write more behind the triangles; whole triangles there are a wrong count.
+        if (bytes.size() == size || (bytes.size() > size && (bytes.size() - size) % 50 != 0 && count > 0)) {
+            std::string kept(bytes.substr(0, size));
+            for (std::size_t at = 84; at < size; at += 50)
+                std::fill_n(kept.begin() + static_cast<std::ptrdiff_t>(at), 12, '\0');
+            return kept;
+        }
         if (bytes.find('\0') != bytes.npos) {
-            refuse(file, "expected ", 84 + 50 * count, " bytes of a binary STL with ", count, " triangles, got ",
-                   bytes.size());
+            refuse(file, "expected ", size, " bytes of a binary STL with ", count, " triangles, got ", bytes.size());
         }
     }
     Lines facet(file,
-                "facet normal 0 0 0 ; outer loop ; vertex 0 0 0 ; vertex 0 0 0 ; vertex 0 0 0 ; endloop ; endfacet");
+                "facet normal n n n ; outer loop ; vertex 0 0 0 ; vertex 0 0 0 ; vertex 0 0 0 ; endloop ; endfacet");
     facet.next();
     const std::string text = lower(bytes);
     Lines lines(file, text);
@@ -301,6 +326,10 @@ std::string checked_stl(const std::string& file, std::string_view bytes) {
             for (const std::string_view wanted : facet.words) {
                 if (wanted == "0") {
                     lines.number();
+                } else if (wanted == "n") {
+                    const std::string_view word = lines.word();  // some programs write NaN, in many ways
+                    if (!is_number(word) && word.size() > 16) lines.refuse("a number of a normal", word);
+                    lines.keep("0");
                 } else if (wanted == ";") {
                     lines.end_line();
                     lines.expect("a line of a facet");
@@ -324,6 +353,7 @@ std::string checked_ply(const std::string& file, std::string_view bytes) {
     for (lines.end_line(), lines.expect("'end_header'"); lines.words[0] != "end_header"; lines.expect("'end_header'")) {
         const std::string_view kind = lines.word();
         if (kind == "comment" || kind == "obj_info") continue;
+        lines.kept.clear();
         lines.keep(kind);
         if (kind == "format") {
             format = lines.keep(lines.word());
@@ -331,25 +361,38 @@ std::string checked_ply(const std::string& file, std::string_view bytes) {
         } else if (kind == "element") {
             const std::string name(lines.keep(lines.word()));
             elements.push_back({name, lines.integer(lines.word(), 0, static_cast<std::int64_t>(bytes.size()))});
+            elements.back().header = lines.kept + '\n';
         } else if (kind == "property" && !elements.empty()) {
-            elements.back().properties.push_back(property_of(lines, elements.size(), coordinates));
+            elements.back().properties.push_back(property_of(lines, elements.back(), coordinates));
+            if (elements.back().properties.back().is_kept) elements.back().header += lines.kept + '\n';
         } else {
             lines.refuse("a statement of a PLY header", kind);
         }
         lines.end_line();
     }
-    if (elements.size() < 2 || elements[0].name != "vertex" || elements[1].name != "face") {
-        refuse(file, "expected the elements vertex and face to be the first");
-    }
+    const auto element = [&](std::string_view name) {
+        const auto is_named = [&](const Element& each) { return each.name == name; };
+        if (std::count_if(elements.begin(), elements.end(), is_named) != 1) {
+            refuse(file, "expected the elements vertex and face, once each");
+        }
+        return std::find_if(elements.begin(), elements.end(), is_named);
+    };
+    const auto vertex = element("vertex"), face = element("face");
     std::sort(coordinates.begin(), coordinates.end());
     if (coordinates != "xyz") refuse(file, "expected a property x, y and z of a vertex, got '", coordinates, "'");
-    lines.kept += "end_header\r\n";  // after \n, assimp skips a binary body's first \n
-    if (format == "ascii") {
-        check_rows(elements, TextRows{lines, false});
-        return lines.kept;
+    const auto is_corners = [](const Property& each) { return each.is_corners; };
+    if (std::count_if(face->properties.begin(), face->properties.end(), is_corners) != 1) {
+        refuse(file, "expected a list vertex_indices of a face, once");
     }
-    check_rows(elements, BinaryRows{file, bytes, bytes.size() - lines.rest.size(), format == "binary_big_endian"});
-    return lines.kept.append(lines.rest);
+    if (format == "ascii") {
+        check_rows(elements, vertex->count, TextRows{lines, false});
+    } else {
+        check_rows(elements, vertex->count,
+                   BinaryRows{file, bytes, bytes.size() - lines.rest.size(), format == "binary_big_endian"});
+    }
+    // After \n, assimp skips a binary body's first \n.
+    return "ply\nformat " + format + " 1.0\n" + vertex->header + face->header + "end_header\r\n" + vertex->body +
+           face->body;
 }
 
 }  // namespace examples
