@@ -64,7 +64,8 @@ enum class CutStatus {
     reserve_too_small,  ///< the mesh has too few vertices left to double others
 };
 
-/// Result of `Tearing::cut_along`: the events that parts are to follow. Valid until the tear's next call.
+/// Result of `Tearing::cut_along`: the events that parts are to follow, which converts to a span of them. Valid until
+/// the tear's next call.
 template <Real Scalar>
 struct Cut {
     CutStatus status = CutStatus::cut;               ///< whether it was cut, or why there are no events
@@ -76,7 +77,6 @@ struct Cut {
     [[nodiscard]] auto end() const noexcept { return events.end(); }
     [[nodiscard]] std::size_t size() const noexcept { return events.size(); }
     [[nodiscard]] bool empty() const noexcept { return events.empty(); }
-    operator std::span<const TearEvent<Scalar>>() const noexcept { return events; }  // as of `Tearing::update`
     ///@}
 };
 
