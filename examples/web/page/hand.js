@@ -61,8 +61,12 @@ export class Hand {
     Object.assign(this, { x, y });
   }
 
+  // After a pull the tool stays where its forceps open.
   release() {
-    if (this.down) this.released = performance.now();
+    if (this.down) {
+      this.released = performance.now();
+      if (this.pull) this.aim = { ...this.aim, point: this.aim.point.clone().add(this.drag) };
+    }
     this.down = false;
     this.pointer = null;
     this.scene.controls.enabled = true;
