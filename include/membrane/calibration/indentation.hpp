@@ -29,7 +29,7 @@ namespace membrane {
 /// Builds network and foundation from constants, as a std::pair.
 template <class Build>
 concept MembraneBuilder = requires(const Build& build, std::span<const double> constants) {
-    build(constants).first.springs();
+    std::declval<const std::remove_cvref_t<decltype(build(constants).first)>&>().springs();
     build(constants).second;
 };
 
