@@ -16,8 +16,8 @@
 #include "support/tick_scenes.hpp"
 
 // Time of a whole tick, and error of its force: a tool of 2 mm is pressed 1 mm deep and slides at 50 mm/s, by scalar,
-// mesh, layers and sweeps, beside the tick of Bullet's soft body with the same trajectory; and after 1,500 ticks. Then a
-// tick with other tools, laws, rules and bodies.
+// mesh, layers and sweeps, beside the tick of Bullet's soft body with the same trajectory; and after 1,500 ticks. Then
+// a tick with other tools, laws, rules and bodies.
 
 namespace {
 

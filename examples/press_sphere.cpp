@@ -10,7 +10,7 @@ int main() {
         membrane::VirtualVolumeSprings(mesh, {.stiffness = 8.0, .damping = 0.02});  // [N/m], [N s/m]
     const auto feel = membrane::ReactionForce{};                                    // the membrane's force on the tool
 
-    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = 6, .sweeps = 2});  // or by choose_settings()
     auto tree = membrane::AabbTree(mesh);
     auto tracker = membrane::ContactTracker(mesh);
     auto normals = membrane::VertexNormals(mesh);

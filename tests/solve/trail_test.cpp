@@ -45,8 +45,8 @@ struct Slide {
     int now = 0;
 
     Tool<S> tool() const {
-        const double deep = depth * std::min(now / 60.0, 1.0), way = speed * dt * std::max(now - 60, 0);
-        const double angle = way / (flat ? 0.4 * radius : radius), around = 0.2 * std::sin(0.37 * angle);
+        const double deep = depth * std::min(now / 60.0, 1.0), slid = speed * dt * std::max(now - 60, 0);
+        const double angle = slid / (flat ? 0.4 * radius : radius), around = 0.2 * std::sin(0.37 * angle);
         const Vector3<double> on_sphere = Vector3<double>(std::sin(angle), around, std::cos(angle)).normalized();
         const Vector3<double> on_disc(0.4 * radius * std::cos(angle), 0.4 * radius * std::sin(angle), 0);
         const double height = tool_radius - deep;
@@ -74,8 +74,8 @@ struct Slide {
         return work;
     }
 
-    /// After a long slide a tick makes hardly more updates than after a short one. How many depends on the mesh below the
-    /// tool, too, and on a soft foundation the trail becomes longer until its beginning has come to rest.
+    /// After a long slide a tick makes hardly more updates than after a short one. How many also depends on the mesh
+    /// below the tool, and on a soft foundation the trail becomes longer until its beginning has come to rest.
     template <class Move>
     void check(const Move& move) {
         const Work first = play_until(300, move);

@@ -52,6 +52,8 @@ void bind_report(py::module_& module) {
         .def_readonly("converged", &StepReport::converged, doc("StepReport::converged"))
         .def_readonly("out_of_time", &StepReport::out_of_time, doc("StepReport::out_of_time"))
         .def_readonly("residual", &StepReport::residual, doc("StepReport::residual"))
+        .def_readonly("residual_beyond", &StepReport::residual_beyond, doc("StepReport::residual_beyond"))
+        .def_readonly("unsupported", &StepReport::unsupported, doc("StepReport::unsupported"))
         .def_readonly("vertex_updates", &StepReport::vertex_updates, doc("StepReport::vertex_updates"))
         .def("total_reaction", &StepReport::total_reaction, doc("StepReport::total_reaction"));
     def_property_in_loop(

@@ -43,6 +43,9 @@ class ActiveVertices {
     [[nodiscard]] std::span<const Index> contact_layer() const noexcept { return vertices().first(layer_0().size()); }
     ///@}
 
+    /// Whether this step updates `v`.
+    [[nodiscard]] bool updates(Index v) const noexcept { return active_.contains(v); }
+
     /// This step's queue.
     [[nodiscard]] const PropagationQueue& queue() const noexcept { return queue_; }
 
@@ -74,8 +77,8 @@ class ActiveVertices {
     }
 
     /// Ends a step: awake are now the active and frontier vertices for which `is_balanced(v)` is false, the vertices
-    /// that had to wait, and the neighbours of those that `moved`; if `recheck`, because a vertex now counts as balanced
-    /// under smaller forces only, also vertices that fell asleep. Returns whether the forces on all vertices balance.
+    /// that had to wait, and the neighbours of those that `moved`; with `recheck`, because `is_balanced` has become
+    /// stricter, also vertices that fell asleep. Returns whether the forces on all vertices balance.
     template <class Network, class IsBalanced>
     [[nodiscard]] bool end_step(const Network& network, IsBalanced is_balanced, std::span<const Index> moved,
                                 bool recheck = false) noexcept;

@@ -68,14 +68,18 @@ class TimeBudget {
     /// Whether there is a deadline.
     [[nodiscard]] bool limited() const noexcept { return deadline_ != nullptr; }
 
-    /// Begins the updates; at the end of the step the residual forces of `vertices` are evaluated.
-    void begin(std::size_t vertices) {
-        set_residual_count(vertices);
+    /// Begins the updates; see `set_residual_count`.
+    void begin(std::size_t vertices, std::size_t beyond = 0) {
+        set_residual_count(vertices, beyond);
         if (limited()) left_ = left_of_(deadline_);
     }
 
-    /// Sets the number of residual forces at the end of the step.
-    void set_residual_count(std::size_t vertices) { residual_count_ = static_cast<double>(vertices); }
+    /// At the end of the step the residual forces on `vertices` are evaluated, and the forces on those `beyond` them,
+    /// each of which takes about as long as an update.
+    void set_residual_count(std::size_t vertices, std::size_t beyond = 0) {
+        residual_count_ = static_cast<double>(vertices);
+        beyond_ = static_cast<double>(beyond);
+    }
 
     ///@{
     /// Whether there is time for a contact iteration of so many updates, or for a batch beyond layer 0. The first of
@@ -108,14 +112,15 @@ class TimeBudget {
     /// Ends the step.
     void end() {
         if (!limited() || residual_count_ == 0) return;
-        const double found = in_updates(lap()) / residual_count_, known = costs_->residual;
+        const double found = (std::max)(in_updates(lap()) - beyond_, 0.0) / residual_count_;
+        const double known = costs_->residual;
         const bool first = !std::exchange(costs_->known, true);
         costs_->residual = first ? found : known + (std::clamp(found, known / 2, 2 * known) - known) / 4;
     }
 
   private:
     [[nodiscard]] bool has_time_for(double updates) const {
-        return left_ >= costs_->update * (updates + costs_->residual * residual_count_);
+        return left_ >= costs_->update * (updates + costs_->residual * residual_count_ + beyond_);
     }
     [[nodiscard]] double in_updates(double time) const { return costs_->update > 0 ? time / costs_->update : 0; }
     [[nodiscard]] double lap() {
@@ -126,7 +131,7 @@ class TimeBudget {
     const void* deadline_ = nullptr;  // its type is known to `left_of_`
     double (*left_of_)(const void* deadline) = nullptr;
     StepCosts* costs_ = nullptr;
-    double left_ = 0, residual_count_ = 0, time_ = 0, updates_ = 0;
+    double left_ = 0, residual_count_ = 0, beyond_ = 0, time_ = 0, updates_ = 0;
     bool first_contact_ = true, first_batch_ = true;
 };
 

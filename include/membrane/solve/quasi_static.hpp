@@ -156,6 +156,8 @@ class QuasiStaticSolver {
     template <class Network>
     void write_back(PointsRef<Scalar>& x, const Network& network, Scalar queue_residual,
                     bool constraints_changed) noexcept;
+    template <class Scene>
+    void measure_beyond(const Scene& scene) noexcept;
     [[nodiscard]] bool has_moved(Index v) const noexcept {
         const auto moved = moved_.items();
         return std::find(moved.begin(), moved.end(), v) != moved.end();
@@ -278,6 +280,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     acting.end();
     resume_ = sweeps.resume;
     write_back(x, network, options_.adaptive_layers ? Scalar(0) : sweeps.queue_residual, sweeps.constraints_changed);
+    measure_beyond(scene);
     sweeps.budget.end();
     return report_;
 }
@@ -377,6 +380,24 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
     state_.end_step();
+}
+
+// The forces on the free neighbours of the active vertices, which are among the vertices loaded: the caller's positions
+// are the new ones.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Scene>
+void QuasiStaticSolver<Scalar, Rule>::measure_beyond(const Scene& scene) noexcept {
+    for (const Index v : state_.loaded.items()) {
+        const auto around = scene.network.neighbours(v);
+        const auto is_updated = [&](const auto& end) { return active_.updates(end.other); };
+        if (active_.updates(v) || state_.is_fixed(v) || std::none_of(around.begin(), around.end(), is_updated))
+            continue;
+        const Vector3<Scalar> here = point(scene.start, v);
+        const Vector3<Scalar> force = scene.network.force_on(v, scene.start).force +
+                                      scene.volume.force_on(v, here, here, scene.dt).force + state_.constraint_force(v);
+        report_.residual_beyond = (std::max)(report_.residual_beyond, norm(force));
+        report_.unsupported += force;
+    }
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>

@@ -24,7 +24,9 @@ enum class UpdateOrder {
 /// Options of the solver. More layers, sweeps and iterations are more accurate, and cost more.
 template <Real Scalar>
 struct SolverOptions {
-    Index layers = 6;              ///< of the queue beyond layer 0; `unlimited`: all vertices connected to the seeds
+    Index layers = 6;  ///< of the queue beyond layer 0; `unlimited`: all vertices connected to the seeds. The default
+        ///< suits a foundation of a fifth of the springs: `choose_settings` finds the number for a scene,
+        ///< `recommended_layers` for a material; they leave out `StepReport::residual_beyond`
     bool adaptive_layers = false;  ///< adds a layer, up to `layers`, while a force on it exceeds `force_tolerance`
     Index sweeps = 2;              ///< passes over the queue in each step
     Index contact_iterations = 3;  ///< updates of layer 0 in each sweep at most: vertices in contact converge last
@@ -63,12 +65,19 @@ template <Real Scalar>
 struct StepReport {
     StepStatus status = StepStatus::advanced;  ///< whether the step advanced
     /// No residual force exceeds `force_tolerance` on the vertices that the step may move: those of the queue, and with
-    /// `adaptive_layers` those of the whole membrane.
+    /// `adaptive_layers` those of the whole membrane. Whether the layers are enough, only `residual_beyond` shows.
     bool converged = false;
     /// The deadline ended the step early: without it more vertex updates would have been made, even if none moved a
     /// vertex.
     bool out_of_time = false;
-    Scalar residual = 0;                         ///< largest residual force on a free active vertex [N]; 0 if refused
+    Scalar residual = 0;  ///< largest residual force on a free active vertex [N]; 0 if refused
+    ///@{
+    /// What the layers leave out: the largest residual force on a free vertex that this step did not update, beside one
+    /// that it did, and the sum of these forces [N]. The sum is the part of the tools' force on the membrane that
+    /// reaches neither foundation nor pinned vertices. Both are 0 if the queue has all vertices.
+    Scalar residual_beyond = 0;
+    Vector3<Scalar> unsupported = Vector3<Scalar>::Zero();
+    ///@}
     Index vertex_updates = 0;                    ///< including evaluations of forces without an update
     std::span<const Index> moved;                ///< vertices whose position changed, or that a tear has placed since
     std::span<const Vector3<Scalar>> reactions;  ///< for each constraint, in order, the membrane's force on it [N]

@@ -107,7 +107,7 @@ struct StepState {
     [[nodiscard]] bool is_fixed(Index v) const noexcept { return fixed[static_cast<std::size_t>(v)] != 0; }
 
     /// Tolerance of vertices outside the queue [N]: a step does not solve the queue any better than its residual, so
-    /// vertices that the contact has left wait for the forces far below it.
+    /// vertices that the contact has left wait while the forces on them are far below it.
     [[nodiscard]] Scalar outside_tolerance() const noexcept { return (std::max)(force_tolerance, queue_residual / 10); }
 
     ///@{

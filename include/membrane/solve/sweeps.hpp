@@ -60,7 +60,7 @@ struct Sweeps {
         for (const auto vertices : {one_by_one, active.frontier(), scene.state.prescribed.items()}) {
             for (const Index v : vertices) load_neighbours(v);
         }
-        budget.begin(active.vertices().size() + active.frontier().size());
+        budget.begin(active.vertices().size() + active.frontier().size(), beyond());
     }
 
     /// Sweeps until no vertex moves, `sweeps` are done, or time is up.
@@ -124,6 +124,11 @@ struct Sweeps {
 
   private:
     [[nodiscard]] bool advances() const noexcept { return report.status == StepStatus::advanced; }
+
+    // Number of vertices that this step does not update, beside those that it does.
+    [[nodiscard]] std::size_t beyond() const noexcept {
+        return scene.state.loaded.items().size() - active.vertices().size();
+    }
 
     // Packs vertices if no constraint adds a force beyond layer 0.
     void pack() noexcept {
@@ -204,7 +209,7 @@ struct Sweeps {
         const std::size_t before = active.vertices().size();
         active.grow(scene.network, options);
         for (const Index v : active.frontier()) load_neighbours(v);
-        budget.set_residual_count(active.vertices().size() + active.frontier().size());
+        budget.set_residual_count(active.vertices().size() + active.frontier().size(), beyond());
         update_until_time_is_up(before, active.vertices().size());
         return true;
     }
