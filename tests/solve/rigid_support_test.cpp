@@ -285,3 +285,199 @@ TEST_CASE("far from what is fixed its stiffness changes nothing, to the bit") {
     }
     CHECK(soft.x() == stiff.x());
 }
+
+// Constraints that cannot all hold.
+
+namespace {
+
+/// The farthest of these vertices from where they were [m].
+double farthest(const Points<double>& now, const Points<double>& before) {
+    return (now - before).colwise().norm().maxCoeff();
+}
+
+/// A random sheet with a pinned border.
+struct PinnedSheet {
+    explicit PinnedSheet(test::Random& random, Index squares)
+        : mesh(sheet({.width = 0.02, .height = 0.02, .columns = squares, .rows = squares})),
+          network(mesh, LinearSpring{}, {.stiffness = random.number(5.0, 60.0), .pinned = border(mesh)}),
+          foundation(mesh, {.stiffness = random.number(0.5, 8.0)}),
+          solver(network),
+          tree(mesh),
+          x(mesh.positions()) {}
+
+    /// Of the stiffest vertex, whose springs are at rest [N/m].
+    double stiffest() const {
+        double largest = 0;
+        for (Index v = 0; v < mesh.vertex_count(); ++v) {
+            const Vector3<double> at = point(mesh.positions(), v);
+            largest = std::max(largest, network.force_on(v, mesh.positions()).stiffness +
+                                            foundation.force_on(v, at, at, 1.0).stiffness);
+        }
+        return largest;
+    }
+
+    StepReport<double> tick(const auto&... constraints) {
+        const Points<double> before = x;
+        const auto report = solver.step(x, 1e-3, network, foundation, constraints...);
+        REQUIRE(report.status == StepStatus::advanced);
+        tree.refit(x, report.moved);
+        moved = farthest(x, before);
+        displaced = farthest(x, mesh.positions());
+        return report;
+    }
+
+    TriangleMesh<double> mesh;
+    MassSpringNetwork<double, LinearSpring> network;
+    VirtualVolumeSprings<double> foundation;
+    QuasiStaticSolver<double> solver;
+    AabbTree<double> tree;
+    Points<double> x;
+    double moved = 0, displaced = 0;  // the farthest vertex in the last tick, and from its place at rest [m]
+};
+
+/// Two balls on both sides of a sheet. Their distance falls until they overlap.
+struct Pinch {
+    explicit Pinch(test::Random& random)
+        : radii{random.number(0.8e-3, 3e-3), random.number(0.8e-3, 3e-3)},
+          overlap(std::pow(10.0, random.number(-6.0, -3.0))),
+          rise(random.number(-0.5e-3, 0.5e-3)),
+          at(random.number(-4e-3, 4e-3), random.number(-4e-3, 4e-3), 0) {
+        const double beside = random.chance(0.3) ? 0 : random.number(0.0, 0.5e-3), turn = random.number(0.0, 6.3);
+        offset = {beside * std::cos(turn), beside * std::sin(turn), 0};
+    }
+
+    /// The balls after a `part` of their motion, 0 to 1: both along the normal, and nearer to each other.
+    std::array<Tool<double>, 2> tools(double part) const {
+        const double sum = radii[0] + radii[1];
+        const double apart = std::sqrt(sum * sum - squared_norm(offset)) + gap - (gap + overlap) * part;
+        const Vector3<double> centre = at + std::max(part, 0.0) * Vector3<double>(0, 0, rise), up(0, 0, apart / sum);
+        return {Tool<double>{.position = centre + radii[0] * up, .radius = radii[0]},
+                Tool<double>{.position = centre + offset - radii[1] * up, .radius = radii[1]}};
+    }
+
+    static constexpr double gap = 0.3e-3;  // of the balls at first [m]
+    std::array<double, 2> radii;
+    double overlap, rise;  // [m]
+    Vector3<double> at, offset;
+};
+
+std::array<Index, 3> corners_of(const TriangleMesh<double>& mesh, Index f) {
+    return {mesh.triangles()(0, f), mesh.triangles()(1, f), mesh.triangles()(2, f)};
+}
+
+}  // namespace
+
+TEST_CASE("tools that overlap share the overlap: motion and forces are bounded, and end with it") {
+    for (int seed = 1; seed <= cases(4, 400); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        PinnedSheet scene(random, 10 + random.index(14));
+        const Pinch pinch(random);
+        const double edge = 0.02 / std::sqrt(scene.mesh.triangle_count() / 2.0), stiffest = scene.stiffest();
+        CAPTURE(pinch.overlap, pinch.rise, edge);
+        ContactTracker<double> above(scene.mesh), below(scene.mesh);
+        auto last = pinch.tools(0);
+        for (int i = 0; i <= 400; ++i) {
+            const auto tools = pinch.tools(i < 150 ? i / 150.0 : i < 300 ? 1 : -3 * (i - 300) / 100.0);
+            const auto& [a, b] = tools;
+            const double motion =
+                std::max((a.position - last[0].position).norm(), (b.position - last[1].position).norm());
+            last = tools;
+            const auto on_a = above.update(scene.tree, scene.x, a), on_b = below.update(scene.tree, scene.x, b);
+            const auto report = scene.tick(press(a, on_a), press(b, on_b));
+            CAPTURE(i, scene.moved, scene.displaced);
+            if (i < 300) {
+                CHECK(scene.displaced < std::abs(pinch.rise) + pinch.overlap + pinch.gap);
+                CHECK(scene.moved < 2 * (motion + pinch.overlap) + 0.05 * edge);
+            }
+            for (const std::size_t tool : {0u, 1u}) {
+                std::vector<Index> pressed;
+                for (const auto& point : scene.solver.contact_points(tool))
+                    pressed.insert(pressed.end(), point.corners.begin(), point.corners.end());
+                std::sort(pressed.begin(), pressed.end());
+                const auto count = std::unique(pressed.begin(), pressed.end()) - pressed.begin();
+                CHECK(report.reactions[tool].norm() <=
+                      stiffest * (pinch.overlap + std::abs(pinch.rise) + motion) * static_cast<double>(count));
+            }
+        }
+        CHECK(scene.displaced < 1e-6);
+    }
+}
+
+TEST_CASE(
+    "two equal balls that overlap on both sides of a vertex penetrate by half of the overlap, with opposite forces") {
+    test::Random random(1);
+    PinnedSheet scene(random, 12);
+    ContactTracker<double> above(scene.mesh), below(scene.mesh);
+    constexpr double radius = 2e-3, overlap = 0.1e-3;
+    StepReport<double> report;
+    for (int i = 0; i < 300; ++i) {
+        const double z = radius + 0.05e-3 - (0.05e-3 + overlap / 2) * std::min(1.0, i / 100.0);
+        const Tool<double> a{.position = {0, 0, z}, .radius = radius}, b{.position = {0, 0, -z}, .radius = radius};
+        const auto on_a = above.update(scene.tree, scene.x, a), on_b = below.update(scene.tree, scene.x, b);
+        report = scene.tick(press(a, on_a), press(b, on_b));
+        if (z > radius) CHECK(report.violated == no_index);
+        if (z < radius - 1e-6) CHECK(report.violated != no_index);
+    }
+    const double force = report.reactions[0].norm();
+    CHECK(force > 0);
+    CHECK((report.reactions[0] + report.reactions[1]).norm() < 1e-6 * force);
+    CHECK(std::abs(report.violation - overlap / 2) < 0.02 * overlap);
+    CHECK(scene.displaced < 0.1 * overlap);
+}
+
+TEST_CASE("tools that do not oppose each other hold exactly") {
+    test::Random random(2);
+    PinnedSheet scene(random, 12);
+    ContactTracker<double> left(scene.mesh), right(scene.mesh);
+    for (int i = 0; i < 100; ++i) {
+        const double z = 2e-3 - 1e-5 * i;
+        const Tool<double> a{.position = {-1e-3, 0, z}, .radius = 2e-3}, b{.position = {1e-3, 0, z}, .radius = 2e-3};
+        const auto on_a = left.update(scene.tree, scene.x, a), on_b = right.update(scene.tree, scene.x, b);
+        const auto report = scene.tick(press(a, on_a), press(b, on_b));
+        CHECK(report.violation == 0);
+        CHECK(report.violated == no_index);
+    }
+}
+
+TEST_CASE("forceps against pins, other forceps or a tool: motion and forces are bounded, and end with them") {
+    for (int seed = 1; seed <= cases(12, 2'000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        PinnedSheet scene(random, 12);
+        const auto& mesh = scene.mesh;
+        enum { pins, forceps, ball };
+        const int against = seed % 3;
+        const auto is_held = [&](Index f) {
+            const auto v = corners_of(mesh, f);
+            const auto count = std::count_if(v.begin(), v.end(), [&](Index of) { return scene.network.pinned(of); });
+            return (count > 0) == (against == pins);
+        };
+        Index f = random.index(mesh.triangle_count());
+        while (!is_held(f)) f = random.index(mesh.triangle_count());
+        const auto corners = corners_of(mesh, f);
+        const double first = random.number() * (random.chance(0.3) ? 0.02 : 1.0),
+                     second = random.number() * (1 - first);
+        const Vector3<double> weights(first, second, 1 - first - second);
+        const Vector3<double> rest = point_at(triangle_at(mesh.positions(), corners), weights);
+        const Vector3<double> pull_to = 1e-3 * random.unit_vector();
+        const double stiffest = scene.stiffest();
+        ContactTracker<double> tracker(mesh);
+        for (int i = 0; i <= 450; ++i) {
+            const double part = std::clamp(std::min(i, 300 - i) / 100.0, against == ball ? -1.0 : 0.0, 1.0);
+            const PointAttachment<double> held{f, corners, weights, rest + (against == ball ? 0 : part) * pull_to};
+            const PointAttachment<double> other{f, corners, weights, rest - part * pull_to};
+            const Tool<double> tool{.position = rest + Vector3<double>(0, 0, 2e-3 - 1e-3 * part), .radius = 2e-3};
+            const auto contact = tracker.update(scene.tree, scene.x, tool);
+            const auto report = against == pins      ? scene.tick(held)
+                                : against == forceps ? scene.tick(held, other)
+                                                     : scene.tick(held, press(tool, contact));
+            CAPTURE(i, scene.moved, scene.displaced, against);
+            CHECK(scene.displaced < 5e-3);
+            CHECK(scene.moved < 0.3e-3);
+            // A point in the middle of three fixed corners is three times as stiff as one of them.
+            for (const auto& force : report.reactions) CHECK(force.norm() < 3 * 4 * stiffest * 1e-3);
+        }
+        CHECK(scene.displaced < 0.1e-3);
+    }
+}

@@ -54,6 +54,8 @@ void bind_report(py::module_& module) {
         .def_readonly("residual", &StepReport::residual, doc("StepReport::residual"))
         .def_readonly("residual_beyond", &StepReport::residual_beyond, doc("StepReport::residual_beyond"))
         .def_readonly("unsupported", &StepReport::unsupported, doc("StepReport::unsupported"))
+        .def_readonly("violation", &StepReport::violation, doc("StepReport::violation"))
+        .def_readonly("violated", &StepReport::violated, doc("StepReport::violated"))
         .def_readonly("vertex_updates", &StepReport::vertex_updates, doc("StepReport::vertex_updates"))
         .def("total_reaction", &StepReport::total_reaction, doc("StepReport::total_reaction"));
     def_property_in_loop(

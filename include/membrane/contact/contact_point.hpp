@@ -22,7 +22,8 @@ struct ContactPoint {
     Vector3<Scalar> weights = Vector3<Scalar>::Zero();           ///< barycentric, of the corners
     Vector3<Scalar> normal = Vector3<Scalar>::Zero();  ///< unit vector from the surface to the tool; zero on its axis
     Vector3<Scalar> force = Vector3<Scalar>::Zero();   ///< on the membrane [N]
-    bool on_fixed = false;  ///< whether a corner is fixed and takes part of the force; set by the solver
+    bool on_fixed =
+        false;  ///< whether a corner is fixed, or shared with a point of another constraint; set by the solver
     bool by_plane = false;  ///< whether the tool is kept on its side of the triangle's plane, not of the triangle only
     Scalar side = 0;        ///< of the triangle, 1 or -1, if the tool is over its interior; 0: as in the last step
     Scalar gap = 0;         ///< signed distance of the tool when the point was found [m]; negative in penetration

@@ -176,19 +176,48 @@ class ConstraintContext {
         }
     }
 
-    /// Displacement of a fixed vertex by the tools that press on it, as of a spring of its support stiffness [m]; zero
-    /// for other vertices.
+    /// The part of this constraint's force on `v` that is opposed, 0 to 1, see `rigid_support.hpp`.
+    [[nodiscard]] Scalar opposed_part(Index v) const noexcept {
+        if (fixed(v)) return 1;
+        const Vector3<Scalar> own = state_.support_force(v), others = state_.opposing_force(v);
+        const Scalar size = norm(own);
+        const Scalar opposing = size > 0 ? (std::max)(-dot(own, others) / size, Scalar(0)) : norm(others);
+        return opposing > 0 ? opposing / (size + opposing) : Scalar(0);
+    }
+
+    /// Displacement of a fixed or shared vertex under this constraint: the opposed part of its force over the support
+    /// stiffness [m]; zero for other vertices.
     [[nodiscard]] Vector3<Scalar> support_displacement(Index v) const noexcept {
         const Scalar stiffness = state_.support_stiffness(v);
         if (!state_.pressed_supports.contains(v) || !(stiffness > 0)) return Vector3<Scalar>::Zero();
-        return state_.support_force(v) / stiffness;
+        return opposed_part(v) * state_.support_force(v) / stiffness;
     }
 
-    /// Compliance of a fixed vertex under tools [m/N]; zero for other vertices.
+    /// Derivative of this displacement by the force [m/N]; zero for other vertices.
     [[nodiscard]] Scalar support_compliance(Index v) const noexcept {
         const Scalar stiffness = state_.support_stiffness(v);
-        return fixed(v) && stiffness > 0 ? 1 / stiffness : Scalar(0);
+        const bool held = fixed(v) || state_.pressed_supports.contains(v);
+        return held && stiffness > 0 ? opposed_part(v) * opposed_part(v) / stiffness : Scalar(0);
     }
+
+    /// Vertices shared with this constraint may move by `distance` in this step [m]: the motion of a tool or a target
+    /// since the last one, and the violation.
+    void allow_motion(Scalar distance) noexcept { state_.largest_motion = (std::max)(state_.largest_motion, distance); }
+
+    /// Moves shared vertices that have moved farther than that in this step back to there: a triangle that rocks
+    /// between two tools may turn over in few passes.
+    void limit_shared() noexcept {
+        for (const Index v : state_.shared.items()) {
+            const Vector3<Scalar> by = position(v) - start(v);
+            const Scalar distance = norm(by);
+            if (distance > state_.largest_motion && !fixed(v))
+                set_position(v, start(v) + (state_.largest_motion / distance) * by);
+        }
+    }
+
+    /// Sums the forces at the points on fixed or shared vertices: of this constraint, and of the others. The points of
+    /// the first `begun` constraints are those of this step, the others those of the last. Cost: linear in the points.
+    void sum_support_forces(std::size_t begun = StepState<Scalar>::max_constraints) noexcept;
 
     /// Sets the stiffness of a fixed vertex against tools [N/m].
     void set_support(Index v, Scalar stiffness) noexcept { state_.row(state_.support, v).number[3] = stiffness; }
@@ -236,6 +265,30 @@ void ConstraintContext<Scalar>::prescribe(Index v) noexcept {
     state_.set_position(v, start(v));
     state_.fixed[static_cast<std::size_t>(v)] = 1;
     state_.clear_response(v);
+}
+
+template <Real Scalar>
+void ConstraintContext<Scalar>::sum_support_forces(std::size_t begun) noexcept {
+    for (const Index v : state_.pressed_supports.items()) {
+        state_.row(state_.support, v).set(Vector3<Scalar>::Zero(), state_.support_stiffness(v));
+        state_.row(state_.opposing, v) = {};
+    }
+    for (std::size_t c = 0; c < StepState<Scalar>::max_constraints; ++c) {
+        const auto points = c < begun ? state_.point_ranges[c].of(state_.points.items())
+                                      : state_.previous_ranges[c].of(state_.previous_points.items());
+        auto& rows = c == constraint_ ? state_.support : state_.opposing;
+        for (const auto& point : points) {
+            for (std::size_t k = 0; k < 3 && point.on_fixed; ++k) {
+                const Index v = point.corners[k];
+                state_.pressed_supports.insert(v);
+                auto& number = state_.row(rows, v).number;
+                for (std::size_t i = 0; i < 3; ++i) {
+                    number[i] +=
+                        point.weights[static_cast<Eigen::Index>(k)] * point.force[static_cast<Eigen::Index>(i)];
+                }
+            }
+        }
+    }
 }
 
 template <Real Scalar>

@@ -8,10 +8,12 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include <membrane/contact/grasper.hpp>
 #include <membrane/contact/tool.hpp>
 #include <membrane/solve/predictor.hpp>
+#include <membrane/solve/step.hpp>
 #include <membrane/solve/surface_point.hpp>
 
 /// Constraints: arguments of a step that act on the membrane from outside.
@@ -22,11 +24,12 @@ namespace membrane {
 
 /// A constraint on the membrane for one step. `begin` seeds all vertices where its force enters, and moves attached
 /// points to their targets. `enforce` restores the constraint, and returns whether it was violated. It is called after
-/// each update of layer 0. If there is time, it is also called at the end of the step, unless nothing has changed since
-/// a call that found no violation. `reaction` is the force of the membrane on the constraint [N]. Optional members:
-/// `driving_input(): DrivingInput<Scalar>`, from which the next steps are extrapolated; `prescribe(context)`, which
-/// prescribes vertices and is called before any `begin`; `end(context)`, called after all reactions of a step that
-/// advanced, and not of one that is refused: for what a constraint keeps from step to step.
+/// each update of layer 0, several times in turns where constraints may oppose one another. If there is time, it is
+/// also called at the end of the step, unless nothing has changed since a call that found no violation. `reaction` is
+/// the force of the membrane on the constraint [N]. Optional members: `driving_input(): DrivingInput<Scalar>`, from
+/// which the next steps are extrapolated; `prescribe(context)`, which prescribes vertices and is called before any
+/// `begin`; `end(context)`, called after all reactions of a step that advanced, and not of one that is refused: for
+/// what a constraint keeps from step to step.
 template <class C, class Scalar>
 concept Constraint = Real<Scalar> &&
     requires(const C& constraint, ConstraintContext<Scalar>& context, const ConstraintContext<Scalar>& done) {
@@ -166,11 +169,20 @@ class ConstraintList {
             context_.begin_points();
             constraint.begin(context_);
         });
+        context_.state().find_shared();
     }
-    /// Enforces all constraints; returns whether one was violated.
+    /// Enforces all constraints, in several rounds if they may oppose one another; returns whether one was violated.
     [[nodiscard]] bool enforce() const noexcept {
+        constexpr int max_rounds = 8;
+        const int rounds = context_.state().several_on_fixed ? max_rounds : 1;
         bool changed = false;
-        for_each([&](const auto& constraint, std::size_t) { changed |= constraint.enforce(context_); });
+        bool again = true;
+        for (int i = 0; again && i < rounds; ++i) {
+            again = false;
+            for_each([&](const auto& constraint, std::size_t) { again |= constraint.enforce(context_); });
+            context_.limit_shared();
+            changed |= again;
+        }
         return changed;
     }
     /// Computes the reactions; returns false if one is not finite. Updates the contact points from their packs.
@@ -183,6 +195,18 @@ class ConstraintList {
             finite &= is_finite(reactions[i]);
         });
         return finite;
+    }
+    /// Finds the largest violation, after `react`.
+    void find_violation(StepReport<Scalar>& report) const noexcept {
+        for_each([&](const auto&, std::size_t i) {
+            if (context_.state().several_on_fixed) context_.sum_support_forces();
+            for (const auto& point : std::as_const(context_).points()) {
+                const Scalar violation = point.on_fixed ? norm(support_displacement(context_, point)) : Scalar(0);
+                if (!(violation > report.violation)) continue;
+                report.violation = violation;
+                report.violated = static_cast<Index>(i);
+            }
+        });
     }
     /// Ends a step that has advanced.
     void end() const noexcept {
@@ -201,7 +225,8 @@ class ConstraintList {
     std::span<const ConstraintRef<Scalar>> constraints_;
 };
 
-/// Attaches a point of a triangle to `target`, by at most `max_force`; the corners are otherwise free.
+/// Attaches a point of a triangle to `target`, by at most `max_force`; the corners are otherwise free. A point on fixed
+/// corners, or that other constraints hold, stays off the target by force over stiffness, see `rigid_support.hpp`.
 template <Real Scalar>
 struct PointAttachment {
     Index triangle = no_index;                                   ///< `no_index`: no attachment
@@ -220,6 +245,13 @@ struct PointAttachment {
     bool enforce(ConstraintContext<Scalar>& context) const noexcept;
     [[nodiscard]] Vector3<Scalar> reaction(const ConstraintContext<Scalar>& context) const noexcept;
     ///@}
+
+  private:
+    // From the point to the target [m].
+    [[nodiscard]] Vector3<Scalar> offset(const ConstraintContext<Scalar>& context,
+                                         const ContactPoint<Scalar>& point) const noexcept {
+        return target - point_at(triangle_of(context, corners), barycentric) - support_displacement(context, point);
+    }
 };
 
 /// Attaches a vertex to `target`.
@@ -336,22 +368,25 @@ void PointAttachment<Scalar>::begin(ConstraintContext<Scalar>& context) const no
     const Vector3<Scalar> none = Vector3<Scalar>::Zero();
     ContactPoint<Scalar> point{triangle, 0, corners, barycentric, none, none};
     if (const auto* before = context.cached_point(triangle, 0, corners[0])) point.force = before->force;
+    point.on_fixed = is_on_fixed(context, corners);
     const Scalar size = norm(point.force);
     if (size > max_force) point.force *= max_force / size;
     add_point_force(context, corners, barycentric, point.force);
     context.add_point(point);
     if (size >= max_force) return;  // it slips: the target is not where the point will be
-    const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
-    move_point<Scalar>(context, corners, barycentric, target - now);
+    context.allow_motion(norm<Scalar>(target - point_at(triangle_of(context, corners), barycentric)));
+    context.sum_support_forces(context.constraint() + 1);
+    press_in<Scalar>(context, corners, barycentric, offset(context, point));
 }
 
 template <Real Scalar>
 bool PointAttachment<Scalar>::enforce(ConstraintContext<Scalar>& context) const noexcept {
     bool changed = false;
     for (auto& point : context.points()) {
-        const Vector3<Scalar> now = point_at(triangle_of(context, corners), barycentric);
-        if (!(norm<Scalar>(target - now) > negligible_distance(context, point))) continue;
-        Vector3<Scalar> more = force_for<Scalar>(context, point, target - now);
+        if (point.on_fixed) context.sum_support_forces();
+        const Vector3<Scalar> by = offset(context, point);
+        if (!(norm(by) > negligible_distance(context, point))) continue;
+        Vector3<Scalar> more = force_for<Scalar>(context, point, by);
         const Scalar size = norm<Scalar>(point.force + more);
         if (size > max_force) {
             more = (max_force / size) * (point.force + more) - point.force;

@@ -70,7 +70,7 @@ struct alignas(32) ContactPack {
     std::array<unsigned char, lanes> turn;           ///< number of the point's corner that is corner 0 here
     std::size_t size = 0;                            ///< lanes in use
     ContactKind kind = ContactKind::end;             ///< of all its points
-    bool on_fixed = false;                           ///< whether a corner of a point is fixed
+    bool on_fixed = false;                           ///< whether a corner of a point is fixed or shared
     bool has_sides = false;                          ///< whether the side of a point is known
     bool acts = true;  ///< whether a point pressed or penetrated in the last pass over all packs
 };
@@ -102,6 +102,9 @@ class ContactPacks {
     /// capacity in packs is that in points. Cost: linear in the points.
     template <class IsFixed>
     void append(std::span<const ContactPoint<Scalar>> points, std::size_t first, IsFixed is_fixed) noexcept;
+
+    /// Sets `on_fixed` of each pack by that of its points; `points` are all of the step.
+    void set_on_fixed(std::span<const ContactPoint<Scalar>> points) noexcept;
 
     /// Brings weights, normal and force of `points`, all of the step, up to date with their packs. Cost: linear in the
     /// points.
@@ -200,6 +203,15 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
     }
     for (const auto& point : points) {
         for (const Index v : point.corners) colours(v) = 0;
+    }
+}
+
+template <Real Scalar>
+void ContactPacks<Scalar>::set_on_fixed(std::span<const ContactPoint<Scalar>> points) noexcept {
+    for (auto& pack : items()) {
+        for (std::size_t i = 0; i < pack.size; ++i) {
+            pack.on_fixed = pack.on_fixed || points[static_cast<std::size_t>(pack.point[i])].on_fixed;
+        }
     }
 }
 

@@ -217,18 +217,18 @@ MEMBRANE_INLINE void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& p
         scatter_padded(row, state.force.data(), pack.corner[k].data());
         if (!pack.on_fixed) return;
         auto support = gather_padded(state.support.data(), pack.corner[k].data());
-        support.point += (1 - pack.free[i]) * change;
+        support.point += change;
         scatter_padded(support, state.support.data(), pack.corner[k].data());
     });
     pack.applied = load;
 }
 
-/// Compliance and displacement of fixed corners under the tool.
+/// Compliance and displacement of fixed and shared corners under the tool, see `rigid_support.hpp`.
 template <Real Scalar>
 struct SupportOfPack {
     Lanes<Scalar> compliance = 0;            // of all points [m/N]
     Lanes<Scalar> displacement = 0;          // along the normal [m]
-    Lanes<Scalar> force = 0, stiffness = 0;  // sums over fixed corners [N], [N/m]
+    Lanes<Scalar> force = 0, stiffness = 0;  // sums over these corners [N], [N/m]
 };
 
 template <Real Scalar>
@@ -239,13 +239,20 @@ template <Real Scalar>
     for (std::size_t k = 0; pack.on_fixed && k < 3; ++k) {
         const auto i = static_cast<Eigen::Index>(k);
         const auto support = gather_padded(state.support.data(), pack.corner[k].data());
-        const Wide& stiffness = support.extra;
-        const auto yields = (stiffness > 0) & (pack.free[i] < 1);
+        const auto others = gather_padded(state.opposing.data(), pack.corner[k].data());
+        const Wide &weight = pack.load.weights[i], &stiffness = support.extra;
+        const auto is_fixed = pack.free[i] < 1;
+        const Wide pressed = -dot(support.point, pack.load.normal);
+        const Wide own = select<Wide>(is_fixed, pressed, larger<Wide>(pressed, 0));
+        const Wide opposing = larger<Wide>(dot(others.point, pack.load.normal), 0);
+        const auto holds = is_fixed | (opposing > 0);
+        const Wide part = select<Wide>(is_fixed, 1, opposing / select<Wide>(opposing > 0, own + opposing, 1));
+        const auto yields = holds & (stiffness > 0);
         const Wide compliance = select<Wide>(yields, 1 / select<Wide>(yields, stiffness, 1), 0);
-        sum.compliance += pack.load.weights[i] * pack.load.weights[i] * compliance;
-        sum.displacement += pack.load.weights[i] * (compliance * dot(support.point, pack.load.normal));
-        sum.force += (1 - pack.free[i]) * norm(support.point);
-        sum.stiffness += (1 - pack.free[i]) * stiffness;
+        sum.compliance += weight * weight * (part * part * compliance);
+        sum.displacement -= weight * (compliance * (part * own));
+        sum.force += select<Wide>(is_fixed, norm(support.point), opposing);
+        sum.stiffness += select<Wide>(holds, stiffness, 0);
     }
     return sum;
 }

@@ -277,6 +277,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     }
     if (report_.status == StepStatus::advanced && !acting.react(reactions_)) report_.status = StepStatus::unstable;
     if (report_.status != StepStatus::advanced) return refuse_step(report_.status);
+    acting.find_violation(report_);
     acting.end();
     resume_ = sweeps.resume;
     write_back(x, network, options_.adaptive_layers ? Scalar(0) : sweeps.queue_residual, sweeps.constraints_changed);
@@ -405,7 +406,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::refuse_step(StepStatus statu
     if (status == StepStatus::unstable) state_.reset_points();  // a force of the last step may have diverged
     predictor_.reset();
     reactions_.fill(Vector3<Scalar>::Zero());
-    report_.residual = 0;
+    report_.residual = report_.violation = 0;
+    report_.violated = no_index;
     report_.status = status;
     return report_;
 }

@@ -8,13 +8,19 @@
 
 #include <membrane/solve/vertex_update.hpp>
 
-/// The stiffness of a pinned or prescribed vertex against a tool.
+/// The stiffness of vertices that constraints cannot move freely, against these constraints: constraints that cannot
+/// all hold then share the violation.
 ///
-/// A rigid vertex would leave the contact force of a penetrating tool undetermined, and the force would depend on
-/// whether a contact point has a thousandth of its weight on a free corner. Against tools only, a fixed vertex is
-/// therefore on a spring of stiffness k to its position. A contact point with the weights w has on fixed corners the
-/// compliance sum w^2 / k, added to that of the free corners. So its force is continuous in the tool's position, and k
-/// d at a penetration d of a fixed vertex. Springs and foundation use the vertex's own position.
+/// A fixed vertex, pinned or prescribed, would leave the contact force of a penetrating tool undetermined, and the
+/// force would depend on whether a contact point has a thousandth of its weight on a free corner. Against constraints,
+/// a fixed vertex is therefore on a spring of stiffness k to its position. A contact point with the weights w has on
+/// fixed corners the compliance sum w^2 / k, added to that of the free corners. So its force is continuous in the
+/// tool's position, and k d at a penetration d of a fixed vertex. Springs and foundation use the vertex's own position.
+///
+/// A free vertex may be shared: several constraints have points on it, as two tools that pinch a sheet, or a tool on
+/// tissue that forceps hold. If one constraint acts on it with the force f, and the others oppose f by g, then to this
+/// constraint the vertex seems displaced by f g / (f + g) / k. Without opposition this is 0; a fixed vertex opposes any
+/// force. So two tools that overlap by d penetrate by d / 2 each, with the force k d at a vertex between them.
 namespace membrane {
 
 namespace detail {
@@ -23,6 +29,9 @@ namespace detail {
 // a factor of 4 a fixed vertex is stiffer than every free one, and the contact forces at a rim and at the vertices
 // beside it still converge in few iterations.
 inline constexpr int support_factor = 4;
+
+// A free vertex between two tools also yields sideways: a stiffer one would be squeezed out from between them.
+inline constexpr double shared_support_factor = 0.5;
 
 }  // namespace detail
 
@@ -34,24 +43,25 @@ template <class Scalar, class Network, class Volume>
     return scene.network.force_on(v, scene.start).stiffness + scene.volume.force_on(v, here, here, for_ever).stiffness;
 }
 
-/// Sets the stiffness against tools of the fixed ones among `vertices`: `stiffness` [N/m], or for 0 four times the
-/// largest stiffness of the vertex and its neighbours. Online. Cost: for 0, the springs of the fixed vertices'
-/// neighbours.
+/// Sets the stiffness against constraints of the fixed and the shared ones among `vertices`. Fixed: `stiffness` [N/m],
+/// or for 0 four times the largest stiffness of the vertex and its neighbours. Shared: half of that largest stiffness.
+/// Online. Cost: the springs of the vertices' neighbours.
 template <class Scalar, class Network, class Volume>
 void set_supports(const StepInput<Scalar, Network, Volume>& scene, std::type_identity_t<Scalar> stiffness,
                   std::span<const Index> vertices) noexcept {
     for (const Index v : vertices) {
-        if (!scene.state.is_fixed(v)) continue;
+        const bool fixed = scene.state.is_fixed(v);
+        if (!fixed && !scene.state.shared.contains(v)) continue;
         Scalar support = stiffness;
-        if (stiffness == 0) {
+        if (stiffness == 0 || !fixed) {
             Scalar stiffest = own_stiffness(scene, v);
             for (const auto& end : scene.network.neighbours(v)) {
                 stiffest = (std::max)(stiffest, own_stiffness(scene, end.other));
             }
-            support = detail::support_factor * stiffest;
+            support = (fixed ? detail::support_factor : static_cast<Scalar>(detail::shared_support_factor)) * stiffest;
         }
         scene.state.set_support_stiffness(v, support);
-        scene.state.clear_response(v);
+        if (fixed) scene.state.clear_response(v);
     }
 }
 

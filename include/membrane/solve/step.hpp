@@ -34,7 +34,7 @@ struct SolverOptions {
     bool predict = true;  ///< a step extrapolates the last displacements, if the last step was complete
     Index max_vertex_updates = unlimited;  ///< in a step; layer 0, prescribed vertices and one more are always updated
     Scalar force_tolerance = 0;  ///< residual force of a vertex in equilibrium [N]; 0: the network's, above rounding
-    Scalar rigid_stiffness = 0;  ///< of a fixed vertex against tools [N/m]; 0: 4 times the stiffest beside it
+    Scalar rigid_stiffness = 0;  ///< of a fixed vertex against constraints [N/m]; 0: 4 times the stiffest beside it
     Index max_contact_points = 4096;     ///< capacity in contact points; it determines the memory, not the time
     Index max_packed_vertices = 32'768;  ///< capacity in vertices updated by SIMD: 260 bytes each, 460 in double
 
@@ -78,6 +78,10 @@ struct StepReport {
     Scalar residual_beyond = 0;
     Vector3<Scalar> unsupported = Vector3<Scalar>::Zero();
     ///@}
+    /// Constraints that cannot all hold share the violation, see `rigid_support.hpp`: the largest distance by which one
+    /// does not hold at a point, as a tool that penetrates between another tool and the membrane, or at a pin [m].
+    Scalar violation = 0;
+    Index violated = no_index;                   ///< number of that constraint; `no_index`: all hold
     Index vertex_updates = 0;                    ///< including evaluations of forces without an update
     std::span<const Index> moved;                ///< vertices whose position changed, or that a tear has placed since
     std::span<const Vector3<Scalar>> reactions;  ///< for each constraint, in order, the membrane's force on it [N]

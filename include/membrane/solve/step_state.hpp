@@ -73,8 +73,9 @@ struct StepState {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.reset();
-        visit(self.position, self.response, self.support, self.residual, self.loaded, self.pressed_supports,
-              self.previous_points, self.previous_ranges, self.queue_residual, self.asleep_below, self.splits);
+        visit(self.position, self.response, self.support, self.residual, self.loaded, self.shared,
+              self.pressed_supports, self.previous_points, self.previous_ranges, self.queue_residual, self.asleep_below,
+              self.splits);
         if constexpr (Visit::restores) self.index_previous_points();
     }
 
@@ -138,8 +139,10 @@ struct StepState {
     ///@}
 
     ///@{
-    /// The force of the tools on a fixed vertex [N], and its stiffness against them, 0 before a contact near it [N/m].
+    /// The force of a constraint on a fixed or shared vertex [N], that of the other constraints [N], and the vertex's
+    /// stiffness against the part of the force that is opposed, 0 before a contact near it [N/m].
     [[nodiscard]] Vector3<Scalar> support_force(Index v) const noexcept { return row(support, v).point(); }
+    [[nodiscard]] Vector3<Scalar> opposing_force(Index v) const noexcept { return row(opposing, v).point(); }
     [[nodiscard]] Scalar support_stiffness(Index v) const noexcept { return row(support, v).extra(); }
     void set_support_stiffness(Index v, Scalar stiffness) noexcept { row(support, v).number[3] = stiffness; }
     ///@}
@@ -184,6 +187,9 @@ struct StepState {
         row(response, 2 * v + 1).number[3] = stiffness;
     }
 
+    /// Finds the vertices shared by points of several constraints. Cost: linear in the points.
+    void find_shared() noexcept;
+
     /// Makes the previous points known to `previous_at`.
     void index_previous_points() noexcept;
 
@@ -191,7 +197,8 @@ struct StepState {
     Rows position;  ///< `position_of`, `compliance`
     Rows force;     ///< `constraint_force`, `contact_stiffness`
     Rows response;  ///< two rows: compliance xx, yy, zz, xy; xz, yz [m/N], internal force [N], internal stiffness [N/m]
-    Rows support;   ///< of fixed vertices: `support_force`, `support_stiffness`
+    Rows support;   ///< of fixed and shared vertices: `support_force`, `support_stiffness`
+    Rows opposing;  ///< of fixed and shared vertices: `opposing_force`
     Rows residual;  ///< `residual_force`, `unbalanced_force`
     Rows anchor;    ///< positions to which `kept` vertices go back [m]
     std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
@@ -200,9 +207,11 @@ struct StepState {
     /// Vertices whose positions are loaded, that are seeds, that constraints prescribe, or on which their forces act.
     IndexSet loaded, seeds, prescribed, forced;
     ///@}
-    IndexSet pressed_supports;         ///< fixed vertices that a tool presses on
+    IndexSet shared;                   ///< vertices with points of several constraints, of the last step until found
+    IndexSet pressed_supports;         ///< corners of points on a fixed or a shared vertex
     IndexSet kept;                     ///< vertices with an `anchor`
     std::vector<unsigned char> fixed;  ///< of loaded vertices: pinned or prescribed
+    std::vector<unsigned char> owner;  ///< scratch of `find_shared`
 
     ///@{
     /// Contact points of all constraints, of this step and of the last one.
@@ -221,9 +230,11 @@ struct StepState {
     Scalar force_tolerance = 0;  ///< a negligible change of force [N]
     Scalar queue_residual = 0;   ///< largest residual force in the queue after the last step [N]
     Scalar asleep_below = 0;     ///< no vertex that has moved is asleep under a larger force than this [N]
+    Scalar largest_motion = 0;   ///< how far shared vertices may move in this step [m]
     ///@{
-    /// A constraint found its input invalid; the contact points exceed the capacity.
-    bool invalid = false, full = false;
+    /// A constraint found its input invalid; the contact points exceed the capacity; several constraints have points on
+    /// fixed or shared vertices.
+    bool invalid = false, full = false, several_on_fixed = false;
     Index splits = 0;                          ///< of a tear, until now
     StepStatus missed = StepStatus::advanced;  ///< a part has followed fewer
     ///@}
@@ -237,6 +248,7 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       force(position),
       response(2 * position.size()),
       support(position),
+      opposing(position),
       residual(position),
       anchor(position),
       added_stiffness(position.size(), 0),
@@ -244,9 +256,11 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       seeds(vertices),
       prescribed(vertices),
       forced(vertices),
+      shared(vertices),
       pressed_supports(vertices),
       kept(vertices),
       fixed(static_cast<std::size_t>(vertices), 0),
+      owner(fixed),
       points(static_cast<std::size_t>(max_contact_points)),
       previous_points(points),
       first_previous(static_cast<std::size_t>(vertices), no_index),
@@ -260,14 +274,50 @@ void StepState<Scalar>::begin_step() noexcept {
         row(force, v) = {};
         added_stiffness[static_cast<std::size_t>(v)] = 0;
     }
-    for (const Index v : pressed_supports.items()) row(support, v).set(Vector3<Scalar>::Zero(), support_stiffness(v));
+    for (const Index v : pressed_supports.items()) {
+        row(support, v).set(Vector3<Scalar>::Zero(), support_stiffness(v));
+        row(opposing, v) = {};
+    }
     for (IndexSet* set : {&loaded, &seeds, &prescribed, &forced, &pressed_supports, &kept, &candidates}) set->clear();
     points.clear();
     packs.clear();
     point_ranges = {};
     pack_ranges = {};
-    invalid = full = false;
+    largest_motion = 0;
+    invalid = full = several_on_fixed = false;
     missed = StepStatus::advanced;
+}
+
+template <Real Scalar>
+void StepState<Scalar>::find_shared() noexcept {
+    const auto owner_of = [this](Index v) -> unsigned char& { return owner[static_cast<std::size_t>(v)]; };
+    const auto is_vertex = [this](Index v) { return v >= 0 && v < vertex_count(); };
+    shared.clear();
+    for (std::size_t c = 0; c < max_constraints; ++c) {
+        const auto number = static_cast<unsigned char>(c + 1);
+        for (const auto& point : point_ranges[c].of(points.items())) {
+            for (const Index v : point.corners) {
+                if (!is_vertex(v)) continue;
+                const auto before = std::exchange(owner_of(v), number);
+                if (before != 0 && before != number) shared.insert(v);
+            }
+        }
+    }
+    int constraints_on_fixed = 0;
+    for (const auto& range : point_ranges) {
+        bool on_fixed = false;
+        for (auto& point : range.of(points.items())) {
+            for (const Index v : point.corners) {
+                if (!is_vertex(v)) continue;
+                owner_of(v) = 0;
+                point.on_fixed = point.on_fixed || shared.contains(v);
+            }
+            on_fixed = on_fixed || point.on_fixed;
+        }
+        constraints_on_fixed += on_fixed ? 1 : 0;
+    }
+    several_on_fixed = constraints_on_fixed > 1;
+    packs.set_on_fixed(points.items());
 }
 
 template <Real Scalar>
@@ -301,8 +351,9 @@ template <Real Scalar>
 void StepState<Scalar>::reset() noexcept {
     begin_step();
     reset_points();
+    shared.clear();
     queue_residual = asleep_below = 0;
-    for (Rows* rows : {&position, &response, &support, &residual})
+    for (Rows* rows : {&position, &response, &support, &opposing, &residual})
         std::fill(rows->begin(), rows->end(), PaddedPoint<Scalar>{});
 }
 
@@ -311,7 +362,9 @@ void StepState<Scalar>::split(const VertexSplit& split) noexcept {
     ++splits;
     for (Rows* rows : {&position, &support, &residual}) row(*rows, split.copy) = row(*rows, split.vertex);
     for (const Index i : {0, 1}) row(response, 2 * split.copy + i) = row(response, 2 * split.vertex + i);
-    if (loaded.contains(split.vertex)) loaded.insert(split.copy);
+    for (IndexSet* set : {&loaded, &shared}) {
+        if (set->contains(split.vertex)) set->insert(split.copy);
+    }
     for (auto& point : previous_points.items()) {
         const Index first = point.corners[0];
         if (first >= 0 && first < vertex_count()) first_previous[static_cast<std::size_t>(first)] = no_index;

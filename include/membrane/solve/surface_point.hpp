@@ -48,6 +48,13 @@ template <Real Scalar>
     return free;
 }
 
+/// Whether a corner is fixed, or was shared by several constraints in the last step.
+template <Real Scalar>
+[[nodiscard]] bool is_on_fixed(const ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners) noexcept {
+    return std::any_of(corners.begin(), corners.end(),
+                       [&](Index v) { return context.fixed(v) || context.state().shared.contains(v); });
+}
+
 /// Whether the point moves less than a tenth as far as its free corners. Then no force moves it.
 template <Real Scalar>
 [[nodiscard]] bool is_rigid(const ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners,
@@ -79,7 +86,7 @@ void press_in(ConstraintContext<Scalar>& context, const std::array<Index, 3>& co
     }
 }
 
-/// Response of the point to `force` [m].
+/// Response of the point to `force` [m], with the displacement of fixed and shared corners.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> response_of(const ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
                                           const Vector3<Scalar>& force) noexcept {
@@ -87,6 +94,7 @@ template <Real Scalar>
     for (std::size_t k = 0; k < 3; ++k) {
         const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
         sum += weight * context.response(point.corners[k], weight * force);
+        if (point.on_fixed) sum += weight * weight * context.support_compliance(point.corners[k]) * force;
     }
     return sum;
 }
@@ -117,6 +125,7 @@ template <Real Scalar>
     for (std::size_t k = 0; k < 3; ++k) {
         const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
         sum += weight * weight * context.compliance(point.corners[k]);
+        if (point.on_fixed) sum += weight * weight * context.support_compliance(point.corners[k]);
     }
     return (std::max)(context.force_tolerance() * sum, detail::rounding_at(context.position(point.corners[0])));
 }
@@ -143,7 +152,7 @@ void add_support_forces(ConstraintContext<Scalar>& context, const ContactPoint<S
     }
 }
 
-/// Displacement of the point by its fixed corners under tools [m].
+/// Displacement of the point by its fixed and shared corners under the constraint [m].
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> support_displacement(const ConstraintContext<Scalar>& context,
                                                    const ContactPoint<Scalar>& point) noexcept {

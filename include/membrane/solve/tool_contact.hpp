@@ -130,16 +130,18 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
         context.state().full = true;
         return;
     }
-    // Until the new points are found, fixed corners are displaced by the forces of the last step.
-    for (const auto& point : context.previous_points()) add_support_forces(context, point, point.force);
+    context.allow_motion(contact.detection_distance - contact.radius + (std::max)(-contact.gap, Scalar(0)));
+    // Until the new points are found, fixed and shared corners are displaced by the forces of the last step.
+    context.sum_support_forces(context.constraint());
     const auto out = direction_out_of_support(context);
     if (contact.tunnelled && !out) carry_with_tool(context);
     list_candidates(context);
-    if (!contact.tunnelled && !out && contact.gap < -negligible_distance(context, contact.corners[0])) {
+    const bool shared = std::any_of(contact.corners.begin(), contact.corners.end(),
+                                    [&](Index v) { return context.state().shared.contains(v); });
+    if (!contact.tunnelled && !out && !shared && contact.gap < -negligible_distance(context, contact.corners[0])) {
         clear_contact_point(context);
     }
     out ? touch_support(context, *out) : find_points(context);
-    for (const auto& point : context.previous_points()) add_support_forces<Scalar>(context, point, -point.force);
     if (context.state().full) return;
     pack_points(context);
     for (int pass = 0; pass < detail::max_push_passes; ++pass) {
@@ -242,7 +244,7 @@ void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point
     const bool apart = distance > contact.radius / 1000;
     point.normal = direction(apart ? point.normal : Vector3<Scalar>(contact.previous_axis_point - contact.axis_point),
                              contact.normal);
-    point.on_fixed = std::any_of(point.corners.begin(), point.corners.end(), [&](Index v) { return context.fixed(v); });
+    point.on_fixed = is_on_fixed(context, point.corners);
     // Fixed corners have not been carried along: a triangle that the tool has passed is between its last and its new
     // position.
     if (contact.tunnelled && point.on_fixed) {
@@ -282,8 +284,8 @@ void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
     const auto points = context.points();
     for (const auto& point : points) {
         add_point_force(context, point.corners, point.weights, point.force);
-        add_support_forces(context, point, point.force);
     }
+    context.sum_support_forces(context.constraint() + 1);
     auto& range = state.pack_ranges[context.constraint()];
     range.begin = state.packs.size();
     state.packs.append(std::span<const ContactPoint<Scalar>>(points), state.point_ranges[context.constraint()].begin,
@@ -353,15 +355,17 @@ void ToolContact<Scalar>::prevent_tunnelling(Context& context) const noexcept {
 template <Real Scalar>
 bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     if (!contact.touching()) return false;
+    const bool takes_turns = context.state().several_on_fixed;  // then another constraint's pass comes next
+    if (takes_turns) context.sum_support_forces();
     Scalar first = 0;  // largest change of a force in the first pass [N]
     bool released = false;
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
     const int most = detail::max_contact_passes(points.size(), on_fixed || feature_pairs(tool) > 1);
     bool deep = false;
-    for (int i = 0; i < detail::deep_contact_passes; ++i) {
+    for (int i = 0; i < (takes_turns ? 1 : detail::deep_contact_passes); ++i) {
         const auto pass = solve_contacts(context.state(), shape(), packs(context), i > 0);
-        deep = pass.deep;
+        deep = pass.deep && !takes_turns;
         released = released || pass.released;
         if (i == 0) first = pass.largest;
         // Stops if the vertices need updates first.
@@ -370,6 +374,7 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     for (int i = 0; deep && i < detail::max_push_passes; ++i) deep = push_out(context.state(), shape(), packs(context));
     apply_forces(context.state(), packs(context));
     prevent_tunnelling(context);
+    if (takes_turns) context.state().packs.unpack(context.state().points.items());
     return first > 0 || released || has_new_overlap(context);
 }
 
