@@ -972,3 +972,67 @@ TEST_CASE("positions and trees of another membrane touch nothing, and the next c
     CHECK(tracker.update(tree, x, tool).phase == ContactPhase::ongoing);
     CHECK_FALSE(tracker.update(tree, x, tool, body).touching());
 }
+
+namespace {
+
+/// A torus about the z axis, facing outward: `around` times `across` vertices.
+TriangleMesh<double> torus(double radius, double thickness, Index around, Index across) {
+    Points<double> x(3, around * across);
+    Triangles triangles(3, 2 * around * across);
+    Index f = 0;
+    for (Index i = 0; i < around; ++i) {
+        for (Index k = 0; k < across; ++k) {
+            const double a = 2 * std::numbers::pi * i / around, b = 2 * std::numbers::pi * k / across;
+            const double out = radius + thickness * std::cos(b);
+            x.col(i * across + k) = Vector(out * std::cos(a), out * std::sin(a), thickness * std::sin(b));
+            const auto at = [&](Index ring, Index of) { return ring % around * across + of % across; };
+            triangles.col(f++) << at(i, k), at(i + 1, k), at(i + 1, k + 1);
+            triangles.col(f++) << at(i, k), at(i + 1, k + 1), at(i, k + 1);
+        }
+    }
+    return TriangleMesh<double>(x, triangles);
+}
+
+/// How often the surface winds round `q`, by the solid angles of its triangles.
+double winding_by_angles(const Points<double>& x, const Triangles& triangles, const Vector& q) {
+    double sum = 0;
+    for (Eigen::Index f = 0; f < triangles.cols(); ++f) {
+        const Vector a = x.col(triangles(0, f)) - q, b = x.col(triangles(1, f)) - q, c = x.col(triangles(2, f)) - q;
+        const double la = a.norm(), lb = b.norm(), lc = c.norm();
+        sum += 2 * std::atan2(a.dot(b.cross(c)), la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb);
+    }
+    return sum / (4 * std::numbers::pi);
+}
+
+}  // namespace
+
+TEST_CASE("a shaft first seen across a closed surface is inside where the surface winds round its axis") {
+    int across = 0;
+    for (int seed = 1; seed <= cases(60, 20'000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = random.chance(0.5) ? membrane::icosphere<double>({.radius = 1, .subdivisions = 2})
+                                             : torus(0.8, 0.3, 24, 10);
+        const Points<double> x = mesh.vertex_count() == 162 ? wavy(mesh.positions(), random) : mesh.positions();
+        const auto& triangles = mesh.triangles();
+        Tool<double> shaft;
+        shaft.axis = random.number(0.5, 4.0) * random.unit_vector();
+        shaft.position = random.vector<double>(-1, 1) - random.number() * shaft.axis;
+        shaft.radius = random.number(0.01, 0.1);
+        double deepest = 0;  // of the axis
+        for (int i = 0; i <= 60; ++i) {
+            const Vector q = shaft.position + i / 60.0 * shaft.axis;
+            if (winding_by_angles(x, triangles, q) > 0.5) deepest = std::max(deepest, distance_to(x, triangles, q));
+        }
+        AabbTree<double> tree(mesh);
+        tree.refit(x);
+        ContactTracker<double> tracker(mesh);
+        const auto contact = tracker.update(tree, x, shaft);
+        if (deepest > 0.02) CHECK(contact.touching());
+        if (!contact.touching() || !(contact.gap < -shaft.radius * 1.001)) continue;
+        CHECK(winding_by_angles(x, triangles, contact.axis_point) > 0.5);
+        CHECK(-contact.gap - shaft.radius < deepest + 0.05);
+        ++across;
+    }
+    CHECK(across > 0);
+}

@@ -135,6 +135,11 @@ class ContactTracker : public SplitCount {
         contact.gap = -contact.gap - 2 * scene.radius;
         contact.normal = -contact.normal;
     }
+    // Whether a shaft passes through triangle `f`.
+    [[nodiscard]] bool pierces(const Scene& scene, Index f) const noexcept {
+        return feature_pairs(scene.tool) > 1 &&
+               surface_.nearest(scene.x, f, scene.tool).on_triangle.squared_distance == 0;
+    }
     [[nodiscard]] bool was_behind(const Scene& scene, Index f, Scalar side, const Vector3<Scalar>& q) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> middle_inside(const Scene& scene, Index f, Scalar side) const noexcept;
     [[nodiscard]] bool has_passed(const Scene& scene, Index start, Scalar side,
@@ -415,10 +420,11 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
         behind = !leaves_border(scene, contact);
         if (behind) turn(scene, contact);
     }
-    const bool first_seen_in_shaft = !last_.touching() && feature_pairs(scene.tool) > 1 &&  // it may pierce the surface
-                                     (surface_.closed() || !last_tool_) &&
-                                     !surface_.on_border(contact.triangle, contact.barycentric);
-    contact.tunnelled = behind && !slid_off_ &&
+    const bool first_seen_in_shaft = !last_tool_ && feature_pairs(scene.tool) > 1 &&  // it may pierce the surface
+                                     !surface_.closed() && !surface_.on_border(contact.triangle, contact.barycentric);
+    // A shaft first seen across a closed surface has come in anywhere: `describe_shaft` finds where it is inside.
+    const bool first_seen_across = !last_.touching() && surface_.closed() && pierces(scene, f);
+    contact.tunnelled = behind && !slid_off_ && !first_seen_across &&
                         (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.axis_point));
     if (behind && !contact.tunnelled) turn(scene, contact);
     if (!contact.tunnelled && feature_pairs(scene.tool) > 1 && !slid_off_ && !leaves_border(scene, contact)) {
@@ -435,7 +441,7 @@ bool ContactTracker<Scalar>::was_behind(const Scene& scene, Index f, Scalar side
 }
 
 // If a point of a shaft is behind the surface, makes the contact that of this point. Tests the middle of the part of
-// the axis inside and, at an open surface, both ends.
+// the axis inside and both ends.
 template <Real Scalar>
 void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar side,
                                             Contact<Scalar>& contact) const noexcept {
@@ -451,12 +457,15 @@ void ContactTracker<Scalar>::describe_shaft(const Scene& scene, Index f, Scalar 
         contact = there;
     };
     if (const auto middle = middle_inside(scene, f, side)) take_if_behind(*middle);
-    if (side_ == 0 || surface_.closed()) return;
     // A shaft with one end behind passes through the surface or around its border.
     const Vector3<Scalar> end = scene.tool.position + scene.tool.axis;
-    if (scene.tree.first_hit(scene.x, scene.tool.position, end).triangle == no_index) return;
+    if (surface_.closed()) {
+        if (!pierces(scene, f)) return;
+    } else if (side_ == 0 || scene.tree.first_hit(scene.x, scene.tool.position, end).triangle == no_index) {
+        return;
+    }
     take_if_behind(scene.tool.position);
-    take_if_behind(scene.tool.position + scene.tool.axis);
+    take_if_behind(end);
 }
 
 // If the shaft passes through `f` and out again farther along, returns the point halfway between. Both ends may be
