@@ -667,3 +667,14 @@ TEST_CASE("equilibrium refuses what does not fit together", "[equilibrium]") {
     CHECK(refusal([&] { std::ignore = sphere.rest({}, pull(0, Point(0, 0, 1)), pull(42, Point(0, 0, 1))); }) ==
           "equilibrium: constraint 1 names vertex 42, expected 0 to 41");
 }
+
+TEST_CASE("an equilibrium needs no options, and is then that of the default ones", "[equilibrium]") {
+    const auto mesh = icosphere({.radius = 1, .subdivisions = 1});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 1.0});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 0.5});
+    const auto hold = pull(3, Eigen::Vector3d(1.1 * mesh.positions().col(3)));
+    const auto plain = equilibrium(mesh.positions(), mesh, network, foundation, hold);
+    const auto full = equilibrium(mesh.positions(), mesh, network, foundation, {}, hold);
+    CHECK(plain.x == full.x);
+    CHECK(plain.reactions[0] == full.reactions[0]);
+}

@@ -32,3 +32,14 @@ TEMPLATE_TEST_CASE("no force that is enclosed is farther off than said", "[error
         CHECK(farthest <= norm<double>(given.template cast<double>() - force.centre) * (1 + 1e-14) + force.radius);
     }
 }
+
+#define CHECK_NAME(status) CHECK(to_string(BoundStatus::status) == #status)
+
+TEST_CASE("a status of a bound has the name that it has in a program", "[bound]") {
+    CHECK_NAME(certified);
+    CHECK_NAME(not_convex);
+    CHECK_NAME(not_converged);
+    CHECK_NAME(contact);
+    CHECK_NAME(unsupported);
+    CHECK_NAME(invalid_input);
+}

@@ -181,3 +181,14 @@ TEST_CASE("with nothing else free the slope is the vertex's own stiffness", "[ta
     }
     CHECK((dense(found.stiffness) - expected).norm() < 1e-6);
 }
+
+#define CHECK_NAME(status) CHECK(to_string(TangentStatus::status) == #status)
+
+TEST_CASE("a status of a tangent has the name that it has in a program", "[tangent]") {
+    CHECK_NAME(found);
+    CHECK_NAME(not_stable);
+    CHECK_NAME(not_converged);
+    CHECK_NAME(contact);
+    CHECK_NAME(unsupported);
+    CHECK_NAME(invalid_input);
+}

@@ -993,3 +993,14 @@ TEST_CASE("a cut that is none says why", "[tear]") {
     CHECK(status(2, {11, 12}) == CutStatus::one_edge_within);
     CHECK(status(1, {10, 11, 12, 13}) == CutStatus::reserve_too_small);
 }
+
+#define CHECK_NAME(status) CHECK(to_string(CutStatus::status) == #status)
+
+TEST_CASE("a status of a cut has the name that it has in a program", "[tear]") {
+    CHECK_NAME(cut);
+    CHECK_NAME(no_path);
+    CHECK_NAME(not_joined);
+    CHECK_NAME(crosses_border);
+    CHECK_NAME(one_edge_within);
+    CHECK_NAME(reserve_too_small);
+}

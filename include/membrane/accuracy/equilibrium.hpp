@@ -47,6 +47,15 @@ template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> V
                                       const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
                                       const EquilibriumOptions& options, const Constraints&... constraints);
 
+/// With the default options.
+template <Real Scalar, ElasticNetwork<Scalar> Network, FoundationModel<Scalar> Volume, StaticConstraint First,
+          StaticConstraint... Others>
+[[nodiscard]] Equilibrium equilibrium(const std::type_identity_t<ConstPointsRef<Scalar>>& x,
+                                      const TriangleMesh<Scalar>& mesh, const Network& network, const Volume& volume,
+                                      const First& first, const Others&... others) {
+    return equilibrium<Scalar>(x, mesh, network, volume, EquilibriumOptions{}, first, others...);
+}
+
 namespace detail {
 
 inline void check_count(Eigen::Index found, Index vertices, std::string_view what) {

@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <span>
+#include <string_view>
 
 #include <membrane/core/types.hpp>
 
@@ -21,6 +22,19 @@ enum class BoundStatus {
     unsupported,    ///< a constraint without `describe`, or an attached point that shares a corner with another one
     invalid_input,  ///< a number is not finite, an index is not a vertex, or counts do not match
 };
+
+/// The name of the status, as above.
+[[nodiscard]] constexpr std::string_view to_string(BoundStatus status) noexcept {
+    switch (status) {
+        case BoundStatus::certified: return "certified";
+        case BoundStatus::not_convex: return "not_convex";
+        case BoundStatus::not_converged: return "not_converged";
+        case BoundStatus::contact: return "contact";
+        case BoundStatus::unsupported: return "unsupported";
+        case BoundStatus::invalid_input: return "invalid_input";
+    }
+    return "";
+}
 
 /// An enclosure of a force: within `radius` of `centre` [N].
 struct ForceEnclosure {

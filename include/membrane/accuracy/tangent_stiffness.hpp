@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -34,6 +35,19 @@ enum class TangentStatus {
     unsupported,    ///< a constraint without `describe`, or an attached point that shares a corner with another one
     invalid_input,  ///< a number is not finite, an index is not a vertex, or counts do not match
 };
+
+/// The name of the status, as above.
+[[nodiscard]] constexpr std::string_view to_string(TangentStatus status) noexcept {
+    switch (status) {
+        case TangentStatus::found: return "found";
+        case TangentStatus::not_stable: return "not_stable";
+        case TangentStatus::not_converged: return "not_converged";
+        case TangentStatus::contact: return "contact";
+        case TangentStatus::unsupported: return "unsupported";
+        case TangentStatus::invalid_input: return "invalid_input";
+    }
+    return "";
+}
 
 /// Result of `compute`.
 struct TangentReport {

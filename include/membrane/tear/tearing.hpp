@@ -64,6 +64,19 @@ enum class CutStatus {
     reserve_too_small,  ///< the mesh has too few vertices left to double others
 };
 
+/// The name of the status, as above.
+[[nodiscard]] constexpr std::string_view to_string(CutStatus status) noexcept {
+    switch (status) {
+        case CutStatus::cut: return "cut";
+        case CutStatus::no_path: return "no_path";
+        case CutStatus::not_joined: return "not_joined";
+        case CutStatus::crosses_border: return "crosses_border";
+        case CutStatus::one_edge_within: return "one_edge_within";
+        case CutStatus::reserve_too_small: return "reserve_too_small";
+    }
+    return "";
+}
+
 /// Result of `Tearing::cut_along`: the events that parts are to follow, which converts to a span of them. Valid until
 /// the tear's next call.
 template <Real Scalar>
@@ -85,7 +98,14 @@ template <Real Scalar, class... Parts>
 void follow(const TearEvent<Scalar>& event, Parts&... parts) noexcept {
     const auto apply = [&](auto& part) {
         using Part = std::remove_reference_t<decltype(part)>;
-        static_assert(FollowsSplit<Part> || FollowsMovedVertex<Part, Scalar>, "this part does not follow a tear");
+        constexpr bool follows = FollowsSplit<Part> || FollowsMovedVertex<Part, Scalar>;
+        constexpr bool has_springs = requires { part.springs_of(Index(0)); };
+        static_assert(
+            follows || !has_springs,
+            "follow: this network (see Part) does not tear: make it a TearableSprings of a mesh with_reserve");
+        static_assert(follows || has_springs,
+                      "follow: this part (see Part) has neither split(const VertexSplit&) noexcept nor "
+                      "reshape(const MovedVertex<Scalar>&) noexcept: leave it out, or give it one");
         if constexpr (FollowsMovedVertex<Part, Scalar>) {
             if (event.moved.vertex != no_index) part.reshape(event.moved);
         }
