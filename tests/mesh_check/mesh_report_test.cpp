@@ -21,9 +21,14 @@ TEST_CASE("a report lists what is found, and counts what it does not list", "[me
     CHECK(!report.valid());
     report.complete = false;
     CHECK(to_string(report) ==
-          "warning: isolated vertex: no triangle names vertex 0; repair with .drop_isolated\n"
-          "warning: isolated vertex: no triangle names vertex 1; repair with .drop_isolated\n"
-          "error: repeated vertex: triangle 7 names vertex 3 twice; repair with .drop_repeated\n"
-          "3 more: isolated vertex\n"
-          "the search is not complete\n");
+          "error: repeated vertex: 1; repair with .drop_repeated\n"
+          "warning: isolated vertex: 5; repair with .drop_isolated\n"
+          "the search is not complete\n"
+          "repeated vertex: triangle 7 names vertex 3 twice\n"
+          "isolated vertex: no triangle names vertex 0\n"
+          "isolated vertex: no triangle names vertex 1\n"
+          "isolated vertex: 3 more\n");
+    const detail::Recorder all(report, 100);
+    for (Index v = 0; v < 50; ++v) all(MeshDefect::coincident_vertices, {v}, {}, "vertex ", v);
+    CHECK_THAT(to_string(report), ContainsSubstring("coincident vertices: vertex 9\ncoincident vertices: 40 more\n"));
 }

@@ -54,23 +54,27 @@ struct MeshReport {
     }
 };
 
-/// One line for each finding.
+/// A line for each kind, with its number and remedy; then one for each of the first ten findings of a kind.
 [[nodiscard]] inline std::string to_string(const MeshReport& report) {
-    std::string text;
-    for (const MeshFinding& finding : report.findings) {
-        text += severity(finding.defect) == Severity::error ? "error: " : "warning: ";
-        ((((text += name(finding.defect)) += ": ") += finding.text) += "; ") += remedy(finding.defect);
-        text += "\n";
-    }
+    constexpr std::size_t most = 10;
+    std::string text, list;
     for (std::size_t i = 0; i < mesh_defect_count; ++i) {
         const auto defect = static_cast<MeshDefect>(i);
-        const auto listed = std::count_if(report.findings.begin(), report.findings.end(),
-                                          [&](const MeshFinding& finding) { return finding.defect == defect; });
-        const std::size_t more = report.counts[i] - static_cast<std::size_t>(listed);
-        if (more > 0) ((text += std::to_string(more) + " more: ") += name(defect)) += "\n";
+        if (report.counts[i] == 0) continue;
+        text += severity(defect) == Severity::error ? "error: " : "warning: ";
+        (((((text += name(defect)) += ": ") += std::to_string(report.counts[i])) += "; ") += remedy(defect)) += "\n";
+        std::size_t listed = 0;
+        for (const MeshFinding& finding : report.findings) {
+            if (finding.defect != defect || listed == most) continue;
+            (((list += name(defect)) += ": ") += finding.text) += "\n";
+            ++listed;
+        }
+        if (report.counts[i] > listed) {
+            (((list += name(defect)) += ": ") += std::to_string(report.counts[i] - listed)) += " more\n";
+        }
     }
     if (!report.complete) text += "the search is not complete\n";
-    return text;
+    return text + list;
 }
 
 namespace detail {

@@ -81,7 +81,10 @@ inline constexpr std::array<DefectText, mesh_defect_count> defect_texts{{
     {"all on one line", "check the program that wrote the positions"},
     {"duplicate triangle", "repair with .drop_duplicates"},
     {"double-sided triangle", "repair with .drop_duplicates: a membrane is one sheet, with two sides anyway"},
-    {"non-manifold edge", "remove triangles until two are left, or give the others vertices of their own"},
+    {"non-manifold edge",
+     "repair with .weld and .drop_duplicates if triangles are doubled; else remove triangles until two are left, or "
+     "give "
+     "the others vertices of their own: the mesh does not say which ones are the membrane"},
     {"one-sided", "cut it open: a tool needs an outside to work on"},
     {"inconsistent orientation", "repair with .orient"},
     {"non-manifold vertex", "repair with .weld if vertices coincide there, else with .split_vertices"},
