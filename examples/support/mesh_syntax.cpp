@@ -327,7 +327,7 @@ std::string checked_stl(const std::string& file, std::string_view bytes) {
                 if (wanted == "0") {
                     lines.number();
                 } else if (wanted == "n") {
-                    const std::string_view word = lines.word();  // some programs write NaN, in many ways
+                    const std::string_view word = lines.word();  // some programs write NaN, as nan(ind)
                     if (!is_number(word) && word.size() > 16) lines.refuse("a number of a normal", word);
                     lines.keep("0");
                 } else if (wanted == ";") {

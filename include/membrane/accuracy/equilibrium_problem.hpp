@@ -169,8 +169,8 @@ ProblemStatus EquilibriumProblem::assign(const std::type_identity_t<ConstPointsR
     return status == ProblemStatus::valid && has_contact_ ? ProblemStatus::contact : status;
 }
 
-// A spring's force is off by at most 13 units of rounding, half an epsilon each, times k (l + r). A sum of n terms adds n
-// units times all magnitudes. Loads and foundation are two more terms, and the magnitudes are rounded as well.
+// A spring's force is off by at most 13 units of rounding, half an epsilon each, times k (l + r). A sum of n terms adds
+// n units times all magnitudes. Loads and foundation are two more terms, and the magnitudes are rounded as well.
 template <class Network>
 bool EquilibriumProblem::take_springs(const Network& network) noexcept {
     springs_.clear();

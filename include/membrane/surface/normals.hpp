@@ -38,9 +38,9 @@ struct OneRing {
 
 /// Unit normals of the vertices, weighted by the area of their triangles. Owns its data: the mesh need not outlive it.
 ///
-/// An update of the moved vertices gives the same bits as an update of all, after tears too. If the triangles of a vertex
-/// have no area together, are not finite or too large, the vertex gets its normal at rest, or (0, 0, 1) if it had none or has no
-/// triangles: always a finite vector of length 1.
+/// An update of the moved vertices gives the same bits as an update of all, after tears too. If the triangles of a
+/// vertex have no area together, are not finite or too large, the vertex gets its normal at rest, or (0, 0, 1) if it
+/// had none or has no triangles: always a finite vector of length 1.
 template <Real Scalar>
 class VertexNormals {
   public:

@@ -85,7 +85,7 @@ struct Cut {
     std::span<const TearEvent<Scalar>> events = {};  ///< in order
 
     ///@{
-    /// Of the events, which a loop over the cut visits.
+    /// Of the events.
     [[nodiscard]] auto begin() const noexcept { return events.begin(); }
     [[nodiscard]] auto end() const noexcept { return events.end(); }
     [[nodiscard]] std::size_t size() const noexcept { return events.size(); }
@@ -537,8 +537,8 @@ bool Tearing<Scalar, Criterion>::has_changed_around(Index v) const noexcept {
     });
 }
 
-// The triangles with a corner within `radius` of vertex `v` at rest [m], over triangles that share a corner. A vertex at
-// the radius is not within it, however that is rounded: often it is the next tip, which joins the two sides of its tear.
+// The triangles with a corner within `radius` of vertex `v` at rest [m], over triangles that share a corner. A vertex
+// at the radius is not within it, however that is rounded: it may be the next tip, which joins both sides of its tear.
 template <Real Scalar, TearCriterion<Scalar> Criterion>
 void Tearing<Scalar, Criterion>::list_patch(Index v, Scalar radius) noexcept {
     patch_.clear();
