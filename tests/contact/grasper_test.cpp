@@ -89,10 +89,13 @@ TEST_CASE("forceps that were closed before they touched hold nothing", "[grasp]"
     const auto contact = contact_at<double>(mesh, 3, {0.2, 0.3, 0.5});
     CHECK_FALSE(grasper.update(Contact<double>::none(), mesh.positions(), tool).holding());
     CHECK_FALSE(grasper.update(contact, mesh.positions(), tool).holding());
+    CHECK(grasper.update(contact, mesh.positions(), tool).status == GraspStatus::missed);
     tool.grasping = false;
     CHECK_FALSE(grasper.update(contact, mesh.positions(), tool).holding());
+    CHECK(grasper.update(contact, mesh.positions(), tool).status == GraspStatus::open);
     tool.grasping = true;
     CHECK(grasper.update(contact, mesh.positions(), tool).holding());
+    CHECK(grasper.update(contact, mesh.positions(), tool).status == GraspStatus::holding);
     grasper.reset();
     CHECK_FALSE(grasper.update(Contact<double>::none(), mesh.positions(), tool).holding());
     grasper.reset();
@@ -112,6 +115,9 @@ TEST_CASE("forceps do not slip below what the jaws hold, or if they hold nothing
     CHECK(still.offset == grasp.offset);
     CHECK(grasper.slip(mesh.positions(), moved, {2, 0, 0}));
     CHECK(grasper.update(Contact<double>::none(), mesh.positions(), tool).offset != grasp.offset);
+    const Tool<double> away{.position = {0.2, 0, 0}, .grasping = true};
+    CHECK(grasper.slip(mesh.positions(), away, {2, 0, 0}));
+    CHECK(grasper.update(Contact<double>::none(), mesh.positions(), away).status == GraspStatus::slipped);
 }
 
 TEST_CASE("a contact that has ended is not held, one that begins is", "[grasp]") {

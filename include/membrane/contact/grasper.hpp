@@ -23,6 +23,14 @@ namespace membrane {
 template <Real Scalar>
 class MovingBody;  // of surface/moving_body.hpp, which the update on a moving body needs
 
+/// Whether forceps hold a point, or why not.
+enum class GraspStatus {
+    open,     ///< they are not closed
+    holding,  ///< they hold a point
+    missed,   ///< they closed without contact, as on a flap that nothing supports and that they have pushed away
+    slipped,  ///< the tissue has slipped out of the jaws
+};
+
 /// A point of the membrane that moves with the tool.
 template <Real Scalar>
 struct Grasp {
@@ -33,6 +41,7 @@ struct Grasp {
     Vector3<Scalar> origin = Vector3<Scalar>::Zero();                ///< of the held point, on the rest surface [m]
     Vector3<Scalar> body_velocity = Vector3<Scalar>::Zero();         ///< of a moving body at the held point [m/s]
     Scalar holding_force = std::numeric_limits<Scalar>::infinity();  ///< at which the held point slips [N]
+    GraspStatus status = GraspStatus::open;                          ///< whether it is held, or why not
 
     /// Whether a point is held.
     [[nodiscard]] bool holding() const noexcept { return triangle != no_index; }
@@ -130,9 +139,11 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
     const bool closes = tool.grasping && !closed_;
     closed_ = tool.grasping;
     if (!tool.grasping) grasp_ = {};
+    if (closes) grasp_.status = GraspStatus::missed;
     if (!closes || !contact.touching() || !is_valid(tool) || !are_vertices(contact.corners, x.cols())) return grasp_;
 
     slipped_ = 0;
+    grasp_.status = GraspStatus::holding;
     grasp_.holding_force = static_cast<Scalar>(options_.holding_force);
     grasp_.triangle = contact.triangle;
     grasp_.corners = contact.corners;
@@ -158,7 +169,10 @@ bool Grasper<Scalar>::slip(const ConstPointsRef<Scalar>& x, const Tool<Scalar>& 
     slipped_ += norm(by);
     dissipated_ += (std::max)(0.0, static_cast<double>(dot(by, reaction)));
     grasp_.offset = now;
-    if (slipped_ >= static_cast<Scalar>(options_.jaw_length)) grasp_ = {};
+    if (slipped_ >= static_cast<Scalar>(options_.jaw_length)) {
+        grasp_ = {};
+        grasp_.status = GraspStatus::slipped;
+    }
     return true;
 }
 
