@@ -3,10 +3,13 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <utility>
 
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
 #include <membrane/surface/moving_body.hpp>
 #include <membrane/surface/shapes.hpp>
 
@@ -79,6 +82,35 @@ TEMPLATE_TEST_CASE("forceps take hold of the point they touch, and it goes with 
         REQUIRE_FALSE(grasper.update(contact, x, tool).holding());
         tool.grasping = true;  // and once more, elsewhere
         REQUIRE(grasper.update(contact_at<S>(mesh, (f + 1) % 80, {1, 0, 0}), x, tool).triangle == (f + 1) % 80);
+    }
+}
+
+TEST_CASE("in a fold forceps hold a point between its sides, whichever rounding makes the nearer", "[grasp]") {
+    const auto mesh = sheet<double>({.width = 1, .height = 1, .columns = 10, .rows = 10});
+    for (int seed = 1; seed <= cases(50); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const double slope = random.number(0.1, 1.0), radius = random.number(0.03, 0.2);
+        const double across = radius * slope / std::sqrt(1 + slope * slope);  // from the fold to where it touches
+        const Tool<double> tool{
+            .position = {0, random.number(-0.3, 0.3), (radius - 1e-6) * std::sqrt(1 + slope * slope)},
+            .radius = radius,
+            .grasping = true};
+        const auto held = [&](double disturbance) {
+            Points<double> x = mesh.positions();
+            x.row(2) = slope * x.row(0).cwiseAbs();
+            x = test::jittered<double>(x, disturbance, random);
+            AabbTree<double> tree(mesh);
+            tree.refit(x);
+            ContactTracker<double> tracker(mesh);
+            Grasper<double> grasper(mesh);
+            const auto grasp = grasper.update(tracker.update(tree, x, tool), x, tool);
+            REQUIRE(grasp.holding());
+            return Vector3<double>(tool.position + grasp.offset);
+        };
+        const auto point = held(0);
+        CHECK(std::abs(point.x()) < across);
+        for (int i = 0; i < 4; ++i) CHECK(norm<double>(held(1e-13) - point) < 1e-9);
     }
 }
 

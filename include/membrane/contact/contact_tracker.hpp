@@ -44,8 +44,9 @@ struct TrackerOptions {
 ///
 /// Beyond the paper: the search floods every triangle within the detection distance. Each tick also casts the
 /// displacement of the tool's position (and of the other end of a capsule) against the tree. If it hits, the contact is
-/// at the intersection, however long the displacement. A second fold of the surface that approaches a tool in contact
-/// is found within `full_query_interval` ticks; beyond a tear, at once.
+/// at the intersection, however long the displacement; where a contact begins at a small angle, at the end of the
+/// displacement. A second fold of the surface that approaches a tool in contact is found within `full_query_interval`
+/// ticks; beyond a tear, at once.
 ///
 /// A contact begins if the gap is not positive. It ends if the gap is positive and either the tool has left the rest
 /// surface or the gap exceeds depth plus travel of the tool: a membrane that springs back stays in contact.
@@ -128,6 +129,8 @@ class ContactTracker : public SplitCount {
     bool find(const Scene& scene, Contact<Scalar>& contact) noexcept;
     [[nodiscard]] bool contacts(const Scene& scene, Contact<Scalar>& contact) noexcept;
     bool sweep_test(const Scene& scene, Contact<Scalar>& contact) const noexcept;
+    [[nodiscard]] std::optional<Contact<Scalar>> where_it_ends(const Scene& scene,
+                                                               const Contact<Scalar>& passed) const noexcept;
     void describe(const Scene& scene, Index f, Contact<Scalar>& contact) const noexcept;
     void describe_shaft(const Scene& scene, Index f, Scalar side, Contact<Scalar>& contact) const noexcept;
     // Describes the contact as one from the other side.
@@ -391,13 +394,30 @@ bool ContactTracker<Scalar>::sweep_test(const Scene& scene, Contact<Scalar>& con
             passed.gap = -passed.gap;
             if (side_is_open() && was_behind(scene, hit.triangle, side, from)) passed.side = -side;
         }
-        contact = passed;
+        const auto end = where_it_ends(scene, passed);
+        if (end && end->gap >= 0) return false;  // it has grazed the surface
+        contact = end ? *end : passed;
         contact.gap -= scene.radius;
         return true;
     };
     return through(last_tool_->position, scene.tool.position) ||
            (feature_pairs(scene.tool) > 1 &&
             through(last_tool_->position + last_tool_->axis, scene.tool.position + scene.tool.axis));
+}
+
+// A tool that comes in at a small angle touches the surface where it ends, not where it passed: without friction it
+// carries nothing along. The contact there; null if it comes in steeply, or ends at another side of a fold.
+template <Real Scalar>
+std::optional<Contact<Scalar>> ContactTracker<Scalar>::where_it_ends(const Scene& scene,
+                                                                     const Contact<Scalar>& passed) const noexcept {
+    const Vector3<Scalar>& q = passed.axis_point;
+    if (last_.touching() || squared_norm<Scalar>(q - passed.point) < 2 * passed.gap * passed.gap) return std::nullopt;
+    const Index f = surface_.walk_to_closest(scene.x, passed.triangle, q);
+    auto there = contact_in(surface_, scene.x, f, Tool<Scalar>{.position = q}, Scalar(0), passed.side);
+    if (surface_.on_border(f, there.barycentric) || !(dot(there.normal, passed.normal) > 0)) return std::nullopt;
+    there.previous_axis_point = there.point + margin_ * there.normal;
+    there.tunnelled = true;
+    return there;
 }
 
 // The contact at triangle `f`. If the tool is behind `f`, it has tunnelled or is outside in a crease.

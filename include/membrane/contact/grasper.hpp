@@ -62,7 +62,8 @@ struct GraspOptions {
     void validate() const;
 };
 
-/// Holds the contact point from when the tool closes in contact until it opens.
+/// Holds a point from when the tool closes in contact until it opens: the contact point or, where the tool touches
+/// several triangles, the point under it along the mean of their normals.
 template <Real Scalar>
 class Grasper {
   public:
@@ -116,6 +117,8 @@ class Grasper {
     }
 
   private:
+    void take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x) noexcept;
+
     Points<Scalar> origins_;
     GraspOptions options_;
     Grasp<Scalar> grasp_;
@@ -145,16 +148,46 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
     slipped_ = 0;
     grasp_.status = GraspStatus::holding;
     grasp_.holding_force = static_cast<Scalar>(options_.holding_force);
-    grasp_.triangle = contact.triangle;
-    grasp_.corners = contact.corners;
-    grasp_.barycentric = contact.barycentric;
+    take_point(contact, x);
     if (options_.snap_to_vertex) {
-        const auto& weights = contact.barycentric;
+        const Vector3<Scalar> weights = grasp_.barycentric;
         grasp_.barycentric = Vector3<Scalar>::Unit(std::max_element(weights.begin(), weights.end()) - weights.begin());
     }
     grasp_.offset = point_at(triangle_at(x, grasp_.corners), grasp_.barycentric) - tool.position;
     grasp_.origin = point_at(triangle_at(origins_, grasp_.corners), grasp_.barycentric);
     return grasp_;
+}
+
+// At equilibrium the tool touches several triangles, and rounding decides which is the nearest. So the mean of those
+// equally near counts, each less the less near it is.
+template <Real Scalar>
+void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x) noexcept {
+    grasp_.triangle = contact.triangle;
+    grasp_.corners = contact.corners;
+    grasp_.barycentric = contact.barycentric;
+    if (contact.tunnelled) return;
+    Scalar least = std::numeric_limits<Scalar>::infinity(), sum = 0;
+    for (const auto& point : contact.points) least = (std::min)(least, point.gap);
+    Vector3<Scalar> normal = Vector3<Scalar>::Zero(), axis_point = Vector3<Scalar>::Zero();
+    for (const auto& point : contact.points) {
+        const Scalar weight = 1 - 64 * (point.gap - least) / contact.radius;
+        if (!(weight > 0)) continue;
+        sum += weight;
+        normal += weight * point.normal;
+        axis_point += weight * (point_at(triangle_at(x, point.corners), point.weights) +
+                                (point.gap + contact.radius) * point.normal);
+    }
+    if (!(sum > 1) || !(norm(normal) > sum / 8)) return;
+    const Vector3<Scalar> from = axis_point / sum, to = from - 4 * contact.radius * direction(normal, normal);
+    Scalar first = std::numeric_limits<Scalar>::infinity();
+    for (const auto& [triangle, corners] : contact.candidates) {
+        const auto hit = first_hit(triangle_at(x, corners), from, to);
+        if (!hit || !(hit->fraction < first)) continue;
+        first = hit->fraction;
+        grasp_.triangle = triangle;
+        grasp_.corners = corners;
+        grasp_.barycentric = hit->barycentric;
+    }
 }
 
 template <Real Scalar>
