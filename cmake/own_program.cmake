@@ -17,6 +17,12 @@ endif()
 # Fewer collections of garbage: a tenth of the time of g++, for more memory.
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     string(APPEND CMAKE_CXX_FLAGS " --param=ggc-min-expand=100 --param=ggc-min-heapsize=1000000")
+    if(MEMBRANE_USUAL_TYPES)  # a tenth less again, for what tests gain little from
+        foreach(pass tree-pta tree-dominator-opts ivopts if-conversion if-conversion2 shrink-wrap tree-sink tree-slsr
+                tree-bit-ccp branch-count-reg reorder-blocks cprop-registers split-wide-types)
+            string(APPEND CMAKE_CXX_FLAGS " -fno-${pass}")
+        endforeach()
+    endif()
 endif()
 
 # membrane_program(<name> <source>...): an executable with the library, the warnings and the includes of its folder.

@@ -325,7 +325,7 @@ Scene random_scene(int kind, Random& random) {
 }  // namespace
 
 TEST_CASE("the estimated error of a mesh is within a factor of 2 of the error against fine meshes") {
-    const int count = cases(2 * scene_count, 12 * scene_count);
+    const int count = cases(scene_count / 2, 12 * scene_count);
     int within = 0, judged = 0, small = 0, small_within = 0, recovered = 0;
     std::string others;
     for (int seed = 1; seed <= count; ++seed) {

@@ -180,7 +180,7 @@ TEST_CASE("Rows with deviations of their own count by these: weighted least squa
             matrix.row(r) << d / deviation, std::pow(d, 1.5) / deviation;
             right[r] = table.force[row] / deviation;
         }
-        const Eigen::Matrix2d inverse = (matrix.transpose() * matrix).inverse();
+        const Eigen::Matrix2d normal = matrix.transpose() * matrix, inverse = normal.inverse();
         const Eigen::Vector2d best = inverse * (matrix.transpose() * right);
         const double scatter = (matrix * best - right).norm() / std::sqrt(static_cast<double>(rows - 2));
         const auto found = fit(table, {10, 10}, hertz);

@@ -42,7 +42,7 @@ constexpr bool is_noexcept<Result (Class::*)(Arguments...) const noexcept> = tru
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("surfaces are queried without exceptions", "[noexcept]", double, float) {
+TEMPLATE_TEST_CASE("surfaces are queried without exceptions", "[noexcept]", TEST_SCALARS) {
     using S = TestType;
     static_cast<void>([](const Vector3<S>& p, S s, const Points<S>& points, const Triangle<S>& triangle) {
         static_assert(noexcept(dot(p, p))&& noexcept(squared_norm(p))&& noexcept(norm(p))&& noexcept(cross(p, p)));
@@ -66,7 +66,7 @@ TEMPLATE_TEST_CASE("surfaces are queried without exceptions", "[noexcept]", doub
     SUCCEED();
 }
 
-TEMPLATE_TEST_CASE("contact is found without exceptions", "[noexcept]", double, float) {
+TEMPLATE_TEST_CASE("contact is found without exceptions", "[noexcept]", TEST_SCALARS) {
     using S = TestType;
     static_cast<void>([](AabbTree<S>& tree, const ConstPointsRef<S>& x, std::span<const Index> moved,
                          const Vector3<S>& p, S radius, void (*visit)(Index)) {
@@ -92,7 +92,7 @@ TEMPLATE_TEST_CASE("contact is found without exceptions", "[noexcept]", double, 
     SUCCEED();
 }
 
-TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double, float) {
+TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", TEST_SCALARS) {
     using S = TestType;
     using Network = MassSpringNetwork<S, LinearSpring>;
     using Volume = VirtualVolumeSprings<S>;
@@ -159,7 +159,7 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", double
     CHECK((step != nullptr && pushed != nullptr));
 }
 
-TEMPLATE_TEST_CASE("the device is served without exceptions", "[noexcept]", double, float) {
+TEMPLATE_TEST_CASE("the device is served without exceptions", "[noexcept]", TEST_SCALARS) {
     using S = TestType;
     static_cast<void>([](ScriptedDevice<S>& device, const Vector3<S>& force, const HapticState<S>& state,
                          const SpringDamperForce& springs, const ReactionForce& reaction) {
@@ -174,7 +174,7 @@ TEMPLATE_TEST_CASE("the device is served without exceptions", "[noexcept]", doub
     SUCCEED();
 }
 
-TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept]", double, float) {
+TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept]", TEST_SCALARS) {
     using S = TestType;
     static_cast<void>([](ContactFriction<SpringDamperForce, S>& friction, ExtrapolatedReaction<S>& extrapolated,
                          GraspTransition<SpringDamperForce, S>& transition, VirtualCoupling<S>& coupling,
@@ -200,7 +200,7 @@ TEMPLATE_TEST_CASE("a force is found and limited without exceptions", "[noexcept
     SUCCEED();
 }
 
-TEMPLATE_TEST_CASE("a membrane tears, peels and is dragged without exceptions", "[noexcept]", double, float) {
+TEMPLATE_TEST_CASE("a membrane tears, peels and is dragged without exceptions", "[noexcept]", TEST_SCALARS) {
     using S = TestType;
     using Springs = TearableSprings<S, LinearSpring>;
     using Foundation = CohesiveSprings<S>;
@@ -227,7 +227,7 @@ TEMPLATE_TEST_CASE("a membrane tears, peels and is dragged without exceptions", 
     SUCCEED();
 }
 
-TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", double, float) {
+TEMPLATE_TEST_CASE("hands and loops meet without exceptions", "[noexcept]", TEST_SCALARS) {
     using S = TestType;
     static_cast<void>([](SimulatedHand<S>& hand, ScriptedDevice<S, SimulatedHand<S>>& device, const Vector3<S>& p) {
         static_assert(noexcept(hand.reset_to(p))&& noexcept(hand.set_target(p, p))&& noexcept(hand.advance(p, S(1))));

@@ -206,7 +206,7 @@ void check_converged(const Run& run) {
 
 TEST_CASE("converged: no vertex that may move is out of balance, no tool inside", "[solver][converged]") {
     long said = 0;
-    const int runs = cases(200, 20'000);
+    const int runs = cases(80, 20'000);
     for (int seed = 1; seed <= runs; ++seed) {
         CAPTURE(seed);
         Run run(static_cast<std::uint64_t>(seed));

@@ -145,7 +145,7 @@ S tenth_power(double low, double high, Random& random) {
 
 TEMPLATE_TEST_CASE(
     "all stiffnesses, dampings and tolerances times a factor: the same positions, forces times the factor",
-    "[extremes]", double, float) {
+    "[extremes]", TEST_SCALARS) {
     using S = TestType;
     Count count;
     for (int seed = 1; seed <= cases(120, 20'000); ++seed) {
@@ -163,7 +163,7 @@ TEMPLATE_TEST_CASE(
     CHECK(count.outliers <= 0.01 * count.seen);
 }
 
-TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same mesh", "[extremes]", double, float) {
+TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same mesh", "[extremes]", TEST_SCALARS) {
     using S = TestType;
     Count count;
     for (int seed = 1; seed <= cases(120, 20'000); ++seed) {
@@ -178,7 +178,7 @@ TEMPLATE_TEST_CASE("a mesh of a micrometre to a thousand kilometres is the same 
 }
 
 TEMPLATE_TEST_CASE("away from the origin the error is that of the coordinates, and too far is refused by name",
-                   "[extremes]", double, float) {
+                   "[extremes]", TEST_SCALARS) {
     using S = TestType;
     const double epsilon = static_cast<double>(std::numeric_limits<S>::epsilon());
     int refused = 0, accepted = 0, seen = 0, at_rest = 0;

@@ -115,7 +115,7 @@ void mistreat(int seed) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("stiffnesses twelve powers of ten apart come to a safe outcome", "[extremes]", double, float) {
+TEMPLATE_TEST_CASE("stiffnesses twelve powers of ten apart come to a safe outcome", "[extremes]", TEST_SCALARS) {
     for (int seed = 1; seed <= cases(240, 20'000); ++seed) {
         CAPTURE(seed);
         mistreat<TestType, BlockStep>(seed);
@@ -152,7 +152,7 @@ double largest_block(const TriangleMesh<S>& mesh, const std::vector<S>& stiffnes
 }  // namespace
 
 TEMPLATE_TEST_CASE("for any dt the rule as published converges below two over the largest block, and is refused beyond",
-                   "[extremes]", double, float) {
+                   "[extremes]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = unit_sphere<S>(1);
     for (int seed = 1; seed <= cases(240, 20'000); ++seed) {
@@ -190,8 +190,8 @@ TEMPLATE_TEST_CASE("for any dt the rule as published converges below two over th
     }
 }
 
-TEMPLATE_TEST_CASE("without damping safe and block steps are the same to the bit for any dt", "[extremes]", double,
-                   float) {
+TEMPLATE_TEST_CASE("without damping safe and block steps are the same to the bit for any dt", "[extremes]",
+                   TEST_SCALARS) {
     using S = TestType;
     const auto mesh = unit_sphere<S>(1);
     const auto run = [&](int seed, S dt, auto rule) {
@@ -232,7 +232,7 @@ Vector3<S> exact_place(const GuardedLoop<S>& loop, Random& random) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("a tool that is at the end of the range for a tick presses again two ticks later", "[extremes][bad]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     for (const Vector3<S>& axis : {Vector3<S>(0, 0, 0), Vector3<S>(1, 0, 0)}) {
         for (const S far : {std::numeric_limits<S>::max(), std::numeric_limits<S>::lowest()}) {
@@ -260,7 +260,7 @@ enum class Drawn { vertex, point, load };
 // A tool that oscillates with growing amplitude takes what it holds along. A step from which the next one could not go
 // on is refused, so that the membrane comes back however far it was drawn.
 TEMPLATE_TEST_CASE("a membrane that is drawn off farther and farther comes back when it is released", "[extremes][bad]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     const auto mesh = unit_sphere<S>(2);
     const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = S(40)});
@@ -301,7 +301,7 @@ TEMPLATE_TEST_CASE("a membrane that is drawn off farther and farther comes back 
 }
 
 TEMPLATE_TEST_CASE("a tool exactly on a vertex, an edge, a face or an anchor divides nothing by zero", "[extremes]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     // On a sheet the coordinates are round: products that should vanish do.
     const auto sphere = unit_sphere<S>(1);
@@ -350,7 +350,7 @@ test::Surface<S> crushed_surface(Random& random) {
 }  // namespace
 
 TEMPLATE_TEST_CASE("triangles of next to no height and springs of no length divide nothing by zero", "[extremes]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     for (int seed = 1; seed <= cases(240, 20'000); ++seed) {
         CAPTURE(seed);
@@ -380,7 +380,7 @@ TEMPLATE_TEST_CASE("triangles of next to no height and springs of no length divi
 
 TEMPLATE_TEST_CASE(
     "a surface whose every triangle has next to no height is refused by name, or divides nothing by zero", "[extremes]",
-    double, float) {
+    TEST_SCALARS) {
     using S = TestType;
     int refused = 0, accepted = 0;
     for (int seed = 1; seed <= cases(240, 20'000); ++seed) {

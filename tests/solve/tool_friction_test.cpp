@@ -154,7 +154,7 @@ double along_disc(const Vector3<double>& force) { return std::hypot(force[0], fo
 }  // namespace
 
 TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and is pulled against its motion",
-                   "[friction]", double, float) {
+                   "[friction]", TEST_SCALARS) {
     // Around a flat ball, as under a block, all normal forces are nearly parallel.
     for (const auto& [coefficient, is_flat] :
          {std::pair{0.1, false}, {0.3, false}, {1.0, false}, {0.1, true}, {0.3, true}, {1.0, true}}) {
@@ -167,7 +167,7 @@ TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and 
         Vector3<double> sum = Vector3<double>::Zero();
         double at_vertices = 0;
         int count = 0;
-        for (int i = 1; i <= 1000; i += cases_are_slow ? 10 : 1) {
+        for (int i = 1; i <= 1000; i += cases_are_slow ? 10 : in_full() ? 1 : 5) {
             const auto force = drag.move_to(1e-6 * i * direction);
             drag.check_cones();
             if (i < 300) continue;
@@ -183,7 +183,7 @@ TEMPLATE_TEST_CASE("a tool slips at the coefficient times the normal force, and 
     }
 }
 
-TEMPLATE_TEST_CASE("below that it sticks: the membrane moves with the tool", "[friction]", double, float) {
+TEMPLATE_TEST_CASE("below that it sticks: the membrane moves with the tool", "[friction]", TEST_SCALARS) {
     constexpr bool is_float = std::is_same_v<TestType, float>;  // in which the vertices of the rim slip to and fro
     Drag<TestType> drag({.friction = 0.6});
     drag.press_in();
@@ -237,7 +237,7 @@ TEMPLATE_TEST_CASE("below that it sticks: the membrane moves with the tool", "[f
     CHECK(along_disc(drag.move_to({0, 0, 0})) < force_before + 0.2 * forces.back());
 }
 
-TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[friction]", double, float) {
+TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[friction]", TEST_SCALARS) {
     constexpr bool is_float = std::is_same_v<TestType, float>;
     // At coefficients from 0.6 on, friction compresses the membrane as far as it has been stretched. A flat ball
     // touches 37 vertices, a round one 7.
@@ -256,7 +256,7 @@ TEMPLATE_TEST_CASE("under a tool at rest the membrane does not creep", "[frictio
     const auto before = drag.x;
     const auto force = drag.move_to(held);
     CHECK(along_disc(force) > 0.1 * force[2]);
-    for (int i = 0; i < (cases_are_slow ? 300 : 10'000); ++i) drag.move_to(held);
+    for (int i = 0; i < (cases_are_slow ? 300 : cases(1000, 10'000)); ++i) drag.move_to(held);
     // What the vertex updates leave out at the force tolerance: in float 2 uN, on springs of 43 N/m, wherever the
     // forces of many vertices are at their limit.
     const bool is_at_limit = is_float && settings.friction > 0.5;
@@ -292,8 +292,8 @@ TEST_CASE("the forces of a frictional contact balance those of the membrane", "[
     }
 }
 
-TEMPLATE_TEST_CASE("what the hand gives is stored in membrane and foundation, or taken by slip", "[friction]", double,
-                   float) {
+TEMPLATE_TEST_CASE("what the hand gives is stored in membrane and foundation, or taken by slip", "[friction]",
+                   TEST_SCALARS) {
     const double coefficient = GENERATE(0.1, 0.3, 0.6);
     CAPTURE(coefficient);
     Drag<TestType> drag({.friction = coefficient, .rings = 20});
@@ -418,7 +418,7 @@ TEST_CASE("friction is restored from a snapshot, and runs on to the same bits", 
 }
 
 TEMPLATE_TEST_CASE("vertices that become two share their friction, and one that moves at rest is held anew",
-                   "[friction][tear]", double, float) {
+                   "[friction][tear]", TEST_SCALARS) {
     using S = TestType;
     int parted = 0, reshaped = 0;
     for (int seed = 1; seed <= cases(40); ++seed) {
@@ -467,7 +467,7 @@ TEMPLATE_TEST_CASE("vertices that become two share their friction, and one that 
 }
 
 TEMPLATE_TEST_CASE("vertices stay where they are on the tool as the membrane tears under it", "[friction][tear]",
-                   double, float) {
+                   TEST_SCALARS) {
     using S = TestType;
     TornDrag<S> drag{2e-3, 0.05e-3, S(2)};
     drag.drag_to({0, 0, 0}, 50);
@@ -496,7 +496,7 @@ TEMPLATE_TEST_CASE("vertices stay where they are on the tool as the membrane tea
     CHECK(parted == 1);
 }
 
-TEMPLATE_TEST_CASE("a vertex that moves at rest keeps its friction", "[friction][tear]", double, float) {
+TEMPLATE_TEST_CASE("a vertex that moves at rest keeps its friction", "[friction][tear]", TEST_SCALARS) {
     using S = TestType;
     TornDrag<S> drag{10e-3, 0.2e-3, S(20)};
     drag.drag_to({S(20e-6), 0, 0}, 60);

@@ -11,6 +11,9 @@ inline constexpr bool cases_are_slow = false;
 inline constexpr bool cases_are_slow = true;  // asserts, or a sanitizer
 #endif
 
+/// Whether tests that take seconds run in full, as with `tests/run --long`.
+inline bool in_full() { return !cases_are_slow && std::getenv("MEMBRANE_LONG_TESTS") != nullptr; }
+
 /// How many random cases to run: `usual`; `in_long_run` times MEMBRANE_LONG_TESTS where that is set, to 1 by
 /// `tests/run --long` and to more by `tests/campaign`; a twentieth where asserts or a sanitizer make each case slow. At
 /// least one.

@@ -7,7 +7,9 @@
 #include <map>
 #include <numbers>
 
-#include <Eigen/Dense>
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/QR>
 
 namespace test {
 

@@ -1,4 +1,4 @@
 // SPDX-License-Identifier: MIT
 #include "usual_types.hpp"
 
-MEMBRANE_USUAL_TYPES(template, double);
+MEMBRANE_USUAL_TYPES_IN_DOUBLE(template);

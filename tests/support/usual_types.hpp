@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <Eigen/SVD>
 #include <membrane/haptics/smooth_contact.hpp>
 #include <membrane/instantiated.hpp>
+#include <membrane/model/bending_triangles.hpp>
+#include <membrane/model/cohesive_springs.hpp>
 #include <membrane/model/foundation_layer.hpp>
 #include <membrane/model/moving_foundation.hpp>
+#include <membrane/model/tearable_springs.hpp>
 #include <membrane/surface/moving_body.hpp>
 
 // What most tests are made of beside the types of `membrane::instantiated`. Nothing of accuracy/ is here: its inline
@@ -14,8 +18,20 @@
     PREFIX class membrane::SmoothContact<SCALAR>;                                  \
     PREFIX class membrane::MassSpringNetwork<SCALAR, membrane::ExponentialSpring>; \
     PREFIX class membrane::FoundationSprings<SCALAR>;                              \
+    PREFIX class membrane::detail::BendingMesh<SCALAR>;                            \
     MEMBRANE_INSTANTIATE_STEP(PREFIX, SCALAR, BlockStep,                           \
                               membrane::MovingFoundation<membrane::VirtualVolumeSprings<SCALAR>, SCALAR>)
 
-MEMBRANE_USUAL_TYPES(extern template, double);
+// In float few tests have them.
+#define MEMBRANE_USUAL_TYPES_IN_DOUBLE(PREFIX)                                                             \
+    MEMBRANE_USUAL_TYPES(PREFIX, double);                                                                  \
+    PREFIX class Eigen::JacobiSVD<Eigen::MatrixXd>;                                                        \
+    MEMBRANE_INSTANTIATE_STEP(PREFIX, double, BlockStep, membrane::FoundationSprings<double>);             \
+    MEMBRANE_INSTANTIATE_STEP(PREFIX, double, BlockStep, membrane::CohesiveSprings<double>);               \
+    PREFIX membrane::StepReport<double> membrane::QuasiStaticSolver<double, membrane::BlockStep>::step_in( \
+        membrane::TimeBudget, membrane::PointsRef<double>&, double,                                        \
+        const membrane::TearableSprings<double, membrane::LinearSpring>&,                                  \
+        const membrane::VirtualVolumeSprings<double>&, std::span<const membrane::ConstraintRef<double>>) noexcept
+
+MEMBRANE_USUAL_TYPES_IN_DOUBLE(extern template);
 MEMBRANE_USUAL_TYPES(extern template, float);
