@@ -99,7 +99,7 @@ Slide<S, Network, Volume> slide(const TriangleMesh<S>& mesh, const Network& netw
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("however long a tool slides, a tick makes no more updates", "[trail]", float, double) {
+TEMPLATE_TEST_CASE("however long a tool slides, a tick makes no more updates", "[trail]", TEST_SCALARS) {
     using S = TestType;
     const auto mesh = icosphere<S>({.radius = radius, .subdivisions = 3});
     const MassSpringNetwork<S, LinearSpring> network(mesh, {}, {.stiffness = S(40)});
