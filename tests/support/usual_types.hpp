@@ -18,13 +18,13 @@
     PREFIX class membrane::SmoothContact<SCALAR>;                                  \
     PREFIX class membrane::MassSpringNetwork<SCALAR, membrane::ExponentialSpring>; \
     PREFIX class membrane::FoundationSprings<SCALAR>;                              \
-    PREFIX class membrane::detail::BendingMesh<SCALAR>;                            \
     MEMBRANE_INSTANTIATE_STEP(PREFIX, SCALAR, BlockStep,                           \
                               membrane::MovingFoundation<membrane::VirtualVolumeSprings<SCALAR>, SCALAR>)
 
 // In float few tests have them.
 #define MEMBRANE_USUAL_TYPES_IN_DOUBLE(PREFIX)                                                             \
     MEMBRANE_USUAL_TYPES(PREFIX, double);                                                                  \
+    PREFIX class membrane::detail::BendingMesh<double>;                                                    \
     PREFIX class Eigen::JacobiSVD<Eigen::MatrixXd>;                                                        \
     MEMBRANE_INSTANTIATE_STEP(PREFIX, double, BlockStep, membrane::FoundationSprings<double>);             \
     MEMBRANE_INSTANTIATE_STEP(PREFIX, double, BlockStep, membrane::CohesiveSprings<double>);               \
