@@ -35,7 +35,7 @@ class SoftTissue {
     /// Vertices at one position, as along a seam of the texture, are one vertex of the membrane.
     /// @throws membrane::InvalidInput for a mesh that is no membrane
     SoftTissue(std::span<const EngineVertex> vertices, std::span<const std::uint32_t> indices, const Tool& tool)
-        : SoftTissue(weld(vertices, indices), vertices.size(), indices, tool) {}
+        : SoftTissue(weld(vertices, indices), tool) {}
     ~SoftTissue() {
         running_ = false;
         thread_.join();
@@ -88,8 +88,7 @@ class SoftTissue {
 
     static membrane::RepairedMesh<float> weld(std::span<const EngineVertex> vertices,
                                               std::span<const std::uint32_t> indices);
-    SoftTissue(const membrane::RepairedMesh<float>& welded, std::size_t vertex_count,
-               std::span<const std::uint32_t> indices, const Tool& tool);
+    SoftTissue(const membrane::RepairedMesh<float>& welded, const Tool& tool);
     static double now() { return std::chrono::duration<double>(Clock::now().time_since_epoch()).count(); }
     void run() noexcept;
     void tick() noexcept;
@@ -130,8 +129,7 @@ inline membrane::RepairedMesh<float> SoftTissue::weld(std::span<const EngineVert
     return membrane::repair(positions, triangles, {.weld = 1e-6, .drop_repeated = true, .drop_isolated = true});
 }
 
-inline SoftTissue::SoftTissue(const membrane::RepairedMesh<float>& welded, std::size_t vertex_count,
-                              std::span<const std::uint32_t> indices, const Tool& tool)
+inline SoftTissue::SoftTissue(const membrane::RepairedMesh<float>& welded, const Tool& tool)
     : mesh_(welded.positions, welded.triangles),
       network_(mesh_, {}, {.stiffness = membrane::spring_stiffnesses(mesh_, capsule)}),
       foundation_(mesh_, {.normal = membrane::normal_stiffnesses(mesh_, fibres),
@@ -148,15 +146,9 @@ inline SoftTissue::SoftTissue(const membrane::RepairedMesh<float>& welded, std::
       shown_(x_),
       normals_(mesh_),
       copies_(static_cast<std::size_t>(mesh_.vertex_count())) {
-    std::vector<membrane::Index> welded_to(vertex_count, membrane::no_index);
-    for (std::size_t f = 0; f < welded.source_triangles.size(); ++f) {
-        for (std::size_t j = 0; j < 3; ++j) {
-            welded_to[indices[3 * static_cast<std::size_t>(welded.source_triangles[f]) + j]] =
-                welded.triangles(static_cast<Eigen::Index>(j), static_cast<Eigen::Index>(f));
-        }
-    }
-    for (std::uint32_t i = 0; i < vertex_count; ++i) {
-        if (welded_to[i] != membrane::no_index) copies_[static_cast<std::size_t>(welded_to[i])].push_back(i);
+    for (std::size_t i = 0; i < welded.new_vertices.size(); ++i) {
+        const membrane::Index v = welded.new_vertices[i];  // `no_index` if no triangle has it
+        if (v != membrane::no_index) copies_[static_cast<std::size_t>(v)].push_back(static_cast<std::uint32_t>(i));
     }
     thread_ = std::thread([this] { run(); });
 }
