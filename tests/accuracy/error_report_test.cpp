@@ -33,7 +33,7 @@ TEMPLATE_TEST_CASE("no force that is enclosed is farther off than said", "[error
     }
 }
 
-#define CHECK_NAME(status) CHECK(to_string(BoundStatus::status) == #status)
+#define CHECK_NAME(status) CHECK(to_string(membrane::BoundStatus::status) == #status)
 
 TEST_CASE("a status of a bound has the name that it has in a program", "[bound]") {
     CHECK_NAME(certified);

@@ -182,7 +182,7 @@ TEST_CASE("with nothing else free the slope is the vertex's own stiffness", "[ta
     CHECK((dense(found.stiffness) - expected).norm() < 1e-6);
 }
 
-#define CHECK_NAME(status) CHECK(to_string(TangentStatus::status) == #status)
+#define CHECK_NAME(status) CHECK(to_string(membrane::TangentStatus::status) == #status)
 
 TEST_CASE("a status of a tangent has the name that it has in a program", "[tangent]") {
     CHECK_NAME(found);

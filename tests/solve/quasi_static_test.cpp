@@ -827,6 +827,54 @@ TEST_CASE("points, networks and foundations of another count are refused, and th
     CHECK(same_bits(x, same));
 }
 
+TEST_CASE("the report names the constraint at fault", "[solver][bad]") {
+    const Sphere<double> sphere;
+    QuasiStaticSolver solver(sphere.network);
+    Points<double> x = sphere.mesh.positions(), wild = x;
+    wild(1, 3) = std::nan("");
+    const auto good = pull(3, sphere.raised(3, 0.1)), far_away = pull(7, sphere.raised(7, 0.1));
+    const auto nowhere = pull(3, Vector3<double>(std::nan(""), 0, 0)), not_there = pull(162, Vector3<double>(0, 0, 1));
+    const std::array<Index, 2> vertices{4, -1};
+    const auto at_fault = [&](Points<double>& at, const auto&... constraints) {
+        const auto report = solver.step(at, 0.1, sphere.network, sphere.foundation, constraints...);
+        CHECK((report.status == StepStatus::advanced || report.status == StepStatus::invalid_input));
+        return report.invalid_constraint;
+    };
+    CHECK(at_fault(x, good, far_away) == no_index);
+    CHECK(at_fault(x, nowhere, good) == 0);
+    CHECK(at_fault(x, good, nowhere) == 1);
+    CHECK(at_fault(x, good, far_away, not_there) == 2);
+    CHECK(at_fault(x, good, pin(vertices), far_away) == 1);
+    CHECK(at_fault(x, good, not_there, nowhere) == 2);  // numbers before vertices
+    CHECK(at_fault(wild, good, far_away) == no_index);
+}
+
+TEST_CASE("a tolerance in parts of the reactions says converged while a tool moves, and changes nothing else",
+          "[solver]") {
+    const Sphere<double> sphere;
+    const auto run = [&](double relative, int& converged, int& small) {
+        QuasiStaticSolver solver(sphere.network, {.layers = unlimited, .sweeps = 4, .relative_tolerance = relative});
+        Points<double> x = sphere.mesh.positions();
+        for (int i = 1; i <= 60; ++i) {
+            const auto report = solver.step(x, 0.1, sphere.network, sphere.foundation,
+                                            pull(3, sphere.raised(3, 0.005 * i)), pull(90, sphere.raised(90, -0.1)));
+            const double felt = norm(report.reactions[0]) + norm(report.reactions[1]);
+            converged += report.converged ? 1 : 0;
+            small += report.residual <= 1e-3 * felt ? 1 : 0;
+            if (relative > 0) REQUIRE(report.converged == (report.residual <= relative * felt));
+        }
+        return x;
+    };
+    int strictly = 0, relatively = 0, small = 0, same_small = 0;
+    const auto x = run(0, strictly, small);
+    CHECK(same_bits(x, run(1e-3, relatively, same_small)));
+    CHECK(strictly == 0);
+    CHECK(relatively > 50);
+    CHECK(relatively == small);
+    CHECK(test::refusal([&] { QuasiStaticSolver(sphere.network, {.relative_tolerance = -1}); }) ==
+          "QuasiStaticSolver: relative_tolerance must be finite and not negative [1], got -1");
+}
+
 // ---- scale
 
 namespace {

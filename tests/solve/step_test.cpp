@@ -34,3 +34,18 @@ TEST_CASE("a report begins as a step that did nothing") {
     CHECK(report.reactions.empty());
     CHECK(report.vertex_updates == 0);
 }
+
+#define CHECK_NAME(status) CHECK(to_string(membrane::StepStatus::status) == #status)
+
+TEST_CASE("a status has the name that it has in a program", "[solver]") {
+    CHECK_NAME(advanced);
+    CHECK_NAME(bad_time_step);
+    CHECK_NAME(invalid_input);
+    CHECK_NAME(unstable);
+    CHECK_NAME(too_many_contact_points);
+    CHECK_NAME(wrong_vertex_count);
+    CHECK_NAME(network_missed_split);
+    CHECK_NAME(foundation_missed_split);
+    CHECK_NAME(solver_missed_split);
+    CHECK_NAME(contact_missed_split);
+}

@@ -994,7 +994,7 @@ TEST_CASE("a cut that is none says why", "[tear]") {
     CHECK(status(1, {10, 11, 12, 13}) == CutStatus::reserve_too_small);
 }
 
-#define CHECK_NAME(status) CHECK(to_string(CutStatus::status) == #status)
+#define CHECK_NAME(status) CHECK(to_string(membrane::CutStatus::status) == #status)
 
 TEST_CASE("a status of a cut has the name that it has in a program", "[tear]") {
     CHECK_NAME(cut);

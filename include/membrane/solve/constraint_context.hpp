@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <span>
+#include <utility>
 
 #include <membrane/solve/step.hpp>
 #include <membrane/solve/step_state.hpp>
@@ -248,7 +249,7 @@ class ConstraintContext {
 template <Real Scalar>
 bool ConstraintContext<Scalar>::validate(Index v) noexcept {
     const bool valid = v >= 0 && v < state_.vertex_count();
-    if (!valid) state_.invalid = true;
+    if (!valid && !std::exchange(state_.invalid, true)) state_.invalid_constraint = static_cast<Index>(constraint_);
     return valid;
 }
 

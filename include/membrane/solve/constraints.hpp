@@ -154,9 +154,11 @@ class ConstraintList {
     ConstraintList(ConstraintContext<Scalar>& context, std::span<const ConstraintRef<Scalar>> constraints) noexcept
         : context_(context), constraints_(constraints) {}
 
-    /// Whether all constraints are valid.
-    [[nodiscard]] bool valid() const noexcept {
-        return std::all_of(constraints_.begin(), constraints_.end(), [](const auto& c) { return c.valid(); });
+    /// Number of the first constraint that is not valid; `no_index`: all are.
+    [[nodiscard]] Index first_invalid() const noexcept {
+        const auto found =
+            std::find_if(constraints_.begin(), constraints_.end(), [](const auto& c) { return !c.valid(); });
+        return found == constraints_.end() ? no_index : static_cast<Index>(found - constraints_.begin());
     }
     /// Collects the inputs that drive the constraints.
     void collect_inputs(std::span<DrivingInput<Scalar>> inputs) const noexcept {

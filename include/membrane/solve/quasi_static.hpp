@@ -251,7 +251,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     const ConstPointsRef<Scalar> start = x, now = state_.positions();
     ConstraintContext<Scalar> context(start, state_, network);
     const ConstraintList<Scalar> acting(context, constraints);
-    if (!acting.valid()) return refuse_step(StepStatus::invalid_input);
+    report_.invalid_constraint = acting.first_invalid();
+    if (report_.invalid_constraint != no_index) return refuse_step(StepStatus::invalid_input);
     extrapolate<Volume>(acting, context);
     const auto compare_splits = [&](const auto& part, StepStatus missed) {
         if constexpr (requires { part.splits(); }) context.compare_splits(part.splits(), missed);
@@ -260,6 +261,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     compare_splits(network, StepStatus::network_missed_split);
     if (state_.missed == StepStatus::advanced) acting.begin();
     if (state_.missed != StepStatus::advanced) return refuse_step(state_.missed);
+    report_.invalid_constraint = state_.invalid_constraint;
     if (state_.invalid) return refuse_step(StepStatus::invalid_input);
     if (state_.full) return refuse_step(StepStatus::too_many_contact_points);
 
@@ -378,6 +380,12 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     state_.asleep_below = recheck ? outside : (std::max)(state_.asleep_below, outside);
     report_.converged = active_.end_step(network, is_balanced, report_.moved, recheck) && !constraints_changed &&
                         report_.residual <= tolerance && state_.asleep_below <= tolerance;
+    if (options_.relative_tolerance > 0 && !report_.out_of_time && !active_.truncated()) {
+        Scalar felt = 0;
+        for (const auto& reaction : report_.reactions) felt += norm(reaction);
+        const Scalar largest = (std::max)(report_.residual, state_.asleep_below);
+        report_.converged = report_.converged || (felt > 0 && largest <= options_.relative_tolerance * felt);
+    }
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
     state_.end_step();

@@ -34,6 +34,9 @@ struct SolverOptions {
     bool predict = true;  ///< a step extrapolates the last displacements, if the last step was complete
     Index max_vertex_updates = unlimited;  ///< in a step; layer 0, prescribed vertices and one more are always updated
     Scalar force_tolerance = 0;  ///< residual force of a vertex in equilibrium [N]; 0: the network's, above rounding
+    /// A step has also converged if no residual force exceeds this part of the reactions' sizes together, as 1e-3 of
+    /// what the hand feels; 0: does not count.
+    Scalar relative_tolerance = 0;
     Scalar rigid_stiffness = 0;  ///< of a fixed vertex against constraints [N/m]; 0: 4 times the stiffest beside it
     Index max_contact_points = 4096;     ///< capacity in contact points; it determines the memory, not the time
     Index max_packed_vertices = 32'768;  ///< capacity in vertices updated by SIMD: 260 bytes each, 460 in double
@@ -60,12 +63,32 @@ enum class StepStatus {
     ///@}
 };
 
+/// The name of the status, as above.
+[[nodiscard]] constexpr std::string_view to_string(StepStatus status) noexcept {
+    switch (status) {
+        case StepStatus::advanced: return "advanced";
+        case StepStatus::bad_time_step: return "bad_time_step";
+        case StepStatus::invalid_input: return "invalid_input";
+        case StepStatus::unstable: return "unstable";
+        case StepStatus::too_many_contact_points: return "too_many_contact_points";
+        case StepStatus::wrong_vertex_count: return "wrong_vertex_count";
+        case StepStatus::network_missed_split: return "network_missed_split";
+        case StepStatus::foundation_missed_split: return "foundation_missed_split";
+        case StepStatus::solver_missed_split: return "solver_missed_split";
+        case StepStatus::contact_missed_split: return "contact_missed_split";
+    }
+    return "";
+}
+
 /// The report of a step. The spans are the solver's and valid until its next step.
 template <Real Scalar>
 struct StepReport {
     StepStatus status = StepStatus::advanced;  ///< whether the step advanced
+    /// With `invalid_input`, the number of the constraint at fault; `no_index`: `x` is, or the foundation.
+    Index invalid_constraint = no_index;
     /// No residual force exceeds `force_tolerance` on the vertices that the step may move: those of the queue, and with
-    /// `adaptive_layers` those of the whole membrane. Whether the layers are enough, only `residual_beyond` shows.
+    /// `adaptive_layers` those of the whole membrane; or none exceeds `relative_tolerance` of the reactions. Whether the
+    /// layers are enough, only `residual_beyond` shows.
     bool converged = false;
     /// The deadline ended the step early: without it more vertex updates would have been made, even if none moved a
     /// vertex.
@@ -107,6 +130,7 @@ void SolverOptions<Scalar>::validate() const {
     at_least(max_contact_points, 0, "max_contact_points");
     at_least(max_packed_vertices, 0, "max_packed_vertices");
     detail::check_option(component, force_tolerance, "force_tolerance", "N");
+    detail::check_option(component, relative_tolerance, "relative_tolerance", "1");
     detail::check_option(component, rigid_stiffness, "rigid_stiffness", "N/m");
 }
 

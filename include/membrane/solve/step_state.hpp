@@ -235,6 +235,7 @@ struct StepState {
     /// A constraint found its input invalid; the contact points exceed the capacity; several constraints have points on
     /// fixed or shared vertices.
     bool invalid = false, full = false, several_on_fixed = false;
+    Index invalid_constraint = no_index;       ///< number of the one that was invalid first
     Index splits = 0;                          ///< of a tear, until now
     StepStatus missed = StepStatus::advanced;  ///< a part has followed fewer
     ///@}
@@ -285,6 +286,7 @@ void StepState<Scalar>::begin_step() noexcept {
     pack_ranges = {};
     largest_motion = 0;
     invalid = full = several_on_fixed = false;
+    invalid_constraint = no_index;
     missed = StepStatus::advanced;
 }
 
