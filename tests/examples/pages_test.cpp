@@ -943,6 +943,26 @@ TEST_CASE("pages: rim") {
     for (const auto v : membrane::border(cornea)) CHECK(network.pinned(v));
 }
 
+TEST_CASE("pages: driven_rim") {
+    const auto cornea = membrane::spherical_cap({.radius = 7.8e-3, .diameter = 11.7e-3, .rings = 12});
+    const auto rim = membrane::border(cornea);
+    const auto network =
+        membrane::MassSpringNetwork(cornea, membrane::LinearSpring{}, {.stiffness = 40.0, .pinned = rim});
+    const auto foundation = membrane::VirtualVolumeSprings(cornea, {.stiffness = 8.0});
+    auto solver = membrane::QuasiStaticSolver(network, {.layers = membrane::unlimited});
+    auto tree = membrane::AabbTree(cornea);
+    auto x = cornea.positions();
+    const double dt = 1e-3, speed = 1e-3;
+    static_cast<void>(solver.step(x, dt, network, foundation));
+    // [driven_rim]
+    for (const auto v : rim) x(2, v) += speed * dt;  // pinned vertices are the caller's to move
+    const auto report = solver.step(x, dt, network, foundation);
+    tree.refit(x, rim);
+    tree.refit(x, report.moved);
+    // [/driven_rim]
+    CHECK(report.moved.size() == static_cast<std::size_t>(cornea.vertex_count()) - rim.size());
+}
+
 TEST_CASE_METHOD(Touched, "pages: contact") {
     // [contact]
     const auto nearest = tree.closest_point(x, tool.position);  // triangle, barycentric coordinates, distance

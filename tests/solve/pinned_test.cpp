@@ -1,10 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include <membrane/solve/quasi_static.hpp>
 
+#include <algorithm>
 #include <cstdint>
 #include <utility>
 #include <vector>
 
+#include <membrane/contact/aabb_tree.hpp>
+#include <membrane/contact/contact_tracker.hpp>
+#include <membrane/model/spring_stiffness.hpp>
+#include <membrane/solve/tool_contact.hpp>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
@@ -91,5 +96,70 @@ TEST_CASE("what the network of the step pins does not move, whatever went before
             if (report.converged) break;
             REQUIRE(tick < 2999);
         }
+    }
+}
+
+TEST_CASE("a rim that its user moves takes the membrane along", "[pinned]") {
+    const auto cap = spherical_cap({.radius = 0.01, .diameter = 0.015, .rings = 8});
+    const auto rim = border(cap);
+    const MassSpringNetwork network(cap, LinearSpring{}, {.stiffness = 40.0, .pinned = rim});
+    const VirtualVolumeSprings soft(cap, {.stiffness = 1.0});
+    const auto is_woken = [&](const SolverOptions<double>& options, bool wakes) {
+        QuasiStaticSolver solver(network, options);
+        Points<double> x = cap.positions();
+        StepReport<double> report;
+        for (int tick = 0; tick < 2000 && !(tick > 60 && report.converged); ++tick) {
+            if (tick > 20 && tick <= 40) {
+                for (const Index v : rim) x.col(v) += 5e-5 * Vector3<double>(1, 0.5, 0.2);
+            }
+            if (wakes) solver.wake_all();
+            report = solver.step(x, 1e-3, network, soft);
+            REQUIRE(report.status == StepStatus::advanced);
+        }
+        REQUIRE(report.converged);
+        return x;
+    };
+    const SolverOptions<double> all{.layers = unlimited, .sweeps = 4};
+    const auto x = is_woken(all, false), y = is_woken(all, true);
+    CHECK((x - y).cwiseAbs().maxCoeff() < 1e-10);
+    CHECK((x - cap.positions()).colwise().norm().minCoeff() > 1e-6);
+    const SolverOptions<double> as_needed{.layers = unlimited, .adaptive_layers = true, .sweeps = 4};
+    CHECK((is_woken(as_needed, false) - y).cwiseAbs().maxCoeff() < 1e-10);
+}
+
+TEST_CASE("a rim at rest wakes nothing", "[pinned]") {
+    const auto cap = spherical_cap({.radius = 0.01, .diameter = 0.015, .rings = 8});
+    const MassSpringNetwork network(cap, LinearSpring{}, {.stiffness = 40.0, .pinned = border(cap)});
+    QuasiStaticSolver solver(network);
+    Points<double> x = 1.1 * cap.positions();  // out of equilibrium
+    for (int tick = 0; tick < 3; ++tick) CHECK(solver.step(x, 1e-3, network, NoFoundation{}).vertex_updates == 0);
+}
+
+TEST_CASE("a ball on a sphere beside pinned vertices comes to rest", "[pinned]") {
+    Random random(5);
+    const double ball = mean_edge(mesh);
+    for (int seed = 1; seed <= 30; ++seed) {
+        const bool one = seed % 2 == 0;
+        std::vector<Index> pins;
+        for (Index v = 20 % (one ? 21 : 2); v < mesh.vertex_count(); v += one ? mesh.vertex_count() : 2)
+            pins.push_back(v);
+        CAPTURE(seed, one);
+        const auto network = network_with(pins);
+        QuasiStaticSolver<double> solver(network, {.layers = 6, .sweeps = 2});
+        AabbTree<double> tree(mesh);
+        ContactTracker<double> tracker(mesh);
+        auto x = mesh.positions();
+        const Vector3<double> above = point(mesh.positions(), 20) + random.vector(-0.7 * ball, 0.7 * ball);
+        const Vector3<double> out = above.normalized();
+        const double depth = 0.5 * ball * seed / 30;
+        StepReport<double> report;
+        for (int tick = 0; tick < 500 && !(tick > 100 && report.converged); ++tick) {
+            const double in = depth * std::min(1.0, tick / 100.0);
+            const Tool<double> tool{.position = (0.01 + ball - in) * out, .radius = ball};
+            report = solver.step(x, 1e-3, network, foundation, press(tool, tracker.update(tree, x, tool)));
+            REQUIRE(report.status == StepStatus::advanced);
+            tree.refit(x, report.moved);
+        }
+        CHECK(report.converged);
     }
 }

@@ -71,8 +71,9 @@ class QuasiStaticSolver {
                                AnyExecutor executor = {});
 
     /// Brings `x` (3 x V [m]) nearer to equilibrium in a tick of `dt` [s] under up to 16 constraints. Online.
-    /// Cost: `sweeps` + 1 evaluations of each active vertex; in layer 0, up to `sweeps` times `contact_iterations` + 1.
-    /// An evaluation costs the vertex's springs.
+    /// Cost: `sweeps` + 1 evaluations of each active vertex; in layer 0, up to `sweeps` times `contact_iterations` + 1;
+    /// one of each free vertex beside them, and one comparison of each pinned vertex. An evaluation costs the vertex's
+    /// springs.
     template <CheckedElasticNetwork<Scalar> Network, CheckedFoundationModel<Scalar> Volume,
               CheckedConstraint<Scalar>... Constraints>
     [[nodiscard]] StepReport<Scalar> step(PointsRef<Scalar> x, Scalar dt, const Network& network, const Volume& volume,
@@ -93,7 +94,9 @@ class QuasiStaticSolver {
     }
 
     /// Wakes vertices that were moved, or whose anchors were moved, by other means than a step of this solver. Ignores
-    /// an index that is no vertex. Not needed for the motion of a `MovingBody`.
+    /// an index that is no vertex. Not needed for the motion of a `MovingBody`, nor for vertices that its network pins:
+    /// the next step compares their positions with those in the last step, and begins the queue beside those that have
+    /// moved.
     void wake(std::span<const Index> vertices) noexcept;
     void wake_all() noexcept;  ///< `wake` for every vertex. Cost: O(V).
 
@@ -113,7 +116,8 @@ class QuasiStaticSolver {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.active_, self.state_, self.predictor_, self.last_prescribed_, self.woken_, self.placed_, self.moved_,
-              self.last_displacements_, self.complete_, self.pose_, self.deformations_, self.resume_, self.costs_);
+              self.last_displacements_, self.pins_, self.pinned_at_, self.pins_known_, self.complete_, self.pose_,
+              self.deformations_, self.resume_, self.costs_);
         if constexpr (Visit::restores) self.report_ = {};
     }
 
@@ -148,9 +152,11 @@ class QuasiStaticSolver {
     [[nodiscard]] StepReport<Scalar> step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt, const Network& network,
                                              const Volume& volume, Constraints constraints) noexcept;
     template <class Volume>
-    void follow_body(const Volume& volume) noexcept;
+    bool follow_body(const Volume& volume) noexcept;
     template <class Volume>
     void extrapolate(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context) noexcept;
+    template <class Network>
+    void seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context, bool with_body) noexcept;
     template <class Network>
     void select(const Network& network, const ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
@@ -175,6 +181,9 @@ class QuasiStaticSolver {
     IndexSet placed_;                    // by a tear, since the last step that advanced
     FixedVector<Index> moved_;           // in the last step that advanced
     Points<Scalar> last_displacements_;  // of `moved_` [m]
+    FixedVector<Index> pins_;            // the pinned vertices
+    Points<Scalar> pinned_at_;           // positions of `pins_` in the last step [m]
+    bool pins_known_ = false;            // whether there was a last step
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
@@ -204,6 +213,16 @@ template <class Scalar, class Rule, class Network>
                : 0;
 }
 
+// Number of pinned vertices; of all vertices if a tear may split those.
+template <class Network>
+[[nodiscard]] std::size_t max_pins(const Network& network) noexcept {
+    std::size_t count = 0;
+    for (Index v = 0; v < network.vertex_count(); ++v) {
+        if (FollowsSplit<Network> || network.pinned(v)) ++count;
+    }
+    return count;
+}
+
 }  // namespace detail
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
@@ -220,12 +239,17 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       woken_(last_prescribed_),
       placed_(FollowsSplit<Network> ? network.vertex_count() : 0),  // no memory where nothing tears
       moved_(static_cast<std::size_t>(network.vertex_count())),
-      last_displacements_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)) {
+      last_displacements_(Points<Scalar>::Zero(3, options.predict ? network.vertex_count() : 0)),
+      pins_(detail::max_pins(network)),
+      pinned_at_(Points<Scalar>::Zero(3, static_cast<Index>(pins_.capacity()))) {
     detail::define_made<QuasiStaticSolver>();
     if constexpr (requires { rule.validate(); }) rule.validate();
     if constexpr (requires { network.splits(); }) state_.splits = network.splits();
     if constexpr (requires { requires Rule::needs_mass; }) {
         if (!network.has_masses()) refuse("QuasiStaticSolver", "the rule needs masses [kg], the network has none");
+    }
+    for (Index v = 0; v < network.vertex_count(); ++v) {
+        if (network.pinned(v)) pins_.try_push_back(v);
     }
     state_.force_tolerance = options.force_tolerance > 0 ? options.force_tolerance : network.force_tolerance();
 }
@@ -244,7 +268,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     if (x.cols() != count || network.vertex_count() != count || !has_vertices(volume, count))
         return refuse_step(StepStatus::wrong_vertex_count);
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
-    follow_body(volume);  // uses the vertices loaded by the last step
+    const bool body_moved = follow_body(volume);  // uses the vertices loaded by the last step
     state_.begin_step();
 
     // Views: `x` does not change before the end of the step, and `now` shows each update.
@@ -267,6 +291,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
 
     const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
     set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
+    seed_beside_moved_pins(network, context, body_moved);
     select(network, context);
     Sweeps<Scalar, Rule, Network, Volume> sweeps{scene,   rule_,  options_, executor_, active_,
                                                  packed_, acting, report_,  budget,    resume_};
@@ -288,21 +313,23 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     return report_;
 }
 
-// The body has moved since the last step, and the membrane with it: rotates the cached vectors.
+// If the body has moved since the last step, and the membrane with it, rotates the cached vectors and returns true.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Volume>
-void QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume& volume) noexcept {
+bool QuasiStaticSolver<Scalar, Rule>::follow_body([[maybe_unused]] const Volume& volume) noexcept {
     if constexpr (moves<Volume>) {
         const auto& body = volume.body();
-        if (std::exchange(deformations_, body.deformations()) != body.deformations()) wake_all();
-        if (body.pose().same_pose(pose_)) return;
+        const bool deformed = std::exchange(deformations_, body.deformations()) != body.deformations();
+        if (deformed) wake_all();
+        if (body.pose().same_pose(pose_)) return deformed;
         const auto motion = motion_between(std::exchange(pose_, body.pose()), body.pose());
         state_.rotate(motion.rotation);
-        if (!options_.predict) return;
-        for (const Index v : moved_.items()) {
+        for (const Index v : options_.predict ? moved_.items() : std::span<Index>()) {
             last_displacements_.col(v) = motion.vector_to_world(point(last_displacements_, v));
         }
+        return true;
     }
+    return false;
 }
 
 // Adds the extrapolated displacements to vertices of the queue that moved in the last step: those that a contact has
@@ -326,6 +353,24 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
         if (context.fixed(v) || !active_.queue().contains(v)) continue;
         context.move(v, factor * point(last_displacements_, v));
         active_.wake(v);
+    }
+}
+
+// A force enters the membrane beside pinned vertices that the caller has moved. With its body it moves without a force.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Network>
+void QuasiStaticSolver<Scalar, Rule>::seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context,
+                                                             bool with_body) noexcept {
+    const bool known = std::exchange(pins_known_, true) && !with_body;
+    for (std::size_t i = 0; i < pins_.size(); ++i) {
+        const Index v = pins_[i], at = static_cast<Index>(i);
+        const Vector3<Scalar> here = context.start(v);
+        if (here == point(pinned_at_, at)) continue;
+        pinned_at_.col(at) = here;
+        if (!known || !network.pinned(v)) continue;
+        for (const auto& end : network.neighbours(v)) {
+            if (!network.pinned(end.other)) context.seed(end.other);
+        }
     }
 }
 
@@ -441,6 +486,11 @@ void QuasiStaticSolver<Scalar, Rule>::split(const VertexSplit& split) noexcept {
     if (placed_.capacity() > 0) placed_.insert(split.copy);
     if (options_.predict) last_displacements_.col(split.copy) = last_displacements_.col(split.vertex);
     if (has_moved(split.vertex)) moved_.try_push_back(split.copy);
+    const auto pins = pins_.items();
+    const auto pin = std::find(pins.begin(), pins.end(), split.vertex);
+    if (pin == pins.end()) return;
+    const auto at = static_cast<Index>(pin - pins.begin()), copy_at = static_cast<Index>(pins_.size());
+    if (pins_.try_push_back(split.copy)) pinned_at_.col(copy_at) = pinned_at_.col(at);
 }
 
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
@@ -455,7 +505,7 @@ void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     active_.clear();
     state_.reset();
     predictor_.reset();
-    complete_ = false;
+    complete_ = pins_known_ = false;
     last_prescribed_.clear();
     woken_.clear();
     placed_.clear();

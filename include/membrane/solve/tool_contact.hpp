@@ -136,9 +136,10 @@ void ToolContact<Scalar>::begin(Context& context) const noexcept {
     const auto out = direction_out_of_support(context);
     if (contact.tunnelled && !out) carry_with_tool(context);
     list_candidates(context);
-    const bool shared = std::any_of(contact.corners.begin(), contact.corners.end(),
-                                    [&](Index v) { return context.state().shared.contains(v); });
-    if (!contact.tunnelled && !out && !shared && contact.gap < -negligible_distance(context, contact.corners[0])) {
+    // A tool penetrates fixed and shared vertices at equilibrium, too.
+    const auto stays = [&](Index v) { return context.fixed(v) || context.state().shared.contains(v); };
+    const bool held = std::any_of(contact.corners.begin(), contact.corners.end(), stays);
+    if (!contact.tunnelled && !out && !held && contact.gap < -negligible_distance(context, contact.corners[0])) {
         clear_contact_point(context);
     }
     out ? touch_support(context, *out) : find_points(context);
