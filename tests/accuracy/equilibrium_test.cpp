@@ -619,6 +619,7 @@ TEST_CASE("equilibrium says when it is not there yet", "[equilibrium]") {
     const Point target = 0.7 * sphere.x().col(0);
     const auto rest = sphere.rest({.max_iterations = 1}, pull(0, target));
     CHECK(!rest.converged);
+    CHECK(rest.status == EquilibriumStatus::unbalanced);
     CHECK(rest.iterations == 1);
     CHECK(rest.residual > 1e-6);
     CHECK(is_finite(rest.x));
@@ -628,6 +629,7 @@ TEST_CASE("equilibrium says when it is not there yet", "[equilibrium]") {
     const auto lost = equilibrium(sphere.x(), sphere.mesh, network, NoFoundation{}, {},
                                   load<double>(sphere.corners(0), {1, 0, 0}, {0, 0, 1}));
     CHECK(!lost.converged);
+    CHECK(lost.status == EquilibriumStatus::unbalanced);
     CHECK(lost.residual > 1e-3);
 
     // A point held where a tool is.
@@ -636,12 +638,42 @@ TEST_CASE("equilibrium says when it is not there yet", "[equilibrium]") {
     const auto grasp = sphere.grasp(contact.triangle, contact.barycentric);
     const auto stuck = sphere.rest({}, press(stroke.at(1), contact), pull(stroke.at(1), grasp));
     CHECK(!stuck.converged);
+    CHECK(stuck.status != EquilibriumStatus::found);
 
     // A shaft that is already through, whatever the contact says.
     Contact<double> wrong = contact;
     wrong.gap = 0;
     const Tool<double> shaft{.position = {0.05, 0.03, 0.9}, .axis = {0, 0, 0.4}, .radius = 0.01};
-    CHECK(!sphere.rest({}, press(shaft, wrong)).converged);
+    const auto through = sphere.rest({}, press(shaft, wrong));
+    CHECK(!through.converged);
+    CHECK(through.status == EquilibriumStatus::penetrated);
+    CHECK(to_string(through.status) == "a tool penetrates");
+}
+
+// Contact points on both sides of an edge may be near it: then they are nearly dependent.
+TEST_CASE("equilibrium under a tool that presses the pole of an icosphere converges at every depth, in few iterations",
+          "[equilibrium]") {
+    const auto mesh = icosphere({.radius = 10e-3, .subdivisions = 2});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
+    const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0});
+    for (int seed = 1; seed <= cases(60, 5000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        // Near the depth of 0.6 mm, at which a contact point is at 3e-4 of a triangle's height from an edge.
+        const double depth = random.chance(0.5) ? 0.6e-3 + 1e-5 * random.number(-1.0, 1.0) : random.number(1e-5, 2e-3);
+        const Tool<double> tool{.position = {0, 0, 12e-3 - depth}, .radius = 2e-3};
+        AabbTree tree(mesh);
+        ContactTracker tracker(mesh);
+        Tool<double> above = tool;
+        above.position.z() = 12.5e-3;
+        (void)tracker.update(tree, mesh.positions(), above);
+        const auto contact = tracker.update(tree, mesh.positions(), tool);
+        const auto start = test::jittered<double>(mesh.positions(), random.number(0.0, 1e-4), random);
+        const auto rest = equilibrium(start, mesh, network, foundation, {}, press(tool, contact));
+        CAPTURE(depth, to_string(rest.status), rest.residual, rest.penetration);
+        REQUIRE(rest.converged);
+        REQUIRE(rest.iterations <= 30);
+    }
 }
 
 TEST_CASE("equilibrium refuses what does not fit together", "[equilibrium]") {

@@ -18,14 +18,14 @@
 ///     #include <membrane/accuracy/equilibrium.hpp>
 ///     const auto rest = membrane::equilibrium(x, mesh, network, foundation, {}, press(tool, contact),
 ///                                             membrane::pull(7, target));
-///     if (!rest.converged) ...
+///     if (!rest.converged) std::cerr << to_string(rest.status);
 ///     (x - rest.x).colwise().norm().maxCoeff();                              // error of a step's positions [m]
 ///     rest.reactions[0];                                                     // force of the membrane on the tool [N]
 namespace membrane {
 
 /// The equilibrium near `x` (3 x V [m]) under the constraints of a step, to double precision for any scalar of network
 /// and foundation. A user-defined foundation that is not linear (see `FoundationModel`) is evaluated in its own scalar.
-/// Reactions are as in `StepReport`. If the method does not converge, `converged` is false and `x` is the last iterate.
+/// Reactions are as in `StepReport`. If the method does not converge, `x` is the last iterate, and `status` the reason.
 ///
 /// Newton's method on all vertices at once, with exact Hessians and sparse factorisation. Contact points near a tool
 /// are inequalities with exact second derivatives: sequential quadratic programming [Nocedal06] 18. A line search on

@@ -31,6 +31,29 @@ struct EquilibriumOptions {
     void validate() const;
 };
 
+/// Whether an equilibrium was found, or what is missing after the last iteration.
+enum class EquilibriumStatus {
+    found,          ///< forces balance, targets are reached, no tool penetrates
+    unbalanced,     ///< a free vertex has a residual force
+    target_missed,  ///< an attached point or a prescribed vertex is not at its target
+    penetrated,     ///< a tool penetrates
+    contact_open,   ///< a contact force acts across a gap
+    not_finite,     ///< a step of Newton's method is not finite: stiffnesses are too large, or too far apart
+};
+
+/// What the status means, for a message.
+[[nodiscard]] constexpr std::string_view to_string(EquilibriumStatus status) noexcept {
+    switch (status) {
+        case EquilibriumStatus::found: return "equilibrium found";
+        case EquilibriumStatus::unbalanced: return "a free vertex has a residual force";
+        case EquilibriumStatus::target_missed: return "an attached point or a prescribed vertex is not at its target";
+        case EquilibriumStatus::penetrated: return "a tool penetrates";
+        case EquilibriumStatus::contact_open: return "a contact force acts across a gap";
+        case EquilibriumStatus::not_finite: break;
+    }
+    return "a step of Newton's method is not finite";
+}
+
 /// The equilibrium of a membrane under the constraints of a scene.
 struct Equilibrium {
     Points<double> x;                        ///< 3 x V [m]
@@ -39,7 +62,8 @@ struct Equilibrium {
     double residual = 0;                     ///< largest unbalanced force on a free vertex [N]
     double penetration = 0;                  ///< largest penetration of a tool [m]
     Index iterations = 0;                    ///< of Newton's method, in all increments
-    bool converged = false;                  ///< forces balance, attachments are at their targets, no tool penetrates
+    bool converged = false;                  ///< `status` is `found`
+    EquilibriumStatus status = EquilibriumStatus::unbalanced;  ///< the reason, if it has not converged
 };
 
 /// A tool that the surface must stay outside of.

@@ -39,11 +39,11 @@ class EquilibriumSolver {
         double penetration = 0;
     };
 
-    [[nodiscard]] bool solve_increment();
+    [[nodiscard]] EquilibriumStatus solve_increment();
     [[nodiscard]] State state_at(const Points<double>& x);
     [[nodiscard]] Points<double> newton_step();
     void add_rows();
-    [[nodiscard]] bool is_balanced() const;
+    [[nodiscard]] EquilibriumStatus status() const;
     [[nodiscard]] bool targets_reached() const;
     void advance(const Points<double>& step);
     [[nodiscard]] Points<double> applied(const State& state) const;
@@ -111,8 +111,9 @@ Equilibrium EquilibriumSolver<ElasticModel>::run(std::size_t constraint_count) {
     for (double i = 1; i <= increments; ++i) {
         goals_ = scene_.goals(i / increments);
         here_ = state_at(here_.elastic.x);
-        result.converged = solve_increment();
+        result.status = solve_increment();
     }
+    result.converged = result.status == EquilibriumStatus::found;
     result.x = here_.elastic.x;
     result.reactions = reactions(constraint_count);
     std::copy_if(here_.contacts.begin(), here_.contacts.end(), std::back_inserter(result.contacts),
@@ -125,15 +126,19 @@ Equilibrium EquilibriumSolver<ElasticModel>::run(std::size_t constraint_count) {
 }
 
 template <class ElasticModel>
-bool EquilibriumSolver<ElasticModel>::solve_increment() {
+EquilibriumStatus EquilibriumSolver<ElasticModel>::solve_increment() {
+    constexpr auto found = EquilibriumStatus::found;
     for (Index i = 0; i < options_.max_iterations; ++i) {
         ++iterations_;
         const Points<double> step = newton_step();
-        if (is_balanced()) return true;
-        if (!is_finite(step)) return false;
+        if (status() == found) return found;
+        if (!is_finite(step)) return EquilibriumStatus::not_finite;
         advance(step);
+        // With the multipliers of this step: where contact points are nearly dependent, new ones would amplify the
+        // rounding of gaps.
+        if (status() == found) return found;
     }
-    return false;
+    return status();
 }
 
 template <class ElasticModel>
@@ -202,12 +207,15 @@ void EquilibriumSolver<ElasticModel>::add_rows() {
 }
 
 template <class ElasticModel>
-bool EquilibriumSolver<ElasticModel>::is_balanced() const {
+EquilibriumStatus EquilibriumSolver<ElasticModel>::status() const {
+    if (!targets_reached()) return EquilibriumStatus::target_missed;
+    if (!(here_.penetration <= negligible_length())) return EquilibriumStatus::penetrated;
     const double largest = (std::max)(here_.elastic.largest_force, goals_.loads.colwise().norm().maxCoeff());
-    if (!(residual(here_) <= (std::max)(options_.tolerance * largest, stiffness_ * spacing_))) return false;
-    const auto contacts = [&](const ToolPoint& p) { return p.multiplier == 0 || p.gap <= negligible_length(); };
-    return targets_reached() && here_.penetration <= negligible_length() &&
-           std::all_of(here_.contacts.begin(), here_.contacts.end(), contacts);
+    if (!(residual(here_) <= (std::max)(options_.tolerance * largest, stiffness_ * spacing_)))
+        return EquilibriumStatus::unbalanced;
+    const auto closed = [&](const ToolPoint& p) { return p.multiplier == 0 || p.gap <= negligible_length(); };
+    return std::all_of(here_.contacts.begin(), here_.contacts.end(), closed) ? EquilibriumStatus::found
+                                                                             : EquilibriumStatus::contact_open;
 }
 
 template <class ElasticModel>
