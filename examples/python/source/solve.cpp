@@ -43,10 +43,11 @@ void bind_report(py::module_& module) {
         .value("too_many_contact_points", StepStatus::too_many_contact_points,
                doc("StepStatus::too_many_contact_points"))
         .value("wrong_vertex_count", StepStatus::wrong_vertex_count, doc("StepStatus::wrong_vertex_count"))
-        .value("network_missed_split", StepStatus::network_missed_split)
-        .value("foundation_missed_split", StepStatus::foundation_missed_split)
-        .value("solver_missed_split", StepStatus::solver_missed_split)
-        .value("contact_missed_split", StepStatus::contact_missed_split);
+        .value("network_missed_split", StepStatus::network_missed_split, doc("StepStatus::network_missed_split"))
+        .value("foundation_missed_split", StepStatus::foundation_missed_split,
+               doc("StepStatus::foundation_missed_split"))
+        .value("solver_missed_split", StepStatus::solver_missed_split, doc("StepStatus::solver_missed_split"))
+        .value("contact_missed_split", StepStatus::contact_missed_split, doc("StepStatus::contact_missed_split"));
     auto report = py::class_<StepReport>(module, "StepReport", doc("StepReport"));
     report.def_readonly("status", &StepReport::status, doc("StepReport::status"))
         .def_readonly("converged", &StepReport::converged, doc("StepReport::converged"))

@@ -272,7 +272,7 @@ class Elements {
 
     /// All elements, in the order in which they were given.
     [[nodiscard]] std::span<const Instance> all() const& noexcept { return all_; }
-    void all() && = delete;
+    [[nodiscard]] std::vector<Instance> all() && noexcept { return std::move(all_); }
 
     /// Calls `act(instance)` for each element.
     template <class Act>

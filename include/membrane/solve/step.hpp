@@ -53,14 +53,10 @@ enum class StepStatus {
     unstable,       ///< the rule may diverge for this dt, or a force is unbounded: nothing has moved
     too_many_contact_points,  ///< more contact points than the capacity: nothing has moved
     wrong_vertex_count,       ///< `x`, network or foundation is not of the solver's vertices: nothing has moved
-    ///@{
-    /// This part has missed a split of a tear: pass it to `follow` for each event. Nothing has moved. A contact misses
-    /// one with its tracker or tree.
-    network_missed_split,
-    foundation_missed_split,
-    solver_missed_split,
-    contact_missed_split,
-    ///@}
+    network_missed_split,     ///< of a tear: pass this part to `follow` for each event. Nothing has moved
+    foundation_missed_split,  ///< of a tear: pass this part to `follow` for each event. Nothing has moved
+    solver_missed_split,      ///< of a tear: pass this part to `follow` for each event. Nothing has moved
+    contact_missed_split,     ///< of a tear: pass tracker and tree to `follow` for each event. Nothing has moved
 };
 
 /// The name of the status, as above.
