@@ -83,8 +83,8 @@ struct StepReport {
     /// With `invalid_input`, the number of the constraint at fault; `no_index`: `x` is, or the foundation.
     Index invalid_constraint = no_index;
     /// No residual force exceeds `force_tolerance` on the vertices that the step may move: those of the queue, and with
-    /// `adaptive_layers` those of the whole membrane; or none exceeds `relative_tolerance` of the reactions. Whether the
-    /// layers are enough, only `residual_beyond` shows.
+    /// `adaptive_layers` those of the whole membrane. Or none exceeds `relative_tolerance` of the reactions. Whether
+    /// the layers are enough, only `residual_beyond` shows.
     bool converged = false;
     /// The deadline ended the step early: without it more vertex updates would have been made, even if none moved a
     /// vertex.
