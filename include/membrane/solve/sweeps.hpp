@@ -73,8 +73,11 @@ struct Sweeps {
             if (!advances()) return;
             if (moved) constraints_hold = false;
             changed |= moved;
-            // The queue needs no more: vertices outside have waited for it.
-            if (!changed) changed = std::exchange(scene.state.queue_residual, Scalar(0)) > 0;
+            // The queue needs no more. If vertices outside have waited for it, they are next.
+            if (!changed && scene.state.outside_tolerance() > scene.state.force_tolerance) {
+                scene.state.queue_residual = 0;
+                changed = true;
+            }
         }
         if ((changed || report.out_of_time) && !constraints_hold) {
             if (!budget.has_time_to_enforce()) report.out_of_time = true;
