@@ -368,13 +368,16 @@ TEST_CASE("PLY may have its numbers in many formats") {
                                 text.substr(rows, face_rows - rows)));
 
     for (const bool big_endian : {false, true}) {
-        const std::string bytes = binary_ply(solid, big_endian);
-        const std::size_t v = bytes.find("element vertex"), f = bytes.find("element face"),
-                          end = bytes.find("end_header\n"), body = end + 11, corners = bytes.size() - 4 * 13;
-        CHECK(is_solid("b.ply", bytes.substr(0, v) + bytes.substr(f, end - f) + bytes.substr(v, f - v) +
-                                    "end_header\n" + bytes.substr(corners) + bytes.substr(body, corners - body)));
-        std::string with_list = with(bytes.substr(0, corners), "end_header", "property list uchar float t\nend_header");
-        for (std::size_t k = 0; k < 4; ++k) with_list += bytes.substr(corners + 13 * k, 13) + '\2' + "12345678";
+        const std::string binary = binary_ply(solid, big_endian);
+        const std::size_t v = binary.find("element vertex"), f = binary.find("element face"),
+                          header_end = binary.find("end_header\n"), rows_begin = header_end + 11,
+                          corners = binary.size() - 4 * 13;
+        CHECK(is_solid("b.ply", binary.substr(0, v) + binary.substr(f, header_end - f) + binary.substr(v, f - v) +
+                                    "end_header\n" + binary.substr(corners) +
+                                    binary.substr(rows_begin, corners - rows_begin)));
+        std::string with_list =
+            with(binary.substr(0, corners), "end_header", "property list uchar float t\nend_header");
+        for (std::size_t k = 0; k < 4; ++k) with_list += binary.substr(corners + 13 * k, 13) + '\2' + "12345678";
         CHECK(is_solid("b.ply", with_list));
         auto first = solid;
         for (const std::uint32_t bits :

@@ -445,7 +445,7 @@ TEST_CASE("a set of constraints is valid if all are, violated if any is, finite 
             const Told a{first, first, first ? 1 : nan, &begun}, b{second, second, second ? 2 : nan, &begun};
             const std::array refs{ConstraintRef<double>(a), ConstraintRef<double>(b)};
             const ConstraintList<double> both(context, refs);
-            CHECK(both.valid() == (first && second));
+            CHECK(both.first_invalid() == (!first ? 0 : !second ? 1 : no_index));
             CHECK(both.enforce() == (first || second));
             CHECK(both.react(reactions) == (first && second));
             both.begin();
@@ -456,7 +456,7 @@ TEST_CASE("a set of constraints is valid if all are, violated if any is, finite 
     CHECK(reactions[1].x() == 2);
 
     const ConstraintList<double> none(context, {});
-    CHECK(none.valid());
+    CHECK(none.first_invalid() == no_index);
     CHECK_FALSE(none.enforce());
     CHECK(none.react({}));
 }
