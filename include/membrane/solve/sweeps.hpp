@@ -168,7 +168,7 @@ struct Sweeps {
             }
             const std::size_t packed_count = (std::min)(layer.size(), in_packs);
             changed |= update_packs<true>(0, packed.pack_from(packed_count));
-            for (const Index v : layer.subspan(packed_count)) changed |= update(v);
+            for (const Index v : layer.subspan(packed_count)) changed |= update(v, true);
             budget.updated(layer.size());
             if (!advances()) break;
             if (!enforce()) break;
@@ -222,10 +222,10 @@ struct Sweeps {
         const std::size_t packed_end = std::clamp(in_packs, begin, end);
         bool changed = update_packs_until_time_is_up(packed.pack_from(begin), packed.pack_from(packed_end));
         for (std::size_t i = packed_end; i < end && goes_on(i);) {
-            const auto batch = active.vertices().subspan(i, (std::min)(updates_in_batch, end - i));
-            for (const Index v : batch) changed |= update(v);
-            budget.updated(batch.size());
-            i += batch.size();
+            const std::size_t count = (std::min)(updates_in_batch, end - i);
+            for (const std::size_t batch_end = i + count; i < batch_end; ++i)
+                changed |= update(active.vertices()[i], i < active.from_queue());
+            budget.updated(count);
         }
         return changed;
     }
@@ -289,12 +289,11 @@ struct Sweeps {
         return outcome == Outcome::moved;
     }
 
-    bool update(Index v) noexcept {
+    bool update(Index v, bool in_queue) noexcept {
         auto& state = scene.state;
         if (state.is_fixed(v) || !advances()) return false;
         ++report.vertex_updates;
         const auto vertex = state_of<Rule>(scene, v);
-        const bool in_queue = active.queue().contains(v);
         const auto move = move_of(rule, vertex, in_queue ? state.force_tolerance : state.outside_tolerance());
         if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
             if (move.may_overshoot && diverges(scene, v, move.compliance)) {
