@@ -553,7 +553,7 @@ TEST_CASE("the work of validation is bounded", "[mesh]") {
     CHECK(validate(heap.x, heap.triangles, {.tolerance = 0.0, .max_findings_per_kind = 3}).findings.size() <= 6);
     const MeshReport one_of_a_kind = validate(heap.x, heap.triangles, {.tolerance = 0.0, .max_findings_per_kind = 1});
     CHECK(one_of_a_kind.findings.size() <= 2);
-    CHECK_THAT(to_string(one_of_a_kind), ContainsSubstring("components, one with triangle 0, one with triangle 1;"));
+    CHECK_THAT(to_string(one_of_a_kind), ContainsSubstring("components, one with triangle 0, one with triangle 1\n"));
 }
 
 TEST_CASE("a vertex beside an edge is on it within the tolerance, to any side", "[mesh][bad]") {

@@ -377,7 +377,7 @@ TEST_CASE("a shaft thinner than an edge, two edges deep, stays outside a closed 
 }
 
 TEST_CASE("every still thin shaft comes to rest outside a closed surface", "[withdrawal]") {
-    for (const int seed : {44, 704}) {
+    for (const int seed : {201, 704}) {
         CAPTURE(seed);
         const auto left = press_thin_shaft(seed);
         CHECK(left.converged);

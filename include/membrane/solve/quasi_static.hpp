@@ -417,8 +417,9 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     state_.queue_residual = queue_residual;
     const Scalar tolerance = state_.force_tolerance, outside = state_.outside_tolerance();
     const auto is_balanced = [&](Index v) {
+        const bool fixed = state_.loaded.contains(v) ? state_.is_fixed(v) : network.pinned(v);
         const Scalar largest = active_.queue().contains(v) ? tolerance : outside;
-        return state_.is_fixed(v) || state_.unbalanced_force(v) <= largest;
+        return fixed || state_.unbalanced_force(v) <= largest;
     };
     // Now and then, as this costs all that has moved since the last equilibrium.
     const bool recheck = outside < state_.asleep_below && (outside == tolerance || outside < state_.asleep_below / 4);
