@@ -195,7 +195,7 @@ TEST_CASE("a body that turns and shifts under forceps: all forces as at rest", "
                 const Difference difference(rest, moved, pose);
                 const bool still = tick % phase_ticks == phase_ticks - 1;
                 const double bound = still ? 1e-9 : 1e-4;
-                // Where a tool presses what forceps hold, an order that rounding decides changes a force by the residual.
+                // Rounding decides the order of two constraints on one vertex: a force may differ by the residual.
                 const double undone = std::max(rest.report.residual, moved.report.residual) / 5e-3;
                 REQUIRE(difference.force <= bound + (still ? 0 : std::min(undone, 1e-3)));
                 REQUIRE(difference.positions <= bound);
