@@ -165,7 +165,7 @@ class ForceLimiter {
 
     /// The device whose limits apply.
     [[nodiscard]] const DeviceProfile& device() const& noexcept { return device_; }
-    [[nodiscard]] DeviceProfile device() && noexcept { return std::move(device_); }
+    [[nodiscard]] DeviceProfile device() && noexcept { return device_; }
 
     /// As new, except for the thermal load. For a replay construct a new limiter.
     void reset() noexcept;

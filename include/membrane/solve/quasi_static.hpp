@@ -151,6 +151,9 @@ class QuasiStaticSolver {
     template <class Network, class Volume>
     [[nodiscard]] StepReport<Scalar> step_in(TimeBudget budget, PointsRef<Scalar>& x, Scalar dt, const Network& network,
                                              const Volume& volume, Constraints constraints) noexcept;
+    template <class Network, class Volume>
+    [[nodiscard]] StepStatus begin_constraints(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context,
+                                               const Network& network, const Volume& volume) noexcept;
     template <class Volume>
     bool follow_body(const Volume& volume) noexcept;
     template <class Volume>
@@ -275,19 +278,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     const ConstPointsRef<Scalar> start = x, now = state_.positions();
     ConstraintContext<Scalar> context(start, state_, network);
     const ConstraintList<Scalar> acting(context, constraints);
-    report_.invalid_constraint = acting.first_invalid();
-    if (report_.invalid_constraint != no_index) return refuse_step(StepStatus::invalid_input);
-    extrapolate<Volume>(acting, context);
-    const auto compare_splits = [&](const auto& part, StepStatus missed) {
-        if constexpr (requires { part.splits(); }) context.compare_splits(part.splits(), missed);
-    };
-    compare_splits(volume, StepStatus::foundation_missed_split);
-    compare_splits(network, StepStatus::network_missed_split);
-    if (state_.missed == StepStatus::advanced) acting.begin();
-    if (state_.missed != StepStatus::advanced) return refuse_step(state_.missed);
-    report_.invalid_constraint = state_.invalid_constraint;
-    if (state_.invalid) return refuse_step(StepStatus::invalid_input);
-    if (state_.full) return refuse_step(StepStatus::too_many_contact_points);
+    const StepStatus begun = begin_constraints(acting, context, network, volume);
+    if (begun != StepStatus::advanced) return refuse_step(begun);
 
     const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
     set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
@@ -311,6 +303,28 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     measure_beyond(scene);
     sweeps.budget.end();
     return report_;
+}
+
+// Extrapolates, and begins the constraints. Returns why the step is refused: an input is invalid, a part has missed a
+// split of a tear, or there are too many contact points.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+template <class Network, class Volume>
+StepStatus QuasiStaticSolver<Scalar, Rule>::begin_constraints(const ConstraintList<Scalar>& acting,
+                                                              ConstraintContext<Scalar>& context,
+                                                              const Network& network, const Volume& volume) noexcept {
+    report_.invalid_constraint = acting.first_invalid();
+    if (report_.invalid_constraint != no_index) return StepStatus::invalid_input;
+    extrapolate<Volume>(acting, context);
+    const auto compare_splits = [&](const auto& part, StepStatus missed) {
+        if constexpr (requires { part.splits(); }) context.compare_splits(part.splits(), missed);
+    };
+    compare_splits(volume, StepStatus::foundation_missed_split);
+    compare_splits(network, StepStatus::network_missed_split);
+    if (state_.missed == StepStatus::advanced) acting.begin();
+    if (state_.missed != StepStatus::advanced) return state_.missed;
+    report_.invalid_constraint = state_.invalid_constraint;
+    if (state_.invalid) return StepStatus::invalid_input;
+    return state_.full ? StepStatus::too_many_contact_points : StepStatus::advanced;
 }
 
 // If the body has moved since the last step, and the membrane with it, rotates the cached vectors and returns true.
