@@ -265,8 +265,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
                                                             Constraints constraints) noexcept {
     detail::require_made<QuasiStaticSolver>();
     reactions_.fill(Vector3<Scalar>::Zero());
-    report_ = {};
-    report_.reactions = {reactions_.data(), constraints.size()};
+    report_ = {.reactions = {reactions_.data(), constraints.size()}};
     const Index count = state_.vertex_count();
     if (x.cols() != count || network.vertex_count() != count || !has_vertices(volume, count))
         return refuse_step(StepStatus::wrong_vertex_count);
