@@ -102,7 +102,7 @@ struct StepReport {
     Scalar violation = 0;
     Index violated = no_index;                   ///< number of that constraint; `no_index`: all hold
     Index vertex_updates = 0;                    ///< including evaluations of forces without an update
-    std::span<const Index> moved;                ///< vertices whose position changed, or that a tear has placed since
+    std::span<const Index> moved = {};           ///< vertices whose position changed, or that a tear has placed since
     std::span<const Vector3<Scalar>> reactions;  ///< for each constraint, in order, the membrane's force on it [N]
 
     /// The membrane's force on all constraints together [N].
