@@ -1,6 +1,5 @@
 # Sourced by .ci/run and .ci/release: named steps, each one's share of the time. Stops at the first that fails.
-# Bash; the caller has `set -euo pipefail`.
-source "$(dirname "${BASH_SOURCE[0]}")/../cmake/setup.sh"
+# Bash; the caller has sourced cmake/setup.sh.
 
 exec < /dev/null  # no input from a terminal
 
