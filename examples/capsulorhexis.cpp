@@ -25,7 +25,9 @@ Opened open(const RhexisScene& scene, double toughness, double lift, const LoopO
     while (result.ticks * options.tick < 30 && !is_round(tear)) {
         const auto start = std::chrono::steady_clock::now();
         forceps.guide(tear, operation.x(), options.tick, felt.norm());
-        felt = operation.step(forceps.hold(tear)).reactions[0];
+        const auto report = operation.step(forceps.hold(tear));
+        felt = report.reactions[0];
+        result.converged += report.converged ? 1 : 0;
         forceps.slip(tear, operation.x());
         result.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
         result.add(scene, operation, forceps, felt);

@@ -56,7 +56,7 @@ class Capsulorhexis {
         : tissue_(capsule_tissue(scene)),
           body_(scene.body()),
           options_(options),
-          solver_(tissue_, {.layers = 12, .sweeps = options.sweeps}),
+          solver_(tissue_, {.layers = 12, .sweeps = options.sweeps, .relative_tolerance = 1e-2}),
           tear_(scene.mesh, membrane::EnergyRelease{.toughness = toughness, .thickness = capsule.thickness}),
           x_(scene.mesh.positions()),
           fluid_(options.drag, x_.cols()) {

@@ -68,6 +68,7 @@ struct Opened {
     double circularity = 0;       ///< of the opening
     double seconds = 0;           ///< of computation
     int ticks = 0, grasps = 0;
+    int converged = 0;  ///< ticks after which no residual force exceeded a hundredth of what the forceps feel
 
     /// A tick.
     void add(const RhexisScene& scene, const Capsulorhexis& operation, const Forceps& forceps, const Vector& felt);
@@ -126,9 +127,11 @@ inline void Opened::add_force(const Tear& tear, const Forceps& forceps, const Ve
 
 /// Prints it; `resistance` is the energy that a length of the tear takes [J/m].
 inline void print(const RhexisScene& scene, const Opened& opened, double resistance) {
-    std::printf("%s, %d vertices: circularity %.3f; %.3g mm torn in %d ticks, %.0f us for a tick, %d grasps\n",
-                scene.name.c_str(), int{scene.mesh.vertex_count()}, opened.circularity, 1e3 * opened.length,
-                opened.ticks, 1e6 * opened.seconds / opened.ticks, opened.grasps);
+    std::printf(
+        "%s, %d vertices: circularity %.3f; %.3g mm torn in %d ticks, %.0f %% converged, %.0f us for a tick, %d "
+        "grasps\n",
+        scene.name.c_str(), int{scene.mesh.vertex_count()}, opened.circularity, 1e3 * opened.length, opened.ticks,
+        100.0 * opened.converged / opened.ticks, 1e6 * opened.seconds / opened.ticks, opened.grasps);
     std::printf("  force: RMS %.3g mN (surgeons: expert 8.97, novice 17.16), peak %.3g mN, %.0f degrees off the tear\n",
                 1e3 * opened.rms(), 1e3 * opened.peak(), 180 / std::numbers::pi * opened.angle());
     std::printf("  the tear took %.3f of toughness * thickness * length\n", opened.torn / (resistance * opened.length));
