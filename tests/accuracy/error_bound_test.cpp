@@ -160,7 +160,7 @@ TEST_CASE("no vertex and no reaction is farther from the equilibrium than the bo
     };
     for (const Part& part : {Part{2, 1880}, Part{3, 140}, Part{4, 8}}) {
         Sphere sphere(part.subdivisions);
-        for (int i = 1; i <= cases((part.count + 3) / 4, part.count); ++i) {
+        for (int i = 1; i <= cases((part.count + 9) / 10, part.count); ++i) {
             const auto seed = static_cast<std::uint64_t>(10'000 * part.subdivisions + i);
             CAPTURE(seed);
             test::Random random(seed);

@@ -182,13 +182,11 @@ TEST_CASE("with nothing else free the slope is the vertex's own stiffness", "[ta
     CHECK((dense(found.stiffness) - expected).norm() < 1e-6);
 }
 
-#define CHECK_NAME(status) CHECK(to_string(membrane::TangentStatus::status) == #status)
-
 TEST_CASE("a status of a tangent has the name that it has in a program", "[tangent]") {
-    CHECK_NAME(found);
-    CHECK_NAME(not_stable);
-    CHECK_NAME(not_converged);
-    CHECK_NAME(contact);
-    CHECK_NAME(unsupported);
-    CHECK_NAME(invalid_input);
+    CHECK(to_string(membrane::TangentStatus::found) == "found");
+    CHECK(to_string(membrane::TangentStatus::not_stable) == "not_stable");
+    CHECK(to_string(membrane::TangentStatus::not_converged) == "not_converged");
+    CHECK(to_string(membrane::TangentStatus::contact) == "contact");
+    CHECK(to_string(membrane::TangentStatus::unsupported) == "unsupported");
+    CHECK(to_string(membrane::TangentStatus::invalid_input) == "invalid_input");
 }

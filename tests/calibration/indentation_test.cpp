@@ -150,8 +150,9 @@ TEST_CASE("Depths may come in any order and repeat, and without touch there is n
 }
 
 TEST_CASE("A tool that goes on from a deep indentation is still in contact") {
+    const int count = cases(20, 60);
     int found = 0;
-    for (int seed = 1; seed <= 60; ++seed) {
+    for (int seed = 1; seed <= count; ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const auto mesh = sphere(2);
@@ -164,7 +165,7 @@ TEST_CASE("A tool that goes on from a deep indentation is still in contact") {
         CHECK(forces[1] > 0);
         ++found;
     }
-    CHECK(found > 50);
+    CHECK(found > 5 * count / 6);
 }
 
 TEST_CASE("All stiffnesses times a factor make the force of an indentation times it, in float too") {

@@ -130,13 +130,13 @@ auto parts_of(VariedLoop<S, Rule>& loop) {
 
 }  // namespace
 
-TEMPLATE_TEST_CASE("a loop restored from a snapshot goes on with the same bits", "[snapshot]", double, float) {
+TEMPLATE_TEST_CASE("a loop restored from a snapshot goes on with the same bits", "[snapshot]", TEST_SCALARS) {
     for (int seed = 1; seed <= cases(20); ++seed) check_resumes<test::WholeLoop<TestType>>(seed);
     for (int seed = 1; seed <= cases(10); ++seed) check_resumes<test::OddLoop<TestType>>(seed);
     for (int seed = 1; seed <= cases(10); ++seed) check_resumes<test::HapticLoop<TestType>>(seed);
 }
 
-TEMPLATE_TEST_CASE("so does a loop with any options of the step", "[snapshot]", double, float) {
+TEMPLATE_TEST_CASE("so does a loop with any options of the step", "[snapshot]", TEST_SCALARS) {
     for (int seed = 1; seed <= cases(40); ++seed) {
         check_resumes<VariedLoop<TestType, BlockStep>>(seed);
         if (seed % 4 == 0) check_resumes<VariedLoop<TestType, SafeStep>>(seed);

@@ -637,7 +637,7 @@ TEST_CASE_METHOD(Touched, "pages: snapshot") {
 
 TEST_CASE("pages: meshes from formulas") {
     // [distmesh]
-    const auto lens = membrane::distmesh(membrane::Ellipsoid{.radii = {4.5e-3, 4.5e-3, 2e-3}}, {.edge_length = 0.3e-3});
+    const auto lens = membrane::distmesh(membrane::Ellipsoid{.radii = {4.5e-3, 4.5e-3, 2e-3}}, {.edge_length = 0.6e-3});
     const auto front = membrane::trimmed(membrane::Ball{.radius = 8e-3}, membrane::HalfSpace{.point = {0, 0, -5e-3}});
     const auto cornea = membrane::distmesh(front, {.edge_length = 0.8e-3});  // with a border
     const auto torus = [](const Eigen::Vector3d& p) {                        // or any function of your own

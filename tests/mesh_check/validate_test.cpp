@@ -530,7 +530,7 @@ TEMPLATE_TEST_CASE("garbage ends in a report", "[mesh][bad]", TEST_SCALARS) {
 
 TEMPLATE_TEST_CASE("a fan all pairs of which meet is tested in part, and taken", "[mesh]", TEST_SCALARS) {
     using S = TestType;
-    for (int seed = 1; seed <= variants; ++seed) {  // row 40
+    for (int seed = 1; seed <= cases(3, variants); ++seed) {  // row 40
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         Surface<S> fan = test::shuffled(test::fan<S>(100'000 + random.index(1000)), random);

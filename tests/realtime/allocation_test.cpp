@@ -189,9 +189,8 @@ TEMPLATE_TEST_CASE("nor do bounds of the error and slopes of the force", "[alloc
     CHECK(found > 0);
 }
 
-TEMPLATE_TEST_CASE("copied and moved parts run on to the same bits, and allocate nothing", "[allocation]",
-                   (test::WholeLoop<double>), (test::OddLoop<double>), (test::WholeLoop<float>),
-                   (test::OddLoop<float>)) {
+TEMPLATE_PRODUCT_TEST_CASE("copied and moved parts run on to the same bits, and allocate nothing", "[allocation]",
+                           (test::WholeLoop, test::OddLoop), (TEST_SCALARS)) {
     TestType original(4);
     bool same = true;
     for (const int before : {0, 1, 150, 2000}) {  // at rest, in the air, in contact

@@ -97,7 +97,7 @@ TEST_CASE("neither a recorder, full or not, nor a replay calls the system", "[sy
     CHECK(child.code == 0);
 }
 
-TEMPLATE_TEST_CASE("nor do the ticks of other loops", "[system_call]", (test::WholeLoop<float>),
-                   (test::OddLoop<double>), (test::OddLoop<float>)) {
+TEMPLATE_PRODUCT_TEST_CASE("nor do the ticks of other loops", "[system_call]", (test::WholeLoop, test::OddLoop),
+                           (TEST_SCALARS)) {
     check_without_system_calls<TestType>(cases(5'000));
 }

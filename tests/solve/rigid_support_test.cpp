@@ -254,7 +254,7 @@ TEST_CASE("nor does it jump over a pin, or a vertex that is held, in whatever or
 TEST_CASE("beside a rim a tool that stands still feels a force that does, however the solver predicts") {
     // At some places beside a rim there are two states of rest, and the path decides between them.
     int places = 0, with_two_states = 0;
-    for (double y = 0.0085; y < 0.0104; y += 5e-5) {
+    for (double y = 0.0085; y < 0.0104; y += in_full() ? 5e-5 : 2e-4) {
         double forces[2];
         for (const bool predict : {false, true}) {
             CAPTURE(y, predict);
@@ -273,8 +273,8 @@ TEST_CASE("beside a rim a tool that stands still feels a force that does, howeve
         if (!(std::abs(forces[0] - forces[1]) < 1e-3 * forces[0])) ++with_two_states;
         CHECK(std::abs(forces[0] - forces[1]) < 1e-2 * forces[0]);
     }
-    CHECK(with_two_states <= 2);
-    CHECK(places >= 35);
+    CHECK(with_two_states <= (places + 9) / 19);
+    CHECK(places >= 9);
 }
 
 TEST_CASE("far from what is fixed its stiffness changes nothing, to the bit") {

@@ -112,9 +112,9 @@ TEST_CASE("a criterion sees the largest principal tension around the tip, in the
 
 // Closed form: a strip in pure shear releases its energy density times its height.
 TEST_CASE("a tear in pure shear begins at the right stretch, on any grid, and runs straight", "[tear]") {
-    const int directions = cases(3, 20), edges = in_full() ? 20 : 10;
+    const int directions = cases(2, 20), edges = in_full() ? 20 : 6;
     for (int i = 0; i < directions; ++i) {
-        const double turn = 60.0 * i / (std::max)(directions - 1, 1);
+        const double turn = 60.0 * i / (in_full() ? directions - 1 : 3);
         CAPTURE(turn);
         TornStrip<double> strip({.columns = 48, .turn = turn * degree});
         double off_line = 0;
@@ -172,6 +172,7 @@ TEMPLATE_TEST_CASE("the driving force is what two equilibria, before and after a
     for (const Case& scene :
          {Case{40, 16, false, 1.2, 0}, Case{40, 16, true, 1.1, 0}, Case{24, 16, false, 1.2, 0},
           Case{24, 4, false, 1.2, 0}, Case{30, 14, false, 1.15, 3e-3}, Case{30, 14, true, 1.1, 3e-3}}) {
+        if (!in_full() && scene.columns == 40) continue;  // fine
         CAPTURE(scene.columns, scene.notch, scene.springs, scene.stretch, scene.drawn);
         struct State {
             double energy, tip, force;
@@ -206,7 +207,7 @@ TEMPLATE_TEST_CASE("what the clamps give is stored, or taken by the tear and a f
         double drag, turn;
     };
     for (const auto& [drag, turn] : {Case{1e-2, 0}, Case{3e-2, 17}, Case{1e-1, 40}}) {
-        if (cases_are_slow && turn != 17) continue;
+        if (!in_full() && turn != 17) continue;
         CAPTURE(turn, drag);
         TornStrip<TestType> strip({.turn = turn * degree, .drag = drag});
         strip.cut();
@@ -994,13 +995,11 @@ TEST_CASE("a cut that is none says why", "[tear]") {
     CHECK(status(1, {10, 11, 12, 13}) == CutStatus::reserve_too_small);
 }
 
-#define CHECK_NAME(status) CHECK(to_string(membrane::CutStatus::status) == #status)
-
 TEST_CASE("a status of a cut has the name that it has in a program", "[tear]") {
-    CHECK_NAME(cut);
-    CHECK_NAME(no_path);
-    CHECK_NAME(not_joined);
-    CHECK_NAME(crosses_border);
-    CHECK_NAME(one_edge_within);
-    CHECK_NAME(reserve_too_small);
+    CHECK(to_string(membrane::CutStatus::cut) == "cut");
+    CHECK(to_string(membrane::CutStatus::no_path) == "no_path");
+    CHECK(to_string(membrane::CutStatus::not_joined) == "not_joined");
+    CHECK(to_string(membrane::CutStatus::crosses_border) == "crosses_border");
+    CHECK(to_string(membrane::CutStatus::one_edge_within) == "one_edge_within");
+    CHECK(to_string(membrane::CutStatus::reserve_too_small) == "reserve_too_small");
 }
