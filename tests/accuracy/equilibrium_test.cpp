@@ -676,6 +676,24 @@ TEST_CASE("equilibrium under a tool that presses the pole of an icosphere conver
     }
 }
 
+TEST_CASE("equilibrium takes as many iterations on a fine mesh as on a coarse one", "[equilibrium]") {
+    for (const Index subdivisions : {2, 3, 4}) {
+        CAPTURE(subdivisions);
+        const auto mesh = icosphere({.radius = 10e-3, .subdivisions = subdivisions});
+        const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
+        const VirtualVolumeSprings foundation(mesh, {.stiffness = 8.0});
+        Tool<double> tool{.position = {0, 0, 12.5e-3}, .radius = 2e-3};
+        AabbTree tree(mesh);
+        ContactTracker tracker(mesh);
+        (void)tracker.update(tree, mesh.positions(), tool);
+        tool.position.z() = 11.4e-3;
+        const auto contact = tracker.update(tree, mesh.positions(), tool);
+        const auto rest = equilibrium(mesh.positions(), mesh, network, foundation, {}, press(tool, contact));
+        REQUIRE(rest.converged);
+        CHECK(rest.iterations <= 8);
+    }
+}
+
 TEST_CASE("equilibrium refuses what does not fit together", "[equilibrium]") {
     const Sphere sphere(0.3, 1), other(0.3, 0);
     const auto refused = [&](const auto& x, const auto& mesh, const auto& network, const auto& foundation) {

@@ -3,14 +3,14 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <optional>
 #include <utility>
 #include <vector>
 
-#include <Eigen/Cholesky>
-#include <Eigen/SparseCholesky>
-
-#include <membrane/core/types.hpp>
+#include <membrane/accuracy/block_cholesky.hpp>
 
 /// The linear problem of one Newton step under constraints.
 ///
@@ -37,7 +37,7 @@ struct NewtonStep {
 };
 
 /// Minimises s.Hs / 2 - F.s over the steps s of the free vertices, under the rows [Nocedal06] 16, 18. H is sparse; the
-/// multipliers come from the dual problem, whose size is the number of active rows.
+/// multipliers come from the dual problem, whose size is the number of rows.
 class NewtonSystem {
   public:
     /// A system in which the vertices with a nonzero entry of `fixed` are fixed.
@@ -56,34 +56,28 @@ class NewtonSystem {
     void add(const ConstraintRow& row);
 
     /// If H is not positive definite, it is shifted until it is; `scale` is a typical stiffness in H. A row without
-    /// free vertices is ignored. Cost: a factorisation of H, and a solve for each active row.
+    /// free vertices is ignored. Cost: a factorisation of H, a solution with its factors, and for each row half a
+    /// solution with a small part of them.
     [[nodiscard]] NewtonStep solve(double scale);
 
   private:
-    using Triplet = Eigen::Triplet<double>;
-    using Sparse = Eigen::SparseMatrix<double>;
-
-    [[nodiscard]] Eigen::Index at(Index v) const noexcept { return slots_[static_cast<std::size_t>(v)]; }
+    struct Link {  // of two free vertices with a block of H
+        Index first, second;
+    };
+    [[nodiscard]] Index at(Index v) const noexcept { return slots_[static_cast<std::size_t>(v)]; }
     [[nodiscard]] bool is_free(Index v) const noexcept { return at(v) >= 0; }
     void put(Index i, Index j, const Eigen::Matrix3d& block);
     void factorise(double scale);
-    [[nodiscard]] std::vector<std::size_t> expected() const;
-    [[nodiscard]] std::vector<std::size_t> violated(const Eigen::VectorXd& step,
-                                                    const std::vector<std::size_t>& active) const;
-    void extend(Eigen::MatrixXd& responses, const std::vector<std::size_t>& rows) const;
-    [[nodiscard]] Eigen::VectorXd multipliers_of(const std::vector<std::size_t>& active,
-                                                 const Eigen::MatrixXd& responses, const Eigen::VectorXd& alone) const;
-    [[nodiscard]] double change(const ConstraintRow& row, const Eigen::Ref<const Eigen::VectorXd>& step) const;
-    [[nodiscard]] bool can_change(const ConstraintRow& row) const noexcept;
+    void add_multipliers(Eigen::VectorXd& step, Eigen::VectorXd& multipliers) const;
 
-    std::vector<Eigen::Index> slots_;  // of each free vertex, its first row; -1 for the others
-    Eigen::Index size_ = 0;
-    Points<double> prescribed_;
-    std::vector<Triplet> triplets_;
-    Eigen::VectorXd force_;
+    std::vector<Index> slots_;  // of each free vertex, its number; -1 for the others
+    std::vector<std::vector<std::pair<Index, std::size_t>>> links_of_;  // of each free vertex, to those before
+    std::vector<Link> links_;
+    std::vector<Eigen::Matrix3d> diagonal_, linked_;  // H
+    Points<double> prescribed_, force_;
     std::vector<ConstraintRow> rows_;
-    Eigen::SimplicialLDLT<Sparse> factors_;
-    double shift_ = 0;  // of the last step that needed one
+    std::optional<BlockCholesky> factors_;  // for these links
+    double shift_ = 0;                      // of the last step that needed one
 };
 
 /// Minimises y.Wy / 2 + q.y over y with y >= 0 except for `equality`; W is the `coupling`, positive semidefinite
@@ -92,40 +86,46 @@ class NewtonSystem {
                                                            const std::vector<unsigned char>& equality);
 
 inline NewtonSystem::NewtonSystem(const std::vector<unsigned char>& fixed) {
-    for (const auto is_fixed : fixed) {
-        slots_.push_back(is_fixed != 0 ? -1 : size_);
-        if (is_fixed == 0) size_ += 3;
-    }
+    Index free = 0;
+    for (const auto is_fixed : fixed) slots_.push_back(is_fixed != 0 ? -1 : free++);
+    links_of_.resize(static_cast<std::size_t>(free));
+    diagonal_.resize(links_of_.size());
 }
 
 inline void NewtonSystem::open(const Points<double>& prescribed) {
     prescribed_ = prescribed;
-    triplets_.clear();
+    std::fill(diagonal_.begin(), diagonal_.end(), Eigen::Matrix3d::Zero());
+    std::fill(linked_.begin(), linked_.end(), Eigen::Matrix3d::Zero());
     rows_.clear();
-    force_.setZero(size_);
+    force_.setZero(3, static_cast<Eigen::Index>(diagonal_.size()));
 }
 
 inline void NewtonSystem::add(Index i, Index j, const Eigen::Matrix3d& block) {
-    put(i, j, block);
-    if (i != j) put(j, i, block.transpose());
+    if (is_free(i) && is_free(j))
+        return at(i) < at(j) ? put(at(j), at(i), block.transpose()) : put(at(i), at(j), block);
+    if (is_free(i)) force_.col(at(i)) -= block * prescribed_.col(j);
+    if (is_free(j)) force_.col(at(j)) -= block.transpose() * prescribed_.col(i);
 }
 
+// The lower triangle is enough.
 inline void NewtonSystem::put(Index i, Index j, const Eigen::Matrix3d& block) {
-    if (!is_free(i)) return;
-    if (!is_free(j)) {
-        force_.segment<3>(at(i)) -= block * prescribed_.col(j);
+    if (i == j) {
+        diagonal_[static_cast<std::size_t>(i)] += block;
         return;
     }
-    if (at(i) < at(j)) return;  // the lower triangle is enough
-    for (Eigen::Index column = 0; column < 3; ++column) {
-        for (Eigen::Index row = 0; row < 3; ++row) {
-            triplets_.emplace_back(at(i) + row, at(j) + column, block(row, column));
-        }
+    auto& known = links_of_[static_cast<std::size_t>(i)];
+    auto link = std::find_if(known.begin(), known.end(), [&](const auto& other) { return other.first == j; });
+    if (link == known.end()) {
+        link = known.emplace(link, j, links_.size());
+        links_.push_back({i, j});
+        linked_.push_back(Eigen::Matrix3d::Zero());
+        factors_.reset();
     }
+    linked_[link->second] += block;
 }
 
 inline void NewtonSystem::add_force(Index v, const Vector3<double>& force) {
-    if (is_free(v)) force_.segment<3>(at(v)) += force;
+    if (is_free(v)) force_.col(at(v)) += force;
 }
 
 inline void NewtonSystem::add(const ConstraintRow& row) {
@@ -144,161 +144,131 @@ inline void NewtonSystem::add(const ConstraintRow& row) {
 
 // [Nocedal06] 3.4, algorithm 3.3. A barely positive pivot, as of a membrane free to rotate, counts as not positive.
 inline void NewtonSystem::factorise(double scale) {
-    Sparse matrix(size_, size_);
-    matrix.setFromTriplets(triplets_.begin(), triplets_.end());
-    const auto is_definite = [&] {
-        const bool succeeded = factors_.info() == Eigen::ComputationInfo{};  // Eigen::Success, a macro in Xlib.h
-        return succeeded && factors_.vectorD().minCoeff() > 1e-12 * scale;
-    };
-    factors_.setShift(0);
-    factors_.compute(matrix);
-    if (is_definite()) return;
+    if (!factors_) factors_.emplace(static_cast<Index>(diagonal_.size()), links_);
+    factors_->open();
+    for (std::size_t i = 0; i < diagonal_.size(); ++i) factors_->add(static_cast<Index>(i), diagonal_[i]);
+    for (std::size_t i = 0; i < linked_.size(); ++i) factors_->subtract(i, -linked_[i]);
+    if (factors_->factorise(0, 1e-12 * scale)) return;
     shift_ = (std::max)(shift_ / 16, 1e-9 * scale);
-    for (; shift_ < 1e12 * scale; shift_ *= 4) {
-        factors_.setShift(shift_);
-        factors_.factorize(matrix);
-        if (is_definite()) return;
-    }
+    while (!factors_->factorise(shift_, 1e-12 * scale) && shift_ < 1e12 * scale) shift_ *= 4;
 }
 
 inline NewtonStep NewtonSystem::solve(double scale) {
     NewtonStep result{prescribed_, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(rows_.size()))};
-    if (size_ == 0) return result;
+    if (diagonal_.empty()) return result;
     factorise(scale);
-    const Eigen::VectorXd alone = factors_.solve(force_);
-    Eigen::VectorXd step = alone, multipliers;
-    std::vector<std::size_t> active;      // rows
-    Eigen::MatrixXd responses(size_, 0);  // of the step to each multiplier
-    auto next = expected();
-    if (next.empty()) next = violated(step, active);
-    for (; !next.empty(); next = violated(step, active)) {
-        active.insert(active.end(), next.begin(), next.end());
-        extend(responses, next);
-        multipliers = multipliers_of(active, responses, alone);
-        step = alone + responses * multipliers;
-    }
-    for (std::size_t k = 0; k < active.size(); ++k) {
-        result.multipliers[static_cast<Eigen::Index>(active[k])] = multipliers[static_cast<Eigen::Index>(k)];
-    }
+    Eigen::VectorXd step(force_.size());
+    const auto row = [&](Index v) { return static_cast<Eigen::Index>(3 * factors_->rank(at(v))); };
     for (Index v = 0; v < static_cast<Index>(slots_.size()); ++v) {
-        if (is_free(v)) result.step.col(v) = step.segment<3>(at(v));
+        if (is_free(v)) step.segment<3>(row(v)) = force_.col(at(v));
+    }
+    factors_->solve_lower(step);
+    if (!rows_.empty()) add_multipliers(step, result.multipliers);
+    factors_->solve_upper(step);
+    for (Index v = 0; v < static_cast<Index>(slots_.size()); ++v) {
+        if (is_free(v)) result.step.col(v) = step.segment<3>(row(v));
     }
     return result;
 }
 
-/// Rows that are likely to have a multiplier.
-inline std::vector<std::size_t> NewtonSystem::expected() const {
-    std::vector<std::size_t> found;
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-        if (rows_[i].equality || rows_[i].stiffening > 0) found.push_back(i);
-    }
-    return found;
-}
-
-/// The most violated inactive row, and those at least half as violated.
-inline std::vector<std::size_t> NewtonSystem::violated(const Eigen::VectorXd& step,
-                                                       const std::vector<std::size_t>& active) const {
-    std::vector<double> after(rows_.size());
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-        after[i] = can_change(rows_[i]) ? rows_[i].value + change(rows_[i], step) : 0;
-    }
-    for (const std::size_t i : active) after[i] = 0;
-    double worst = 0;
-    for (const double value : after) worst = (std::min)(worst, value);
-    std::vector<std::size_t> found;
-    if (!(worst < -1e-14 * step.lpNorm<Eigen::Infinity>())) return found;
-    for (std::size_t i = 0; i < rows_.size(); ++i) {
-        if (after[i] <= worst / 2) found.push_back(i);
-    }
-    return found;
-}
-
-inline void NewtonSystem::extend(Eigen::MatrixXd& responses, const std::vector<std::size_t>& rows) const {
-    Eigen::MatrixXd gradients = Eigen::MatrixXd::Zero(size_, static_cast<Eigen::Index>(rows.size()));
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-        const auto& row = rows_[rows[i]];
-        for (std::size_t k = 0; k < 3; ++k) {
-            if (!is_free(row.vertices[k])) continue;
-            gradients.col(static_cast<Eigen::Index>(i)).segment<3>(at(row.vertices[k])) += row.gradient[k];
+// Computes the multipliers, and adds what they change to `step`, L^-1 F. With the gradients G and Y = L^-1 G^T, the
+// matrix of the dual problem, G H^-1 G^T, is Y^T Y.
+inline void NewtonSystem::add_multipliers(Eigen::VectorXd& step, Eigen::VectorXd& multipliers) const {
+    std::vector<Index> vertices;
+    for (const auto& row : rows_) {
+        for (const Index v : row.vertices) {
+            if (is_free(v)) vertices.push_back(at(v));
         }
     }
-    const Eigen::Index before = responses.cols();
-    responses.conservativeResize(Eigen::NoChange, before + gradients.cols());
-    responses.rightCols(gradients.cols()) = factors_.solve(gradients);
-}
-
-inline Eigen::VectorXd NewtonSystem::multipliers_of(const std::vector<std::size_t>& active,
-                                                    const Eigen::MatrixXd& responses,
-                                                    const Eigen::VectorXd& alone) const {
-    Eigen::MatrixXd coupling(responses.cols(), responses.cols());
-    Eigen::VectorXd q(responses.cols());
+    const auto ranks = factors_->affected(vertices);
+    const auto rows = static_cast<Eigen::Index>(3 * ranks.size());
+    Eigen::MatrixXd responses = Eigen::MatrixXd::Zero(rows, multipliers.size());
+    Eigen::VectorXd alone(rows), values(multipliers.size());
+    for (std::size_t i = 0; i < ranks.size(); ++i) {
+        alone.segment<3>(static_cast<Eigen::Index>(3 * i)) = step.segment<3>(static_cast<Eigen::Index>(3 * ranks[i]));
+    }
     std::vector<unsigned char> equality;
-    for (Eigen::Index i = 0; i < q.size(); ++i) {
-        const auto& row = rows_[active[static_cast<std::size_t>(i)]];
-        for (Eigen::Index j = 0; j < q.size(); ++j) coupling(i, j) = change(row, responses.col(j));
-        q[i] = can_change(row) ? row.value + change(row, alone) : 0;
+    for (Eigen::Index r = 0; r < values.size(); ++r) {
+        const auto& row = rows_[static_cast<std::size_t>(r)];
+        for (std::size_t k = 0; k < 3; ++k) {
+            if (!is_free(row.vertices[k])) continue;
+            const auto place = std::lower_bound(ranks.begin(), ranks.end(), factors_->rank(at(row.vertices[k])));
+            responses.col(r).segment<3>(3 * (place - ranks.begin())) += row.gradient[k];
+        }
+        values[r] = responses.col(r).isZero(0) ? 0 : row.value;
         equality.push_back(row.equality ? 1 : 0);
     }
-    return estimated_multipliers((coupling + coupling.transpose()) / 2, q, equality);
-}
-
-inline double NewtonSystem::change(const ConstraintRow& row, const Eigen::Ref<const Eigen::VectorXd>& step) const {
-    double sum = 0;
-    for (std::size_t k = 0; k < 3; ++k) {
-        if (is_free(row.vertices[k])) sum += dot<double>(row.gradient[k], step.segment<3>(at(row.vertices[k])));
+    factors_->solve_lower(responses, ranks);
+    multipliers =
+        estimated_multipliers(responses.transpose() * responses, values + responses.transpose() * alone, equality);
+    alone += responses * multipliers;
+    for (std::size_t i = 0; i < ranks.size(); ++i) {
+        step.segment<3>(static_cast<Eigen::Index>(3 * ranks[i])) = alone.segment<3>(static_cast<Eigen::Index>(3 * i));
     }
-    return sum;
 }
 
-inline bool NewtonSystem::can_change(const ConstraintRow& row) const noexcept {
-    for (std::size_t k = 0; k < 3; ++k) {
-        if (is_free(row.vertices[k]) && !row.gradient[k].isZero(0)) return true;
-    }
-    return false;
-}
-
-namespace detail {
-
-/// Minimises y.Wy / 2 + q.y over the y that are zero where `active` is 0.
-[[nodiscard]] inline Eigen::VectorXd min_over_active(Eigen::MatrixXd coupling, Eigen::VectorXd q,
-                                                     const Eigen::VectorXd& active) {
-    for (Eigen::Index i = 0; i < q.size(); ++i) {
-        if (active[i] != 0) continue;
-        coupling.row(i).setZero();
-        coupling.col(i).setZero();
-        coupling(i, i) = 1;
-        q[i] = 0;
-    }
-    return -coupling.ldlt().solve(q);
-}
-
-}  // namespace detail
-
+// An active y may be nonzero. L is the Cholesky factor of the active rows and columns of W.
 inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
                                              const std::vector<unsigned char>& equality) {
     const double slack = 1e-15 * q.lpNorm<Eigen::Infinity>();
     Eigen::VectorXd y = Eigen::VectorXd::Zero(q.size());
-    Eigen::VectorXd active(q.size());  // 1, or 0 where y stays zero
-    for (Eigen::Index i = 0; i < q.size(); ++i) active[i] = equality[static_cast<std::size_t>(i)] != 0 ? 1 : 0;
+    std::vector<Eigen::Index> active;
+    Eigen::MatrixXd lower(q.size(), q.size());
+    const auto activate = [&](Eigen::Index i) {  // false if the row depends on the active ones
+        const Eigen::Index count = std::ssize(active);
+        Eigen::VectorXd row = coupling(active, i);
+        lower.topLeftCorner(count, count).triangularView<Eigen::Lower>().solveInPlace(row);
+        const double pivot = coupling(i, i) - row.squaredNorm();
+        if (!(pivot > 1e-14 * coupling(i, i))) return false;
+        lower.row(count).head(count) = row.transpose();
+        lower(count, count) = std::sqrt(pivot);
+        active.push_back(i);
+        return true;
+    };
+    const auto is_equality = [&](Eigen::Index i) { return equality[static_cast<std::size_t>(i)] != 0; };
+    for (Eigen::Index i = 0; i < q.size(); ++i) {
+        if (is_equality(i)) activate(i);
+    }
+    std::vector<unsigned char> tried = equality;  // active, or of no use at this y
     for (Eigen::Index round = 0; round < 10 * (q.size() + 1); ++round) {
-        const Eigen::VectorXd best = detail::min_over_active(coupling, q, active);
+        const auto factor = lower.topLeftCorner(std::ssize(active), std::ssize(active));
+        Eigen::VectorXd best = -q(active);
+        factor.triangularView<Eigen::Lower>().solveInPlace(best);
+        factor.transpose().triangularView<Eigen::Upper>().solveInPlace(best);
+        const Eigen::VectorXd here = y(active);
         double part = 1;
-        Eigen::Index first = no_index;  // to become zero along the step
-        for (Eigen::Index i = 0; i < q.size(); ++i) {
-            if (equality[static_cast<std::size_t>(i)] != 0 || best[i] >= 0 || y[i] >= part * (y[i] - best[i])) continue;
-            part = y[i] / (y[i] - best[i]);
-            first = i;
+        Eigen::Index first = no_index;  // of the active ones, to become zero along the step
+        for (Eigen::Index a = 0; a < best.size(); ++a) {
+            if (is_equality(active[static_cast<std::size_t>(a)]) || best[a] >= 0) continue;
+            const double from = (std::max)(here[a], 0.0);
+            if (from >= part * (from - best[a])) continue;
+            part = from / (from - best[a]);
+            first = a;
         }
-        y += part * (best - y);
+        y(active) = first == no_index ? best : Eigen::VectorXd(here + part * (best - here));
+        if (y(active) != here) {
+            tried = equality;
+            for (const Eigen::Index i : active) tried[static_cast<std::size_t>(i)] = 1;
+        }
         if (first != no_index) {
-            y[first] = 0;
-            active[first] = 0;
+            auto kept = std::exchange(active, {});
+            y[kept[static_cast<std::size_t>(first)]] = 0;
+            kept.erase(kept.begin() + first);
+            for (const Eigen::Index i : kept) activate(i);
             continue;
         }
-        const Eigen::VectorXd slope = (coupling * y + q).array() * (1 - active.array());
-        Eigen::Index next = 0;
-        if (slope.minCoeff(&next) >= -slack) break;
-        active[next] = 1;
+        const Eigen::VectorXd slope = coupling * y + q;
+        Eigen::Index next = no_index;
+        do {
+            next = no_index;
+            for (Eigen::Index i = 0; i < slope.size(); ++i) {
+                if (tried[static_cast<std::size_t>(i)] != 0 || slope[i] >= (next == no_index ? -slack : slope[next]))
+                    continue;
+                next = i;
+            }
+            if (next == no_index) return y;
+            tried[static_cast<std::size_t>(next)] = 1;
+        } while (!activate(next));
     }
     return y;
 }
