@@ -2,6 +2,7 @@
 #include <membrane/solve/quasi_static.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -13,7 +14,9 @@
 #include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
+#include "support/cases.hpp"
 #include "support/catch.hpp"
+#include "support/contact_newton.hpp"
 #include "support/random.hpp"
 
 // Which vertices are pinned is the network's affair, and that of the network of the step alone.
@@ -162,4 +165,114 @@ TEST_CASE("a ball on a sphere beside pinned vertices comes to rest", "[pinned]")
         }
         CHECK(report.converged);
     }
+}
+
+namespace {
+
+/// A flat mesh with its rim and some vertices inside pinned, and a ball of an edge's radius that presses it from above.
+struct BallOnSheet {
+    const TriangleMesh<double>& flat;
+    double foundation_stiffness;  // [N/m]
+    std::vector<Index> pins;
+    SolverOptions<double> options;
+
+    MassSpringNetwork<double, LinearSpring> network{flat, LinearSpring{}, {.stiffness = 40.0, .pinned = pins}};
+    VirtualVolumeSprings<double> volume{flat, {.stiffness = foundation_stiffness}};
+    QuasiStaticSolver<double> solver{network, options};
+    double radius = mean_edge(flat);
+    Tool<double> tool{};
+    Points<double> x = flat.positions();
+
+    /// The last step after the ball has gone to `depth` below the mesh, and has waited for equilibrium.
+    StepReport<double> press_at(const Vector3<double>& at, double depth) {
+        AabbTree<double> tree(flat);
+        ContactTracker<double> tracker(flat);
+        StepReport<double> report;
+        for (int tick = 0; tick < 1500 && !(tick > 100 && report.converged); ++tick) {
+            const double down = depth * std::min(1.0, tick / 100.0);
+            tool = {.position = {at.x(), at.y(), radius - down}, .radius = radius};
+            report = solver.step(x, 1e-3, network, volume, press(tool, tracker.update(tree, x, tool)));
+            REQUIRE(report.status == StepStatus::advanced);
+            tree.refit(x, report.moved);
+        }
+        return report;
+    }
+
+    /// The largest sum of all forces on a free vertex [N].
+    double unbalanced() const {
+        Points<double> force(3, flat.vertex_count());
+        for (Index v = 0; v < flat.vertex_count(); ++v) {
+            const auto here = point(x, v);
+            force.col(v) = network.force_on(v, x).force + volume.force_on(v, here, here, 1.0).force;
+        }
+        for (const auto& contact : solver.contact_points(0)) {
+            for (std::size_t k = 0; k < 3; ++k)
+                force.col(contact.corners[k]) += contact.weights[static_cast<Index>(k)] * contact.force;
+        }
+        for (const Index v : pins) force.col(v).setZero();
+        return force.colwise().norm().maxCoeff();
+    }
+};
+
+/// The rim, the vertex in the middle, and every other vertex unless `one`.
+std::vector<Index> pins_of(const TriangleMesh<double>& flat, bool one) {
+    Index middle = 0;
+    flat.positions().colwise().norm().minCoeff(&middle);
+    std::vector<Index> pins = border(flat);
+    pins.push_back(middle);
+    for (Index v = middle % 2; v < flat.vertex_count() && !one; v += 2) pins.push_back(v);
+    std::sort(pins.begin(), pins.end());
+    pins.erase(std::unique(pins.begin(), pins.end()), pins.end());
+    return pins;
+}
+
+}  // namespace
+
+TEST_CASE("a ball on a sheet beside pinned vertices comes to rest", "[pinned]") {
+    const auto square = sheet<double>({.width = 0.02, .height = 0.02, .columns = 12, .rows = 12});
+    const auto round = disc<double>({.radius = 0.01, .rings = 7});
+    for (int seed = 1; seed <= cases(60, 1'000); ++seed) {
+        Random random(static_cast<std::uint64_t>(seed));
+        const bool one = random.chance(0.5), founded = random.chance(0.7);
+        const auto& flat = random.chance(0.5) ? square : round;
+        BallOnSheet scene{flat, founded ? 4.0 : 0.0, pins_of(flat, one), {.layers = unlimited}};
+        const auto at = random.vector(-0.7 * scene.radius, 0.7 * scene.radius);
+        const double depth = scene.radius * random.number(0.1, 1.0);
+        CAPTURE(seed, one, founded, depth / scene.radius);
+        const auto report = scene.press_at(at, depth);
+        // Without foundation a force may creep between nearly coincident points, long after the forces balance.
+        CHECK((report.converged || !founded));
+        CHECK(scene.unbalanced() < 1e-8);
+    }
+}
+
+TEST_CASE("beside a pin the forces are those of Newton's method", "[pinned]") {
+    const auto square = sheet<double>({.width = 0.02, .height = 0.02, .columns = 8, .rows = 8});
+    const auto pins = pins_of(square, true);
+    int at_the_pin = 0;
+    for (int seed = 1; seed <= cases(20, 200); ++seed) {
+        Random random(static_cast<std::uint64_t>(seed));
+        // A stiff support: for Newton's method a pin does not yield, and the ball must stay beside it.
+        BallOnSheet scene{square, 4.0, pins, {.layers = unlimited, .sweeps = 4, .rigid_stiffness = 1e8}};
+        const double beside = random.number(0.3, 1.5), turn = random.number(0.0, 6.3);  // [radii], [rad]
+        const Vector3<double> at = beside * scene.radius * Vector3<double>(std::cos(turn), std::sin(turn), 0);
+        const double lowest = beside < 1 ? 1 - std::sqrt(1 - beside * beside) : 1.0;
+        const double depth = 0.95 * scene.radius * lowest * random.number(0.2, 1.0);
+        CAPTURE(seed, beside, depth);
+        const auto report = scene.press_at(at, depth);
+        REQUIRE(report.converged);
+        const auto springs = scene.network.springs();
+        const test::PressedMembrane membrane{square.triangles(), {springs.begin(), springs.end()},
+                                             square.positions(), 4.0,
+                                             {scene.tool},       {pins.begin(), pins.end()}};
+        const auto newton = test::at_rest(membrane, scene.x, {.far = scene.radius / 2, .max_step = scene.radius / 4});
+        REQUIRE(newton.converged);
+        CHECK((report.reactions[0] - newton.reactions[0]).norm() < 1e-3 * newton.reactions[0].norm() + 1e-8);
+        for (const auto& contact : scene.solver.contact_points(0)) {
+            const auto is_pin = [&](Index v) { return v == square.vertex_count() / 2; };
+            at_the_pin +=
+                norm(contact.force) > 0 && std::any_of(contact.corners.begin(), contact.corners.end(), is_pin);
+        }
+    }
+    CHECK(at_the_pin > 0);
 }

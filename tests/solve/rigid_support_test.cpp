@@ -404,6 +404,24 @@ TEST_CASE("tools that overlap share the overlap: motion and forces are bounded, 
     }
 }
 
+TEST_CASE("tools that overlap and stand still come to rest") {
+    for (int seed = 1; seed <= cases(30, 1'000); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        PinnedSheet scene(random, 10 + random.index(14));
+        const Pinch pinch(random);
+        CAPTURE(pinch.overlap, pinch.rise);
+        ContactTracker<double> above(scene.mesh), below(scene.mesh);
+        StepReport<double> report;
+        for (int i = 0; i < 4000 && !(i > 150 && report.converged); ++i) {
+            const auto [a, b] = pinch.tools(std::min(1.0, i / 150.0));
+            const auto on_a = above.update(scene.tree, scene.x, a), on_b = below.update(scene.tree, scene.x, b);
+            report = scene.tick(press(a, on_a), press(b, on_b));
+        }
+        CHECK(report.converged);
+    }
+}
+
 TEST_CASE(
     "two equal balls that overlap on both sides of a vertex penetrate by half of the overlap, with opposite forces") {
     test::Random random(1);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -59,6 +60,7 @@ struct alignas(32) ContactPack {
     Load load;      ///< by the last pass
     Load applied;   ///< included in the rows of forces
     Wide distance;  ///< of the tool's axis from the points, along their normals [m]
+    Wide change;    ///< of the forces in the last pass, beside fixed or shared corners [N]
 
     Vector3<Wide> free;  ///< 1 for a corner that may move
     Wide side;           ///< of the points, see `ContactPoint::side`
@@ -133,7 +135,7 @@ void ContactPacks<Scalar>::begin_pack(ContactKind kind) noexcept {
     pack.load = {{1, 0, 0}, none, 0, none};  // unused lanes have valid numbers
     pack.applied = {none, none, 0, none};
     pack.free = none;
-    pack.distance = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
+    pack.distance = pack.change = pack.side = pack.end = pack.listed = pack.used = Scalar(0);
     for (auto& begins : pack.corner) begins.fill(unused_row_);
     pack.point.fill(no_index);
     pack.turn.fill(0);
@@ -209,9 +211,12 @@ void ContactPacks<Scalar>::append(std::span<const ContactPoint<Scalar>> points, 
 template <Real Scalar>
 void ContactPacks<Scalar>::set_on_fixed(std::span<const ContactPoint<Scalar>> points) noexcept {
     for (auto& pack : items()) {
-        for (std::size_t i = 0; i < pack.size; ++i) {
-            pack.on_fixed = pack.on_fixed || points[static_cast<std::size_t>(pack.point[i])].on_fixed;
-        }
+        const auto members = std::span(pack.point).first(pack.size);
+        const auto is_on_fixed = [&](Index i) { return points[static_cast<std::size_t>(i)].on_fixed; };
+        if (pack.on_fixed || std::none_of(members.begin(), members.end(), is_on_fixed)) continue;
+        pack.on_fixed = true;
+        // What has been added along the normal stays until the step ends.
+        pack.applied.stiffness = Vector3<Lanes<Scalar>>(0, 0, 0);
     }
 }
 

@@ -201,7 +201,13 @@ MEMBRANE_INLINE void locate(const ContactTool<Scalar>& tool, const std::array<Pa
     }
 }
 
-/// Adds the change of a pack's forces since they were last applied to the rows of forces.
+// The corners of a triangle are updated under the same contact force: rocking together, they are at most twice as stiff
+// as each alone, if no angle is obtuse.
+inline constexpr int corners_at_once = 2;
+
+/// Adds the change of a pack's forces since they were last applied to the rows of forces, and that of its rocking
+/// stiffness: along the total force on a corner; beside fixed or shared corners in all directions. There a point may
+/// press hard with little weight on its free corners, and other points set the direction of the total force on them.
 template <Real Scalar>
 MEMBRANE_INLINE void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& pack) noexcept {
     using Wide = Lanes<Scalar>;
@@ -213,9 +219,14 @@ MEMBRANE_INLINE void add_forces(StepState<Scalar>& state, ContactPack<Scalar>& p
         const Vector3<Wide> change = before * applied.normal - now * load.normal;
         Wide& contact_stiffness = row.extra;
         row.point += change;
-        contact_stiffness += load.stiffness[i] - applied.stiffness[i];
+        const Wide stiffer = load.stiffness[i] - applied.stiffness[i];
+        if (!pack.on_fixed) contact_stiffness += stiffer;
         scatter_padded(row, state.force.data(), pack.corner[k].data());
         if (!pack.on_fixed) return;
+        for (std::size_t lane = 0; lane < Wide::count; ++lane) {
+            const auto v = static_cast<std::size_t>(pack.corner[k][lane] / numbers_in_point);
+            state.added_stiffness[v] += corners_at_once * stiffer[lane];
+        }
         auto support = gather_padded(state.support.data(), pack.corner[k].data());
         support.point += change;
         scatter_padded(support, state.support.data(), pack.corner[k].data());
@@ -334,6 +345,9 @@ MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lan
     const auto moves = acts & (response.compliance > 0);
     const Wide divisor = select<Wide>(moves, response.compliance, 1);
     Wide change = larger<Wide>(-gap / divisor, -pack.load.force);
+    // The response leaves out that a rocking triangle shifts the force between supports: it may be too small. If the
+    // changes alternate, they are halved.
+    if (pack.on_fixed) change = select<Wide>(change * pack.change < 0, change / 2, change);
     // At equilibrium the contact force balances the internal force at the corners, now or once the gap is closed. If a
     // force is much larger, a tool has jumped to the wrong side of some points, and they press against one another.
     const Wide limit = 8 * (response.internal_force + abs(gap) * response.internal_stiffness);
@@ -343,6 +357,7 @@ MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lan
     const auto counts = moves & (abs(change) * response.compliance > tolerance);
     if (!any(counts)) return 0;
     change = select<Wide>(counts, change, 0);
+    pack.change = change;
     pack.load.force += change;
     each_corner([&](std::size_t k) {
         corner[k].point -= change * response.of_corner[k];

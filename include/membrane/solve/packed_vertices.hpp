@@ -205,6 +205,7 @@ class PackedVertices {
     // State of a pack before its update.
     struct PackState {
         Vector3<Wide> here, constraint_force;
+        Wide added_stiffness;
         VertexState<Wide> vertex;
         VertexForce<Wide> others;
     };
@@ -436,7 +437,7 @@ MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const 
     scatter_padded<Scalar>({{kept(block.xx), kept(block.yy), kept(block.zz)}, kept(block.xy)}, rows.response.data(),
                            begins.data());
     const Wide internal_force = norm<Wide>(at.vertex.force - at.constraint_force);
-    const Wide internal_stiffness = at.vertex.stiffness - at.vertex.contact_stiffness;
+    const Wide internal_stiffness = at.vertex.stiffness - at.vertex.contact_stiffness - at.added_stiffness;
     scatter_padded<Scalar>({{kept(block.xz), kept(block.yz), kept(internal_force)}, kept(internal_stiffness)},
                            rows.response.data() + 1, begins.data());
 }
@@ -462,9 +463,9 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
         at.constraint_force = of_constraints.point;
         at.vertex.contact_stiffness = larger<Wide>(of_constraints.extra, 0);
         at.vertex.contact_normal = direction_or_zero<Wide>(at.constraint_force);
-        const auto in_all_directions = Wide::of(
+        at.added_stiffness = Wide::of(
             [&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(own[i] / numbers_in_point)]; });
-        at.others = {at.constraint_force, at.vertex.contact_stiffness + in_all_directions};
+        at.others = {at.constraint_force, at.vertex.contact_stiffness + at.added_stiffness};
     }
     add_others<in_contact>(p, at.here, scene, at.others);
     at.vertex.force += at.others.force;

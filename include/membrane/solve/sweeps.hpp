@@ -303,8 +303,9 @@ struct Sweeps {
         }
         state.set_compliance(v, as_block<Scalar>(move.compliance), move.least);
         if (vertex.constrained) {
-            state.set_internal(v, norm<Scalar>(vertex.force - state.constraint_force(v)),
-                               vertex.stiffness - vertex.contact_stiffness);
+            state.set_internal(
+                v, norm<Scalar>(vertex.force - state.constraint_force(v)),
+                vertex.stiffness - vertex.contact_stiffness - state.added_stiffness[static_cast<std::size_t>(v)]);
         }
         if (!move.moves) return false;
         state.set_position(v, point(scene.x, v) + backtracked<Rule>(scene, v, vertex, move.displacement));
