@@ -268,6 +268,66 @@ TEST_CASE("a contact begins, goes on and ends once, with the depth against the s
     CHECK(ended == 1);
 }
 
+namespace {
+
+/// Bodies 2 mm thick along z or less: a sphere, a tube along x, a slab. From the sphere, by the largest coordinate.
+TriangleMesh<double> body(Index shape, double half) {
+    const auto sphere = membrane::icosphere<double>({.radius = 1, .subdivisions = 3});
+    Points<double> x = sphere.positions();
+    for (auto p : x.colwise()) {
+        if (shape == 1) p = Vector(4, 1, 1).cwiseProduct(p) / std::max(std::abs(p.x()), std::hypot(p.y(), p.z()));
+        if (shape == 2) p = Vector(4, 4, 1).cwiseProduct(p) / p.cwiseAbs().maxCoeff();
+    }
+    return {half * x, sphere.triangles()};
+}
+
+}  // namespace
+
+// Pressed slowly through the middle of a body and its opposite wall, to a tool's radius beyond, and drawn back.
+TEST_CASE("pressed deeper than the body is thick, a tool stays in contact, and the depth grows") {
+    for (int seed = 1; seed <= cases(3, 60); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const Index shape = seed % 3;
+        const double half = shape == 2 ? random.number(0.2e-3, 0.5e-3) : 1e-3, radius = random.number(0.3e-3, 0.5e-3);
+        const auto mesh = body(shape, half);
+        const membrane::MassSpringNetwork<double, membrane::LinearSpring> network(mesh, {}, {.stiffness = 40});
+        const membrane::VirtualVolumeSprings<double> foundation(mesh, {.stiffness = 8});
+        membrane::QuasiStaticSolver<double> solver(network, {.layers = membrane::unlimited, .sweeps = 6});
+        AabbTree<double> tree(mesh);
+        ContactTracker<double> tracker(mesh);
+        Points<double> x = mesh.positions();
+        Tool<double> tool{.position = 0.05 * half * random.vector(), .radius = radius};
+        const double step = random.number(5e-6, 15e-6), start = half + radius + 2 * step, end = -half - 2 * radius;
+        double last_force = 0, largest = 0, last_depth = 0;
+        bool opposed = false;  // whether the membrane pushes the tool back, not aside
+        const auto tick = [&](double z) {
+            tool.position.z() = z;
+            const auto contact = tracker.update(tree, x, tool);
+            const auto report = solver.step(x, 1e-3, network, foundation, press(tool, contact));
+            tree.refit(x, report.moved);
+            last_force = report.reactions[0].norm();
+            largest = std::max(largest, last_force);
+            opposed = report.reactions[0].z() > 0.7 * last_force;
+            return contact;
+        };
+        for (double z = start; z > end; z -= step) {
+            const double before = last_force;
+            const auto contact = tick(z);
+            CAPTURE(seed, shape, half, radius, z, before, last_force, contact.depth, last_depth);
+            REQUIRE((contact.touching() || before <= 0.05 * largest));
+            if (opposed && shape > 0) REQUIRE(contact.depth >= last_depth - 0.1 * step);
+            if (shape == 2 && contact.touching()) REQUIRE(std::abs(contact.depth - (radius + half - z)) <= 1e-12);
+            last_depth = contact.depth;
+        }
+        CAPTURE(seed, shape, half, radius);
+        if (!opposed) continue;  // the body has rolled aside
+        for (double z = end; z < start; z += step) tick(z);
+        for (int still = 0; still < 50; ++still) tick(start);
+        CHECK_FALSE(tick(start).touching());
+        CHECK((x - mesh.positions()).cwiseAbs().maxCoeff() <= 1e-3 * half);
+    }
+}
+
 TEST_CASE("anchors that moved carry the depth with them") {
     const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
     const Vector shift(0.3, -0.1, 0.2);

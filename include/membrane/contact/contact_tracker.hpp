@@ -59,7 +59,8 @@ struct TrackerOptions {
 /// detected.
 ///
 /// The rest surface is the mesh, or the anchors of a moving body, even where the membrane is torn. Depth is measured
-/// against it. If the tool is outside the rest surface and the membrane lies farther out, there is no contact: a
+/// against it, on the side where the tool entered: it grows beyond the middle of a body, too, and beyond its other
+/// wall. If the tool is outside the rest surface and the membrane lies farther out, there is no contact: a
 /// contact must not pull.
 template <Real Scalar>
 class ContactTracker : public SplitCount {
@@ -99,7 +100,8 @@ class ContactTracker : public SplitCount {
         visit(self.surface_);
         if (self.surface_.has_reserve()) visit(self.origins_, self.torn_, self.splits_);
         visit(self.near_, self.nearest_, self.nearest_square_, self.last_, self.last_tool_, self.pose_, self.side_,
-              self.slid_off_, self.origin_triangles_, self.ticks_, self.full_query_count_, self.rebound_ticks_);
+              self.slid_off_, self.origin_triangles_, self.entry_normal_, self.beyond_middle_, self.ticks_,
+              self.full_query_count_, self.rebound_ticks_);
     }
 
   private:
@@ -160,7 +162,12 @@ class ContactTracker : public SplitCount {
     template <class List>
     void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                const List& list) const noexcept;
-    void measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    Scalar measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] Vector3<Scalar> mean_touched_normal(const Scene& scene,
+                                                      const Vector3<Scalar>& otherwise) const noexcept;
+    [[nodiscard]] Vector3<Scalar> rest_normal(const Scene& scene, Index f) const noexcept {
+        return direction<Scalar>(area_vector(at_rest().triangle(scene.anchors, f)), Vector3<Scalar>::Zero());
+    }
     [[nodiscard]] bool is_below_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] bool leaves_border(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     void decide_side(const Scene& scene, const Contact<Scalar>& contact) noexcept;
@@ -169,6 +176,7 @@ class ContactTracker : public SplitCount {
     // After tunnelling the membrane springs back and may fold over the tool: for some ticks candidates include more
     // rings.
     static constexpr int candidate_rings = 2, candidate_rings_after_tunnelling = 6, ticks_after_tunnelling = 16;
+    static constexpr Scalar alike = Scalar(0.55);  // least cosine between normals of one wall of a body, 57 degrees
     static constexpr Scalar negligible_part = Scalar(1e-6);  // fraction of the tool's displacement in a tick
 
     // The surface at rest: a tear does not part it.
@@ -198,6 +206,8 @@ class ContactTracker : public SplitCount {
     bool slid_off_ = false;    // whether a shaft has slid off a displaced border: its parts may be on different sides
     // The triangles of the rest surface nearest to the tool's two ends and its axis point.
     std::array<Index, 3> origin_triangles_{no_index, no_index, no_index};
+    Vector3<Scalar> entry_normal_ = Vector3<Scalar>::Zero();  // at rest, of the wall where the tool entered; 0: none
+    bool beyond_middle_ = false;                              // whether the tool is nearer to another wall
     Index ticks_ = 0, full_query_count_ = 0;
     int rebound_ticks_ = 0;
 };
@@ -243,6 +253,8 @@ void ContactTracker<Scalar>::reset() noexcept {
     side_ = 0;
     slid_off_ = false;
     origin_triangles_.fill(no_index);
+    entry_normal_.setZero();
+    beyond_middle_ = false;
     ticks_ = 0;
     rebound_ticks_ = 0;
 }
@@ -271,6 +283,7 @@ void ContactTracker<Scalar>::move_with_body(const RigidFrame<Scalar>& pose) noex
     for (auto* stored : {&last_.point, &last_.axis_point, &last_.previous_axis_point})
         *stored = motion.point_to_world(*stored);
     last_.normal = motion.vector_to_world(last_.normal);
+    entry_normal_ = motion.vector_to_world(entry_normal_);
 }
 
 template <Real Scalar>
@@ -297,6 +310,8 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
         }
         near_.clear();
         origin_triangles_.fill(no_index);
+        entry_normal_.setZero();
+        beyond_middle_ = false;
         contact = {};
         contact.phase = before ? ContactPhase::ended : ContactPhase::none;
     }
@@ -368,11 +383,11 @@ template <Real Scalar>
 bool ContactTracker<Scalar>::contacts(const Scene& scene, Contact<Scalar>& contact) noexcept {
     if (!last_.touching() && contact.gap > 0) return false;
     if (contact.gap > 0 && (slid_off_ || is_below_border(scene, contact))) return false;
-    measure_depth(scene, contact);
+    const Scalar rebound = measure_depth(scene, contact);
     if (is_hooked(scene, contact)) return false;
     if (!last_.touching()) return true;
     const Scalar slack = margin_ / 1000;
-    return contact.gap <= slack || (contact.depth > 0 && contact.gap <= contact.depth + scene.travel);
+    return contact.gap <= slack || (contact.depth > 0 && contact.gap <= rebound + scene.travel);
 }
 
 // Whether an end of the tool has passed through the surface since the last tick.
@@ -660,20 +675,55 @@ void ContactTracker<Scalar>::collect_candidates(int rings) noexcept {
     }
 }
 
+// Measures the depth to the nearest triangle of the rest surface. Beyond the middle of a body that triangle is on the
+// opposite wall; then to the nearest one that faces as the wall where the tool entered. Returns the largest gap of a
+// membrane that springs back [m]: it does not go past the nearest triangle.
 template <Real Scalar>
-void ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
+Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
                                                 contact.axis_point};
     const std::size_t count = feature_pairs(scene.tool) == 1 ? 1 : 3;
     const bool below_border = is_below_border(scene, contact);  // there the sign of the height means nothing
+    const auto cosine = [&](Index f) { return dot(rest_normal(scene, f), entry_normal_); };
+    const auto faces = [&](Index f) { return cosine(f) > alike; };
+    const Vector3<Scalar> touched = rest_normal(scene, contact.triangle);
+    if (entry_normal_.isZero(0) || (!beyond_middle_ && faces(contact.triangle))) entry_normal_ = touched;
+    const auto nearby = near_.items();
+    bool beyond = false;
+    Scalar rebound = 0;
     contact.depth = 0;
     for (std::size_t i = 0; i < count; ++i) {
-        Index& f = origin_triangles_[i];
-        f = at_rest().walk_to_closest(scene.anchors, f == no_index ? contact.triangle : f, probes[i]);
+        const Index start = origin_triangles_[i] == no_index ? contact.triangle : origin_triangles_[i];
+        Index& f = origin_triangles_[i] = at_rest().walk_to_closest(scene.anchors, start, probes[i]);
         Scalar height = contact.side * at_rest().height(scene.anchors, f, probes[i]);
         if (below_border) height = std::abs(height);
+        if (!faces(f) && !(beyond_middle_ && std::any_of(nearby.begin(), nearby.end(), faces))) {
+            entry_normal_ = mean_touched_normal(scene, touched);
+        }
+        const bool is_beside = height > 0 && cosine(f) > -alike;
+        const bool is_beyond = !below_border && !faces(f) && !is_beside;
+        rebound = (std::max)(rebound, scene.radius + (is_beyond ? std::abs(height) : -height));
+        if (is_beyond) {
+            beyond = true;
+            f = at_rest().walk_to_closest(scene.anchors, faces(start) ? start : contact.triangle, probes[i], faces);
+            height = contact.side * at_rest().height(scene.anchors, f, probes[i]);
+        }
         contact.depth = (std::max)(contact.depth, scene.radius - height);
     }
+    beyond_middle_ = beyond;
+    return rebound;
+}
+
+// The mean normal at rest of the triangles near the tool, without those of an opposite wall. `otherwise`: none is near.
+template <Real Scalar>
+Vector3<Scalar> ContactTracker<Scalar>::mean_touched_normal(const Scene& scene,
+                                                            const Vector3<Scalar>& otherwise) const noexcept {
+    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    for (const Index f : near_.items()) {
+        const Vector3<Scalar> normal = rest_normal(scene, f);
+        if (dot(normal, entry_normal_) > Scalar(-0.5)) sum += normal;
+    }
+    return direction(sum, otherwise);
 }
 
 // Whether no triangle is within two mean edges of the tool.

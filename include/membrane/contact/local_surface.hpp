@@ -75,9 +75,17 @@ class LocalSurface {
         return std::any_of(vertices.begin(), vertices.end(), [&](Index v) { return adjacency_.on_border(v); });
     }
 
-    /// Walks from `f` over triangles that share a corner, ever nearer to `q`, to a local minimum of the distance.
+    ///@{
+    /// Walks from `f` over triangles that share a corner, ever nearer to `q`, to a local minimum of the distance; only
+    /// over triangles `g` for which `may(g)` holds.
+    template <class May>
+    [[nodiscard]] Index walk_to_closest(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q,
+                                        const May& may) const noexcept;
     [[nodiscard]] Index walk_to_closest(const ConstPointsRef<Scalar>& x, Index f,
-                                        const Vector3<Scalar>& q) const noexcept;
+                                        const Vector3<Scalar>& q) const noexcept {
+        return walk_to_closest(x, f, q, [](Index) { return true; });
+    }
+    ///@}
 
     /// Signed distance of `q` from its nearest point of triangle `f`, negative behind the surface [m].
     [[nodiscard]] Scalar height(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q) const noexcept;
@@ -177,8 +185,9 @@ bool LocalSurface<Scalar>::on_border(Index f, const Vector3<Scalar>& barycentric
 }
 
 template <Real Scalar>
-Index LocalSurface<Scalar>::walk_to_closest(const ConstPointsRef<Scalar>& x, Index f,
-                                            const Vector3<Scalar>& q) const noexcept {
+template <class May>
+Index LocalSurface<Scalar>::walk_to_closest(const ConstPointsRef<Scalar>& x, Index f, const Vector3<Scalar>& q,
+                                            const May& may) const noexcept {
     Scalar square = closest_point(triangle(x, f), q).squared_distance;
     Wide some;
     std::size_t count = 0;
@@ -195,6 +204,7 @@ Index LocalSurface<Scalar>::walk_to_closest(const ConstPointsRef<Scalar>& x, Ind
     for (Index from = no_index; from != f;) {
         from = f;
         around_corners(from, [&](Index g) {
+            if (!may(g)) return;
             some[count++] = g;
             if (count == some.size()) examine();
         });
