@@ -59,6 +59,24 @@ TEST_CASE("a shaft stuck through counts by its lower end") {
     CHECK(found);
 }
 
+TEST_CASE("a shaft stuck through overlaps by its radius at least, also with its ends beyond the border") {
+    const double radius = 0.01;
+    for (int seed = 1; seed <= cases(1000); ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const Index f = random.index(2);
+        const Vector3<double> at = membrane::point_at(surface.triangle(mesh.positions(), f), random.barycentric());
+        Vector3<double> along = random.unit_vector();
+        if (random.chance(0.5)) along.z() *= 0.01;
+        const Tool<double> shaft{
+            .position = at - random.number(0.1, 2.0) * along, .axis = 4 * random.number() * along, .radius = radius};
+        if (surface.nearest(mesh.positions(), f, shaft).on_triangle.squared_distance > 0) continue;
+        const auto contact = membrane::contact_in(surface, mesh.positions(), f, shaft, radius, 1.0);
+        CAPTURE(seed);
+        CHECK(contact.gap <= -radius + 1e-12);
+        CHECK(contact.normal.z() > 0);
+    }
+}
+
 TEST_CASE("where a point passed, the contact is what it passed") {
     const Vector3<double> barycentric(0.2, 0.3, 0.5), from(0.1, 0.1, 1), to(0.1, 0.1, -0.4);
     const auto contact = membrane::contact_where_passed(surface, mesh.positions(), 1, barycentric, from, to, 1.0);

@@ -36,10 +36,14 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
     contact.axis_point = tool.position + nearest.fraction * tool.axis;
     Vector3<Scalar> outward = direction<Scalar>(area_vector(triangle), Vector3<Scalar>::Zero());
     if (nearest.on_triangle.squared_distance == 0 && feature_pairs(tool) > 1) {
-        // The shaft passes through the triangle: the gap is that of its lower end.
-        contact.axis_point = tool.position;
-        if (side * dot(outward, tool.axis) < 0) contact.axis_point += tool.axis;
-        nearest.on_triangle = closest_point(triangle, contact.axis_point);
+        // The shaft passes through the triangle: the gap is that of its lower end, if that is not beyond the border.
+        const bool is_second = side * dot(outward, tool.axis) < 0;
+        const Vector3<Scalar> end = is_second ? Vector3<Scalar>(tool.position + tool.axis) : tool.position;
+        const auto of_end = closest_point(triangle, end);
+        if (!surface.on_border(f, of_end.barycentric)) {
+            contact.axis_point = end;
+            nearest.on_triangle = of_end;
+        }
     } else {
         outward = surface.outward(x, f, nearest.on_triangle.barycentric);
     }
