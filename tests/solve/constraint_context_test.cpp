@@ -142,7 +142,7 @@ TEST_CASE("forces add up, and are taken back with the step", "[context]") {
 TEST_CASE("a fixed vertex yields to tools by force over stiffness, a free one does not", "[context]") {
     SixPoints scene;
     ConstraintContext<double> context(scene.x, scene.work, scene);
-    for (const Index v : {1, 5}) context.set_support(v, 4);
+    for (const Index v : {1, 5}) scene.work.set_support_stiffness(v, 4);
     for (const Index v : {1, 5}) context.add_support_force(v, {0, 0, 2});
     CHECK(context.support_displacement(5) == Vector3<double>(0, 0, 0.5));
     CHECK(context.support_compliance(5) == 0.25);

@@ -220,9 +220,6 @@ class ConstraintContext {
     /// the first `begun` constraints are those of this step, the others those of the last. Cost: linear in the points.
     void sum_support_forces(std::size_t begun = StepState<Scalar>::max_constraints) noexcept;
 
-    /// Sets the stiffness of a fixed vertex against tools [N/m].
-    void set_support(Index v, Scalar stiffness) noexcept { state_.row(state_.support, v).number[3] = stiffness; }
-
     /// Adds to the force of the tools on `v` [N], if it is fixed.
     void add_support_force(Index v, const Vector3<Scalar>& force) noexcept {
         if (!fixed(v)) return;

@@ -55,25 +55,6 @@ template <Real Scalar>
                        [&](Index v) { return context.fixed(v) || context.state().shared.contains(v); });
 }
 
-/// Whether the point moves less than a tenth as far as its free corners. Then no force moves it.
-template <Real Scalar>
-[[nodiscard]] bool is_rigid(const ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners,
-                            const Vector3<Scalar>& weights) noexcept {
-    return squared_norm(free_weights(context, corners, weights)) < Scalar(0.01);
-}
-
-/// Moves the point by a displacement [m], each free corner in proportion to its weight; not if it is rigid.
-template <Real Scalar>
-void move_point(ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners, const Vector3<Scalar>& weights,
-                const Vector3<Scalar>& by) noexcept {
-    if (is_rigid(context, corners, weights)) return;
-    const Vector3<Scalar> free = free_weights(context, corners, weights);
-    for (std::size_t k = 0; k < 3; ++k) {
-        const Scalar part = free[static_cast<Eigen::Index>(k)] / squared_norm(free);
-        if (part > 0) context.move(corners[k], part * by);
-    }
-}
-
 /// Displaces the free corners as if all corners were free and the point moved by a displacement [m]: a point on fixed
 /// corners stays, and displacements are continuous in the weights.
 template <Real Scalar>
@@ -140,15 +121,6 @@ void change_force(ConstraintContext<Scalar>& context, ContactPoint<Scalar>& poin
         context.add_force(point.corners[k], part);
         const Vector3<Scalar> by = context.response(point.corners[k], part);
         if (!by.isZero(0)) context.move(point.corners[k], by);
-    }
-}
-
-/// Adds `force` [N] on the point, by weights, to the force of the tools on its fixed corners.
-template <Real Scalar>
-void add_support_forces(ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
-                        const Vector3<Scalar>& force) noexcept {
-    for (std::size_t k = 0; k < 3 && point.on_fixed; ++k) {
-        context.add_support_force(point.corners[k], point.weights[static_cast<Eigen::Index>(k)] * force);
     }
 }
 
