@@ -701,13 +701,16 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
             entry_normal_ = mean_touched_normal(scene, touched);
         }
         const bool is_beside = height > 0 && cosine(f) > -alike;
-        const bool is_beyond = !below_border && !faces(f) && !is_beside;
-        rebound = (std::max)(rebound, scene.radius + (is_beyond ? std::abs(height) : -height));
-        if (is_beyond) {
-            beyond = true;
-            f = at_rest().walk_to_closest(scene.anchors, faces(start) ? start : contact.triangle, probes[i], faces);
-            height = contact.side * at_rest().height(scene.anchors, f, probes[i]);
+        Scalar outward = -height;
+        if (!below_border && !faces(f) && !is_beside) {
+            const Index of_entry =
+                at_rest().walk_to_closest(scene.anchors, faces(start) ? start : contact.triangle, probes[i], faces);
+            const Scalar entered = contact.side * at_rest().height(scene.anchors, of_entry, probes[i]);
+            // A tool that jumps out of a body has gone through it, and one that is farther beyond it than it is thick.
+            if ((beyond_middle_ || height <= 0) && height < -entered / 2)
+                beyond = true, outward = std::abs(height), f = of_entry, height = entered;
         }
+        rebound = (std::max)(rebound, scene.radius + outward);
         contact.depth = (std::max)(contact.depth, scene.radius - height);
     }
     beyond_middle_ = beyond;
