@@ -60,8 +60,8 @@ struct TrackerOptions {
 ///
 /// The rest surface is the mesh, or the anchors of a moving body, even where the membrane is torn. Depth is measured
 /// against it, on the side where the tool entered: it grows beyond the middle of a body, too, and beyond its other
-/// wall. If the tool is outside the rest surface and the membrane lies farther out, there is no contact: a
-/// contact must not pull.
+/// wall by as much as the body is thick. If the tool is outside the rest surface and the membrane lies farther out,
+/// there is no contact: a contact must not pull.
 template <Real Scalar>
 class ContactTracker : public SplitCount {
   public:
