@@ -17,7 +17,7 @@
 namespace membrane {
 
 /// Assembles the bounds of all springs in one matrix and factorises it. Springs in tension stabilise those in
-/// compression: it shows convexity where the foundation alone does not suffice, and takes about five to ten times as
+/// compression: it shows convexity where the foundation alone does not suffice, and takes a few times as
 /// long as `BlockConvexity`. After a tear construct another one: until then it finds no bound.
 class FactoredConvexity {
   public:

@@ -92,8 +92,9 @@ struct StepReport {
     Scalar residual = 0;  ///< largest residual force on a free active vertex [N]; 0 if refused
     ///@{
     /// What the layers leave out: the largest residual force on a free vertex that this step did not update, beside one
-    /// that it did, and the sum of these forces [N]. The sum is the part of the tools' force on the membrane that
-    /// reaches neither foundation nor pinned vertices. Both are 0 if the queue has all vertices.
+    /// that it did, and the sum of these forces [N]. While the tools move, the sum is the part of their force on the
+    /// membrane that reaches neither foundation nor pinned vertices; beside vertices that have come to rest nothing is
+    /// counted. Both are 0 if the queue has all vertices.
     Scalar residual_beyond = 0;
     Vector3<Scalar> unsupported = Vector3<Scalar>::Zero();
     ///@}
