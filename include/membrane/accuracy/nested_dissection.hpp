@@ -73,11 +73,11 @@ inline Dissection::Levels Dissection::levels_from(Index first) {
 }
 
 inline void Dissection::cut(const Levels& levels) {
-    constexpr std::size_t small = 8;
+    constexpr std::size_t most_uncut = 8;
     const auto& vertices = levels.vertices;
     std::size_t first = 0, last = 0;  // of the separator
     double best = std::numeric_limits<double>::infinity();
-    for (std::size_t level = 1; level + 1 < levels.ends.size() && vertices.size() > small; ++level) {
+    for (std::size_t level = 1; level + 1 < levels.ends.size() && vertices.size() > most_uncut; ++level) {
         const std::size_t begin = levels.ends[level - 1], end = levels.ends[level];
         const double ratio = static_cast<double>(end - begin) /
                              (static_cast<double>(begin) * static_cast<double>(vertices.size() - end));
