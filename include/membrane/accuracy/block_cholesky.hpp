@@ -353,11 +353,12 @@ inline void BlockCholesky::solve_lower(Eigen::VectorXd& b) const {
 
 inline void BlockCholesky::solve_upper(Eigen::VectorXd& b) const {
     Eigen::VectorXd others(product_.rows());
-    for (auto panel = panels_.rbegin(); panel != panels_.rend(); ++panel) {
-        const auto l = numbers(*panel);
-        const auto later = rows(*panel).subspan(panel->count);
+    for (std::size_t p = panels_.size(); p-- > 0;) {
+        const Panel& panel = panels_[p];
+        const auto l = numbers(panel);
+        const auto later = rows(panel).subspan(panel.count);
         for (std::size_t i = 0; i < later.size(); ++i) others.segment<3>(three(i)) = b.segment<3>(three(later[i]));
-        auto own = b.segment(three(panel->first), l.cols());
+        auto own = b.segment(three(panel.first), l.cols());
         own -= l.bottomRows(three(later.size())).transpose() * others.head(three(later.size()));
         l.topRows(l.cols()).transpose().triangularView<Eigen::Upper>().solveInPlace(own);
     }

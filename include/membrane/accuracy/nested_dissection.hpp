@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include <membrane/core/compressed_rows.hpp>
@@ -73,11 +74,11 @@ inline Dissection::Levels Dissection::levels_from(Index first) {
 }
 
 inline void Dissection::cut(const Levels& levels) {
-    constexpr std::size_t most_uncut = 8;
+    constexpr std::size_t cut_above = 8;
     const auto& vertices = levels.vertices;
     std::size_t first = 0, last = 0;  // of the separator
     double best = std::numeric_limits<double>::infinity();
-    for (std::size_t level = 1; level + 1 < levels.ends.size() && vertices.size() > most_uncut; ++level) {
+    for (std::size_t level = 1; level + 1 < levels.ends.size() && vertices.size() > cut_above; ++level) {
         const std::size_t begin = levels.ends[level - 1], end = levels.ends[level];
         const double ratio = static_cast<double>(end - begin) /
                              (static_cast<double>(begin) * static_cast<double>(vertices.size() - end));
@@ -100,8 +101,8 @@ inline void Dissection::cut(const Levels& levels) {
 
 inline std::vector<std::vector<Index>> nested_dissection(const CompressedRows<Index>& neighbours) {
     detail::Dissection dissection(neighbours);
-    std::vector<Index> all;
-    for (Index v = 0; v < neighbours.row_count(); ++v) all.push_back(v);
+    std::vector<Index> all(static_cast<std::size_t>(neighbours.row_count()));
+    std::iota(all.begin(), all.end(), Index(0));
     dissection.dissect(all);
     return dissection.parts;
 }

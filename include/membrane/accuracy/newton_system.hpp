@@ -118,7 +118,7 @@ inline void NewtonSystem::put(Index i, Index j, const Eigen::Matrix3d& block) {
     if (link == known.end()) {
         link = known.emplace(link, j, links_.size());
         links_.push_back({i, j});
-        linked_.push_back(Eigen::Matrix3d::Zero());
+        linked_.emplace_back(Eigen::Matrix3d::Zero());
         factors_.reset();
     }
     linked_[link->second] += block;
@@ -207,68 +207,106 @@ inline void NewtonSystem::add_multipliers(Eigen::VectorXd& step, Eigen::VectorXd
     }
 }
 
-// An active y may be nonzero. L is the Cholesky factor of the active rows and columns of W.
+namespace detail {
+
+/// Active rows and columns of a positive semidefinite matrix, with their Cholesky factor, which grows by a row.
+class ActiveRows {
+  public:
+    explicit ActiveRows(const Eigen::MatrixXd& matrix) : matrix_(matrix), lower_(matrix.rows(), matrix.rows()) {}
+
+    [[nodiscard]] const std::vector<Eigen::Index>& rows() const noexcept { return rows_; }
+
+    /// False if the row depends on the active ones: it is not added.
+    bool add(Eigen::Index i) {
+        Eigen::VectorXd row = matrix_(rows_, i);
+        factor().triangularView<Eigen::Lower>().solveInPlace(row);
+        const double pivot = matrix_(i, i) - row.squaredNorm();
+        if (!(pivot > 1e-14 * matrix_(i, i))) return false;
+        const Eigen::Index count = row.size();
+        lower_.row(count).head(count) = row.transpose();
+        lower_(count, count) = std::sqrt(pivot);
+        rows_.push_back(i);
+        return true;
+    }
+
+    /// Removes the row at this place in `rows()`.
+    void remove(Eigen::Index place) {
+        auto kept = std::exchange(rows_, {});
+        kept.erase(kept.begin() + place);
+        for (const Eigen::Index i : kept) add(i);
+    }
+
+    /// Solves for the active rows.
+    [[nodiscard]] Eigen::VectorXd solve(Eigen::VectorXd b) const {
+        factor().triangularView<Eigen::Lower>().solveInPlace(b);
+        factor().transpose().triangularView<Eigen::Upper>().solveInPlace(b);
+        return b;
+    }
+
+  private:
+    [[nodiscard]] Eigen::Block<const Eigen::MatrixXd> factor() const {
+        return lower_.topLeftCorner(std::ssize(rows_), std::ssize(rows_));
+    }
+
+    const Eigen::MatrixXd& matrix_;
+    Eigen::MatrixXd lower_;
+    std::vector<Eigen::Index> rows_;
+};
+
+/// The smallest of the numbers that are below `limit`, without those with a nonzero entry of `skipped`; `no_index`:
+/// there is none.
+[[nodiscard]] inline Eigen::Index smallest_below(double limit, const Eigen::VectorXd& numbers,
+                                                 const std::vector<unsigned char>& skipped) noexcept {
+    Eigen::Index found = no_index;
+    for (Eigen::Index i = 0; i < numbers.size(); ++i) {
+        if (skipped[static_cast<std::size_t>(i)] != 0 || numbers[i] >= limit) continue;
+        limit = numbers[i], found = i;
+    }
+    return found;
+}
+
+}  // namespace detail
+
+// An active y may be nonzero.
 inline Eigen::VectorXd estimated_multipliers(const Eigen::MatrixXd& coupling, const Eigen::VectorXd& q,
                                              const std::vector<unsigned char>& equality) {
     const double slack = 1e-15 * q.lpNorm<Eigen::Infinity>();
-    Eigen::VectorXd y = Eigen::VectorXd::Zero(q.size());
-    std::vector<Eigen::Index> active;
-    Eigen::MatrixXd lower(q.size(), q.size());
-    const auto activate = [&](Eigen::Index i) {  // false if the row depends on the active ones
-        const Eigen::Index count = std::ssize(active);
-        Eigen::VectorXd row = coupling(active, i);
-        lower.topLeftCorner(count, count).triangularView<Eigen::Lower>().solveInPlace(row);
-        const double pivot = coupling(i, i) - row.squaredNorm();
-        if (!(pivot > 1e-14 * coupling(i, i))) return false;
-        lower.row(count).head(count) = row.transpose();
-        lower(count, count) = std::sqrt(pivot);
-        active.push_back(i);
-        return true;
-    };
     const auto is_equality = [&](Eigen::Index i) { return equality[static_cast<std::size_t>(i)] != 0; };
+    detail::ActiveRows active(coupling);
     for (Eigen::Index i = 0; i < q.size(); ++i) {
-        if (is_equality(i)) activate(i);
+        if (is_equality(i)) active.add(i);
     }
+    Eigen::VectorXd y = Eigen::VectorXd::Zero(q.size());
     std::vector<unsigned char> tried = equality;  // active, or of no use at this y
     for (Eigen::Index round = 0; round < 10 * (q.size() + 1); ++round) {
-        const auto factor = lower.topLeftCorner(std::ssize(active), std::ssize(active));
-        Eigen::VectorXd best = -q(active);
-        factor.triangularView<Eigen::Lower>().solveInPlace(best);
-        factor.transpose().triangularView<Eigen::Upper>().solveInPlace(best);
-        const Eigen::VectorXd here = y(active);
+        const auto& rows = active.rows();
+        const Eigen::VectorXd best = active.solve(-q(rows)), here = y(rows);
         double part = 1;
         Eigen::Index first = no_index;  // of the active ones, to become zero along the step
         for (Eigen::Index a = 0; a < best.size(); ++a) {
-            if (is_equality(active[static_cast<std::size_t>(a)]) || best[a] >= 0) continue;
+            if (is_equality(rows[static_cast<std::size_t>(a)]) || best[a] >= 0) continue;
             const double from = (std::max)(here[a], 0.0);
             if (from >= part * (from - best[a])) continue;
             part = from / (from - best[a]);
             first = a;
         }
-        y(active) = first == no_index ? best : Eigen::VectorXd(here + part * (best - here));
-        if (y(active) != here) {
+        y(rows) = first == no_index ? best : Eigen::VectorXd(here + part * (best - here));
+        if (y(rows) != here) {
             tried = equality;
-            for (const Eigen::Index i : active) tried[static_cast<std::size_t>(i)] = 1;
+            for (const Eigen::Index i : rows) tried[static_cast<std::size_t>(i)] = 1;
         }
         if (first != no_index) {
-            auto kept = std::exchange(active, {});
-            y[kept[static_cast<std::size_t>(first)]] = 0;
-            kept.erase(kept.begin() + first);
-            for (const Eigen::Index i : kept) activate(i);
+            y[rows[static_cast<std::size_t>(first)]] = 0;
+            active.remove(first);
             continue;
         }
         const Eigen::VectorXd slope = coupling * y + q;
-        Eigen::Index next = no_index;
-        do {
-            next = no_index;
-            for (Eigen::Index i = 0; i < slope.size(); ++i) {
-                if (tried[static_cast<std::size_t>(i)] != 0 || slope[i] >= (next == no_index ? -slack : slope[next]))
-                    continue;
-                next = i;
-            }
+        for (bool added = false; !added;) {
+            const Eigen::Index next = detail::smallest_below(-slack, slope, tried);
             if (next == no_index) return y;
             tried[static_cast<std::size_t>(next)] = 1;
-        } while (!activate(next));
+            added = active.add(next);
+        }
     }
     return y;
 }
