@@ -163,6 +163,10 @@ class Repair {
         }
         return referenced;
     }
+    /// `usable` says it of the vertices given; a vertex that was split off is as its origin.
+    [[nodiscard]] bool is_usable(const std::vector<bool>& usable, Index v) const {
+        return usable[static_cast<std::size_t>(origin_[static_cast<std::size_t>(v)])];
+    }
     [[nodiscard]] bool repeats(Index f) const {
         const auto [a, b, c] = corners(f);
         return a == b || b == c || c == a;
@@ -220,7 +224,7 @@ inline void Repair::drop_repeated() {
 inline void Repair::drop_zero_area(const std::vector<bool>& usable) {
     const auto flat = [&](Index f) {
         for (const Index v : corners(f)) {
-            if (!usable[static_cast<std::size_t>(v)]) return false;
+            if (!is_usable(usable, v)) return false;
         }
         return !repeats(f) &&
                on_one_line(point(x_, triangles_(0, f)), point(x_, triangles_(1, f)), point(x_, triangles_(2, f)));
@@ -292,7 +296,7 @@ inline void Repair::split_vertices(const std::vector<bool>& usable) {
         for (Index k = 0; k < 3; ++k) {
             Index& corner = triangles_(k, f);
             const auto v = static_cast<std::size_t>(corner);
-            if (!usable[static_cast<std::size_t>(origin_[v])]) continue;
+            if (!is_usable(usable, corner)) continue;
             const std::size_t fan = sets.find(3 * static_cast<std::size_t>(f) + static_cast<std::size_t>(k));
             if (first_fan[v] == none) first_fan[v] = fan;
             if (first_fan[v] == fan) continue;
@@ -315,8 +319,7 @@ inline SurfaceParts Repair::parts(const std::vector<bool>& usable) const {
     std::vector<bool> finite(static_cast<std::size_t>(triangles_.cols()), true);
     for (const Index f : kept_) {
         for (const Index v : corners(f)) {
-            const auto given = static_cast<std::size_t>(origin_[static_cast<std::size_t>(v)]);
-            if (!usable[given]) finite[static_cast<std::size_t>(f)] = false;
+            if (!is_usable(usable, v)) finite[static_cast<std::size_t>(f)] = false;
         }
     }
     return surface_parts(x_, triangles_, sides(), finite);
