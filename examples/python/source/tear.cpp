@@ -212,7 +212,7 @@ void bind_criteria(py::module_& module) {
                  criterion.validate();
                  return criterion;
              }),
-             py::kw_only(), py::arg("toughness"), py::arg("thickness"), doc("EnergyRelease::check"))
+             py::kw_only(), py::arg("toughness"), py::arg("thickness"), doc("EnergyRelease::validate"))
         .def_readonly("toughness", &EnergyRelease::toughness, doc("EnergyRelease::toughness"))
         .def_readonly("thickness", &EnergyRelease::thickness, doc("EnergyRelease::thickness"));
     py::class_<LargestTension>(module, "LargestTension", doc("LargestTension"))
@@ -221,7 +221,7 @@ void bind_criteria(py::module_& module) {
                  criterion.validate();
                  return criterion;
              }),
-             py::kw_only(), py::arg("strength"), doc("LargestTension::check"))
+             py::kw_only(), py::arg("strength"), doc("LargestTension::validate"))
         .def_readonly("strength", &LargestTension::strength, doc("LargestTension::strength"));
 }
 
