@@ -75,9 +75,8 @@ void bind_tree(py::module_& module) {
         tree, "refit",
         [](Tree& self, Positions x, const std::optional<Moved>& moved) {
             check_count("AabbTree", "x", x.count, self.vertex_count);
-            if (!moved) return self.tree.refit(x.map());
-            check_moved("AabbTree", *moved, self.vertex_count);
-            self.tree.refit(x.map(), moved->vertices);
+            if (moved) check_moved("AabbTree", *moved, self.vertex_count);
+            (void)(moved ? self.tree.refit(x.map(), moved->vertices) : self.tree.refit(x.map()));
         },
         py::arg("x"), py::arg("moved") = py::none(), doc("AabbTree::refit"));
     tree.def(

@@ -73,7 +73,10 @@ void bind_normals(py::module_& module) {
         normals, "update",
         [](Normals& self, Positions x, const std::optional<Moved>& moved) {
             check_count("VertexNormals", "x", x.count, self.vertex_count);
-            if (!moved) return self.normals.update(x.map());
+            if (!moved) {
+                (void)self.normals.update(x.map());
+                return;
+            }
             check_moved("VertexNormals", *moved, self.vertex_count);
             (void)self.normals.update(x.map(), moved->vertices);
         },
