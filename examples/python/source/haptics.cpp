@@ -35,11 +35,11 @@ struct AnyHand {
     void advance(const Vector& force, double dt) noexcept {
         std::visit([&](auto& hand) { static_cast<void>(hand.advance(force, dt)); }, any);
     }
-    [[nodiscard]] const Vector& position() const noexcept {
-        return std::visit([](const auto& hand) -> const Vector& { return hand.position(); }, any);
+    [[nodiscard]] Vector position() const noexcept {
+        return std::visit([](const auto& hand) -> Vector { return hand.position(); }, any);
     }
-    [[nodiscard]] const Vector& velocity() const noexcept {
-        return std::visit([](const auto& hand) -> const Vector& { return hand.velocity(); }, any);
+    [[nodiscard]] Vector velocity() const noexcept {
+        return std::visit([](const auto& hand) -> Vector { return hand.velocity(); }, any);
     }
 };
 static_assert(membrane::CheckedHand<AnyHand, double>);
