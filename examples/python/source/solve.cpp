@@ -14,8 +14,7 @@ namespace {
                                                 const SolverOptions& options) {
     const auto build = [&](const auto& springs, const auto& one) {
         using Type = SolverOf<std::remove_cvref_t<decltype(one)>>;
-        return std::make_unique<Solver>(
-            Solver{Type(springs, options, one), springs.vertex_count(), network.version});
+        return std::make_unique<Solver>(Solver{Type(springs, options, one), springs.vertex_count(), network.version});
     };
     return std::visit(build, network.any, rule);
 }
