@@ -3,6 +3,7 @@
 that are made of its docstrings.
 
 What is built lies in build/python of the repository. MEMBRANE_JOBS: compilers at once, 1 unless given.
+MEMBRANE_OPTIMISATION: -O3 unless given; the results are the same.
 """
 import os
 import pathlib
@@ -22,7 +23,7 @@ os.chdir(here)
 
 # -ffp-contract=off: the same bits as a program of C++ with this option, whatever the processor. g++ 12 does not see that
 # pybind11 asks for the size of a function object before it constructs it in place.
-options = ["-O3", "-g0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-placement-new"]
+options = [os.environ.get("MEMBRANE_OPTIMISATION", "-O3"), "-g0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-placement-new"]
 
 
 def version():
