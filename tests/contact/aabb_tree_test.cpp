@@ -12,16 +12,13 @@
 #include <type_traits>
 #include <vector>
 
-#include <CGAL/AABB_face_graph_triangle_primitive.h>
-#include <CGAL/AABB_traits.h>
-#include <CGAL/AABB_tree.h>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/brute_force.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
-#include "support/cgal_mesh.hpp"
+#include "support/cgal.hpp"
 #include "support/exact_crossing.hpp"
 #include "support/meshes.hpp"
 #include "support/refusal.hpp"
@@ -522,32 +519,25 @@ TEST_CASE("few boxes are visited near the surface", "[tree]") {
 }
 
 TEST_CASE("distances and intersections are those of CGAL's tree", "[tree][cgal]") {
-    using Primitive = CGAL::AABB_face_graph_triangle_primitive<test::CgalMesh>;
-    using Tree = CGAL::AABB_tree<CGAL::AABB_traits<test::CgalKernel, Primitive>>;
     int hits = 0;
     for (int seed = 1; seed <= cases(60); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         auto scene = random_scene<double>(random);
         scene.deform(random);
-        const auto cgal = test::cgal_mesh(scene.x, scene.mesh.triangles());
-        const Tree tree(faces(cgal).first, faces(cgal).second, cgal);
+        const test::CgalTree cgal(scene.x, scene.mesh.triangles());
         for (int i = 0; i < 100; ++i) {
             const auto p = scene.query_beside(random), q = scene.query_beside(random);
-            const double distance = std::sqrt(CGAL::to_double(tree.squared_distance(test::cgal_point(p))));
             const auto nearest = scene.tree.closest_point(scene.x, p);
-            CHECK(std::abs(std::sqrt(nearest.squared_distance) - distance) <= 1e-13 * scene.scale(p));
+            CHECK(std::abs(std::sqrt(nearest.squared_distance) - cgal.distance(p)) <= 1e-13 * scene.scale(p));
 
             const bool hit = scene.tree.first_hit(scene.x, p, q).triangle != no_index;
-            CHECK(hit == tree.do_intersect(test::CgalKernel::Segment_3(test::cgal_point(p), test::cgal_point(q))));
+            CHECK(hit == cgal.intersects(p, q));
             hits += hit ? 1 : 0;
 
             const Vector3<double> high = p + scene.size * random.vector<double>(0, 0.3);
-            const CGAL::Bbox_3 box(p.x(), p.y(), p.z(), high.x(), high.y(), high.z());
-            std::vector<test::CgalMesh::Face_index> faces_in_box;
-            tree.all_intersected_primitives(box, std::back_inserter(faces_in_box));
             CHECK(visited([&](auto visit) { scene.tree.overlap_box(scene.x, p, high, visit); }).size() ==
-                  faces_in_box.size());
+                  cgal.count_in_box(p, high));
         }
     }
     CHECK(hits > cases(1000));

@@ -10,20 +10,15 @@
 #include <utility>
 #include <vector>
 
-#include <CGAL/Polygon_mesh_processing/measure.h>
-#include <CGAL/Polygon_mesh_processing/orientation.h>
-#include <CGAL/Polygon_mesh_processing/self_intersections.h>
-#include <CGAL/boost/graph/helpers.h>
 #include <membrane/mesh_check/quality.hpp>
 
 #include "support/cases.hpp"
 #include "support/catch.hpp"
-#include "support/cgal_mesh.hpp"
+#include "support/cgal.hpp"
 #include "support/random.hpp"
 #include "support/refusal.hpp"
 
 using namespace membrane;
-namespace PMP = CGAL::Polygon_mesh_processing;
 using Point = Vector3<double>;
 
 namespace {
@@ -47,14 +42,12 @@ void check_quality(const TriangleMesh<double>& mesh, double length, const Bars& 
 }
 
 void check_validity(const TriangleMesh<double>& mesh, int euler, bool closed) {
-    const auto cgal = test::cgal_mesh(mesh);
-    REQUIRE(cgal.is_valid());
-    CHECK(static_cast<int>(cgal.number_of_vertices()) - static_cast<int>(cgal.number_of_edges()) +
-              static_cast<int>(cgal.number_of_faces()) ==
-          euler);
-    CHECK(!PMP::does_self_intersect(cgal));
-    CHECK(CGAL::is_closed(cgal) == closed);
-    if (closed) CHECK(PMP::is_outward_oriented(cgal));
+    const auto cgal = test::cgal_facts(mesh);
+    REQUIRE(cgal.valid);
+    CHECK(cgal.euler == euler);
+    CHECK(!cgal.intersects_itself);
+    CHECK(cgal.closed == closed);
+    if (closed) CHECK(cgal.outward);
 }
 
 /// Each triangle faces to where the distance grows, if the body has no edges that it could lie across.

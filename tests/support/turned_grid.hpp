@@ -2,11 +2,9 @@
 #pragma once
 
 #include <cmath>
-#include <map>
+#include <vector>
 
-#include <CGAL/Delaunay_triangulation_2.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-
+#include "support/cgal.hpp"
 #include "support/meshes.hpp"
 
 /// Rectangles on grids of any direction.
@@ -18,15 +16,14 @@ namespace test {
 /// by `turn` [rad]; its border is straight. Triangulated by CGAL.
 template <membrane::Real Scalar>
 Surface<Scalar> turned_grid(int columns, int rows, double edge, double turn) {
-    using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-    using Delaunay = CGAL::Delaunay_triangulation_2<Kernel>;
     const double length = columns * edge, height = rows * edge, cosine = std::cos(turn), sine = std::sin(turn);
-    Delaunay delaunay;
+    std::vector<double> points;
+    const auto insert = [&](double x, double y) { points.insert(points.end(), {x, y}); };
     for (int i = 0; i <= columns; ++i) {
-        for (const double y : {0.0, height}) delaunay.insert({i * edge, y});
+        for (const double y : {0.0, height}) insert(i * edge, y);
     }
-    for (int i = 0; i <= rows; ++i) {
-        for (const double x : {0.0, length}) delaunay.insert({x, i * edge});
+    for (int i = 1; i < rows; ++i) {
+        for (const double x : {0.0, length}) insert(x, i * edge);
     }
     const int extent = columns + rows;
     for (int i = -extent; i <= extent; ++i) {
@@ -34,20 +31,19 @@ Surface<Scalar> turned_grid(int columns, int rows, double edge, double turn) {
             const double a = (i + j / 2.0 + 0.3) * edge, b = (j * std::sqrt(0.75) + 0.4) * edge;
             const double x = length / 2 + cosine * a - sine * b, y = height / 2 + sine * a + cosine * b;
             const double gap = 0.6 * edge;
-            if (x > gap && x < length - gap && y > gap && y < height - gap) delaunay.insert({x, y});
+            if (x > gap && x < length - gap && y > gap && y < height - gap) insert(x, y);
         }
     }
+    const Eigen::Map<const Eigen::Matrix2Xd> grid(points.data(), 2, static_cast<membrane::Index>(points.size() / 2));
     Surface<Scalar> surface;
-    std::map<Delaunay::Vertex_handle, membrane::Index> number;
-    for (auto v = delaunay.finite_vertices_begin(); v != delaunay.finite_vertices_end(); ++v) {
-        const auto x = static_cast<Scalar>(v->point().x()), y = static_cast<Scalar>(v->point().y());
-        number[v] = surface.add(membrane::Vector3<Scalar>(x, y, 0));
+    for (const auto& p : grid.colwise()) {
+        surface.add(membrane::Vector3<Scalar>(static_cast<Scalar>(p.x()), static_cast<Scalar>(p.y()), 0));
     }
-    for (auto f = delaunay.finite_faces_begin(); f != delaunay.finite_faces_end(); ++f) {
-        const auto at = [&](int i) { return number[f->vertex(i)]; };
-        const membrane::Index f0 = surface.add(at(0), at(1), at(2));
-        const auto x = membrane::triangle_at(surface.x, surface.triangles.col(f0));
-        if (!(norm(membrane::area_vector(x)) > 1e-3 * edge * edge)) surface.remove_triangle(f0);
+    const membrane::Triangles triangles = cgal_delaunay(grid);
+    for (const auto& corner : triangles.colwise()) {
+        const membrane::Index f = surface.add(corner[0], corner[1], corner[2]);
+        const auto x = membrane::triangle_at(surface.x, surface.triangles.col(f));
+        if (!(norm(membrane::area_vector(x)) > 1e-3 * edge * edge)) surface.remove_triangle(f);
     }
     return surface;
 }

@@ -10,13 +10,12 @@
 #include <span>
 #include <vector>
 
-#include <CGAL/Side_of_triangle_mesh.h>
 #include <membrane/surface/shapes.hpp>
 
 #include "support/bits.hpp"
 #include "support/cases.hpp"
 #include "support/catch.hpp"
-#include "support/cgal_mesh.hpp"
+#include "support/cgal.hpp"
 #include "support/meshes.hpp"
 #include "support/tears.hpp"
 
@@ -409,8 +408,7 @@ TEST_CASE("the pseudo-normal at the nearest point distinguishes inside from outs
         auto surface = test::surface_of(icosphere({.radius = 1, .subdivisions = 1 + random.index(2)}));
         for (Index v = 0; v < surface.vertex_count(); ++v) surface.x.col(v) *= random.number(0.75, 1.25);  // not convex
         const Adjacency adjacency(surface.mesh());
-        const auto cgal = test::cgal_mesh(surface.x, surface.triangles);
-        const CGAL::Side_of_triangle_mesh<test::CgalMesh, test::CgalKernel> side_of(cgal);
+        const test::CgalTree cgal(surface.x, surface.triangles);
         for (int query = 0; query < 500; ++query) {
             Vector3<double> q = random.vector<double>(-1.3, 1.3);
             if (query % 2 == 0) {  // close to a vertex
@@ -430,7 +428,7 @@ TEST_CASE("the pseudo-normal at the nearest point distinguishes inside from outs
             const auto normal = pseudo_normal(surface.x, surface.triangles, adjacency, triangle, nearest.barycentric);
             CHECK(norm(normal) == Approx(1));
             const bool outside = dot<double>(normal, q - nearest.point) > 0;
-            CHECK(outside == (side_of(test::cgal_point(q)) == CGAL::ON_UNBOUNDED_SIDE));
+            CHECK(outside == cgal.is_outside(q));
         }
     }
     CHECK(at_face > 0);

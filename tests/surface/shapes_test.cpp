@@ -8,19 +8,14 @@
 #include <utility>
 #include <vector>
 
-#include <CGAL/Polygon_mesh_processing/measure.h>
-#include <CGAL/Polygon_mesh_processing/orientation.h>
-#include <CGAL/Polygon_mesh_processing/self_intersections.h>
-#include <CGAL/boost/graph/helpers.h>
 #include <membrane/surface/adjacency.hpp>
 #include <membrane/surface/triangle.hpp>
 
 #include "support/catch.hpp"
-#include "support/cgal_mesh.hpp"
+#include "support/cgal.hpp"
 #include "support/refusal.hpp"
 
 using namespace membrane;
-namespace PMP = CGAL::Polygon_mesh_processing;
 
 namespace {
 
@@ -40,29 +35,14 @@ struct EdgeLengths {
 
 /// CGAL's opinion of a shape: valid, manifold, in one piece, without self-intersection, no vertex too many.
 template <class S>
-test::CgalMesh checked(const TriangleMesh<S>& mesh, int euler) {
-    const test::CgalMesh cgal = test::cgal_mesh(mesh);
-    CHECK(static_cast<Index>(cgal.number_of_faces()) == mesh.triangle_count());
-    CHECK(CGAL::is_valid_polygon_mesh(cgal));
-    CHECK_FALSE(PMP::does_self_intersect(cgal));
-    CHECK(static_cast<int>(cgal.number_of_vertices()) - static_cast<int>(cgal.number_of_edges()) +
-              static_cast<int>(cgal.number_of_faces()) ==
-          euler);
-    for (const auto v : cgal.vertices()) {
-        if (cgal.is_isolated(v)) FAIL("isolated vertex " << v);
-    }
+test::CgalFacts checked(const TriangleMesh<S>& mesh, int euler) {
+    const test::CgalFacts cgal = test::cgal_facts(mesh);
+    CHECK(cgal.faces == mesh.triangle_count());
+    CHECK(cgal.valid);
+    CHECK_FALSE(cgal.intersects_itself);
+    CHECK(cgal.euler == euler);
+    CHECK(cgal.isolated == 0);
     return cgal;
-}
-
-double smallest_angle_degrees(const test::CgalMesh& mesh) {
-    double smallest = 180;
-    for (const auto h : mesh.halfedges()) {
-        if (mesh.is_border(h)) continue;
-        const auto &a = mesh.point(mesh.source(h)), &b = mesh.point(mesh.target(h));
-        const auto& c = mesh.point(mesh.target(mesh.next(h)));
-        smallest = std::min(smallest, CGAL::approximate_angle(a - b, c - b));
-    }
-    return smallest;
 }
 
 /// Whether every triangle of an open shape faces +z.
@@ -93,10 +73,10 @@ TEMPLATE_TEST_CASE("icospheres are closed, outward and on the sphere", "[shapes]
         CHECK(adjacency.closed());
 
         const auto cgal = checked(mesh, 2);
-        CHECK(CGAL::is_closed(cgal));
-        CHECK(PMP::is_outward_oriented(cgal));
-        CHECK(PMP::does_bound_a_volume(cgal));
-        CHECK(smallest_angle_degrees(cgal) > 50);
+        CHECK(cgal.closed);
+        CHECK(cgal.outward);
+        CHECK(cgal.bounds_a_volume);
+        CHECK(cgal.smallest_angle > 50);
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             const Vector3<double> x = point(mesh.positions(), v).template cast<double>();
             REQUIRE(std::abs(norm(x) / radius - 1) < 2 * epsilon);
@@ -104,8 +84,8 @@ TEMPLATE_TEST_CASE("icospheres are closed, outward and on the sphere", "[shapes]
         }
         // An inscribed surface loses area and volume in proportion to the square of its edges.
         const double edge = EdgeLengths(mesh).longest / radius, pi = std::numbers::pi;
-        const double lost_area = 1 - PMP::area(cgal) / (4 * pi * radius * radius);
-        const double lost_volume = 1 - PMP::volume(cgal) / (4 * pi / 3 * radius * radius * radius);
+        const double lost_area = 1 - cgal.area / (4 * pi * radius * radius);
+        const double lost_volume = 1 - cgal.volume / (4 * pi / 3 * radius * radius * radius);
         CHECK(lost_area > 0);
         CHECK(lost_area < edge * edge / 4);
         CHECK(lost_volume > lost_area);
@@ -117,11 +97,11 @@ TEMPLATE_TEST_CASE("icospheres are closed, outward and on the sphere", "[shapes]
 TEST_CASE("the icosahedron has its closed-form measures", "[shapes][cgal]") {
     const double radius = 2, edge = radius / std::sin(2 * std::numbers::pi / 5);
     const auto mesh = icosphere({.radius = radius, .subdivisions = 0});
-    const auto cgal = test::cgal_mesh(mesh);
+    const auto cgal = test::cgal_facts(mesh);
     CHECK(EdgeLengths(mesh).shortest == Approx(edge).epsilon(1e-15));
     CHECK(EdgeLengths(mesh).longest == Approx(edge).epsilon(1e-15));
-    CHECK(PMP::area(cgal) == Approx(5 * std::sqrt(3.0) * edge * edge).epsilon(1e-14));
-    CHECK(PMP::volume(cgal) == Approx(5 * (3 + std::sqrt(5.0)) / 12 * edge * edge * edge).epsilon(1e-14));
+    CHECK(cgal.area == Approx(5 * std::sqrt(3.0) * edge * edge).epsilon(1e-14));
+    CHECK(cgal.volume == Approx(5 * (3 + std::sqrt(5.0)) / 12 * edge * edge * edge).epsilon(1e-14));
 }
 
 TEST_CASE("the icosphere is the one that the reference equilibria were computed on", "[shapes]") {
@@ -149,7 +129,7 @@ TEMPLATE_TEST_CASE("sheets are flat, of their size, and face up", "[shapes][cgal
         const auto cgal = checked(mesh, 1);
         CHECK(faces_up(mesh));
         CHECK((mesh.positions().row(2).array() == 0).all());
-        CHECK(PMP::area(cgal) == Approx(0.3 * 0.2));
+        CHECK(cgal.area == Approx(0.3 * 0.2));
         for (const auto& [axis, size] : {std::pair{0, S(0.3)}, {1, S(0.2)}}) {
             CHECK(mesh.positions().row(axis).maxCoeff() == size / 2);
             CHECK(mesh.positions().row(axis).minCoeff() == -size / 2);
@@ -174,8 +154,8 @@ TEMPLATE_TEST_CASE("discs are flat, round, and face up", "[shapes][cgal]", TEST_
         CHECK((mesh.positions().row(2).array() == 0).all());
         CHECK((mesh.positions().col(0).array() == 0).all());
         const int corners = 6 * rings;  // the rim is a regular polygon
-        CHECK(PMP::area(cgal) == Approx(corners / 2.0 * radius * radius * std::sin(2 * pi / corners)));
-        CHECK(smallest_angle_degrees(cgal) > 40);
+        CHECK(cgal.area == Approx(corners / 2.0 * radius * radius * std::sin(2 * pi / corners)));
+        CHECK(cgal.smallest_angle > 40);
 
         const Adjacency adjacency(mesh);
         CHECK(adjacency.border_vertices().size() == static_cast<std::size_t>(corners));
@@ -203,7 +183,7 @@ TEMPLATE_TEST_CASE("spherical caps lie on their sphere, with the rim asked for",
         CHECK(mesh.triangle_count() == 6 * rings * rings);
         const auto cgal = checked(mesh, 1);
         CHECK(faces_up(mesh));
-        CHECK(smallest_angle_degrees(cgal) > 30);
+        CHECK(cgal.smallest_angle > 30);
         const double rim_height = std::sqrt(std::max(0.0, radius * radius - diameter * diameter / 4));
         for (Index v = 0; v < mesh.vertex_count(); ++v) {
             REQUIRE(norm(point(mesh.positions(), v)) == Approx(radius));
@@ -218,9 +198,9 @@ TEMPLATE_TEST_CASE("spherical caps lie on their sphere, with the rim asked for",
             REQUIRE(std::hypot(x.x(), x.y()) == Approx(diameter / 2));
         }
         const double cap_area = 2 * pi * radius * (radius - rim_height);
-        CHECK(PMP::area(cgal) < cap_area);
+        CHECK(cgal.area < cap_area);
         const double edge = EdgeLengths(mesh).longest / radius;
-        CHECK(PMP::area(cgal) > cap_area * (1 - 0.2 / (rings * rings) - edge * edge / 4));
+        CHECK(cgal.area > cap_area * (1 - 0.2 / (rings * rings) - edge * edge / 4));
     }
 }
 

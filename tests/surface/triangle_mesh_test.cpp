@@ -9,11 +9,9 @@
 #include <string>
 #include <vector>
 
-#include <CGAL/Polygon_mesh_processing/polygon_soup_to_polygon_mesh.h>
-
 #include "support/cases.hpp"
 #include "support/catch.hpp"
-#include "support/cgal_mesh.hpp"
+#include "support/cgal.hpp"
 #include "support/meshes.hpp"
 
 using namespace membrane;
@@ -449,7 +447,6 @@ TEMPLATE_TEST_CASE("a vertex that joins surfaces without an edge is refused", "[
 
 TEST_CASE("what is accepted is what CGAL takes for a mesh", "[mesh][cgal]") {
     // Random triangles thrown in and out of a mesh; CGAL takes two sides of one triangle for a surface, we do not.
-    namespace PMP = CGAL::Polygon_mesh_processing;
     std::array<int, 2> counts{};
     for (int seed = 1; seed <= cases(4000); ++seed) {
         CAPTURE(seed);
@@ -471,7 +468,7 @@ TEST_CASE("what is accepted is what CGAL takes for a mesh", "[mesh][cgal]") {
         for (const auto& corner : surface.triangles.colwise()) different.insert({corner[0], corner[1], corner[2]});
         const bool duplicates = static_cast<Index>(different.size()) < surface.triangle_count();
         const bool accepted = refusal_of(surface).empty();
-        REQUIRE(accepted == (!duplicates && PMP::is_polygon_soup_a_polygon_mesh(test::cgal_soup(surface.triangles))));
+        REQUIRE(accepted == (!duplicates && test::cgal_takes_for_mesh(surface.triangles)));
         ++counts[accepted ? 1 : 0];
     }
     CHECK(counts[0] > cases(500));
