@@ -189,7 +189,7 @@ inline void Film::draw_section(Svg& svg, Pixel corner, double width, double heig
         const auto distances = radii(x, scene_.mesh.triangles(), right, up, directions);
         for (std::size_t i = 0; i < directions.size(); ++i) {
             const Pixel p = pixel(distances[i] * std::sin(directions[i]), distances[i] * std::cos(directions[i]));
-            path += (i == 0 ? "M" : i == 1 ? "L" : " ") + number(p.x) + " " + number(p.y);
+            path.append(i == 0 ? "M" : i == 1 ? "L" : " ").append(number(p.x)).append(" ").append(number(p.y));
         }
         return path;
     };
