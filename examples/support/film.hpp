@@ -157,7 +157,7 @@ inline void Film::draw_membrane(Svg& svg, Pixel middle, double metre) const {
                 const Pixel at = camera.pixel(picture.points.col(v));
                 corners[k] = {std::round(at.x), std::round(at.y)};
             }
-            return "M" + outline(corners);
+            return std::string("M").append(outline(corners));
         };
         const auto colour = [&](const Picture& picture) {
             const auto& normals = normals_[static_cast<std::size_t>(&picture - pictures_.data())];
@@ -219,7 +219,7 @@ inline void Film::draw_force(Svg& svg, Pixel corner, double width, double height
     for (const Frame& frame : record_.frames) {
         if (frame.tool.time > end()) break;
         const Pixel p = pixel(frame.tool.time, frame.reaction.norm());
-        curve += (curve.empty() ? "M" : " ") + number(p.x) + " " + number(p.y);
+        curve.append(curve.empty() ? "M" : " ").append(number(p.x)).append(" ").append(number(p.y));
     }
     svg.line({corner.x, corner.y + height}, {corner.x + width, corner.y + height}, "stroke='#777'");
     svg.add("<path d='", curve, "' fill='none' stroke='#12507b' stroke-width='1.5'/>\n");
@@ -228,7 +228,7 @@ inline void Film::draw_force(Svg& svg, Pixel corner, double width, double height
         if (phase.begin < end())
             svg.text({p.x, p.y + 14}, phase.name, {.size = 10, .colour = "#666", .anchor = "middle"});
     }
-    svg.text({corner.x, corner.y + 8}, "force of the membrane, at most " + force_text(largest),
+    svg.text({corner.x, corner.y + 8}, std::string("force of the membrane, at most ").append(force_text(largest)),
              {.size = 11, .colour = "#12507b"});
     add(svg, "circle", "r='4' fill='#12507b'",
         {attribute("cx", [&](const Picture& picture) { return number(at(picture).x); }),
