@@ -499,3 +499,112 @@ TEST_CASE("forceps against pins, other forceps or a tool: motion and forces are 
         CHECK(scene.displaced < 0.1e-3);
     }
 }
+
+// A shaft over a pinned rim.
+
+namespace {
+
+/// A shaft that lies across a membrane or along its rim, and is pressed down. All lengths in metres.
+template <class S>
+struct ShaftOverRim {
+    explicit ShaftOverRim(test::Random& random)
+        : edge(random.number(0.5e-3, 2e-3)),
+          mesh(mesh_of(random, edge)),
+          network(mesh, LinearSpring{}, {.stiffness = S(random.number(5.0, 60.0)), .pinned = border(mesh)}),
+          foundation(mesh, {.stiffness = S(random.number(0.5, 8.0))}),
+          radius(random.number(0.5e-3, 2e-3)) {
+        const double turn = random.number(0.0, 6.3), half = random.chance(0.25) ? 8e-3 : 14e-3;
+        axis = 2 * half * Vector3<double>(std::cos(turn), std::sin(turn), 0);
+        middle = Vector3<double>(random.number(-1e-3, 1e-3), random.number(-1e-3, 1e-3), 0);
+        along_rim = random.chance(0.3);
+        if (!along_rim) return;
+        const Vector3<double> along = Vector3<double>::UnitY() + Vector3<double>(random.number(-0.1, 0.1), 0, 0);
+        axis = 2 * half * along.normalized();
+        middle.x() = 0.01 - random.number(0.0, 1.0) * radius;  // a side of the sheet, or the end of a radius
+    }
+
+    static TriangleMesh<S> mesh_of(test::Random& random, double edge) {
+        const auto count = static_cast<Index>(0.02 / edge);
+        if (random.chance(0.5)) return disc<S>({.radius = 0.01, .rings = count / 2});
+        return sheet<S>({.width = 0.02, .height = 0.02, .columns = count, .rows = count});
+    }
+
+    /// The largest support stiffness [N/m] at rest.
+    double support_stiffness() const {
+        double largest = 0;
+        for (Index v = 0; v < mesh.vertex_count(); ++v) {
+            const Vector3<S> at = point(mesh.positions(), v);
+            largest = std::max(largest, double(network.force_on(v, mesh.positions()).stiffness +
+                                               foundation.force_on(v, at, at, S(1)).stiffness));
+        }
+        return detail::support_factor * largest;
+    }
+
+    Tool<S> tool(double height) const {
+        Tool<S> tool;
+        tool.position = (middle - axis / 2 + Vector3<double>(0, 0, height)).template cast<S>();
+        tool.axis = axis.cast<S>();
+        tool.radius = S(radius);
+        return tool;
+    }
+
+    double edge;
+    TriangleMesh<S> mesh;
+    MassSpringNetwork<S, LinearSpring> network;
+    VirtualVolumeSprings<S> foundation;
+    double radius;
+    Vector3<double> axis, middle;
+    bool along_rim;
+};
+
+}  // namespace
+
+TEMPLATE_TEST_CASE(
+    "a shaft pressed over a pinned rim: no vertex is thrown, and the force is bounded and, across it, upward", "",
+    TEST_SCALARS) {
+    using S = TestType;
+    const int scenes = cases(20, 400);
+    int turned = 0;  // scenes with a shaft across the rim that pulls
+    for (int seed = 1; seed <= scenes; ++seed) {
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const ShaftOverRim<S> scene(random);
+        const double lowered = 3 * scene.radius, stiffness = scene.support_stiffness();
+        CAPTURE(seed, scene.radius, scene.edge, scene.axis.transpose(), scene.middle.transpose());
+        QuasiStaticSolver<S> solver(scene.network, {.layers = 6, .sweeps = 4, .rigid_stiffness = S(stiffness)});
+        AabbTree<S> tree(scene.mesh);
+        ContactTracker<S> tracker(scene.mesh);
+        Points<S> x = scene.mesh.positions();
+        double up = 0, down = 0;  // the largest vertical forces [N]
+        for (double height = scene.radius; height > scene.radius - lowered; height -= 1e-4) {
+            const auto tool = scene.tool(height);
+            const auto contact = tracker.update(tree, x, tool);
+            const auto report = solver.step(x, S(1e-3), scene.network, scene.foundation, press(tool, contact));
+            tree.refit(x, report.moved);
+            REQUIRE(report.status == StepStatus::advanced);
+            const Vector3<double> force = report.reactions[0].template cast<double>();
+            up = std::max(up, force.z()), down = std::max(down, -force.z());
+            std::vector<Index> pressed;
+            double violation = 0;  // of each point by its own force alone [m]
+            for (const auto& point : solver.contact_points(0)) {
+                if (point.force.isZero(0)) continue;
+                double squares = 0;
+                for (std::size_t k = 0; k < 3; ++k) {
+                    const double weight = point.weights[static_cast<Eigen::Index>(k)];
+                    if (scene.network.pinned(point.corners[k])) squares += weight * weight;
+                    pressed.push_back(point.corners[k]);
+                }
+                violation = std::max(violation, squares * double(norm(point.force)) / stiffness);
+            }
+            CHECK(report.violation > 0.99 * violation - 1e-12);
+            std::sort(pressed.begin(), pressed.end());
+            pressed.erase(std::unique(pressed.begin(), pressed.end()), pressed.end());
+            const auto on_rim =
+                std::count_if(pressed.begin(), pressed.end(), [&](Index v) { return scene.network.pinned(v); });
+            CAPTURE(height, on_rim);
+            CHECK(double((x - scene.mesh.positions()).colwise().norm().maxCoeff()) < 3 * lowered);
+            CHECK(force.norm() < 6 * stiffness * lowered * double(1 + on_rim));
+        }
+        if (!scene.along_rim && down > 0.02 * up) ++turned;
+    }
+    CHECK(turned <= scenes / 20);
+}

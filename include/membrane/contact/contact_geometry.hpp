@@ -39,10 +39,10 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
         // The shaft passes through the triangle: the gap is that of its lower end, if that is not beyond the border.
         const bool is_second = side * dot(outward, tool.axis) < 0;
         const Vector3<Scalar> end = is_second ? Vector3<Scalar>(tool.position + tool.axis) : tool.position;
-        const auto of_end = closest_point(triangle, end);
-        if (!surface.on_border(f, of_end.barycentric)) {
+        const Index g = surface.closed() ? f : surface.walk_to_closest(x, f, end);
+        if (!surface.on_border(g, closest_point(surface.triangle(x, g), end).barycentric)) {
             contact.axis_point = end;
-            nearest.on_triangle = of_end;
+            nearest.on_triangle = closest_point(triangle, end);
         }
     } else {
         outward = surface.outward(x, f, nearest.on_triangle.barycentric);

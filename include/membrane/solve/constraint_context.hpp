@@ -201,14 +201,14 @@ class ConstraintContext {
         return held && stiffness > 0 ? opposed_part(v) * opposed_part(v) / stiffness : Scalar(0);
     }
 
-    /// Vertices shared with this constraint may move by `distance` in this step [m]: the motion of a tool or a target
-    /// since the last one, and the violation.
+    /// Vertices shared with this constraint, or beside fixed ones, may move by `distance` in this step [m]: the motion
+    /// of a tool or a target since the last one, and the violation.
     void allow_motion(Scalar distance) noexcept { state_.largest_motion = (std::max)(state_.largest_motion, distance); }
 
-    /// Moves shared vertices that have moved farther than that in this step back to there: a triangle that rocks
+    /// Moves those of `vertices` that have moved farther than that in this step back to there: a triangle that rocks
     /// between two tools may turn over in few passes.
-    void limit_shared() noexcept {
-        for (const Index v : state_.shared.items()) {
+    void limit_motion(std::span<const Index> vertices) noexcept {
+        for (const Index v : vertices) {
             const Vector3<Scalar> by = position(v) - start(v);
             const Scalar distance = norm(by);
             if (distance > state_.largest_motion && !fixed(v))

@@ -182,7 +182,7 @@ class ConstraintList {
         for (int i = 0; again && i < rounds; ++i) {
             again = false;
             for_each([&](const auto& constraint, std::size_t) { again |= constraint.enforce(context_); });
-            context_.limit_shared();
+            context_.limit_motion(context_.state().shared.items());
             changed |= again;
         }
         return changed;
@@ -203,7 +203,8 @@ class ConstraintList {
         for_each([&](const auto&, std::size_t i) {
             if (context_.state().several_on_fixed) context_.sum_support_forces();
             for (const auto& point : std::as_const(context_).points()) {
-                const Scalar violation = point.on_fixed ? norm(support_displacement(context_, point)) : Scalar(0);
+                const Scalar violation = (std::max)(norm(support_displacement(context_, point)),
+                                                    norm(point.force) * support_compliance(context_, point));
                 if (!(violation > report.violation)) continue;
                 report.violation = violation;
                 report.violated = static_cast<Index>(i);

@@ -254,7 +254,7 @@ template <Real Scalar>
         const Wide &weight = pack.load.weights[i], &stiffness = support.extra;
         const auto is_fixed = pack.free[i] < 1;
         const Wide pressed = -dot(support.point, pack.load.normal);
-        const Wide own = select<Wide>(is_fixed, pressed, larger<Wide>(pressed, 0));
+        const Wide own = larger<Wide>(pressed, select<Wide>(is_fixed, weight * pack.load.force, 0));
         const Wide opposing = larger<Wide>(dot(others.point, pack.load.normal), 0);
         const auto holds = is_fixed | (opposing > 0);
         const Wide part = select<Wide>(is_fixed, 1, opposing / select<Wide>(opposing > 0, own + opposing, 1));

@@ -15,7 +15,9 @@
 /// force would depend on whether a contact point has a thousandth of its weight on a free corner. Against constraints,
 /// a fixed vertex is therefore on a spring of stiffness k to its position. A contact point with the weights w has on
 /// fixed corners the compliance sum w^2 / k, added to that of the free corners. So its force is continuous in the
-/// tool's position, and k d at a penetration d of a fixed vertex. Springs and foundation use the vertex's own position.
+/// tool's position, and k d at a penetration d of a fixed vertex. The forces of several points on a fixed vertex add
+/// up, but each displaces it by at least w / k times its own: opposite forces, as on both sides of a shaft, stay
+/// bounded. Springs and foundation use the vertex's own position.
 ///
 /// A free vertex may be shared: several constraints have points on it, as two tools that pinch a sheet, or a tool on
 /// tissue that forceps hold. If one constraint acts on it with the force f, and the others oppose f by g, then to this

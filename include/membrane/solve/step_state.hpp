@@ -230,7 +230,7 @@ struct StepState {
     Scalar force_tolerance = 0;  ///< a negligible change of force [N]
     Scalar queue_residual = 0;   ///< largest residual force in the queue after the last step [N]
     Scalar asleep_below = 0;     ///< no vertex that has moved is asleep under a larger force than this [N]
-    Scalar largest_motion = 0;   ///< how far shared vertices may move in this step [m]
+    Scalar largest_motion = 0;   ///< how far shared vertices, and those beside fixed ones, may move [m]
     ///@{
     /// A constraint found its input invalid; the contact points exceed the capacity; several constraints have points on
     /// fixed or shared vertices.

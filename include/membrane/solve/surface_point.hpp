@@ -67,15 +67,26 @@ void press_in(ConstraintContext<Scalar>& context, const std::array<Index, 3>& co
     }
 }
 
+/// Displacement of the point's fixed and shared corners by a force on it, over the force [m/N].
+template <Real Scalar>
+[[nodiscard]] Scalar support_compliance(const ConstraintContext<Scalar>& context,
+                                        const ContactPoint<Scalar>& point) noexcept {
+    Scalar sum = 0;
+    for (std::size_t k = 0; k < 3 && point.on_fixed; ++k) {
+        const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
+        sum += weight * weight * context.support_compliance(point.corners[k]);
+    }
+    return sum;
+}
+
 /// Response of the point to `force` [m], with the displacement of fixed and shared corners.
 template <Real Scalar>
 [[nodiscard]] Vector3<Scalar> response_of(const ConstraintContext<Scalar>& context, const ContactPoint<Scalar>& point,
                                           const Vector3<Scalar>& force) noexcept {
-    Vector3<Scalar> sum = Vector3<Scalar>::Zero();
+    Vector3<Scalar> sum = support_compliance(context, point) * force;
     for (std::size_t k = 0; k < 3; ++k) {
         const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
         sum += weight * context.response(point.corners[k], weight * force);
-        if (point.on_fixed) sum += weight * weight * context.support_compliance(point.corners[k]) * force;
     }
     return sum;
 }
@@ -102,11 +113,10 @@ template <Real Scalar>
 template <Real Scalar>
 [[nodiscard]] Scalar negligible_distance(const ConstraintContext<Scalar>& context,
                                          const ContactPoint<Scalar>& point) noexcept {
-    Scalar sum = 0;
+    Scalar sum = support_compliance(context, point);
     for (std::size_t k = 0; k < 3; ++k) {
         const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
         sum += weight * weight * context.compliance(point.corners[k]);
-        if (point.on_fixed) sum += weight * weight * context.support_compliance(point.corners[k]);
     }
     return (std::max)(context.force_tolerance() * sum, detail::rounding_at(context.position(point.corners[0])));
 }

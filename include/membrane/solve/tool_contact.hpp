@@ -30,8 +30,10 @@ namespace membrane {
 ///
 /// Fixed corners (pinned or prescribed) do not move. They resist with a penalty force, the penetration times
 /// `SolverOptions::rigid_stiffness`: at triangles with fixed corners a penetration of force over stiffness remains. If
-/// the tool's axis is behind such a triangle, the only contact point is the nearest one. The force may jump where this
-/// point crosses a border of the mesh, or in a sharp fold at a pin.
+/// a sphere's centre is behind such a triangle, the only contact point is the nearest one; a shaft keeps the side that
+/// each of its points had in the last step. The force may jump where the nearest point crosses a border of the mesh, or
+/// in a sharp fold at a pin. While a tool touches fixed corners, the vertices in contact move in one step by at most
+/// its motion and penetration: opposite forces on both sides of a shaft would fling them away.
 ///
 /// A sphere whose radius is less than a 70th of an edge, as that of a point tool is by default, stays in front of the
 /// planes of the triangles that it touches: on a convex edge or corner it is too far out, by less than its radius.
@@ -246,12 +248,13 @@ void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point
     point.normal = direction(apart ? point.normal : Vector3<Scalar>(contact.previous_axis_point - contact.axis_point),
                              contact.normal);
     point.on_fixed = is_on_fixed(context, point.corners);
-    // Fixed corners have not been carried along: a triangle that the tool has passed is between its last and its new
-    // position.
-    if (contact.tunnelled && point.on_fixed) {
+    // Fixed corners do not follow the tool: when a shaft's axis passes them, it stays on the side of the last step. A
+    // triangle that a tool has tunnelled through is between its last and its new position.
+    const bool keeps_side = before != nullptr && feature_pairs(tool) > 1;
+    if (point.on_fixed && (keeps_side || contact.tunnelled)) {
         const Vector3<Scalar> came = contact.previous_axis_point - contact.axis_point + distance * point.normal -
                                      support_displacement(context, point);
-        if (dot(came, point.normal) < 0) point.normal = -point.normal;
+        if (dot(keeps_side ? before->normal : came, point.normal) < 0) point.normal = -point.normal;
     }
     stay_on_side(context, point);
     if (before != nullptr) point.force = -norm(before->force) * point.normal;
@@ -295,12 +298,13 @@ void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
 }
 
 // Fixed vertices do not yield to a tool: if it penetrates by more than its radius, its axis is behind them. Then the
-// only contact point is the nearest one, on the tool's side in the last step. Returns the direction out of the surface
-// at this point; null if the axis is not behind, or if no corner that has a weight at this point is fixed.
+// only contact point of a sphere is the nearest one, on the tool's side in the last step. Returns the direction out of
+// the surface at this point; null for a shaft, if the centre is not behind, or if no corner that has a weight at this
+// point is fixed.
 template <Real Scalar>
 std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(const Context& context) const noexcept {
     const Vector3<Scalar> fixed = contact.barycentric - free_weights(context, contact.corners, contact.barycentric);
-    if (!(fixed.maxCoeff() > 0)) return std::nullopt;
+    if (!(fixed.maxCoeff() > 0) || feature_pairs(tool) > 1) return std::nullopt;
     Vector3<Scalar> pressed = Vector3<Scalar>::Zero();
     for (const auto& point : context.previous_points()) pressed += point.force;
     const bool turned = dot(pressed, contact.normal) > 0;
@@ -373,6 +377,9 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
         if (!(i + 1 < most ? pass.largest > first / 2 : pass.deep)) break;
     }
     for (int i = 0; deep && i < detail::max_push_passes; ++i) deep = push_out(context.state(), shape(), packs(context));
+    if (on_fixed) {
+        for (const auto& listed : contact.triangles) context.limit_motion(listed.corners);
+    }
     apply_forces(context.state(), packs(context));
     prevent_tunnelling(context);
     if (takes_turns) context.state().packs.unpack(context.state().points.items());
