@@ -19,11 +19,12 @@ TEST_CASE("a report lists what is found, and counts what it does not list", "[me
     CHECK(!report.empty());
     found(MeshDefect::repeated_vertex, {3}, {7}, "triangle ", 7, " names vertex ", 3, " twice");
     CHECK(!report.valid());
-    report.complete = false;
+    report.unfinished = {MeshDefect::t_junction, MeshDefect::self_intersection};
     CHECK(to_string(report) ==
           "error: repeated vertex: 1; repair with .drop_repeated\n"
           "warning: isolated vertex: 5; repair with .drop_isolated\n"
-          "the search is not complete\n"
+          "search stopped at its limit, there may be more: T-junction\n"
+          "search stopped at its limit, there may be more: self-intersection\n"
           "repeated vertex: triangle 7 names vertex 3 twice\n"
           "isolated vertex: no triangle names vertex 0\n"
           "isolated vertex: no triangle names vertex 1\n"

@@ -539,6 +539,7 @@ TEMPLATE_TEST_CASE("a fan all pairs of which meet is tested in part, and taken",
         INFO(to_string(report));
         CHECK(report.empty());
         CHECK(!report.complete);
+        CHECK(report.unfinished == std::vector{MeshDefect::self_intersection});
     }
 }
 
@@ -550,10 +551,15 @@ TEST_CASE("the work of validation is bounded", "[mesh]") {
     const MeshReport report = validate(heap.x, heap.triangles, {.tolerance = 10, .max_pairs_per_triangle = 10});
     CHECK(report.count(MeshDefect::self_intersection) == 100);
     CHECK(!report.complete);
+    CHECK(report.unfinished.front() == MeshDefect::nearly_coincident_vertices);
+    CHECK(report.unfinished.back() == MeshDefect::self_intersection);
     CHECK(validate(heap.x, heap.triangles, {.tolerance = 0.0, .max_findings_per_kind = 3}).findings.size() <= 6);
     const MeshReport one_of_a_kind = validate(heap.x, heap.triangles, {.tolerance = 0.0, .max_findings_per_kind = 1});
     CHECK(one_of_a_kind.findings.size() <= 2);
     CHECK_THAT(to_string(one_of_a_kind), ContainsSubstring("components, one with triangle 0, one with triangle 1\n"));
+    const std::string summary =
+        "several components: " + std::to_string(heap.triangle_count()) + "; make a mesh of each";
+    CHECK_THAT(to_string(one_of_a_kind), ContainsSubstring(summary));
 }
 
 TEST_CASE("a vertex beside an edge is on it within the tolerance, to any side", "[mesh][bad]") {

@@ -34,6 +34,7 @@ struct MeshReport {
     std::vector<MeshFinding> findings;                    ///< In the order of the search; limited for each kind.
     std::array<std::size_t, mesh_defect_count> counts{};  ///< Of each kind, listed or not.
     bool complete = true;                                 ///< False: a search stopped early, there may be more.
+    std::vector<MeshDefect> unfinished;                   ///< The kinds of the searches that stopped early.
 
     /// Number of defects of one kind, listed or not.
     [[nodiscard]] std::size_t count(MeshDefect defect) const noexcept {
@@ -62,7 +63,9 @@ struct MeshReport {
         const auto defect = static_cast<MeshDefect>(i);
         if (report.counts[i] == 0) continue;
         text += severity(defect) == Severity::error ? "error: " : "warning: ";
-        (((((text += name(defect)) += ": ") += std::to_string(report.counts[i])) += "; ") += remedy(defect)) += "\n";
+        const bool counts_parts = defect == MeshDefect::several_components;  // one finding names them all
+        const auto number = counts_parts ? std::to_string(report.facts.components) : std::to_string(report.counts[i]);
+        (((((text += name(defect)) += ": ") += number) += "; ") += remedy(defect)) += "\n";
         std::size_t listed = 0;
         for (const MeshFinding& finding : report.findings) {
             if (finding.defect != defect || listed == most) continue;
@@ -73,7 +76,9 @@ struct MeshReport {
             (((list += name(defect)) += ": ") += std::to_string(report.counts[i] - listed)) += " more\n";
         }
     }
-    if (!report.complete) text += "the search is not complete\n";
+    for (const MeshDefect defect : report.unfinished) {
+        ((text += "search stopped at its limit, there may be more: ") += name(defect)) += "\n";
+    }
     return text + list;
 }
 

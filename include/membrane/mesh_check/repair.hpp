@@ -41,9 +41,9 @@ struct RepairOptions {
     bool drop_duplicates = false;  ///< Of triangles with the same vertices, in any order, keeps only the first.
     /// Reverses triangles until each component is consistently oriented. A component here is what edges of exactly two
     /// triangles join. One that is consistently oriented, see `flip_inward`, or not orientable, is left unchanged. Any
-    /// other closed component then faces outward; in any other open one as few triangles as possible are reversed. Each
-    /// component is treated separately: one inside another faces outward too, even if it is meant as the wall of a
-    /// cavity.
+    /// other that is closed, but for holes of at most a quarter of its area, then faces outward; in any other open one
+    /// as few triangles as possible are reversed. Each component is treated separately: one inside another faces
+    /// outward too, even if it is meant as the wall of a cavity.
     bool orient = false;
     /// Gives each fan of triangles at a vertex, except the first, its own vertex; not where a coordinate is not finite.
     bool split_vertices = false;
@@ -279,7 +279,7 @@ inline void Repair::orient(const std::vector<bool>& usable) {
         const Index p = now.part_of[static_cast<std::size_t>(f)];
         if (p == no_index || agreed[static_cast<std::size_t>(p)]) continue;
         const SurfaceComponent& part = now.parts[static_cast<std::size_t>(p)];
-        if (part.closed && part.volume < 0) turn_over(f);
+        if (part.encloses && part.volume < 0) turn_over(f);
     }
     report_.reversed += static_cast<Index>(std::count(turned.begin(), turned.end(), true));
 }

@@ -71,9 +71,11 @@ struct SurfaceComponent {
     Index first_triangle = no_index;  ///< The lowest index of its triangles.
     Index triangle_count = 0;         ///< Number of its triangles.
     bool closed = true;               ///< Each edge has two triangles, which run along it in opposite directions.
-    double area = 0;                  ///< [m^2]
-    double volume = 0;                ///< If closed [m^3].
-    Aabb<double> extent;              ///< The box around it [m].
+    /// Closed, but for holes that, filled from their middles, have at most a quarter of its area.
+    bool encloses = true;
+    double area = 0;      ///< [m^2]
+    double volume = 0;    ///< If it encloses one, with the holes filled; negative if inward [m^3].
+    Aabb<double> extent;  ///< The box around it [m].
 };
 
 /// The connected components, in order of their first triangles.
@@ -104,10 +106,38 @@ struct SurfaceParts {
                                                 const std::vector<bool>& finite, const SurfaceParts& parts,
                                                 Index borders, bool valid);
 
+namespace detail {
+
+/// Adds the volumes behind the holes to the components that have them, and decides which components enclose one.
+inline void fill_holes(const Points<double>& x, const Triangles& triangles, std::span<const HalfEdge> sides,
+                       SurfaceParts& parts) {
+    std::vector<double> area(parts.parts.size(), 0);
+    for (const auto& line : border_lines(sides, static_cast<Index>(x.cols()))) {
+        Vector3<double> middle = Vector3<double>::Zero();
+        for (const HalfEdge& side : line) middle += point(x, side.first) + point(x, side.second);
+        middle /= 2 * static_cast<double>(line.size());
+        for (const HalfEdge& side : line) {
+            const auto p = static_cast<std::size_t>(parts.part_of[static_cast<std::size_t>(side.triangle)]);
+            SurfaceComponent& part = parts.parts[p];
+            const auto origin = point(x, triangles(0, part.first_triangle));
+            const Vector3<double> a = point(x, side.forward ? side.second : side.first) - origin;
+            const Vector3<double> b = point(x, side.forward ? side.first : side.second) - origin;
+            const Vector3<double> twice = cross<double>(a - (middle - origin), b - (middle - origin));
+            area[p] += norm(twice) / 2;
+            part.volume += dot<double>(middle - origin, twice) / 6;
+        }
+    }
+    for (std::size_t p = 0; p < area.size(); ++p) {
+        parts.parts[p].encloses = parts.parts[p].encloses && area[p] <= parts.parts[p].area / 4;
+    }
+}
+
+}  // namespace detail
+
 inline SurfaceParts surface_parts(const Points<double>& x, const Triangles& triangles, std::span<const HalfEdge> sides,
                                   const std::vector<bool>& finite) {
     DisjointSets sets(static_cast<std::size_t>(triangles.cols()));
-    std::vector<bool> closed(static_cast<std::size_t>(triangles.cols()), true);
+    std::vector<bool> closed(static_cast<std::size_t>(triangles.cols()), true), oriented = closed;
     SurfaceParts result;
     result.part_of.assign(closed.size(), no_index);
     for_each_edge(sides, [&](std::span<const HalfEdge> edge) {
@@ -116,6 +146,7 @@ inline SurfaceParts surface_parts(const Points<double>& x, const Triangles& tria
             const auto f = static_cast<std::size_t>(side.triangle);
             sets.unite(f, static_cast<std::size_t>(edge[0].triangle));
             closed[f] = closed[f] && inner;
+            oriented[f] = oriented[f] && (inner || edge.size() == 1);
             result.part_of[f] = 0;
         }
     });
@@ -130,6 +161,7 @@ inline SurfaceParts surface_parts(const Points<double>& x, const Triangles& tria
         SurfaceComponent& part = result.parts[static_cast<std::size_t>(result.part_of[f])];
         ++part.triangle_count;
         part.closed = part.closed && closed[f] && finite[f];
+        part.encloses = part.encloses && oriented[f] && finite[f];
         if (!finite[f]) continue;
         const auto t = triangle_at(x, triangles.col(static_cast<Eigen::Index>(f)));
         const auto origin = point(x, triangles(0, part.first_triangle));
@@ -137,6 +169,7 @@ inline SurfaceParts surface_parts(const Points<double>& x, const Triangles& tria
         part.volume += dot<double>(t.a - origin, cross<double>(t.b - origin, t.c - origin)) / 6;
         for (int k = 0; k < 3; ++k) part.extent.include(detail::corner(t, k));
     }
+    detail::fill_holes(x, triangles, sides, result);
     return result;
 }
 

@@ -52,8 +52,9 @@ struct ValidateOptions {
 /// accepts the mesh.
 ///
 /// The time is bounded for any input, O(F log F) for usual shapes: a search that exceeds its limit stops, and
-/// `complete` is false. Further checks skip triangles without three different valid vertices. Checks of positions skip
-/// triangles with a corner that is not finite or too large. Checks of distances are skipped if the mesh has no size.
+/// `unfinished` has its kind. Further checks skip triangles without three different valid vertices. Checks of positions
+/// skip triangles with a corner that is not finite or too large. Checks of distances are skipped if the mesh has no
+/// size.
 /// @throws InvalidInput if a matrix does not have three rows or has too many columns for `Index`, and for options out
 /// of range
 template <class P, class T>
@@ -212,10 +213,11 @@ bool check_volumes(const CheckedMesh& mesh, const SurfaceParts& parts, std::int6
     });
 }
 
-/// The checks that need distances; returns whether all searches are complete.
+/// The checks that need distances; returns the kinds of the searches that are not complete.
 template <class Found>
-bool check_geometry(const CheckedMesh& mesh, const SurfaceParts& parts, std::span<const std::vector<HalfEdge>> borders,
-                    double mean_edge, const ValidateOptions& options, Found found) {
+std::vector<MeshDefect> check_geometry(const CheckedMesh& mesh, const SurfaceParts& parts,
+                                       std::span<const std::vector<HalfEdge>> borders, double mean_edge,
+                                       const ValidateOptions& options, Found found) {
     const double tolerance = options.tolerance.value_or((std::max)(1e-6 * mean_edge, 4 * mesh.spacing));
     const std::int64_t effort = 1'000'000 + std::int64_t{options.max_pairs_per_triangle} * mesh.triangles.cols();
     const CoincidentVertices coincident(mesh.x, mesh.points);
@@ -228,20 +230,27 @@ bool check_geometry(const CheckedMesh& mesh, const SurfaceParts& parts, std::spa
         }
     }
     std::int64_t left = effort;
-    bool complete = coincident.for_each_pair(tolerance, left, [&](Index v, Index w) {
+    std::vector<MeshDefect> unfinished;
+    const auto note = [&](MeshDefect defect, bool complete) {
+        if (!complete) unfinished.push_back(defect);
+    };
+    const bool all_pairs = coincident.for_each_pair(tolerance, left, [&](Index v, Index w) {
         found(MeshDefect::nearly_coincident_vertices, {v, w}, {}, "vertices ", v, " and ", w, " are ",
               norm<double>(point(mesh.x, v) - point(mesh.x, w)), " [m] apart, expected more than ", tolerance);
     });
+    note(MeshDefect::nearly_coincident_vertices, all_pairs);
     const std::vector<Index> with_area = check_triangles(mesh, found);
-    complete = check_t_junctions(mesh, borders, tolerance, effort, found) && complete;
-    complete = check_volumes(mesh, parts, effort, found) && complete;
+    note(MeshDefect::t_junction, check_t_junctions(mesh, borders, tolerance, effort, found));
+    note(MeshDefect::nested_components, check_volumes(mesh, parts, effort, found));
     Index meetings = 0;
     left = effort;
     const auto meet = [&](Index f, Index g) {
         found(MeshDefect::self_intersection, {}, {f, g}, "triangles ", f, " and ", g, " meet");
         if (++meetings == options.max_findings_per_kind) left = 0;
     };
-    return for_each_self_intersection(mesh.x, mesh.triangles, with_area, representative, left, meet) && complete;
+    note(MeshDefect::self_intersection,
+         for_each_self_intersection(mesh.x, mesh.triangles, with_area, representative, left, meet));
+    return unfinished;
 }
 
 }  // namespace detail
@@ -267,7 +276,8 @@ MeshReport validate(const Eigen::MatrixBase<P>& positions, const Eigen::MatrixBa
         surface_facts(mesh.x, mesh.sides, mesh.finite, parts, static_cast<Index>(borders.size()), report.valid());
     detail::check_extras(mesh, parts, borders, options.max_findings_per_kind, found);
     if (mesh.has_size) {
-        report.complete = detail::check_geometry(mesh, parts, borders, report.facts.mean_edge, options, found);
+        report.unfinished = detail::check_geometry(mesh, parts, borders, report.facts.mean_edge, options, found);
+        report.complete = report.unfinished.empty();
     }
     return report;
 }
