@@ -284,6 +284,45 @@ TriangleMesh<double> body(Index shape, double half) {
 }  // namespace
 
 // Pressed slowly through the middle of a body and its opposite wall, to a tool's radius beyond, and drawn back.
+TEST_CASE("the depth of a shaft is that of its deepest point, wherever the membrane touches it") {
+    const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
+    for (int seed = 1; seed <= cases(40); ++seed) {
+        CAPTURE(seed);
+        test::Random random(static_cast<std::uint64_t>(seed));
+        const auto up = random.unit_vector();
+        membrane::Tool<double> tool{.axis = random.number(0.2, 2.0) * random.unit_vector(),
+                                    .radius = random.number(0.01, 0.2)};
+        tool.axis -= random.number(0.7, 1.0) * membrane::dot(up, tool.axis) * up;
+        const double deep = random.number(0.01, 0.15);
+        tool.position = (1 + tool.radius - deep) * up - random.number() * tool.axis;
+        const auto height = [&](const membrane::Vector3<double>& q) {  // of a convex body
+            double nearest = 1e9, outside = -1e9;
+            for (membrane::Index f = 0; f < mesh.triangle_count(); ++f) {
+                const auto triangle = membrane::triangle_at(mesh.positions(), mesh.triangles().col(f));
+                nearest = std::min(nearest, std::sqrt(membrane::squared_distance(triangle, q)));
+                outside = std::max(outside, membrane::dot<double>(membrane::area_vector(triangle), q - triangle.a));
+            }
+            return outside > 0 ? nearest : -nearest;
+        };
+        constexpr int samples = 400;
+        double depth = 0;
+        for (int i = 0; i <= samples; ++i) {
+            depth = std::max(depth, tool.radius - height(tool.position + i / double(samples) * tool.axis));
+        }
+        membrane::AabbTree<double> tree(mesh);
+        membrane::ContactTracker<double> tracker(mesh);
+        membrane::Points<double> x = mesh.positions();
+        for (int tick = 0; tick < 4; ++tick) {
+            const auto contact = tracker.update(tree, x, tool);
+            REQUIRE(contact.touching());
+            CHECK(contact.depth > depth - 1e-4);
+            CHECK(contact.depth < depth + membrane::norm(tool.axis) / (2 * samples));
+            x = test::jittered(mesh.positions(), 0.02, random);
+            tree.refit(x);
+        }
+    }
+}
+
 TEST_CASE("pressed deeper than the body is thick, a tool stays in contact, and the depth grows") {
     for (int seed = 1; seed <= cases(3, 60); ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));

@@ -114,6 +114,32 @@ TEST_CASE("in a fold forceps hold a point between its sides, whichever rounding 
     }
 }
 
+TEST_CASE("a shaft on two hills holds the one at its tip, whichever rounding makes the nearer", "[grasp]") {
+    const auto mesh = sheet<double>({.width = 1, .height = 1, .columns = 10, .rows = 10});
+    for (int seed = 1; seed <= cases(20); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const double height = random.number(0.2, 0.4), radius = random.number(0.005, 0.03);
+        const double tip = random.chance(0.5) ? -1 : 1;
+        const Tool<double> tool{.position = {0.45 * tip, 0, height + radius - 1e-6},
+                                .axis = {-0.9 * tip, 0, 0},
+                                .radius = radius,
+                                .grasping = true};
+        Points<double> x = mesh.positions();
+        for (Eigen::Index v = 0; v < x.cols(); ++v) {
+            const bool hill = std::abs(std::abs(x(0, v)) - 0.3) < 0.01 && std::abs(x(1, v)) < 0.01;
+            if (hill) x(2, v) = height + random.number(-1e-13, 1e-13);
+        }
+        AabbTree<double> tree(mesh);
+        tree.refit(x);
+        ContactTracker<double> tracker(mesh);
+        Grasper<double> grasper(mesh);
+        const auto grasp = grasper.update(tracker.update(tree, x, tool), x, tool);
+        REQUIRE(grasp.holding());
+        CHECK(norm<double>(tool.position + grasp.offset - Vector3<double>(0.3 * tip, 0, height)) < 1e-9);
+    }
+}
+
 TEST_CASE("forceps that were closed before they touched hold nothing", "[grasp]") {
     const auto mesh = icosphere({.radius = 1, .subdivisions = 0});
     Grasper<double> grasper(mesh);

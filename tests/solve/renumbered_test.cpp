@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -40,14 +41,16 @@ struct Description {
 
 /// Where the tool is, and the forces and displacements at equilibrium there, in the first description's coordinates.
 struct Equilibrium {
+    Contact<double> found;                                                                // in the first tick there
     Vector3<double> pressed = Vector3<double>::Zero(), pulled = Vector3<double>::Zero();  // [N]
+    double depth = 0;                                                                     // [m]
     Points<double> x;
     bool converged = false;
 };
 
-/// A ball or a point that presses, slides, grasps, pulls, lets go and jumps, on a random surface.
+/// A ball or a shaft that presses, slides, grasps, pulls, lets go and jumps, on a random surface.
 struct Scene {
-    explicit Scene(int seed) : random(static_cast<std::uint64_t>(seed)) {
+    Scene(int seed, bool with_shaft) : random(static_cast<std::uint64_t>(seed)), is_shaft(with_shaft) {
         const double far = random.number(0.5e-3, 2e-3), deep = random.number(0.2e-3, 1e-3);
         const auto first = above(-deep), second = above(-deep);
         const Vector3<double> beside = first + random.vector(-far, far), away = beside + random.vector(-far, 2 * far);
@@ -58,8 +61,10 @@ struct Scene {
         go(away, true, 2);
         go(away, false, 1);
         if (random.chance(0.5)) go(above(1e-3), false, 1);
-        go(second, false, 1);
+        go(second, false, is_shaft ? 3 : 1);
         go(second, true, 1);
+        go(-second, false, 1);  // right through a ball or a cap
+        jump = path.size() - 1;
     }
 
     test::Surface<double> some_surface() {
@@ -69,15 +74,24 @@ struct Scene {
             default: return test::surface_of(spherical_cap<double>({.radius = R, .diameter = 1.6 * R, .rings = 4}));
         }
     }
-    /// A position of the tool at this height above the surface, on its upper side.
+    /// A position of the tool's middle where its lowest point is at this height above the surface, on its upper side.
     Vector3<double> above(double height) {
         const double far = 0.5 * R;
         const Vector3<double> towards(random.number(-far, far), random.number(-far, far), R);
         const double top = surface.x.row(2).maxCoeff();
-        if (top < R / 2) return {towards.x(), towards.y(), height + tool.radius};
-        return (R + height + tool.radius) * direction<double>(towards, towards);
+        const bool is_ball = top > R / 2;
+        const auto up = is_ball ? direction<double>(towards, towards) : Vector3<double>(0, 0, 1);
+        const double above = height + tool.radius + std::abs(dot(up, tool.axis)) / 2;
+        if (is_ball) return (R + above) * up;
+        return {towards.x(), towards.y(), above};
     }
-    void go(const Vector3<double>& to, bool grasping, int ticks) {
+    Vector3<double> some_axis() {
+        if (!is_shaft) return Vector3<double>::Zero();
+        const double flat = random.chance(0.5) ? 0.1 : 1, length = random.number(0.1, 2.5) * R;
+        return length * random.unit_vector<double>().cwiseProduct({1, 1, flat});
+    }
+    void go(const Vector3<double>& middle, bool grasping, int ticks) {
+        const Vector3<double> to = middle - tool.axis / 2;
         const Vector3<double> from = path.empty() ? to : path.back().position;
         for (int i = 1; i <= ticks; ++i) {
             path.push_back(tool);
@@ -87,17 +101,19 @@ struct Scene {
     }
 
     Random random;
+    bool is_shaft;
     test::Surface<double> surface = [&] {
         auto some = some_surface();
         some.x = test::jittered(some.x, 0.04 * R, random);
         return some;
     }();
     bool pinned = random.chance(0.7), triangular = random.chance(0.5), along = random.chance(0.5);
-    Tool<double> tool{.radius = random.chance(0.15) ? 0.0 : random.number(0.5e-3, 6e-3)};
+    Tool<double> tool{.axis = some_axis(), .radius = random.chance(0.15) ? 0.0 : random.number(0.5e-3, 6e-3)};
     GraspOptions jaws{.snap_to_vertex = random.chance(0.3)};
     bool predict = random.chance(0.7);
     UpdateOrder order = test::order_of(random.index(3));
     std::vector<Tool<double>> path;
+    std::size_t jump = 0;
 };
 
 TriangleMesh<double> mesh_of(const test::Surface<double>& surface, const Description& as) {
@@ -124,11 +140,18 @@ std::vector<Equilibrium> run(const Scene& scene, const Description& as, const Po
     ContactTracker tracker(mesh);
     Grasper grasper(mesh, scene.jaws);
     Points<double> x = mesh.positions();
-    const auto come_to_rest = [&](Tool<double> tool) {
+    const auto come_to_rest = [&](Tool<double> tool, bool jumps) {
         tool.position = as.turn * tool.position.eigen();
+        tool.axis = as.turn * tool.axis.eigen();
         Equilibrium now;
         for (int step = 0; step < max_steps && !now.converged; ++step) {
             const auto contact = tracker.update(tree, x, tool);
+            if (step == 0) {
+                now.found = contact;
+                for (auto* found : {&now.found.point, &now.found.normal}) *found = as.turn.transpose() * found->eigen();
+                if (jumps) return now;
+            }
+            now.depth = contact.depth;
             const auto grasp = grasper.update(contact, x, tool);
             const auto report =
                 solver.step(x, 1e-3, network, foundation, press(tool, contact, grasp), pull(tool, grasp));
@@ -144,12 +167,12 @@ std::vector<Equilibrium> run(const Scene& scene, const Description& as, const Po
         return now;
     };
     std::vector<Equilibrium> equilibria;
-    for (const auto& tool : scene.path) equilibria.push_back(come_to_rest(tool));
+    for (const auto& tool : scene.path) equilibria.push_back(come_to_rest(tool, equilibria.size() == scene.jump));
     if (start.cols() > 0) {
         x = start;
         tree.refit(x);
         solver.wake_all();
-        equilibria.back() = come_to_rest(scene.path.back());
+        equilibria.back() = come_to_rest(scene.path.back(), false);
     }
     return equilibria;
 }
@@ -172,15 +195,16 @@ std::vector<Equilibrium> run(const Scene& scene, const Description& as,
                             : on_foundation(springs);
 }
 
-}  // namespace
-
 // The order of the updates depends on the numbers, and so does a step that has not converged: the tool stands still
 // until it has. Where a tiny disturbance changes the equilibrium, or there are two of them, the scene has come to a
-// bifurcation, and is compared up to there.
-TEST_CASE("renumbered, turned and mirrored, a scene has the same equilibria") {
-    long compared = 0, of = 0, bifurcations = 0;
-    for (int seed = 1; seed <= cases(10, 400); ++seed) {
-        Scene scene(seed);
+// bifurcation, and is compared up to there. After a jump right through a body there are many equilibria: then the
+// contact is compared that the step begins with; far behind an open surface not the depth, as there the rest surface
+// has several nearest places. Where a shaft is caught depends on the steps before, so from the other equilibrium's
+// positions it may still come to a third: bifurcations of shafts are counted only.
+void compare(bool shafts, int first_seed, int seeds) {
+    long compared = 0, of = 0, bifurcations = 0, jumps = 0;
+    for (int seed = first_seed; seed < first_seed + seeds; ++seed) {
+        Scene scene(seed, shafts);
         Random random(static_cast<std::uint64_t>(seed) + 1'000'000);
         Description other, disturbed;
         disturbed.disturbance = 1e-12 * R;
@@ -200,11 +224,27 @@ TEST_CASE("renumbered, turned and mirrored, a scene has the same equilibria") {
                    (a.x - b.x).colwise().norm().maxCoeff() < 1e-4 * R;
         };
         for (std::size_t i = 0; i < expected.size(); ++i, ++compared) {
-            if (!expected[i].converged || !found[i].converged || !same(expected[i], control[i])) break;
-            if (same(expected[i], found[i])) continue;
             CAPTURE(seed, i, expected[i].pressed, found[i].pressed, expected[i].pulled, found[i].pulled);
+            CAPTURE(expected[i].depth, found[i].depth);
+            if (i == scene.jump) {
+                const auto &a = expected[i].found, &b = found[i].found;
+                CAPTURE(a.point, b.point, a.normal, b.normal, a.gap, b.gap, a.depth, b.depth, a.tunnelled, b.tunnelled);
+                REQUIRE(a.touching() == b.touching());
+                REQUIRE(a.tunnelled == b.tunnelled);
+                REQUIRE(norm<double>(a.point - b.point) < 1e-4 * R);
+                REQUIRE(norm<double>(a.normal - b.normal) < 1e-3);
+                REQUIRE(std::abs(a.gap - b.gap) < 1e-4 * R);
+                if (a.closed) REQUIRE(std::abs(a.depth - b.depth) < 1e-4 * R);
+                jumps += a.tunnelled;
+                continue;
+            }
+            if (!expected[i].converged || !found[i].converged || !same(expected[i], control[i])) break;
+            if (same(expected[i], found[i])) {
+                REQUIRE(std::abs(expected[i].depth - found[i].depth) < 1e-3 * R);
+                continue;
+            }
             scene.path.resize(i + 1);
-            REQUIRE(same(run(scene, {}, found[i].x)[i], found[i]));
+            if (!shafts) REQUIRE(same(run(scene, {}, found[i].x)[i], found[i]));
             ++bifurcations;
             break;
         }
@@ -212,4 +252,13 @@ TEST_CASE("renumbered, turned and mirrored, a scene has the same equilibria") {
     CAPTURE(compared, of, bifurcations);
     CHECK(compared > 8 * of / 10);
     CHECK(bifurcations <= of / 500);
+    CHECK(jumps > seeds / 3);
+}
+
+}  // namespace
+
+TEST_CASE("renumbered, turned and mirrored, a scene has the same equilibria") { compare(false, 1, cases(10, 400)); }
+
+TEST_CASE("renumbered, turned and mirrored, a scene with a shaft has the same equilibria") {
+    compare(true, 45, cases(5, 400));
 }

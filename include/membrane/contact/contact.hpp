@@ -25,6 +25,9 @@ struct ContactTriangle {
 
 /// The contact of the tool with the membrane: position, depth and phase.
 ///
+/// At equilibrium all triangles that press are equally near, and rounding decides which of them is the active one, with
+/// its point and normal. Contact points, depth, the solver's forces and what forceps hold do not depend on that.
+///
 ///     const auto contact = tracker.update(tree, x, tool);
 ///     if (contact.touching()) std::printf("depth %g m\n", contact.depth);
 template <Real Scalar>

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <initializer_list>
 #include <optional>
 #include <span>
 
@@ -59,9 +60,9 @@ struct TrackerOptions {
 /// detected.
 ///
 /// The rest surface is the mesh, or the anchors of a moving body, even where the membrane is torn. Depth is measured
-/// against it, on the side where the tool entered: it grows beyond the middle of a body, too, and beyond its other
-/// wall by as much as the body is thick. If the tool is outside the rest surface and the membrane lies farther out,
-/// there is no contact: a contact must not pull.
+/// against it, that of a shaft at its deepest point, on the side where the tool entered: it grows beyond the middle of
+/// a body, too, and beyond its other wall by as much as the body is thick. If the tool is outside the rest surface and
+/// the membrane lies farther out, there is no contact: a contact must not pull.
 template <Real Scalar>
 class ContactTracker : public SplitCount {
   public:
@@ -163,6 +164,7 @@ class ContactTracker : public SplitCount {
     void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                const List& list) const noexcept;
     Scalar measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
+    [[nodiscard]] Vector3<Scalar> deepest_point(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] Vector3<Scalar> mean_touched_normal(const Scene& scene,
                                                       const Vector3<Scalar>& otherwise) const noexcept;
     [[nodiscard]] Vector3<Scalar> rest_normal(const Scene& scene, Index f) const noexcept {
@@ -680,14 +682,17 @@ void ContactTracker<Scalar>::collect_candidates(int rings) noexcept {
 // membrane that springs back [m]: it does not go past the nearest triangle.
 template <Real Scalar>
 Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
+    const bool is_shaft = feature_pairs(scene.tool) > 1;
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
-                                                contact.axis_point};
-    const std::size_t count = feature_pairs(scene.tool) == 1 ? 1 : 3;
+                                                is_shaft ? deepest_point(scene, contact) : contact.axis_point};
+    const std::size_t count = is_shaft ? 3 : 1;
     const bool below_border = is_below_border(scene, contact);  // there the sign of the height means nothing
     const auto cosine = [&](Index f) { return dot(rest_normal(scene, f), entry_normal_); };
     const auto faces = [&](Index f) { return cosine(f) > alike; };
     const Vector3<Scalar> touched = rest_normal(scene, contact.triangle);
-    if (entry_normal_.isZero(0) || (!beyond_middle_ && faces(contact.triangle))) entry_normal_ = touched;
+    if (entry_normal_.isZero(0) || (!beyond_middle_ && faces(contact.triangle))) {
+        entry_normal_ = mean_touched_normal(scene, touched);
+    }
     const auto nearby = near_.items();
     bool beyond = false;
     Scalar rebound = 0;
@@ -715,6 +720,47 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
     }
     beyond_middle_ = beyond;
     return rebound;
+}
+
+// The point of a shaft's axis that is deepest below the rest surface. In a convex body the depth is concave along the
+// axis: between two points it is at most where their tangents meet.
+template <Real Scalar>
+Vector3<Scalar> ContactTracker<Scalar>::deepest_point(const Scene& scene,
+                                                      const Contact<Scalar>& contact) const noexcept {
+    struct Depth {
+        Scalar fraction, depth, slope;
+        Index nearest;
+    };
+    const auto& axis = scene.tool.axis;
+    const auto at = [&](Scalar fraction, std::initializer_list<Index> starts) {
+        const Vector3<Scalar> q = scene.tool.position + fraction * axis;
+        const auto distance = [&](Index f) {
+            return closest_point(at_rest().triangle(scene.anchors, f), q).squared_distance;
+        };
+        Index f = contact.triangle;
+        for (const Index start : starts) {
+            if (start != no_index && distance(start) < distance(f)) f = start;
+        }
+        f = at_rest().walk_to_closest(scene.anchors, f, q);
+        const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), q);
+        const Vector3<Scalar> outward = contact.side * at_rest().outward(scene.anchors, f, nearest.barycentric);
+        const Vector3<Scalar> separation = q - nearest.point;
+        const Scalar sign = dot(separation, outward) < 0 ? Scalar(-1) : Scalar(1);
+        return Depth{fraction, -sign * norm(separation), -dot(axis, direction<Scalar>(sign * separation, outward)), f};
+    };
+    constexpr int most = 16;
+    Depth first = at(0, {origin_triangles_[0]}), last = at(1, {origin_triangles_[1]});
+    for (int i = 0; i < most && first.slope > 0 && last.slope < 0; ++i) {
+        const Scalar across = first.depth - last.depth - last.slope * (first.fraction - last.fraction);
+        const Scalar meet = first.fraction + across / (last.slope - first.slope);
+        const Scalar bound = first.depth + first.slope * (meet - first.fraction);
+        if (bound <= (std::max)(first.depth, last.depth) + margin_ / 1000) break;
+        const bool between = meet > first.fraction && meet < last.fraction;
+        const Depth middle = at(between ? meet : (first.fraction + last.fraction) / 2,
+                                {first.nearest, last.nearest, origin_triangles_[2]});
+        (middle.slope > 0 ? first : last) = middle;
+    }
+    return scene.tool.position + (first.depth > last.depth ? first : last).fraction * axis;
 }
 
 // The mean normal at rest of the triangles near the tool, without those of an opposite wall. `otherwise`: none is near.
@@ -779,7 +825,8 @@ bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>
     if (contact.depth > 0 || overlapped(contact.triangle) || std::any_of(nearby.begin(), nearby.end(), overlapped)) {
         return false;
     }
-    const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
+    Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
+    f = at_rest().walk_to_closest(scene.anchors, f, contact.axis_point);
     const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), contact.axis_point);
     return dot<Scalar>(contact.normal, contact.axis_point - nearest.point) < 0;
 }

@@ -63,7 +63,8 @@ struct GraspOptions {
 };
 
 /// Holds a point from when the tool closes in contact until it opens: the contact point or, where the tool touches
-/// several triangles, the point under it along the mean of their normals.
+/// several triangles, the point under it along the mean of their normals. If a shaft has no triangle there, as on two
+/// hills, it holds the touched point nearest to its `position`.
 template <Real Scalar>
 class Grasper {
   public:
@@ -117,7 +118,7 @@ class Grasper {
     }
 
   private:
-    void take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x) noexcept;
+    void take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x, const Tool<Scalar>& tool) noexcept;
 
     Points<Scalar> origins_;
     GraspOptions options_;
@@ -148,7 +149,7 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
     slipped_ = 0;
     grasp_.status = GraspStatus::holding;
     grasp_.holding_force = static_cast<Scalar>(options_.holding_force);
-    take_point(contact, x);
+    take_point(contact, x, tool);
     if (options_.snap_to_vertex) {
         const Vector3<Scalar> weights = grasp_.barycentric;
         grasp_.barycentric = Vector3<Scalar>::Unit(std::max_element(weights.begin(), weights.end()) - weights.begin());
@@ -161,32 +162,41 @@ Grasp<Scalar> Grasper<Scalar>::update(const Contact<Scalar>& contact, const Cons
 // At equilibrium the tool touches several triangles, and rounding decides which is the nearest. So the mean of those
 // equally near counts, each less the less near it is.
 template <Real Scalar>
-void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x) noexcept {
-    grasp_.triangle = contact.triangle;
-    grasp_.corners = contact.corners;
-    grasp_.barycentric = contact.barycentric;
+void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPointsRef<Scalar>& x,
+                                 const Tool<Scalar>& tool) noexcept {
+    const auto hold = [&](Index triangle, const std::array<Index, 3>& corners, const Vector3<Scalar>& barycentric) {
+        grasp_.triangle = triangle;
+        grasp_.corners = corners;
+        grasp_.barycentric = barycentric;
+    };
+    hold(contact.triangle, contact.corners, contact.barycentric);
     if (contact.tunnelled) return;
-    Scalar least = std::numeric_limits<Scalar>::infinity(), sum = 0;
+    constexpr Scalar infinity = std::numeric_limits<Scalar>::infinity();
+    const bool is_shaft = feature_pairs(tool) > 1;
+    Scalar least = infinity, sum = 0, nearest = infinity;
     for (const auto& point : contact.points) least = (std::min)(least, point.gap);
     Vector3<Scalar> normal = Vector3<Scalar>::Zero(), axis_point = Vector3<Scalar>::Zero();
     for (const auto& point : contact.points) {
         const Scalar weight = 1 - 64 * (point.gap - least) / contact.radius;
         if (!(weight > 0)) continue;
+        const Vector3<Scalar> here =
+            point_at(triangle_at(x, point.corners), point.weights) + (point.gap + contact.radius) * point.normal;
         sum += weight;
         normal += weight * point.normal;
-        axis_point += weight * (point_at(triangle_at(x, point.corners), point.weights) +
-                                (point.gap + contact.radius) * point.normal);
+        axis_point += weight * here;
+        const Scalar from_tip = squared_norm<Scalar>(here - tool.position);
+        if (!is_shaft || !(from_tip < nearest)) continue;
+        nearest = from_tip;
+        hold(point.triangle, point.corners, point.weights);
     }
     if (!(sum > 1) || !(norm(normal) > sum / 8)) return;
     const Vector3<Scalar> from = axis_point / sum, to = from - 4 * contact.radius * direction(normal, normal);
-    Scalar first = std::numeric_limits<Scalar>::infinity();
+    Scalar first = infinity;
     for (const auto& [triangle, corners] : contact.candidates) {
         const auto hit = first_hit(triangle_at(x, corners), from, to);
         if (!hit || !(hit->fraction < first)) continue;
         first = hit->fraction;
-        grasp_.triangle = triangle;
-        grasp_.corners = corners;
-        grasp_.barycentric = hit->barycentric;
+        hold(triangle, corners, hit->barycentric);
     }
 }
 
