@@ -135,6 +135,18 @@ TEST_CASE("of several inputs the one that goes on least counts, those that stay 
     CHECK(predictor.extrapolation_factor(std::span<const DrivingInput<double>>()) == 0);
 }
 
+TEST_CASE("an input that changes by rounding stays") {
+    const auto rounded = [](double x) { return DrivingInput<double>(InputSample<double>{{x, 0, 0}, 10, false, 0.1}); };
+    Predictor<double, 2> predictor;
+    static_cast<void>(predictor.extrapolation_factor(Leads{at(1), rounded(1)}));
+    static_cast<void>(predictor.extrapolation_factor(Leads{at(2), rounded(1.09)}));
+    CHECK(predictor.extrapolation_factor(Leads{at(3), rounded(1)}) == 1);
+    CHECK(predictor.extrapolation_factor(Leads{at(3), rounded(1.09)}) == 0);
+    CHECK(predictor.extrapolation_factor(Leads{at(4), rounded(1)}) == 0);  // nothing has moved
+    CHECK(predictor.extrapolation_factor(Leads{at(5), rounded(1.2)}) == 1);
+    CHECK(predictor.extrapolation_factor(Leads{at(6), rounded(1.3)}) == Approx(0.5));
+}
+
 TEST_CASE("after a displacement longer than the input's limit the factor is zero, and once more") {
     const auto expected = [](double first, double second) {
         Predictor<double, 1> predictor;

@@ -23,6 +23,7 @@ struct InputSample {
     Vector3<Scalar> at;                                        ///< a position [m], or a force [N]
     Scalar longest = std::numeric_limits<Scalar>::infinity();  ///< largest change in a tick that is extrapolated
     bool is_force = false;                                     ///< whether `at` is a force
+    Scalar rounding = 0;                                       ///< an input that changes by less is still
 };
 
 /// Empty if the constraint does not act.
@@ -80,7 +81,7 @@ Scalar Predictor<Scalar, max_inputs>::extrapolation_factor(std::span<const Drivi
         };
         if (appears_or_vanishes || (sample != nullptr && jumps())) {
             factor = 0;
-        } else if (sample != nullptr && squared_norm(*before.displacement) > 0) {
+        } else if (sample != nullptr && norm(*before.displacement) > sample->rounding) {
             moves = true;
             factor = (std::min)(factor, factor_of(*input.displacement, *before.displacement));
         }

@@ -355,9 +355,12 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
     if (!options_.predict) return;
     std::array<DrivingInput<Scalar>, StepState<Scalar>::max_constraints> inputs{};
     acting.collect_inputs(inputs);
-    if constexpr (moves<Volume>) {  // relative to the body
-        for (auto& input : inputs) {
-            if (input) input->at = input->is_force ? pose_.vector_to_body(input->at) : pose_.point_to_body(input->at);
+    for (auto& input : inputs) {
+        if (!input) continue;
+        input->rounding = detail::rounding_at(input->at);
+        if constexpr (moves<Volume>) {  // relative to the body, whose pose is rounded as well
+            input->at = input->is_force ? pose_.vector_to_body(input->at) : pose_.point_to_body(input->at);
+            input->rounding = 4 * input->rounding + detail::rounding_at(input->at);
         }
     }
     const Scalar factor = predictor_.extrapolation_factor(inputs);
