@@ -164,7 +164,7 @@ class ContactTracker : public SplitCount {
     void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                const List& list) const noexcept;
     Scalar measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
-    [[nodiscard]] Vector3<Scalar> deepest_point(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
+    [[nodiscard]] Scalar depth_of_shaft(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
     [[nodiscard]] Vector3<Scalar> mean_touched_normal(const Scene& scene,
                                                       const Vector3<Scalar>& otherwise) const noexcept;
     [[nodiscard]] Vector3<Scalar> rest_normal(const Scene& scene, Index f) const noexcept {
@@ -684,7 +684,7 @@ template <Real Scalar>
 Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
     const bool is_shaft = feature_pairs(scene.tool) > 1;
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
-                                                is_shaft ? deepest_point(scene, contact) : contact.axis_point};
+                                                contact.axis_point};
     const std::size_t count = is_shaft ? 3 : 1;
     const bool below_border = is_below_border(scene, contact);  // there the sign of the height means nothing
     const auto cosine = [&](Index f) { return dot(rest_normal(scene, f), entry_normal_); };
@@ -716,17 +716,20 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
                 beyond = true, outward = std::abs(height), f = of_entry, height = entered;
         }
         rebound = (std::max)(rebound, scene.radius + outward);
-        contact.depth = (std::max)(contact.depth, scene.radius - height);
+        if (i < 2 || beyond) contact.depth = (std::max)(contact.depth, scene.radius - height);
+    }
+    if (is_shaft && !beyond) {
+        const Scalar deepest = depth_of_shaft(scene, contact);
+        contact.depth = (std::max)(contact.depth, scene.radius + (below_border ? -std::abs(deepest) : deepest));
     }
     beyond_middle_ = beyond;
     return rebound;
 }
 
-// The point of a shaft's axis that is deepest below the rest surface. In a convex body the depth is concave along the
-// axis: between two points it is at most where their tangents meet.
+// The depth of the deepest point of a shaft's axis below the rest surface [m], within a thousandth of the margin. In a
+// convex body the depth is concave along the axis: between two points it is at most where their tangents meet.
 template <Real Scalar>
-Vector3<Scalar> ContactTracker<Scalar>::deepest_point(const Scene& scene,
-                                                      const Contact<Scalar>& contact) const noexcept {
+Scalar ContactTracker<Scalar>::depth_of_shaft(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
     struct Depth {
         Scalar fraction, depth, slope;
         Index nearest;
@@ -760,7 +763,7 @@ Vector3<Scalar> ContactTracker<Scalar>::deepest_point(const Scene& scene,
                                 {first.nearest, last.nearest, origin_triangles_[2]});
         (middle.slope > 0 ? first : last) = middle;
     }
-    return scene.tool.position + (first.depth > last.depth ? first : last).fraction * axis;
+    return (std::max)(first.depth, last.depth);
 }
 
 // The mean normal at rest of the triangles near the tool, without those of an opposite wall. `otherwise`: none is near.
@@ -825,8 +828,7 @@ bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>
     if (contact.depth > 0 || overlapped(contact.triangle) || std::any_of(nearby.begin(), nearby.end(), overlapped)) {
         return false;
     }
-    Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
-    f = at_rest().walk_to_closest(scene.anchors, f, contact.axis_point);
+    const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
     const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), contact.axis_point);
     return dot<Scalar>(contact.normal, contact.axis_point - nearest.point) < 0;
 }
