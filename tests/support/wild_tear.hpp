@@ -60,14 +60,20 @@ struct WildTear {
           friction({.coefficient = coefficient}),
           normals(mesh),
           x(Scalar(random.number(1.0, 1.3)) * mesh.positions()),
+          start(x),
           target(Vector(0, 0, 0)) {
         tree.refit(x);
         tool.axis = random.chance(0.3) ? Vector(Scalar(2e-3) * random.unit_vector<Scalar>()) : Vector(0, 0, 0);
         tool.radius = Scalar(random.chance(0.2) ? 0.0 : random.number(0.3e-3, 2e-3));
     }
 
-    /// One tick. Whether the step advanced: its report's status.
+    /// One tick. Whether the step advanced: its report's status. Calls `check(foundation, report, dt)` after the step,
+    /// before the membrane tears.
     Report tick() {
+        return tick([](const auto&...) {});
+    }
+    template <class Check>
+    Report tick(const Check& check) {
         if (random.chance(0.02)) follow(cut_at_random(random, tear, x));
         if (random.chance(0.05)) held = random.index(mesh.vertex_count() - tear.surface().reserve()), target = at(held);
         target += random.template vector<Scalar>(Scalar(-2e-4), Scalar(2e-4));
@@ -79,11 +85,19 @@ struct WildTear {
         const auto grasp = grasper.update(contact, x, tool);
         grasps = grasp.holding();
         grasps_surface = !grasps || grasp.corners == tear.surface().corners(grasp.triangle);
+        const auto pressing = friction.press(tool, contact, grasp);
+        const auto grasping = pull(tool, grasp);
+        const auto pulling = membrane::pull(held, pulled);
+        const auto ligaments = tear.ligaments();
         const auto step = [&](const auto& under) {
-            return solver.step(x, dt, sheet, under, friction.press(tool, contact, grasp), pull(tool, grasp),
-                               membrane::pull(held, pulled), tear.ligaments());
+            if (deadline == 0) return solver.step(x, dt, sheet, under, pressing, grasping, pulling, ligaments);
+            double time = 0;  // passes with each reading
+            const membrane::Deadline until([&time] { return time += 1; }, deadline);
+            return solver.step_until(until, x, dt, sheet, under, pressing, grasping, pulling, ligaments);
         };
+        start = x;
         const Report report = adheres ? step(adhesion) : step(foundation);
+        adheres ? check(adhesion, report, dt) : check(foundation, report, dt);
         if (report.status == membrane::StepStatus::advanced) {
             if (adheres) adhesion.update(x, report.moved);
             if (grasper.slip(x, tool, report.reactions[1])) ++slips;
@@ -112,7 +126,7 @@ struct WildTear {
     membrane::TriangleMesh<Scalar> mesh;
     std::vector<Index> rim;
     Sheet sheet;
-    bool adheres;
+    bool adheres, updates_all = true;  // whether a step updates all of its queue
     membrane::FoundationSprings<Scalar> foundation;
     membrane::CohesiveSprings<Scalar> adhesion;
     membrane::Tearing<Scalar> tear;
@@ -123,10 +137,11 @@ struct WildTear {
     double coefficient;
     membrane::ToolFriction<Scalar> friction;
     membrane::VertexNormals<Scalar> normals;
-    membrane::Points<Scalar> x;
+    membrane::Points<Scalar> x, start;  // now, at the start of the last step
     membrane::Tool<Scalar> tool;
     Index held = 0;
     Vector target;
+    double deadline = 0;        // of a step [readings of its clock]; 0: none
     int splits = 0, slips = 0;  // of vertices; of tissue through the jaws
     bool grasps = false,
          grasps_surface = true;  // whether the forceps hold a point; whether that is of the torn surface
@@ -148,6 +163,7 @@ struct WildTear {
         with.adaptive_layers = random.chance(0.2);
         with.contact_iterations = random.index(4) + 1;
         if (random.chance(0.2)) with.max_vertex_updates = random.index(300) + 1;
+        updates_all = !with.adaptive_layers && with.max_vertex_updates == membrane::unlimited;
         return with;
     }
     Vector at(Index v) const { return membrane::point(x, v); }

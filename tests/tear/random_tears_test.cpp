@@ -78,9 +78,51 @@ void check_normals(const test::WildTear<S>& loop) {
     REQUIRE(test::same_bits(all.values(), loop.normals.values()));
 }
 
+/// The forces after a step, evaluated anew: those of tool and forceps are opposite to the reactions, and
+/// on no vertex do they, springs and foundation add up to more than the residual.
+template <class S, class Foundation>
+void check_balance(const test::WildTear<S>& loop, const Foundation& foundation, const StepReport<S>& report, S dt) {
+    std::vector<Vector3<S>> applied(static_cast<std::size_t>(loop.mesh.vertex_count()), Vector3<S>::Zero());
+    S largest = 0;  // force [N]
+    for (std::size_t i = 0; i < 2; ++i) {
+        Vector3<S> sum = report.reactions[i];
+        largest = std::max(largest, norm(sum));
+        for (const auto& point : loop.solver.contact_points(i)) {
+            sum += point.force;
+            largest = std::max(largest, norm(point.force));
+            for (std::size_t k = 0; k < 3; ++k) {
+                applied[static_cast<std::size_t>(point.corners[k])] +=
+                    point.weights[static_cast<Eigen::Index>(k)] * point.force;
+            }
+        }
+        for (const auto& v : loop.friction.vertices()) {
+            if (i != 0) continue;
+            sum += v.force;
+            applied[static_cast<std::size_t>(v.vertex)] += v.force;
+        }
+        // Of a vertex that is held the reaction is all that the springs leave.
+        const bool has_points = i == 0 || !loop.solver.contact_points(i).empty();
+        if (has_points) REQUIRE(norm(sum) <= 1000 * std::numeric_limits<S>::epsilon() * largest);
+    }
+    if (!loop.updates_all) return;  // the queue has others as well
+    const auto joined = loop.tear.ligaments().ligaments;
+    S residual = 0;
+    for (const Index v : loop.solver.queue().vertices()) {
+        const bool opens = std::any_of(joined.begin(), joined.end(),
+                                       [&](const auto& one) { return one.vertex == v || one.copy == v; });
+        if (loop.sheet.pinned(v) || v == loop.held || opens) continue;
+        const Vector3<S> springs = loop.sheet.force_on(v, loop.x).force;
+        const Vector3<S> support = foundation.force_on(v, point(loop.x, v), point(loop.start, v), dt).force;
+        largest = std::max({largest, norm(springs), norm(support)});
+        residual = std::max(residual, norm<S>(springs + support + applied[static_cast<std::size_t>(v)]));
+    }
+    // Large forces of the springs cancel at a vertex.
+    REQUIRE(residual <= report.residual + std::sqrt(std::numeric_limits<S>::epsilon()) * largest);
+}
+
 /// The number of ticks, vertices and tears in which something has occurred.
 struct Counts {
-    int splits = 0, advances = 0, refused = 0, grasped = 0, slipped = 0, dragged = 0, let_go = 0;
+    int splits = 0, advances = 0, refused = 0, grasped = 0, slipped = 0, dragged = 0, let_go = 0, late = 0;
 };
 
 // A tick, and what must hold after it.
@@ -89,7 +131,9 @@ void checked_tick(test::WildTear<S>& loop, Counts& counts) {
     const Points<S> before = loop.x;
     const int splits = loop.splits;
     const double torn = loop.tear.torn_length(), taken = loop.tear.dissipated(), peeled = loop.adhesion.dissipated();
-    const auto report = loop.tick();
+    const auto report = loop.tick([&](const auto& foundation, const auto& step, S dt) {
+        if (step.status == StepStatus::advanced) check_balance(loop, foundation, step, dt);
+    });
     const bool cut = loop.splits != splits;  // which moves a copy from the reserve
     REQUIRE(loop.x.allFinite());
     REQUIRE((report.status == StepStatus::advanced || cut || test::same_bits(loop.x, before)));
@@ -105,6 +149,7 @@ void checked_tick(test::WildTear<S>& loop, Counts& counts) {
     counts.refused += report.status != StepStatus::advanced;
     counts.grasped += loop.grasps;
     counts.dragged += loop.friction.slips();
+    counts.late += report.out_of_time;
 }
 
 // Stiffness of both foundations: the shares of all vertices.
@@ -121,8 +166,10 @@ std::array<double, 2> foundation_of(const test::WildTear<S>& loop) {
 }  // namespace
 
 // Pulls of up to the numbers' range: a step is refused, or all that moves is finite.
-TEMPLATE_TEST_CASE("random tears, peels and drags with nonsense keep positions finite, the surface a mesh, and repeat",
-                   "[tear]", TEST_SCALARS) {
+TEMPLATE_TEST_CASE(
+    "random tears, peels and drags with nonsense keep positions finite, forces in balance, the surface a mesh, "
+    "and repeat",
+    "[tear]", TEST_SCALARS) {
     using Loop = test::WildTear<TestType>;
     constexpr int ticks = cases_are_slow ? 100 : 500;
     const double rounding = std::is_same_v<TestType, float> ? 1e-4 : 1e-10;
@@ -130,6 +177,7 @@ TEMPLATE_TEST_CASE("random tears, peels and drags with nonsense keep positions f
     for (int seed = 1; seed <= cases(5, 500); ++seed) {
         CAPTURE(seed);
         Loop loop(static_cast<std::uint64_t>(seed));
+        if (seed % 3 == 0) loop.deadline = seed % 40;
         const auto whole = foundation_of(loop);
         const auto run = [&](int from) {
             for (int tick = from; tick < (from == 0 ? ticks / 2 : ticks); ++tick) {
@@ -155,11 +203,11 @@ TEMPLATE_TEST_CASE("random tears, peels and drags with nonsense keep positions f
         REQUIRE(test::same_bits(loop.x, end));
     }
     CAPTURE(counts.splits, counts.advances, counts.refused, counts.grasped, counts.slipped, counts.dragged,
-            counts.let_go);
+            counts.let_go, counts.late);
     CHECK(counts.splits > 20 * cases(5, 500));
     if (cases_are_slow) return;  // of one run not everything can be expected
-    CHECK(std::min({counts.advances, counts.refused, counts.grasped, counts.slipped, counts.dragged, counts.let_go}) >
-          0);
+    CHECK(std::min({counts.advances, counts.refused, counts.grasped, counts.slipped, counts.dragged, counts.let_go,
+                    counts.late}) > 0);
 }
 
 TEMPLATE_TEST_CASE(
