@@ -221,3 +221,84 @@ TEST_CASE("converged: no vertex that may move is out of balance, no tool inside"
     }
     CHECK(said > 100L * runs);
 }
+
+namespace {
+
+/// What a press of `Scalar` comes to at rest: its force, whether it has converged, and how far the membrane is from its
+/// rest shape once the tool is gone.
+struct PressAndRelease {
+    double force = 0, left = 0;  // [N], [m]
+    bool converged_pressed = false, converged_released = false;
+};
+
+template <Real S>
+PressAndRelease press_and_release(const TriangleMesh<double>& shape, const Vector3<double>& offset, double support,
+                                  double damping, bool pins, const SolverOptions<S>& options, double depth) {
+    const double top = shape.positions().row(2).maxCoeff(), tool_radius = 2e-3;
+    const TriangleMesh<S> mesh((shape.positions().colwise() + offset.eigen()).template cast<S>(), shape.triangles());
+    const MassSpringNetwork network(mesh, LinearSpring{},
+                                    {.stiffness = S(40), .pinned = pins ? border(mesh) : std::vector<Index>{}});
+    const VirtualVolumeSprings<S> foundation(mesh, {.stiffness = S(support), .damping = S(damping)});
+    QuasiStaticSolver<S> solver(network, options);
+    AabbTree<S> tree(mesh);
+    ContactTracker<S> tracker(mesh);
+    Points<S> x = mesh.positions();
+    PressAndRelease result;
+    const auto hold = [&](double from, double to) {
+        StepReport<S> report;
+        for (int tick = 0; tick <= 500 && !(tick > 100 && report.converged); ++tick) {
+            const double part = std::min(1.0, tick / 100.0), height = top + tool_radius + (1 - part) * from + part * to;
+            const Vector3<double> at = offset + Vector3<double>(0.4e-3, 0.3e-3, height);
+            const Tool<S> tool{.position = at.template cast<S>(), .radius = S(tool_radius)};
+            const auto contact = tracker.update(tree, x, tool);
+            report = solver.step(x, S(1e-3), network, foundation, press(tool, contact));
+            REQUIRE(report.status == StepStatus::advanced);
+            tree.refit(x, report.moved);
+        }
+        result.force = static_cast<double>(norm(report.total_reaction()));
+        return report.converged;
+    };
+    result.converged_pressed = hold(1e-4, -depth);
+    const double force = result.force;
+    result.converged_released = hold(-depth, 0.02);
+    result.force = force;
+    result.left = static_cast<double>((x - mesh.positions()).colwise().norm().maxCoeff());
+    return result;
+}
+
+}  // namespace
+
+// The default tolerance, 0.8 uN, is a few times what rounding allows: half a spacing of numbers in each coordinate, 0.8
+// nm, times 268 N/m.
+TEST_CASE("in float a press of README's scene is that in double to a thousandth, and leaves no dent",
+          "[solver][converged]") {
+    const auto mesh = icosphere({.radius = radius, .subdivisions = 3});
+    for (const double depth : {0.5e-3, 1e-3, 2e-3}) {
+        CAPTURE(depth);
+        const auto all = press_and_release<double>(mesh, {0, 0, 0}, 8, 0.02, false, {}, depth);
+        const auto less = press_and_release<float>(mesh, {0, 0, 0}, 8, 0.02, false, {}, depth);
+        CHECK(less.converged_pressed);
+        CHECK(less.converged_released);
+        CHECK(std::abs(less.force - all.force) <= 2e-4 * all.force);
+        CHECK(less.left <= 1.5e-7);
+    }
+}
+
+TEST_CASE("in float a press comes to rest on every support, and away from the origin", "[solver][converged]") {
+    for (int seed = 1; seed <= cases(40, 1000); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const std::array meshes{spherical_cap({.radius = radius, .diameter = 1.6 * radius, .rings = 8}),
+                                icosphere({.radius = radius, .subdivisions = 2}),
+                                sheet<double>({.width = 0.02, .height = 0.02, .columns = 16, .rows = 16})};
+        const double support = std::pow(10.0, random.number(0.5, 2.0));                    // 3 to 100 N/m
+        const double damping = random.chance(0.5) ? 0 : 0.03 * random.number() * support;  // up to 30 ms
+        const Vector3<double> offset = std::pow(10.0, random.number(-3.0, 0.0)) * random.unit_vector();
+        const SolverOptions<float> options{.layers = random.chance(0.5) ? Index(6) : unlimited,
+                                           .sweeps = 1 << random.index(4)};
+        const auto result = press_and_release<float>(meshes[static_cast<std::size_t>(random.index(3))], offset, support,
+                                                     damping, random.chance(0.5), options, random.number(0.2e-3, 1e-3));
+        CHECK(result.converged_pressed);
+        CHECK(result.converged_released);
+    }
+}

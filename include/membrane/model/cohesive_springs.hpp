@@ -194,6 +194,9 @@ class CohesiveSprings : public SplitCount {
     /// Undoes all damage. Cost: O(V).
     void reset() noexcept;
 
+    /// A negligible force, by the rounding of positions [N].
+    [[nodiscard]] Scalar force_tolerance(Scalar dt) const noexcept { return negligible_.force(dt); }
+
     ///@{
     /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it.
     /// Online.
@@ -223,14 +226,18 @@ class CohesiveSprings : public SplitCount {
     std::vector<Constants> constants_;
     std::vector<Scalar> reached_;  // largest separation of each vertex
     double dissipated_ = 0;
+    detail::NegligibleFoundationForce<Scalar> negligible_;
 };
 
 static_assert(FoundationModel<CohesiveSprings<float>, float> && SpringsInLanes<CohesiveSprings<double>, double>);
 
 template <Real Scalar>
 CohesiveSprings<Scalar>::CohesiveSprings(const TriangleMesh<Scalar>& mesh, const CohesionOptions<Scalar>& options)
-    : anchors_(mesh.positions()), normals_(VertexNormals(mesh).values()) {
+    : anchors_(mesh.positions()),
+      normals_(VertexNormals(mesh).values()),
+      negligible_{detail::position_rounding(anchors_)} {
     set_constants(mesh, options);
+    for (const auto& k : constants_) negligible_.add((std::max)(k.normal_stiffness, k.tangential_stiffness), 0);
     reached_.resize(constants_.size());
     reset();
 }

@@ -109,16 +109,21 @@ concept ElasticNetwork = Real<Scalar> && std::same_as<typename Network::Scalar, 
 
 namespace detail {
 
+/// The length of half a spacing of numbers in each coordinate, at the largest coordinate of `x`, 3 x V [m]: a vertex is
+/// at most that far from where an update would move it.
+template <Real Scalar>
+[[nodiscard]] Scalar position_rounding(const Points<Scalar>& x) noexcept {
+    return Scalar(0.87) * std::numeric_limits<Scalar>::epsilon() * x.cwiseAbs().maxCoeff();
+}
+
 /// The force that is negligible on every vertex of a mesh, by the stiffness of all springs or elements at it.
 template <Real Scalar>
 struct NegligibleForce {
     /// Of a mesh with positions `x`, 3 x V [m]. Cost: O(V).
-    explicit NegligibleForce(const Points<Scalar>& x) : at_vertex(static_cast<std::size_t>(x.cols()), 0) {
-        constexpr Scalar epsilon = std::numeric_limits<Scalar>::epsilon();
+    explicit NegligibleForce(const Points<Scalar>& x)
+        : at_vertex(static_cast<std::size_t>(x.cols()), 0), in_position(position_rounding(x)) {
         const auto width = [&](Index k) { return x.row(k).maxCoeff() - x.row(k).minCoeff(); };
-        in_size = 64 * epsilon * ((std::max)({width(0), width(1), width(2)}) / 2);
-        // A vertex is at most half a spacing of numbers in each coordinate from where an update would move it.
-        in_position = Scalar(0.87) * epsilon * x.cwiseAbs().maxCoeff();
+        in_size = 16 * std::numeric_limits<Scalar>::epsilon() * ((std::max)({width(0), width(1), width(2)}) / 2);
     }
 
     /// Adds a spring or element at vertex `v` [N/m], [m].

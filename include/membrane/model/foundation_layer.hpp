@@ -132,6 +132,9 @@ class FoundationSprings : public SplitCount {
         return dot<Scalar>(displacement, spring(v, position, 1).times(displacement)) / 2;
     }
 
+    /// A negligible force in a tick of `dt` [s], by the rounding of positions [N].
+    [[nodiscard]] Scalar force_tolerance(Scalar dt) const noexcept { return negligible_.force(dt); }
+
     ///@{
     /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it.
     /// Online.
@@ -153,13 +156,16 @@ class FoundationSprings : public SplitCount {
 
     Points<Scalar> anchors_, normals_;
     std::vector<Constants> constants_;
+    detail::NegligibleFoundationForce<Scalar> negligible_;
 };
 
 static_assert(FoundationModel<FoundationSprings<float>, float> && FoundationModel<FoundationSprings<double>, double>);
 
 template <Real Scalar>
 FoundationSprings<Scalar>::FoundationSprings(const TriangleMesh<Scalar>& mesh, const FoundationOptions<Scalar>& options)
-    : anchors_(mesh.positions()), normals_(VertexNormals(mesh).values()) {
+    : anchors_(mesh.positions()),
+      normals_(VertexNormals(mesh).values()),
+      negligible_{detail::position_rounding(anchors_)} {
     constexpr std::string_view component = "FoundationSprings";
     const auto each = [&](const Field<Scalar>& field, std::string_view name, std::string_view unit) {
         return field.expand(mesh.vertex_count(), component, name, "vertex", unit);
@@ -170,7 +176,11 @@ FoundationSprings<Scalar>::FoundationSprings(const TriangleMesh<Scalar>& mesh, c
     const auto tangential = each(options.tangential, "tangential", "N/m");
     const auto time = each(options.recovery_time.given() ? options.recovery_time : Scalar(0), "recovery_time", "s");
     constants_.reserve(normal.size());
-    for (std::size_t v = 0; v < normal.size(); ++v) constants_.push_back({normal[v], tangential[v], time[v]});
+    for (std::size_t v = 0; v < normal.size(); ++v) {
+        constants_.push_back({normal[v], tangential[v], time[v]});
+        const Scalar stiffest = (std::max)(normal[v], tangential[v]);
+        negligible_.add(stiffest, stiffest * time[v]);
+    }
 }
 
 template <Real Scalar>

@@ -343,7 +343,7 @@ class MassSpringNetwork {
     [[nodiscard]] Scalar energy(const ConstPointsRef<Scalar>& x) const noexcept;
 
     /// A negligible residual force [N]. The largest of: 1e-9 of the force of the stiffest spring stretched by its own
-    /// length; its stiffness times 64 roundings of half the mesh's size; and the stiffness at a vertex times the
+    /// length; its stiffness times 16 roundings of half the mesh's size; and the stiffness at a vertex times the
     /// rounding of its position in the mesh, which grows with the distance from the origin.
     [[nodiscard]] Scalar force_tolerance() const noexcept { return force_tolerance_; }
 

@@ -113,6 +113,12 @@ class MovingFoundation {
     }
     { return volume_->energy(v, FrameOnBody<Scalar>(*body_, v).point_to_body(position)); }
 
+    /// Of the model, if it has one [N].
+    [[nodiscard]] Scalar force_tolerance(Scalar dt) const noexcept requires requires(const Volume& volume) {
+        volume.force_tolerance(dt);
+    }
+    { return volume_->force_tolerance(dt); }
+
     /// Of the model, if it counts the splits that it has followed.
     [[nodiscard]] Index splits() const noexcept requires std::derived_from<Volume, SplitCount> {
         return volume_->splits();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
@@ -39,8 +40,8 @@ static_assert(std::is_default_constructible_v<VolumeSpringOptions<double>>);
 /// `spring(v, start, dt)`, with which a solver updates several vertices at once; `hessian(v)`, the stiffness without
 /// damping as a `Symmetric3`, which an equilibrium needs of an anisotropic model; for a linear model
 /// `hessian<Number>(v)` in either number type and `anchors()`, the positions without force: an equilibrium then
-/// evaluates the model in double even if it is of floats. On a moving body a model is transformed by `on(body,
-/// volume)`.
+/// evaluates the model in double even if it is of floats; `force_tolerance(dt)`, the force on a vertex that is
+/// negligible by the rounding of its position [N]. On a moving body a model is transformed by `on(body, volume)`.
 template <class Volume, class Scalar>
 concept FoundationModel = Real<Scalar> &&
     requires(const Volume& volume, Index v, const Vector3<Scalar>& position, Scalar dt) {
@@ -64,6 +65,25 @@ consteval bool check_foundation_model() noexcept {
 /// A `FoundationModel`: if a type does not satisfy it, the error names the missing requirement.
 template <class Volume, class Scalar>
 concept CheckedFoundationModel = detail::check_foundation_model<Volume, Scalar>();
+
+namespace detail {
+
+/// The force that is negligible on every vertex of a foundation. Damping slows a vertex until rounding stops it.
+template <Real Scalar>
+struct NegligibleFoundationForce {
+    /// Adds the spring of a vertex [N/m], [N s/m].
+    void add(Scalar stiffness, Scalar damping) noexcept {
+        elastic = (std::max)(elastic, rounding * stiffness);
+        viscous = (std::max)(viscous, rounding * damping);
+    }
+    /// In a tick of `dt` [s].
+    [[nodiscard]] Scalar force(Scalar dt) const noexcept { return elastic + viscous / dt; }
+
+    Scalar rounding;                  ///< of positions [m]
+    Scalar elastic = 0, viscous = 0;  ///< [N], [N s]
+};
+
+}  // namespace detail
 
 /// No body under the membrane: no force, at no cost.
 struct NoFoundation {
@@ -207,6 +227,9 @@ class VirtualVolumeSprings : public SplitCount {
         return VolumeSpring<Scalar>{point(anchors_, v), stiffness(v)}.energy(position);
     }
 
+    /// A negligible force in a tick of `dt` [s], by the rounding of positions [N].
+    [[nodiscard]] Scalar force_tolerance(Scalar dt) const noexcept { return negligible_.force(dt); }
+
     ///@{
     /// A vertex becomes two, each with its share of the stiffness; a vertex moves at rest, and its anchor with it.
     /// Online.
@@ -223,18 +246,20 @@ class VirtualVolumeSprings : public SplitCount {
   private:
     Points<Scalar> anchors_;
     std::vector<Scalar> stiffness_, damping_;
+    detail::NegligibleFoundationForce<Scalar> negligible_;
 };
 
 template <Real Scalar>
 VirtualVolumeSprings<Scalar>::VirtualVolumeSprings(const TriangleMesh<Scalar>& mesh,
                                                    const VolumeSpringOptions<Scalar>& options)
-    : anchors_(mesh.positions()) {
+    : anchors_(mesh.positions()), negligible_{detail::position_rounding(anchors_)} {
     constexpr std::string_view component = "VirtualVolumeSprings";
     if (!options.stiffness.given()) refuse(component, "stiffness [N/m] is required");
     stiffness_ = options.stiffness.expand(mesh.vertex_count(), component, "stiffness", "vertex", "N/m");
     if (options.damping.given()) {
         damping_ = options.damping.expand(mesh.vertex_count(), component, "damping", "vertex", "N s/m");
     }
+    for (Index v = 0; v < mesh.vertex_count(); ++v) negligible_.add(stiffness(v), damping(v));
 }
 
 template <Real Scalar>

@@ -288,7 +288,7 @@ template <Real Scalar>
         const Wide& compliance = corner[k].extra;
         sum += weight * weight * compliance;
     }
-    const Wide rounding = 16 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude<Wide>(corner[0].point);
+    const Wide rounding = 2 * std::numeric_limits<Scalar>::epsilon() * largest_magnitude<Wide>(corner[0].point);
     const Wide tolerance = state.force_tolerance;
     return larger<Wide>(tolerance * sum, rounding) + tolerance * support.compliance;
 }

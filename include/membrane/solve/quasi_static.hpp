@@ -216,6 +216,17 @@ template <class Scalar, class Rule, class Network>
                : 0;
 }
 
+// A force that is negligible beside rounding [N].
+template <class Network, class Volume, class Scalar>
+[[nodiscard]] Scalar default_tolerance(const Network& network, [[maybe_unused]] const Volume& volume,
+                                       [[maybe_unused]] Scalar dt) noexcept {
+    if constexpr (requires { volume.force_tolerance(dt); }) {
+        return (std::max)(network.force_tolerance(), 2 * volume.force_tolerance(dt));
+    } else {
+        return network.force_tolerance();
+    }
+}
+
 // Number of pinned vertices; of all vertices if a tear may split those.
 template <class Network>
 [[nodiscard]] std::size_t max_pins(const Network& network) noexcept {
@@ -254,7 +265,6 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
     for (Index v = 0; v < network.vertex_count(); ++v) {
         if (network.pinned(v)) pins_.try_push_back(v);
     }
-    state_.force_tolerance = options.force_tolerance > 0 ? options.force_tolerance : network.force_tolerance();
 }
 
 // One step, in temporal order.
@@ -272,6 +282,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
     const bool body_moved = follow_body(volume);  // uses the vertices loaded by the last step
     state_.begin_step();
+    state_.force_tolerance =
+        options_.force_tolerance > 0 ? options_.force_tolerance : detail::default_tolerance(network, volume, dt);
 
     // Views: `x` does not change before the end of the step, and `now` shows each update.
     const ConstPointsRef<Scalar> start = x, now = state_.positions();

@@ -33,7 +33,7 @@ struct SolverOptions {
     UpdateOrder order = UpdateOrder::colour_layers;  ///< of the vertices in a sweep
     bool predict = true;  ///< a step extrapolates the last displacements, if the last step was complete
     Index max_vertex_updates = unlimited;  ///< in a step; layer 0, prescribed vertices and one more are always updated
-    Scalar force_tolerance = 0;  ///< residual force of a vertex in equilibrium [N]; 0: the network's, above rounding
+    Scalar force_tolerance = 0;            ///< residual force of a vertex in equilibrium [N]; 0: above rounding
     /// A step has also converged if no residual force exceeds this part of the reactions' sizes together, as 1e-3 of
     /// what the hand feels; 0: does not count.
     Scalar relative_tolerance = 0;

@@ -118,7 +118,7 @@ template <Real Scalar>
         const Scalar weight = point.weights[static_cast<Eigen::Index>(k)];
         sum += weight * weight * context.compliance(point.corners[k]);
     }
-    return (std::max)(context.force_tolerance() * sum, detail::rounding_at(context.position(point.corners[0])));
+    return (std::max)(context.force_tolerance() * sum, detail::rounding_at(context.position(point.corners[0])) / 8);
 }
 
 /// Adds `force` [N] to the force of a point, and moves its corners by their response.
