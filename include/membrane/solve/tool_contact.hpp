@@ -32,8 +32,8 @@ namespace membrane {
 /// `SolverOptions::rigid_stiffness`: at triangles with fixed corners a penetration of force over stiffness remains. If
 /// a sphere's centre is behind such a triangle, the only contact point is the nearest one; a shaft keeps the side that
 /// each of its points had in the last step. The force may jump where the nearest point crosses a border of the mesh, or
-/// in a sharp fold at a pin. While a shaft touches fixed corners, the vertices in contact move in one step by at most its
-/// motion and penetration: opposite forces on both sides of it would fling them away.
+/// in a sharp fold at a pin. While a shaft touches fixed corners, the vertices in contact move in one step by at most
+/// its motion and penetration: opposite forces on both sides of it would fling them away.
 ///
 /// A sphere whose radius is less than a 70th of an edge, as that of a point tool is by default, stays in front of the
 /// planes of the triangles that it touches: on a convex edge or corner it is too far out, by less than its radius.
