@@ -164,7 +164,8 @@ class ContactTracker : public SplitCount {
     void find_points_of_sphere(const Scene& scene, std::span<const ContactTriangle> listed,
                                const List& list) const noexcept;
     Scalar measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept;
-    [[nodiscard]] Scalar depth_of_shaft(const Scene& scene, const Contact<Scalar>& contact) const noexcept;
+    [[nodiscard]] Scalar depth_of_shaft(const Scene& scene, const Contact<Scalar>& contact,
+                                        bool below_border) const noexcept;
     [[nodiscard]] Vector3<Scalar> mean_touched_normal(const Scene& scene,
                                                       const Vector3<Scalar>& otherwise) const noexcept;
     [[nodiscard]] Vector3<Scalar> rest_normal(const Scene& scene, Index f) const noexcept {
@@ -685,7 +686,6 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
     const bool is_shaft = feature_pairs(scene.tool) > 1;
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
                                                 contact.axis_point};
-    const std::size_t count = is_shaft ? 3 : 1;
     const bool below_border = is_below_border(scene, contact);  // there the sign of the height means nothing
     const auto cosine = [&](Index f) { return dot(rest_normal(scene, f), entry_normal_); };
     const auto faces = [&](Index f) { return cosine(f) > alike; };
@@ -697,7 +697,7 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
     bool beyond = false;
     Scalar rebound = 0;
     contact.depth = 0;
-    for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t i = 0; i < (is_shaft ? 3U : 1U); ++i) {
         const Index start = origin_triangles_[i] == no_index ? contact.triangle : origin_triangles_[i];
         Index& f = origin_triangles_[i] = at_rest().walk_to_closest(scene.anchors, start, probes[i]);
         Scalar height = contact.side * at_rest().height(scene.anchors, f, probes[i]);
@@ -718,18 +718,18 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
         rebound = (std::max)(rebound, scene.radius + outward);
         if (i < 2 || beyond) contact.depth = (std::max)(contact.depth, scene.radius - height);
     }
-    if (is_shaft && !beyond) {
-        const Scalar deepest = depth_of_shaft(scene, contact);
-        contact.depth = (std::max)(contact.depth, scene.radius + (below_border ? -std::abs(deepest) : deepest));
-    }
+    if (is_shaft && !beyond)
+        contact.depth = (std::max)(contact.depth, scene.radius + depth_of_shaft(scene, contact, below_border));
     beyond_middle_ = beyond;
     return rebound;
 }
 
 // The depth of the deepest point of a shaft's axis below the rest surface [m], within a thousandth of the margin. In a
-// convex body the depth is concave along the axis: between two points it is at most where their tangents meet.
+// convex body the depth is concave along the axis: between two points it is at most where their tangents meet. Negative
+// below a border, where the sign means nothing.
 template <Real Scalar>
-Scalar ContactTracker<Scalar>::depth_of_shaft(const Scene& scene, const Contact<Scalar>& contact) const noexcept {
+Scalar ContactTracker<Scalar>::depth_of_shaft(const Scene& scene, const Contact<Scalar>& contact,
+                                              bool below_border) const noexcept {
     struct Depth {
         Scalar fraction, depth, slope;
         Index nearest;
@@ -763,7 +763,8 @@ Scalar ContactTracker<Scalar>::depth_of_shaft(const Scene& scene, const Contact<
                                 {first.nearest, last.nearest, origin_triangles_[2]});
         (middle.slope > 0 ? first : last) = middle;
     }
-    return (std::max)(first.depth, last.depth);
+    const Scalar deepest = (std::max)(first.depth, last.depth);
+    return below_border ? -std::abs(deepest) : deepest;
 }
 
 // The mean normal at rest of the triangles near the tool, without those of an opposite wall. `otherwise`: none is near.

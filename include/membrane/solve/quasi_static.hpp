@@ -216,10 +216,11 @@ template <class Scalar, class Rule, class Network>
                : 0;
 }
 
-// A force that is negligible beside rounding [N].
-template <class Network, class Volume, class Scalar>
-[[nodiscard]] Scalar default_tolerance(const Network& network, [[maybe_unused]] const Volume& volume,
-                                       [[maybe_unused]] Scalar dt) noexcept {
+// The force below which a vertex is in equilibrium [N]: of the options, or above rounding.
+template <class Scalar, class Network, class Volume>
+[[nodiscard]] Scalar tolerance_of(const SolverOptions<Scalar>& options, const Network& network,
+                                  [[maybe_unused]] const Volume& volume, [[maybe_unused]] Scalar dt) noexcept {
+    if (options.force_tolerance > 0) return options.force_tolerance;
     if constexpr (requires { volume.force_tolerance(dt); }) {
         return (std::max)(network.force_tolerance(), 2 * volume.force_tolerance(dt));
     } else {
@@ -282,9 +283,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     if (!is_finite(dt) || !(dt >= (std::numeric_limits<Scalar>::min)())) return refuse_step(StepStatus::bad_time_step);
     const bool body_moved = follow_body(volume);  // uses the vertices loaded by the last step
     state_.begin_step();
-    state_.force_tolerance =
-        options_.force_tolerance > 0 ? options_.force_tolerance : detail::default_tolerance(network, volume, dt);
-
+    state_.force_tolerance = detail::tolerance_of(options_, network, volume, dt);
     // Views: `x` does not change before the end of the step, and `now` shows each update.
     const ConstPointsRef<Scalar> start = x, now = state_.positions();
     ConstraintContext<Scalar> context(start, state_, network);
