@@ -23,7 +23,8 @@ os.chdir(here)
 
 # -ffp-contract=off: the same bits as a program of C++ with this option, whatever the processor. g++ 12 does not see that
 # pybind11 asks for the size of a function object before it constructs it in place.
-options = [os.environ.get("MEMBRANE_OPTIMISATION", "-O3"), "-g0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-placement-new"]
+optimisation = os.environ.get("MEMBRANE_OPTIMISATION", "-O3")
+options = [optimisation, "-g0", "-ffp-contract=off", "-Wall", "-Wextra", "-Wno-placement-new"]
 
 
 def version():

@@ -283,7 +283,6 @@ TriangleMesh<double> body(Index shape, double half) {
 
 }  // namespace
 
-// Pressed slowly through the middle of a body and its opposite wall, to a tool's radius beyond, and drawn back.
 TEST_CASE("the depth of a shaft is that of its deepest point, wherever the membrane touches it") {
     const auto mesh = membrane::icosphere<double>({.radius = 1, .subdivisions = 2});
     for (int seed = 1; seed <= cases(40); ++seed) {
@@ -323,6 +322,7 @@ TEST_CASE("the depth of a shaft is that of its deepest point, wherever the membr
     }
 }
 
+// Pressed slowly through the middle of a body and its opposite wall, to a tool's radius beyond, and drawn back.
 TEST_CASE("pressed deeper than the body is thick, a tool stays in contact, and the depth grows") {
     for (int seed = 1; seed <= cases(3, 60); ++seed) {
         test::Random random(static_cast<std::uint64_t>(seed));
