@@ -85,6 +85,21 @@ TEMPLATE_TEST_CASE("forceps take hold of the point they touch, and it goes with 
     }
 }
 
+namespace {
+
+/// What a tool that closes on the membrane holds.
+Vector3<double> point_held(const TriangleMesh<double>& mesh, const Points<double>& x, const Tool<double>& tool) {
+    AabbTree<double> tree(mesh);
+    tree.refit(x);
+    ContactTracker<double> tracker(mesh);
+    Grasper<double> grasper(mesh);
+    const auto grasp = grasper.update(tracker.update(tree, x, tool), x, tool);
+    REQUIRE(grasp.holding());
+    return tool.position + grasp.offset;
+}
+
+}  // namespace
+
 TEST_CASE("in a fold forceps hold a point between its sides, whichever rounding makes the nearer", "[grasp]") {
     const auto mesh = sheet<double>({.width = 1, .height = 1, .columns = 10, .rows = 10});
     for (int seed = 1; seed <= cases(50); ++seed) {
@@ -100,13 +115,7 @@ TEST_CASE("in a fold forceps hold a point between its sides, whichever rounding 
             Points<double> x = mesh.positions();
             x.row(2) = slope * x.row(0).cwiseAbs();
             x = test::jittered<double>(x, disturbance, random);
-            AabbTree<double> tree(mesh);
-            tree.refit(x);
-            ContactTracker<double> tracker(mesh);
-            Grasper<double> grasper(mesh);
-            const auto grasp = grasper.update(tracker.update(tree, x, tool), x, tool);
-            REQUIRE(grasp.holding());
-            return Vector3<double>(tool.position + grasp.offset);
+            return point_held(mesh, x, tool);
         };
         const auto point = held(0);
         CHECK(std::abs(point.x()) < across);
@@ -130,13 +139,7 @@ TEST_CASE("a shaft on two hills holds the one at its tip, whichever rounding mak
             const bool hill = std::abs(std::abs(x(0, v)) - 0.3) < 0.01 && std::abs(x(1, v)) < 0.01;
             if (hill) x(2, v) = height + random.number(-1e-13, 1e-13);
         }
-        AabbTree<double> tree(mesh);
-        tree.refit(x);
-        ContactTracker<double> tracker(mesh);
-        Grasper<double> grasper(mesh);
-        const auto grasp = grasper.update(tracker.update(tree, x, tool), x, tool);
-        REQUIRE(grasp.holding());
-        CHECK(norm<double>(tool.position + grasp.offset - Vector3<double>(0.3 * tip, 0, height)) < 1e-9);
+        CHECK(norm<double>(point_held(mesh, x, tool) - Vector3<double>(0.3 * tip, 0, height)) < 1e-9);
     }
 }
 
