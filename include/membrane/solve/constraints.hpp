@@ -203,6 +203,7 @@ class ConstraintList {
         for_each([&](const auto&, std::size_t i) {
             if (context_.state().several_on_fixed) context_.sum_support_forces();
             for (const auto& point : std::as_const(context_).points()) {
+                if (!point.on_fixed) continue;
                 const Scalar violation = (std::max)(norm(support_displacement(context_, point)),
                                                     norm(point.force) * support_compliance(context_, point));
                 if (!(violation > report.violation)) continue;
