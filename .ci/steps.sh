@@ -38,6 +38,13 @@ step() {
     printf '=== %s: passed in %d s\n' "$current" "$((SECONDS - begun))"
 }
 
+# sanitized [CMAKE ARGUMENT...]: the tests of code with its own memory access, with assertions and sanitizers.
+sanitized() {
+    configure asan tests -- "$@"
+    build asan membrane_tests
+    (cd "$root" && ctest --preset asan)
+}
+
 # all_passed: after the last step.
 all_passed() {
     ended

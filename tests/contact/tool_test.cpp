@@ -99,6 +99,8 @@ TEMPLATE_TEST_CASE("a tool is carried into a body's frame with all its parts", "
 
 TEMPLATE_TEST_CASE("a sphere comes near a triangle in one way, a capsule in five", "[tool]", TEST_SCALARS) {
     using S = TestType;
+    CHECK_FALSE(is_shaft(Tool<S>{.radius = 1}));
+    CHECK(is_shaft(Tool<S>{.axis = {0, 0, std::numeric_limits<S>::denorm_min()}}));
     CHECK(feature_pairs(Tool<S>{}) == 1);
     CHECK(feature_pairs(Tool<S>{.radius = 1}) == 1);
     CHECK(feature_pairs(Tool<S>{.axis = {0, 0, std::numeric_limits<S>::denorm_min()}}) == 5);

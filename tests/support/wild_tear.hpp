@@ -80,7 +80,7 @@ struct WildTear {
         move_tool();
         Vector pulled = target;
         Scalar dt = Scalar(1e-3);
-        if (random.chance(0.1)) nonsense(pulled, dt);
+        if (random.chance(nonsense_chance)) nonsense(pulled, dt);
         const auto contact = tracker.update(tree, x, tool);
         const auto grasp = grasper.update(contact, x, tool);
         grasps = grasp.holding();
@@ -141,8 +141,9 @@ struct WildTear {
     membrane::Tool<Scalar> tool;
     Index held = 0;
     Vector target;
-    double deadline = 0;        // of a step [readings of its clock]; 0: none
-    int splits = 0, slips = 0;  // of vertices; of tissue through the jaws
+    double nonsense_chance = 0.1;  // of an input that no step takes
+    double deadline = 0;           // of a step [readings of its clock]; 0: none
+    int splits = 0, slips = 0;     // of vertices; of tissue through the jaws
     bool grasps = false,
          grasps_surface = true;  // whether the forceps hold a point; whether that is of the torn surface
 

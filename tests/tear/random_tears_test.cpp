@@ -210,6 +210,27 @@ TEMPLATE_TEST_CASE(
                     counts.late}) > 0);
 }
 
+// Forces at points on opposite sides of a tool balance: nothing but their limit and the release of a point bounds them.
+TEMPLATE_TEST_CASE("random tears, drags and jumps throw no vertex far beyond membrane, target and tool", "[tear]",
+                   TEST_SCALARS) {
+    constexpr int first = 30;
+    for (int seed = first; seed < first + cases(8, 240); ++seed) {
+        CAPTURE(seed);
+        test::WildTear<TestType> loop(static_cast<std::uint64_t>(seed));
+        loop.nonsense_chance = 0;
+        TestType extent = loop.x.colwise().norm().maxCoeff();  // of all so far, from the middle [m]
+        for (int tick = 0; tick < (cases_are_slow ? 100 : 500); ++tick) {
+            CAPTURE(tick);
+            static_cast<void>(loop.tick());
+            const auto& tool = loop.tool;
+            const Vector3<TestType> other_end = tool.position + tool.axis;
+            extent =
+                std::max({extent, norm(loop.target), norm(tool.position) + tool.radius, norm(other_end) + tool.radius});
+            REQUIRE(loop.x.colwise().norm().maxCoeff() <= TestType(1.5) * extent);
+        }
+    }
+}
+
 TEMPLATE_TEST_CASE(
     "a loop that tears goes on from a snapshot in other parts with the same bits, and is reset to the whole membrane",
     "[snapshot][tear]", TEST_SCALARS) {

@@ -35,7 +35,7 @@ Contact<Scalar> contact_in(const LocalSurface<Scalar>& surface, const std::type_
     contact.side = side;
     contact.axis_point = tool.position + nearest.fraction * tool.axis;
     Vector3<Scalar> outward = direction<Scalar>(area_vector(triangle), Vector3<Scalar>::Zero());
-    if (nearest.on_triangle.squared_distance == 0 && feature_pairs(tool) > 1) {
+    if (nearest.on_triangle.squared_distance == 0 && is_shaft(tool)) {
         // The shaft passes through the triangle: the gap is that of its lower end, if that is not beyond the border.
         const bool is_second = side * dot(outward, tool.axis) < 0;
         const Vector3<Scalar> end = is_second ? Vector3<Scalar>(tool.position + tool.axis) : tool.position;

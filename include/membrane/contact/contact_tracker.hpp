@@ -143,8 +143,7 @@ class ContactTracker : public SplitCount {
     }
     // Whether a shaft passes through triangle `f`.
     [[nodiscard]] bool pierces(const Scene& scene, Index f) const noexcept {
-        return feature_pairs(scene.tool) > 1 &&
-               surface_.nearest(scene.x, f, scene.tool).on_triangle.squared_distance == 0;
+        return is_shaft(scene.tool) && surface_.nearest(scene.x, f, scene.tool).on_triangle.squared_distance == 0;
     }
     [[nodiscard]] bool was_behind(const Scene& scene, Index f, Scalar side, const Vector3<Scalar>& q) const noexcept;
     [[nodiscard]] std::optional<Vector3<Scalar>> middle_inside(const Scene& scene, Index f, Scalar side) const noexcept;
@@ -304,7 +303,7 @@ Contact<Scalar> ContactTracker<Scalar>::track(const AabbTree<Scalar>& tree, cons
         complete(scene, contact);
         contact.phase = before ? ContactPhase::ongoing : ContactPhase::began;
         decide_side(scene, contact);
-        slid_off_ = slid_off_ || (feature_pairs(tool) > 1 && leaves_border(scene, contact));
+        slid_off_ = slid_off_ || (is_shaft(tool) && leaves_border(scene, contact));
     } else {
         if ((side_ != 0 || slid_off_) && !tool.grasping) {
             const bool clear = is_clear(scene);
@@ -419,7 +418,7 @@ bool ContactTracker<Scalar>::sweep_test(const Scene& scene, Contact<Scalar>& con
         return true;
     };
     return through(last_tool_->position, scene.tool.position) ||
-           (feature_pairs(scene.tool) > 1 &&
+           (is_shaft(scene.tool) &&
             through(last_tool_->position + last_tool_->axis, scene.tool.position + scene.tool.axis));
 }
 
@@ -458,14 +457,14 @@ void ContactTracker<Scalar>::describe(const Scene& scene, Index f, Contact<Scala
         behind = !leaves_border(scene, contact);
         if (behind) turn(scene, contact);
     }
-    const bool first_seen_in_shaft = !last_tool_ && feature_pairs(scene.tool) > 1 &&  // it may pierce the surface
+    const bool first_seen_in_shaft = !last_tool_ && is_shaft(scene.tool) &&  // it may pierce the surface
                                      !surface_.closed() && !surface_.on_border(contact.triangle, contact.barycentric);
     // A shaft first seen across a closed surface has come in anywhere: `describe_shaft` finds where it is inside.
     const bool first_seen_across = !last_.touching() && surface_.closed() && pierces(scene, f);
     contact.tunnelled = behind && !slid_off_ && !first_seen_across &&
                         (first_seen_in_shaft || has_passed(scene, contact.triangle, contact.side, contact.axis_point));
     if (behind && !contact.tunnelled) turn(scene, contact);
-    if (!contact.tunnelled && feature_pairs(scene.tool) > 1 && !slid_off_ && !leaves_border(scene, contact)) {
+    if (!contact.tunnelled && is_shaft(scene.tool) && !slid_off_ && !leaves_border(scene, contact)) {
         describe_shaft(scene, f, side, contact);
     }
     contact.previous_axis_point = (contact.tunnelled ? contact.point : contact.axis_point) + margin_ * contact.normal;
@@ -683,7 +682,6 @@ void ContactTracker<Scalar>::collect_candidates(int rings) noexcept {
 // membrane that springs back [m]: it does not go past the nearest triangle.
 template <Real Scalar>
 Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>& contact) noexcept {
-    const bool is_shaft = feature_pairs(scene.tool) > 1;
     const std::array<Vector3<Scalar>, 3> probes{scene.tool.position, scene.tool.position + scene.tool.axis,
                                                 contact.axis_point};
     const bool below_border = is_below_border(scene, contact);  // there the sign of the height means nothing
@@ -697,7 +695,7 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
     bool beyond = false;
     Scalar rebound = 0;
     contact.depth = 0;
-    for (std::size_t i = 0; i < (is_shaft ? 3U : 1U); ++i) {
+    for (std::size_t i = 0; i < (is_shaft(scene.tool) ? 3U : 1U); ++i) {
         const Index start = origin_triangles_[i] == no_index ? contact.triangle : origin_triangles_[i];
         Index& f = origin_triangles_[i] = at_rest().walk_to_closest(scene.anchors, start, probes[i]);
         Scalar height = contact.side * at_rest().height(scene.anchors, f, probes[i]);
@@ -718,7 +716,7 @@ Scalar ContactTracker<Scalar>::measure_depth(const Scene& scene, Contact<Scalar>
         rebound = (std::max)(rebound, scene.radius + outward);
         if (i < 2 || beyond) contact.depth = (std::max)(contact.depth, scene.radius - height);
     }
-    if (is_shaft && !beyond)
+    if (is_shaft(scene.tool) && !beyond)
         contact.depth = (std::max)(contact.depth, scene.radius + depth_of_shaft(scene, contact, below_border));
     beyond_middle_ = beyond;
     return rebound;
@@ -829,7 +827,7 @@ bool ContactTracker<Scalar>::is_hooked(const Scene& scene, const Contact<Scalar>
     if (contact.depth > 0 || overlapped(contact.triangle) || std::any_of(nearby.begin(), nearby.end(), overlapped)) {
         return false;
     }
-    const Index f = origin_triangles_[feature_pairs(scene.tool) == 1 ? 0 : 2];
+    const Index f = origin_triangles_[is_shaft(scene.tool) ? 2 : 0];
     const auto nearest = closest_point(at_rest().triangle(scene.anchors, f), contact.axis_point);
     return dot<Scalar>(contact.normal, contact.axis_point - nearest.point) < 0;
 }

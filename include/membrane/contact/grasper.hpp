@@ -172,7 +172,6 @@ void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPoin
     hold(contact.triangle, contact.corners, contact.barycentric);
     if (contact.tunnelled) return;
     constexpr Scalar infinity = std::numeric_limits<Scalar>::infinity();
-    const bool is_shaft = feature_pairs(tool) > 1;
     Scalar least = infinity, sum = 0, nearest = infinity;
     for (const auto& point : contact.points) least = (std::min)(least, point.gap);
     Vector3<Scalar> normal = Vector3<Scalar>::Zero(), axis_point = Vector3<Scalar>::Zero();
@@ -185,7 +184,7 @@ void Grasper<Scalar>::take_point(const Contact<Scalar>& contact, const ConstPoin
         normal += weight * point.normal;
         axis_point += weight * here;
         const Scalar from_tip = squared_norm<Scalar>(here - tool.position);
-        if (!is_shaft || !(from_tip < nearest)) continue;
+        if (!is_shaft(tool) || !(from_tip < nearest)) continue;
         nearest = from_tip;
         hold(point.triangle, point.corners, point.weights);
     }

@@ -223,7 +223,7 @@ Scalar LocalSurface<Scalar>::height(const ConstPointsRef<Scalar>& x, Index f, co
 template <Real Scalar>
 SegmentPair<Scalar> LocalSurface<Scalar>::nearest(const ConstPointsRef<Scalar>& x, Index f,
                                                   const Tool<Scalar>& tool) const noexcept {
-    if (feature_pairs(tool) == 1) return {0, closest_point(triangle(x, f), tool.position)};
+    if (!is_shaft(tool)) return {0, closest_point(triangle(x, f), tool.position)};
     return closest_to_segment<Scalar>(triangle(x, f), tool.position, tool.position + tool.axis);
 }
 
@@ -258,7 +258,7 @@ Lanes<Scalar> LocalSurface<Scalar>::squared_distances(const ConstPointsRef<Scala
 template <Real Scalar>
 Lanes<Scalar> LocalSurface<Scalar>::squared_distances(const ConstPointsRef<Scalar>& x, const Wide& some,
                                                       const Tool<Scalar>& tool) const noexcept {
-    if (feature_pairs(tool) == 1) return squared_distances(x, some, tool.position);
+    if (!is_shaft(tool)) return squared_distances(x, some, tool.position);
     return Lanes<Scalar>::of([&](std::size_t i) { return nearest(x, some[i], tool).on_triangle.squared_distance; });
 }
 

@@ -49,11 +49,17 @@ struct ClosestPoints {
     Vector3<Scalar> separation;   ///< from that point to the tool's axis [m]; the gap is its length minus the radius
 };
 
+/// Whether the axis of the tool has a length: a capsule, such as a shaft.
+template <Real Scalar>
+[[nodiscard]] bool is_shaft(const Tool<Scalar>& tool) noexcept {
+    return !tool.axis.isZero(0);
+}
+
 /// Number of pairs of features that can be in contact at once: 1 for a sphere; 5 for a capsule, its two ends and its
 /// axis across the three edges.
 template <Real Scalar>
 [[nodiscard]] int feature_pairs(const Tool<Scalar>& tool) noexcept {
-    return tool.axis.isZero(0) ? 1 : 5;
+    return is_shaft(tool) ? 5 : 1;
 }
 
 /// Nearest points of pair `pair`, 0 to `feature_pairs(tool)` - 1: each end of the axis with the triangle, then the axis

@@ -95,7 +95,7 @@ Contact<Scalar> RestContact<Scalar>::contact_with(const ConstPointsRef<Scalar>& 
     const bool closed = surface_.closed() && !torn_;
     if (anchors.cols() != at_rest_.cols() || !is_valid(tool) || (!closed && !contact.touching())) return lowest;
     const Scalar side = closed ? Scalar(1) : contact.side;
-    const int points = feature_pairs(tool) == 1 ? 1 : points_along_shaft;
+    const int points = is_shaft(tool) ? points_along_shaft : 1;
     for (int i = 0; i < points; ++i) {
         const Scalar along = points == 1 ? Scalar(0) : static_cast<Scalar>(i) / static_cast<Scalar>(points - 1);
         const auto here = contact_of(tool.position + along * tool.axis, side, tree, anchors);

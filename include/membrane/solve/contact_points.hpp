@@ -350,7 +350,7 @@ MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lan
     if (pack.on_fixed) change = select<Wide>(change * pack.change < 0, change / 2, change);
     // At equilibrium the contact force balances the internal force at the corners, now or once the gap is closed. If a
     // force is much larger, a tool has jumped to the wrong side of some points, and they press against one another.
-    const Wide limit = 8 * (response.internal_force + abs(gap) * response.internal_stiffness);
+    const Wide limit = 2 * (response.internal_force + abs(gap) * response.internal_stiffness);
     const auto too_hard = moves & (pack.load.force + change > limit);
     change = select<Wide>(too_hard, -pack.load.force, change);
     pass.released = pass.released || any(too_hard);
@@ -359,8 +359,10 @@ MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lan
     change = select<Wide>(counts, change, 0);
     pack.change = change;
     pack.load.force += change;
+    // So large a change has no linear response: the next updates of the corners follow a release.
+    const Wide linear = select<Wide>(too_hard, 0, change);
     each_corner([&](std::size_t k) {
-        corner[k].point -= change * response.of_corner[k];
+        corner[k].point -= linear * response.of_corner[k];
         scatter_padded(corner[k], state.position.data(), pack.corner[k].data());
     });
     return abs(change);

@@ -226,7 +226,7 @@ void ToolContact<Scalar>::clear_contact_point(Context& context) const noexcept {
 // tunnelled, are found again on the extrapolated surface, where a normal may have the opposite sign.
 template <Real Scalar>
 void ToolContact<Scalar>::find_points(Context& context) const noexcept {
-    const bool as_found = feature_pairs(tool) == 1 && !contact.tunnelled;
+    const bool as_found = !is_shaft(tool) && !contact.tunnelled;
     for (const auto& found : contact.points) {
         if (as_found) {
             add_point(context, found);
@@ -250,7 +250,7 @@ void ToolContact<Scalar>::add_point(Context& context, ContactPoint<Scalar> point
     point.on_fixed = is_on_fixed(context, point.corners);
     // Fixed corners do not follow the tool: when a shaft's axis passes them, it stays on the side of the last step. A
     // triangle that a tool has tunnelled through is between its last and its new position.
-    const bool keeps_side = before != nullptr && feature_pairs(tool) > 1;
+    const bool keeps_side = before != nullptr && is_shaft(tool);
     if (point.on_fixed && (keeps_side || contact.tunnelled)) {
         const Vector3<Scalar> came = contact.previous_axis_point - contact.axis_point + distance * point.normal -
                                      support_displacement(context, point);
@@ -272,7 +272,7 @@ void ToolContact<Scalar>::stay_on_side(const Context& context, ContactPoint<Scal
     if (point.feature < 0 || point.feature > 1) return;
     const Vector3<Scalar> area = area_vector(triangle_of(context, point.corners));
     const Scalar size = norm(area), square = contact.radius * contact.radius;
-    if (feature_pairs(tool) > 1) {
+    if (is_shaft(tool)) {
         if (contact.closed && square < size) point.side = dot(point.normal, area) < 0 ? Scalar(-1) : Scalar(1);
         return;
     }
@@ -304,7 +304,7 @@ void ToolContact<Scalar>::pack_points(Context& context) const noexcept {
 template <Real Scalar>
 std::optional<Vector3<Scalar>> ToolContact<Scalar>::direction_out_of_support(const Context& context) const noexcept {
     const Vector3<Scalar> fixed = contact.barycentric - free_weights(context, contact.corners, contact.barycentric);
-    if (!(fixed.maxCoeff() > 0) || feature_pairs(tool) > 1) return std::nullopt;
+    if (!(fixed.maxCoeff() > 0) || is_shaft(tool)) return std::nullopt;
     Vector3<Scalar> pressed = Vector3<Scalar>::Zero();
     for (const auto& point : context.previous_points()) pressed += point.force;
     const bool turned = dot(pressed, contact.normal) > 0;
@@ -327,7 +327,7 @@ void ToolContact<Scalar>::touch_support(Context& context, const Vector3<Scalar>&
 // moved.
 template <Real Scalar>
 bool ToolContact<Scalar>::comes_out(const Triangle<Scalar>& before, const Triangle<Scalar>& now) const noexcept {
-    if (feature_pairs(tool) == 1) return false;
+    if (!is_shaft(tool)) return false;
     const Vector3<Scalar> front = contact.side * area_vector(before), front_now = contact.side * area_vector(now);
     return dot<Scalar>(contact.axis_point - before.a, front) < contact.radius / 1000 * norm(front) &&
            dot<Scalar>(contact.axis_point - now.a, front_now) > 0;
@@ -366,7 +366,7 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
     bool released = false;
     const auto points = std::as_const(context).points();
     const bool on_fixed = std::any_of(points.begin(), points.end(), [](const auto& point) { return point.on_fixed; });
-    const int most = detail::max_contact_passes(points.size(), on_fixed || feature_pairs(tool) > 1);
+    const int most = detail::max_contact_passes(points.size(), on_fixed || is_shaft(tool));
     bool deep = false;
     for (int i = 0; i < (takes_turns ? 1 : detail::deep_contact_passes); ++i) {
         const auto pass = solve_contacts(context.state(), shape(), packs(context), i > 0);
@@ -377,7 +377,7 @@ bool ToolContact<Scalar>::enforce(Context& context) const noexcept {
         if (!(i + 1 < most ? pass.largest > first / 2 : pass.deep)) break;
     }
     for (int i = 0; deep && i < detail::max_push_passes; ++i) deep = push_out(context.state(), shape(), packs(context));
-    if (on_fixed && feature_pairs(tool) > 1) {
+    if (on_fixed && is_shaft(tool)) {
         for (const auto& listed : contact.triangles) context.limit_motion(listed.corners);
     }
     apply_forces(context.state(), packs(context));
