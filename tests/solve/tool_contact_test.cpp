@@ -766,3 +766,38 @@ TEST_CASE("a point presses too", "[press]") {
         check_tiny_contact(loop, loop.pressed_by({stroke.at(1)}));
     }
 }
+
+// A tool carries a load however much larger it is than the forces of the membrane, inside and outside of contact alike.
+TEST_CASE("a tool that holds back a load on the membrane has its force, and comes to rest", "[tool_contact]") {
+    const auto mesh = icosphere<double>({.radius = 10e-3, .subdivisions = 3});
+    const MassSpringNetwork network(mesh, LinearSpring{}, {.stiffness = 40.0});
+    const VirtualVolumeSprings foundation(mesh, VolumeSpringOptions<double>{.stiffness = 8.0, .damping = 0.02});
+    const auto corners = mesh.triangles().col(0);
+    const std::array<Index, 3> below{corners[0], corners[1], corners[2]};
+    Vector3<double> middle(0, 0, 0);
+    for (const Index v : below) middle += point(mesh.positions(), v) / 3;
+    const Vector3<double> out = middle / norm(middle);
+    AabbTree<double> tree(mesh);
+    double without = 0;  // force of the tool without a load [N]
+    for (const double size : {0.0, 0.005, 0.02, 0.1}) {
+        CAPTURE(size);
+        QuasiStaticSolver<double> solver(network, {.layers = unlimited, .sweeps = 4, .force_tolerance = 1e-7});
+        ContactTracker<double> tracker(mesh);
+        Points<double> x = mesh.positions();
+        tree.refit(x);
+        for (int tick = 0; tick < 600; ++tick) {
+            const double pressed = std::min(1.0, tick / 200.0), loaded = std::clamp((tick - 200) / 100.0, 0.0, 1.0);
+            const Tool<double> tool{.position = ((1 - pressed) * 12.5e-3 + pressed * (norm(middle) + 1.9e-3)) * out,
+                                    .radius = 2e-3};
+            const auto contact = tracker.update(tree, x, tool);
+            const Vector3<double> force = loaded * size * out;
+            const auto report = solver.step(x, 1e-3, network, foundation, press(tool, contact),
+                                            load<double>(below, {1 / 3.0, 1 / 3.0, 1 / 3.0}, force));
+            tree.refit(x, report.moved);
+            if (tick < 500) continue;
+            REQUIRE(report.converged);
+            if (size == 0) without = norm(report.reactions[0]);
+            REQUIRE(norm(report.reactions[0]) == Approx(without + size).epsilon(0.02));
+        }
+    }
+}

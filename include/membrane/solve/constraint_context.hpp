@@ -79,9 +79,9 @@ class ConstraintContext {
     /// Adds to the external force on `v` for this step [N]. Only active vertices move by it: `seed` makes one active in
     /// `begin`.
     void add_force(Index v, const Vector3<Scalar>& force) noexcept {
-        state_.forced.insert(v);
-        auto& number = state_.row(state_.force, v).number;
-        for (std::size_t k = 0; k < 3; ++k) number[k] += force[static_cast<Eigen::Index>(k)];
+        add_constraint_force(v, force);
+        state_.external_force[static_cast<std::size_t>(v)] += norm(force);
+        state_.has_external_forces = true;
     }
 
     /// Adds to the stiffness of `v` in all directions for this step [N/m]: for a force that changes as `v` moves.
@@ -125,7 +125,14 @@ class ConstraintContext {
     }
     ///@}
 
-    // For the solver and `ToolContact`.
+    // For the solver and its own constraints.
+
+    /// As `add_force`, for a force that a constraint finds: at a point of `add_point`, or friction.
+    void add_constraint_force(Index v, const Vector3<Scalar>& force) noexcept {
+        state_.forced.insert(v);
+        auto& number = state_.row(state_.force, v).number;
+        for (std::size_t k = 0; k < 3; ++k) number[k] += force[static_cast<Eigen::Index>(k)];
+    }
 
     ///@{
     /// The state of the solver's step.

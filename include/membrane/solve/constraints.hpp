@@ -437,7 +437,9 @@ bool PointLoad<Scalar>::valid() const noexcept {
 
 template <Real Scalar>
 void PointLoad<Scalar>::begin(ConstraintContext<Scalar>& context) const noexcept {
-    if (seed_corners(context, corners)) add_point_force(context, corners, barycentric, force);
+    if (!seed_corners(context, corners)) return;
+    for (std::size_t k = 0; k < 3; ++k)
+        context.add_force(corners[k], barycentric[static_cast<Eigen::Index>(k)] * force);
 }
 
 }  // namespace membrane

@@ -262,7 +262,7 @@ template <Real Scalar>
         const Wide compliance = select<Wide>(yields, 1 / select<Wide>(yields, stiffness, 1), 0);
         sum.compliance += weight * weight * (part * part * compliance);
         sum.displacement -= weight * (compliance * (part * own));
-        sum.force += select<Wide>(is_fixed, norm(support.point), opposing);
+        sum.force += select<Wide>(is_fixed, larger<Wide>(norm(support.point), own), opposing);  // forces may cancel
         sum.stiffness += select<Wide>(holds, stiffness, 0);
     }
     return sum;
@@ -304,9 +304,10 @@ template <Real Scalar>
 /// Response of the corners of a pack to a unit force along the normal, and the internal force and stiffness there.
 template <Real Scalar>
 struct PackResponse {
-    std::array<Vector3<Lanes<Scalar>>, 3> of_corner;   // to its part of the force [m/N]
-    Lanes<Scalar> compliance;                          // of the points [m/N]
-    Lanes<Scalar> internal_force, internal_stiffness;  // sums over the corners [N], [N/m]
+    std::array<Vector3<Lanes<Scalar>>, 3> of_corner;  // to its part of the force [m/N]
+    Lanes<Scalar> compliance;                         // of the points [m/N]
+    Lanes<Scalar> balanced_force;                     // largest that internal and external forces there balance [N]
+    Lanes<Scalar> internal_stiffness;                 // sum over the corners [N/m]
 };
 
 template <Real Scalar>
@@ -316,7 +317,7 @@ template <Real Scalar>
     using Wide = Lanes<Scalar>;
     PackResponse<Scalar> response;
     response.compliance = support.compliance;
-    response.internal_force = support.force;
+    response.balanced_force = support.force;
     response.internal_stiffness = support.stiffness;
     each_corner([&](std::size_t k) {
         std::array<Index, Wide::count> begins;
@@ -328,7 +329,12 @@ template <Real Scalar>
         const Wide& weight = pack.load.weights[static_cast<Eigen::Index>(k)];
         response.of_corner[k] = weight * (block * pack.load.normal);
         response.compliance += weight * dot(response.of_corner[k], pack.load.normal);
-        response.internal_force += internal_force;
+        response.balanced_force += internal_force;
+        if (state.has_external_forces) {
+            response.balanced_force += Wide::of([&](std::size_t i) {
+                return state.external_force[static_cast<std::size_t>(pack.corner[k][i] / numbers_in_point)];
+            });
+        }
         response.internal_stiffness += internal_stiffness;
     });
     return response;
@@ -348,9 +354,9 @@ MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lan
     // The response leaves out that a rocking triangle shifts the force between supports: it may be too small. If the
     // changes alternate, they are halved.
     if (pack.on_fixed) change = select<Wide>(change * pack.change < 0, change / 2, change);
-    // At equilibrium the contact force balances the internal force at the corners, now or once the gap is closed. If a
-    // force is much larger, a tool has jumped to the wrong side of some points, and they press against one another.
-    const Wide limit = 2 * (response.internal_force + abs(gap) * response.internal_stiffness);
+    // At equilibrium the contact force balances the other forces at the corners, now or once the gap is closed. If it is
+    // much larger, a tool has jumped to the wrong side of some points, and they press against one another.
+    const Wide limit = 2 * (response.balanced_force + abs(gap) * response.internal_stiffness);
     const auto too_hard = moves & (pack.load.force + change > limit);
     change = select<Wide>(too_hard, -pack.load.force, change);
     pass.released = pass.released || any(too_hard);

@@ -202,6 +202,8 @@ struct StepState {
     Rows residual;  ///< `residual_force`, `unbalanced_force`
     Rows anchor;    ///< positions to which `kept` vertices go back [m]
     std::vector<Scalar> added_stiffness;  ///< that constraints add in all directions [N/m]
+    std::vector<Scalar> external_force;   ///< sum of the sizes of forces given in this step, as by `PointLoad` [N]
+    bool has_external_forces = false;     ///< in this step
 
     ///@{
     /// Vertices whose positions are loaded, that are seeds, that constraints prescribe, or on which their forces act.
@@ -253,6 +255,7 @@ StepState<Scalar>::StepState(Index vertices, Index max_contact_points)
       residual(position),
       anchor(position),
       added_stiffness(position.size(), 0),
+      external_force(position.size(), 0),
       loaded(vertices),
       seeds(vertices),
       prescribed(vertices),
@@ -273,7 +276,7 @@ template <Real Scalar>
 void StepState<Scalar>::begin_step() noexcept {
     for (const Index v : forced.items()) {
         row(force, v) = {};
-        added_stiffness[static_cast<std::size_t>(v)] = 0;
+        added_stiffness[static_cast<std::size_t>(v)] = external_force[static_cast<std::size_t>(v)] = 0;
     }
     for (const Index v : pressed_supports.items()) {
         row(support, v).set(Vector3<Scalar>::Zero(), support_stiffness(v));
@@ -285,7 +288,7 @@ void StepState<Scalar>::begin_step() noexcept {
     point_ranges = {};
     pack_ranges = {};
     largest_motion = 0;
-    invalid = full = several_on_fixed = false;
+    invalid = full = several_on_fixed = has_external_forces = false;
     invalid_constraint = no_index;
     missed = StepStatus::advanced;
 }

@@ -33,7 +33,9 @@ bool seed_corners(ConstraintContext<Scalar>& context, const std::array<Index, 3>
 template <Real Scalar>
 void add_point_force(ConstraintContext<Scalar>& context, const std::array<Index, 3>& corners,
                      const Vector3<Scalar>& weights, const Vector3<Scalar>& force) noexcept {
-    for (std::size_t k = 0; k < 3; ++k) context.add_force(corners[k], weights[static_cast<Eigen::Index>(k)] * force);
+    for (std::size_t k = 0; k < 3; ++k) {
+        context.add_constraint_force(corners[k], weights[static_cast<Eigen::Index>(k)] * force);
+    }
 }
 
 /// The weights of the corners that are free to move, zero for the others.
@@ -128,7 +130,7 @@ void change_force(ConstraintContext<Scalar>& context, ContactPoint<Scalar>& poin
     point.force += force;
     for (std::size_t k = 0; k < 3; ++k) {
         const Vector3<Scalar> part = point.weights[static_cast<Eigen::Index>(k)] * force;
-        context.add_force(point.corners[k], part);
+        context.add_constraint_force(point.corners[k], part);
         const Vector3<Scalar> by = context.response(point.corners[k], part);
         if (!by.isZero(0)) context.move(point.corners[k], by);
     }

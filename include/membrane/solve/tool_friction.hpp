@@ -237,7 +237,7 @@ void ToolFriction<Scalar>::begin(Context& context, const Tool<Scalar>& tool) noe
     read_normal_forces(context);
     for (Vertex& v : vertices_.items()) {
         v.force = v.sticking_force = limited(v.force, v);
-        context.add_force(v.vertex, v.force);
+        context.add_constraint_force(v.vertex, v.force);
     }
 }
 
@@ -289,7 +289,7 @@ Scalar ToolFriction<Scalar>::stick(Context& context, const Tool<Scalar>& tool, V
     const Scalar size = norm(change);
     if (!(size > context.force_tolerance()) || !(size * compliance > detail::rounding_at(now))) return 0;
     v.force += change;
-    context.add_force(v.vertex, change);
+    context.add_constraint_force(v.vertex, change);
     context.move(v.vertex, context.response(v.vertex, change));
     return size;
 }
@@ -315,7 +315,7 @@ void ToolFriction<Scalar>::limit(Context& context) noexcept {
     for (Vertex& v : vertices_.items()) {
         const Vector3<Scalar> now = limited(v.sticking_force, v);
         if (now == v.force) continue;
-        context.add_force(v.vertex, now - v.force);
+        context.add_constraint_force(v.vertex, now - v.force);
         v.force = now;
     }
 }
