@@ -2,10 +2,10 @@
 // Cost of a part that a scene leaves out. Each pair of functions computes the same for every vertex of a sphere: ours
 // leaves a part out by the library's means (no foundation, volume springs without damping, a law of whose result only
 // the tension is used, a membrane that may tear and does not), the other has no such part; that of `by_hand` is a loop
-// written by hand. Their results must have the same bits. The last pair cuts two meshes, of which one has four times as
-// many vertices. `left_out` counts their instructions.
+// of springs alone, written by hand. Their results must have the same bits. The last pair cuts two meshes, of which one
+// has four times as many vertices. `left_out` counts their instructions.
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <concepts>
 #include <cstddef>
 #include <cstdio>
@@ -39,69 +39,92 @@ struct NoEnergy {
     }
 };
 
-/// Volume springs that know no damping.
+/// A volume spring that knows no damping.
+template <membrane::Number N>
+struct StillSpring {
+    membrane::Vector3<N> anchor;
+    N k;
+
+    [[nodiscard]] membrane::VertexForce<N> elastic_force(const membrane::Vector3<N>& position) const noexcept {
+        return {-k * (position - anchor), k};
+    }
+    [[nodiscard]] membrane::VertexForce<N> force_on(const membrane::Vector3<N>& position) const noexcept {
+        return elastic_force(position);
+    }
+    [[nodiscard]] membrane::Vector3<N> damping_force(const membrane::Vector3<N>&) const noexcept { return {0, 0, 0}; }
+    [[nodiscard]] bool damps() const noexcept { return false; }
+};
+
+/// Such springs at all vertices.
 struct NoDamping {
     const Points* anchors;
     const std::vector<S>* stiffness;
 
     template <class V>
-    membrane::VertexForce<S> force_on(Index v, const V& position, const V&, S) const noexcept {
-        const S k = (*stiffness)[static_cast<std::size_t>(v)];
-        return {-k * (position - membrane::point(*anchors, v)), k};
+    [[nodiscard]] StillSpring<S> spring(Index v, const V&, S) const noexcept {
+        return {membrane::point(*anchors, v), (*stiffness)[static_cast<std::size_t>(v)]};
+    }
+    template <class V>
+    [[nodiscard]] membrane::VertexForce<S> force_on(Index v, const V& position, const V& start, S tick) const noexcept {
+        return spring(v, start, tick).force_on(position);
     }
 };
-static_assert(membrane::FoundationModel<NoDamping, S>);
-
-/// What the solver does with a vertex that it updates alone, by a rule that moves it along the force.
-template <class Scene>
-[[gnu::always_inline]] inline void visit(const Scene& scene, Index v, const membrane::VertexState<S>& state) noexcept {
-    const S compliance = Rule{}.compliance(state);
-    if (compliance * state.stiffness >= 2) std::abort();
-    const auto by = membrane::backtracked<Rule>(scene, v, state, compliance * state.force);
-    scene.state.set_position(v, membrane::point(scene.x, v) + by);
-}
+static_assert(membrane::FoundationModel<NoDamping, S> && membrane::SpringsInLanes<NoDamping, S>);
 
 template <class Volume>
 using SceneOf = membrane::StepInput<S, Network, Volume>;
+using Packed = membrane::PackedVertices<S>;
 
-/// `state_of` without a foundation.
-membrane::VertexState<S> bare_state(const SceneOf<membrane::NoFoundation>& scene, Index v) noexcept {
-    membrane::VertexState<S> state;
-    const auto springs = scene.network.force_on(v, scene.x);
-    state.force = springs.force;
-    state.stiffness = springs.stiffness;
-    const membrane::VertexForce<S> constraints{
-        scene.state.constraint_force(v),
-        scene.state.contact_stiffness(v) + scene.state.added_stiffness[static_cast<std::size_t>(v)]};
-    state.force += constraints.force;
-    state.stiffness += constraints.stiffness;
-    state.mass = scene.network.has_masses() ? scene.network.mass(v) : S(0);
-    state.dt = scene.dt;
-    state.constrained = scene.state.seeds.contains(v);
-    if (state.constrained) {
-        state.contact_stiffness = scene.state.contact_stiffness(v);
-        state.contact_normal = membrane::direction_or_zero(scene.state.constraint_force(v));
+/// All vertices by the rule, in groups.
+template <class Scene>
+[[gnu::always_inline]] inline void update_all(Packed& packed, const Scene& scene) noexcept {
+    for (std::size_t p = 0, end = 0; p < packed.count(); p = end) {
+        end = packed.end_of_group(p, packed.count());
+        packed.update<false>(p, end, scene, Rule{}, false, membrane::OneThread());
     }
-    return state;
 }
 
-struct End {
-    Index other;
-    S stiffness, rest_length;
+using Wide = membrane::Lanes<S>;
+using Begins = std::array<Index, Wide::count>;
+struct Slot {
+    Wide stiffness, rest_length;
+    Begins other;
 };
 
-/// Springs and masses as a loop written by hand has them.
+/// Springs and masses as a loop written by hand has them, for the vertices of each pack.
 struct Rows {
-    explicit Rows(const Network& network) {
-        for (Index v = 0; v < network.vertex_count(); ++v) {
-            for (const auto& end : network.springs_of(v)) ends.push_back({end.other, end.stiffness, end.rest_length});
-            begins.push_back(ends.size());
-            masses.push_back(network.mass(v));
+    Rows(const Network& network, const Packed& packed) {
+        const Index unused = membrane::numbers_in_point * network.vertex_count();
+        for (std::size_t p = 0; p < packed.count(); ++p) {
+            const auto vertices = packed.vertices(p);
+            Begins own;
+            own.fill(unused);
+            Wide mass = 1;
+            std::size_t longest = 0;
+            for (std::size_t i = 0; i < vertices.size(); ++i) {
+                own[i] = membrane::numbers_in_point * vertices[i];
+                mass.set(i, network.mass(vertices[i]));
+                longest = std::max(longest, network.springs_of(vertices[i]).size());
+            }
+            const std::size_t first = slots.size();
+            slots.resize(first + longest, {0, 0, own});
+            for (std::size_t i = 0; i < vertices.size(); ++i) {
+                Slot* slot = &slots[first];
+                for (const auto& spring : network.springs_of(vertices[i])) {
+                    slot->stiffness.set(i, spring.stiffness);
+                    slot->rest_length.set(i, spring.rest_length);
+                    (slot++)->other[i] = membrane::numbers_in_point * spring.other;
+                }
+            }
+            owns.push_back(own);
+            ends.push_back(slots.size());
+            masses.push_back(mass);
         }
     }
-    std::vector<std::size_t> begins{0};
-    std::vector<End> ends;
-    std::vector<S> masses;
+    std::vector<Begins> owns;
+    std::vector<std::size_t> ends;
+    std::vector<Slot> slots;
+    std::vector<Wide> masses;
 };
 
 using Tearable = membrane::Tissue<membrane::TearableSprings<S, membrane::LinearSpring>>;
@@ -158,22 +181,10 @@ void cut(Cutting& membrane) {
 
 extern "C" {
 
-COUNTED void foundation_ours(const SceneOf<membrane::NoFoundation>& scene) {
-    for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v)
-        visit(scene, v, membrane::state_of<Rule>(scene, v));
+COUNTED void damping_ours(Packed& packed, const SceneOf<membrane::VirtualVolumeSprings<S>>& scene) {
+    update_all(packed, scene);
 }
-COUNTED void foundation_bare(const SceneOf<membrane::NoFoundation>& scene) {
-    for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v) visit(scene, v, bare_state(scene, v));
-}
-
-COUNTED void damping_ours(const SceneOf<membrane::VirtualVolumeSprings<S>>& scene) {
-    for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v)
-        visit(scene, v, membrane::state_of<Rule>(scene, v));
-}
-COUNTED void damping_bare(const SceneOf<NoDamping>& scene) {
-    for (Index v = 0, count = scene.network.vertex_count(); v < count; ++v)
-        visit(scene, v, membrane::state_of<Rule>(scene, v));
-}
+COUNTED void damping_bare(Packed& packed, const SceneOf<NoDamping>& scene) { update_all(packed, scene); }
 
 COUNTED void energy_ours(const Network& network, const membrane::ConstPointsRef<S>& x, Points& force) {
     for (Index v = 0; v < force.cols(); ++v) force.col(v) = network.force_on(v, x).force;
@@ -183,27 +194,30 @@ COUNTED void energy_bare(const membrane::MassSpringNetwork<S, NoEnergy>& network
     for (Index v = 0; v < force.cols(); ++v) force.col(v) = network.force_on(v, x).force;
 }
 
-COUNTED void by_hand_bare(const Rows& rows, S* x, const S* external, const S* contacts) {
-    for (std::size_t v = 0; v < rows.masses.size(); ++v) {
-        S* here = x + 3 * v;
-        S force_x = 0, force_y = 0, force_z = 0, sum = 0;
-        for (std::size_t e = rows.begins[v]; e < rows.begins[v + 1]; ++e) {
-            const End& end = rows.ends[e];
-            const S* there = x + 3 * static_cast<std::size_t>(end.other);
-            const S dx = there[0] - here[0], dy = there[1] - here[1], dz = there[2] - here[2];
-            const S length = std::sqrt(dx * dx + dy * dy + dz * dz);
-            const S across = length != 0 ? end.stiffness * (length - end.rest_length) * (1 / length) : end.stiffness;
-            force_x += across * dx;
-            force_y += across * dy;
-            force_z += across * dz;
-            sum += end.stiffness < across ? across : end.stiffness;
+COUNTED void by_hand_ours(Packed& packed, const SceneOf<membrane::NoFoundation>& scene) { update_all(packed, scene); }
+COUNTED void by_hand_bare(const Rows& rows, membrane::PaddedPoint<S>* x) {
+    const Slot* slot = rows.slots.data();
+    for (std::size_t p = 0; p < rows.owns.size(); ++p) {
+        const Index* own = rows.owns[p].data();
+        const membrane::Vector3<Wide> here = membrane::gather(x, own);
+        membrane::Vector3<Wide> force(0, 0, 0);
+        Wide sum = 0;
+        for (; slot != rows.slots.data() + rows.ends[p]; ++slot) {
+            const membrane::Vector3<Wide> edge = membrane::gather(x, slot->other.data()) - here;
+            const Wide length = norm(edge);
+            const auto has_length = length != 0;
+            const Wide tension = slot->stiffness * (length - slot->rest_length);
+            const Wide across =
+                select<Wide>(has_length, tension * (1 / select<Wide>(has_length, length, 1)), slot->stiffness);
+            force += across * edge;
+            sum += larger(slot->stiffness, across);
         }
-        sum += contacts[v] < 0 ? 0 : contacts[v];
-        const S step = dt * dt / rows.masses[v];
-        if (step * sum >= 2) std::abort();
-        here[0] += step * (force_x + external[3 * v]);
-        here[1] += step * (force_y + external[3 * v + 1]);
-        here[2] += step * (force_z + external[3 * v + 2]);
+        const Wide step = dt * dt / rows.masses[p];
+        if (any(step * sum >= 2)) std::abort();
+        const auto moves = norm(force) > 0;
+        membrane::PaddedLanes<S> there{here + step * force, step};
+        for (Eigen::Index k = 0; k < 3; ++k) there.point[k] = select<Wide>(moves, there.point[k], here[k]);
+        membrane::scatter_padded(there, x, own);
     }
 }
 
@@ -249,25 +263,30 @@ int main(int argc, char** argv) {
         std::printf("%s: not the same\n", name);
         same = false;
     };
-    const auto visited = [&](const auto& visit, const auto& volume) {
+    membrane::PropagationQueue queue(mesh.vertex_count());
+    const Index first = 0;
+    queue.build(network, {&first, 1}, membrane::unlimited);
+    queue.group(network, true);
+    Packed packed(network);
+    packed.assign(queue.vertices(), queue.colour_ends(), network);
+    const auto in_state = [&](const auto& volume, const auto& act) {
         return [&](Points& x) {
             const membrane::ConstPointsRef<S> begin = start, now = state.positions();
             state.begin_step();
             for (Index v = 0; v < x.cols(); ++v) state.load(v, begin, network);
-            visit(SceneOf<std::remove_cvref_t<decltype(volume)>>{begin, now, dt, network, volume, state});
+            const SceneOf<std::remove_cvref_t<decltype(volume)>> scene{begin, now, dt, network, volume, state};
+            packed.begin_step(scene);
+            act(packed, scene);
             x = now;
         };
     };
-    compare("foundation", visited(foundation_ours, none), visited(foundation_bare, none));
-    compare("damping", visited(damping_ours, springs), visited(damping_bare, undamped));
+    compare("damping", in_state(springs, damping_ours), in_state(undamped, damping_bare));
     compare(
         "energy", [&](Points& x) { energy_ours(network, start, x); },
         [&](Points& x) { energy_bare(network_without_energy, start, x); });
-    const Rows rows(network);
-    const Points no_forces = Points::Zero(3, mesh.vertex_count());
-    const std::vector<S> no_stiffness(static_cast<std::size_t>(mesh.vertex_count()), S(0));
-    compare("by_hand", visited(foundation_ours, none),
-            [&](Points& x) { by_hand_bare(rows, x.data(), no_forces.data(), no_stiffness.data()); });
+    const Rows rows(network, packed);
+    compare("by_hand", in_state(none, by_hand_ours),
+            in_state(none, [&](Packed&, const auto& scene) { by_hand_bare(rows, scene.state.position.data()); }));
     const Tearable tissue = tearable(mesh);
     const membrane::Tearing<S> tear(mesh, membrane::EnergyRelease{.toughness = 1e3, .thickness = 1e-5});
     compare(

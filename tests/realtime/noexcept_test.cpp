@@ -124,9 +124,9 @@ TEMPLATE_TEST_CASE("the membrane moves without exceptions", "[noexcept]", TEST_S
         static_assert(noexcept(packed.append(queue.vertices(), 0, queue.colour_ends(), network)));
         static_assert(noexcept(packed.vertices(0))&& noexcept(packed.first_of(0))&& noexcept(packed.pack_from(0)));
         static_assert(noexcept(packed.begin_step(scene))&& noexcept(packed.evaluate_residual(0, scene)));
-        static_assert(noexcept(packed.template update_pack<true>(0, scene, BlockStep{})));
-        static_assert(noexcept(packed.template update_pack<false>(0, scene, SafeStep{})));
-        static_assert(noexcept(packed.template update<false>(0, 1, scene, BlockStep{}, executor)));
+        static_assert(noexcept(packed.extend(queue.vertices(), 0, queue.colour_ends(), network)));
+        static_assert(noexcept(packed.template update<true>(0, 1, scene, SafeStep{}, false, executor)));
+        static_assert(noexcept(packed.template update<false>(0, 1, scene, BlockStep{}, true, executor)));
         static_assert(noexcept(packed.free_count(0))&& noexcept(packed.needed()));
     });
     static_cast<void>([](StepState<S>& state, const ContactTool<S>& tool, std::span<ContactPack<S>> packs,

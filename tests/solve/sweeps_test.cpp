@@ -75,7 +75,7 @@ TEST_CASE("under a deadline the cost of an update is the time of all over their 
         const std::array<ConstraintRef<double>, 1> loads{ConstraintRef<double>(load)};
         StepState<double> state(mesh.vertex_count(), 0);
         ActiveVertices active(mesh.vertex_count());
-        PackedVertices<double> packed(network);
+        PackedVertices<double> packed(network), spare(network, 0);
         StepReport<double> report;
         StepCosts costs;
         const Deadline deadline([&] { return double(readings++); }, 1e9);
@@ -90,7 +90,7 @@ TEST_CASE("under a deadline the cost of an update is the time of all over their 
                                                                                            network, foundation, state};
         const AnyExecutor executor;
         Sweeps<double, BlockStep, MassSpringNetwork<double, LinearSpring>, Foundation> sweeps{
-            scene, {}, options, executor, active, packed, acting, report, TimeBudget(deadline, costs), 0};
+            scene, {}, options, executor, active, packed, spare, acting, report, TimeBudget(deadline, costs), 0};
         sweeps.load_and_pack();
         sweeps.run();
         const int batches = readings - 1 - enforcements;

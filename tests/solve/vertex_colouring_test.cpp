@@ -66,6 +66,33 @@ TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[v
     }
 }
 
+// So that each vertex is updated where its neighbours are as in the given order.
+TEST_CASE("groups with the same results hold a vertex after all neighbours before it, and before all after it",
+          "[vertex_colouring]") {
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = test::random_surface<double>(random).mesh();
+        const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 1.0});
+        IndexSet set(mesh.vertex_count());
+        for (Index i = random.index(2 * mesh.vertex_count()); i > 0; --i) set.insert(random.index(mesh.vertex_count()));
+        const std::vector<Index> before(set.items().begin(), set.items().end());
+        VertexColouring groups(mesh.vertex_count());
+        groups.add(network, set, 0, before.size(), true);
+        REQUIRE(std::ranges::is_permutation(set.items(), before));
+        const auto group_of = [&](Index v) {
+            const auto at = std::ranges::find(set.items(), v) - set.items().begin();
+            return std::ranges::upper_bound(groups.ends(), static_cast<std::size_t>(at)) - groups.ends().begin();
+        };
+        for (std::size_t i = 0; i < before.size(); ++i) {
+            for (const auto& end : network.springs_of(before[i])) {
+                const auto j = static_cast<std::size_t>(std::ranges::find(before, end.other) - before.begin());
+                if (j < i) REQUIRE(group_of(before[j]) < group_of(before[i]));
+            }
+        }
+    }
+}
+
 TEST_CASE("a snapshot holds the groups", "[vertex_colouring]") {
     Random random(1);
     const auto mesh = test::random_surface<double>(random).mesh();

@@ -11,6 +11,7 @@
 ///
 ///     membrane::InLanes<membrane::VolumeSpring<double>> springs;                 // VolumeSpring<Lanes<double>>
 ///     membrane::set_lane(springs, 2, spring);
+///     const auto second = membrane::lane_of<membrane::VolumeSpring<double>>(springs, 2);
 namespace membrane {
 
 namespace detail {
@@ -48,6 +49,19 @@ void set_lane(InLanes<T>& to, std::size_t lane, const T& from) noexcept {
     for (std::size_t k = 0; k < detail::LanesOf<T>::numbers; ++k) {
         std::memcpy(write + k * sizeof(Lanes<Number>), read + k * sizeof(Number), sizeof(Number));
     }
+}
+
+/// The numbers of one lane. @pre `lane` < the number of lanes
+template <StructOfNumbers T>
+[[nodiscard]] T lane_of(const InLanes<T>& from, std::size_t lane) noexcept {
+    using Number = typename detail::LanesOf<T>::Number;
+    T to;
+    const auto* const read = reinterpret_cast<const std::byte*>(&from) + lane * sizeof(Number);
+    auto* const write = reinterpret_cast<std::byte*>(&to);
+    for (std::size_t k = 0; k < detail::LanesOf<T>::numbers; ++k) {
+        std::memcpy(write + k * sizeof(Number), read + k * sizeof(Lanes<Number>), sizeof(Number));
+    }
+    return to;
 }
 
 }  // namespace membrane

@@ -246,6 +246,44 @@ concept ElementInLanes = StructOfNumbers<E> &&
     { element.energy_change(x, i, x[i]) } -> std::same_as<EnergyChange<Lanes<Scalar>>>;
 };
 
+/// An element a lane, of a kind that does not take `Lanes`: evaluated one after the other.
+template <class E, Real Scalar>
+struct LaneByLane {
+    std::array<const E*, Lanes<Scalar>::count> of_lane{};  ///< null: none
+
+    ///@{
+    /// As of one element; zero in lanes without one.
+    [[nodiscard]] CornerForce<Lanes<Scalar>> force_on(const Corners<Lanes<Scalar>, E::corner_count>& x,
+                                                      std::size_t i) const noexcept {
+        CornerForce<Lanes<Scalar>> all;
+        for (std::size_t lane = 0; lane < of_lane.size(); ++lane) {
+            const auto one = of_lane[lane] ? of_lane[lane]->force_on(corners_of(x, lane), i) : none();
+            set_lane(all, lane, CornerForce<Scalar>(one));
+        }
+        return all;
+    }
+    [[nodiscard]] EnergyChange<Lanes<Scalar>> energy_change(const Corners<Lanes<Scalar>, E::corner_count>& x,
+                                                            std::size_t i,
+                                                            const Vector3<Lanes<Scalar>>& displacement) const noexcept {
+        EnergyChange<Lanes<Scalar>> all;
+        for (std::size_t lane = 0; lane < of_lane.size(); ++lane) {
+            if (!of_lane[lane]) continue;
+            const auto by = lane_of<Vector3<Scalar>>(displacement, lane);
+            set_lane(all, lane, EnergyChange<Scalar>(of_lane[lane]->energy_change(corners_of(x, lane), i, by)));
+        }
+        return all;
+    }
+    ///@}
+
+  private:
+    [[nodiscard]] static CornerForce<Scalar> none() noexcept { return {.remainder = {}}; }
+    [[nodiscard]] static auto corners_of(const Corners<Lanes<Scalar>, E::corner_count>& x, std::size_t lane) noexcept {
+        Corners<Scalar, E::corner_count> corners;
+        for (std::size_t k = 0; k < corners.size(); ++k) corners[k] = lane_of<Vector3<Scalar>>(x[k], lane);
+        return corners;
+    }
+};
+
 /// Energy of a triangle [J], and its forces on its corners [N].
 template <Real Scalar>
 struct TriangleResponse {
@@ -261,7 +299,6 @@ class Elements {
     using Scalar = Scalar_;                                          ///< of the constants and forces
     static constexpr std::size_t corner_count = Each::corner_count;  ///< vertices of one element
     using Instance = ElementInstance<Each>;                          ///< one element with its vertices
-    static constexpr bool in_lanes = ElementInLanes<Each, Scalar>;   ///< whether they can be evaluated in lanes
 
     /// The elements `all` of `mesh`. @throws InvalidInput for a corner that is no vertex, or whose force or stiffness
     /// at rest is not finite: a triangle is too thin, or a constant too large, for the scalar. Cost: linear.

@@ -113,7 +113,7 @@ template <Number Scalar, class Law>
                                                                const Scalar& stiffness,
                                                                const Scalar& rest_length) noexcept {
     const auto has_length = to.length != 0;
-    const auto response = law(SpringState<Scalar>{stiffness, rest_length, to.divisor});
+    const auto response = response_of<Scalar>(law, {stiffness, rest_length, to.divisor});
     return {{select(has_length, response.stiffness, stiffness),
              select<Scalar>(has_length, response.tension * to.per_length, stiffness), to.per_length * to.edge},
             to.edge,
@@ -224,8 +224,8 @@ struct SpringElement {
     template <Number N>
     [[nodiscard]] SpringResponse<N> response(const N& length) const noexcept {
         constexpr auto shortest = (std::numeric_limits<Each<N>>::min)();  // no law is called with a smaller length
-        return (*law)(
-            SpringState<N>{static_cast<N>(stiffness), static_cast<N>(rest_length), larger<N>(length, shortest)});
+        return response_of<N>(*law,
+                              {static_cast<N>(stiffness), static_cast<N>(rest_length), larger<N>(length, shortest)});
     }
 
     ///@{

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include <membrane/core/check.hpp>
+#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/core/types.hpp>
 
@@ -37,8 +38,8 @@ struct SpringResponse {
 
 /// A law of springs. Beyond the signature: tension and energy are 0 at rest length, `tension` is the derivative of
 /// `energy` and `stiffness` that of `tension`, all finite for every finite length. If a law also takes `Lanes`, a
-/// solver updates several vertices at once. Members of the result that a caller does not use are not computed once the
-/// call is inlined.
+/// solver asks it for several springs at once. Members of the result that a caller does not use are not computed once
+/// the call is inlined.
 template <class Law, class Scalar>
 concept SpringLaw = Real<Scalar> && std::copyable<Law> && requires(const Law& law, const SpringState<Scalar>& state) {
     { law(state) }
@@ -60,6 +61,23 @@ consteval bool check_spring_law() noexcept {
 /// A `SpringLaw`: if a type does not satisfy it, the error names the missing requirement.
 template <class Law, class Scalar>
 concept CheckedSpringLaw = detail::check_spring_law<Law, Scalar>();
+
+/// The response of one spring, or of several: a law that does not take `Lanes` is asked for one spring after the other,
+/// but for springs without stiffness, which fill unused lanes.
+template <Number N, class Law>
+[[nodiscard]] MEMBRANE_INLINE SpringResponse<N> response_of(const Law& law, const SpringState<N>& springs) noexcept {
+    if constexpr (requires { law(springs); }) {
+        return law(springs);
+    } else {
+        using Scalar = Each<N>;
+        SpringResponse<N> responses{0, 0, 0};
+        for (std::size_t i = 0; i < N::count; ++i) {
+            const auto spring = lane_of<SpringState<Scalar>>(springs, i);
+            if (spring.stiffness != 0) set_lane(responses, i, SpringResponse<Scalar>(law(spring)));
+        }
+        return responses;
+    }
+}
 
 /// A law that sets `never_stiffens` states that at no other length a spring is stiffer than at this one, or than its
 /// tension over its length if that is larger. Then updates guarantee descent; with other laws a solver needs a line

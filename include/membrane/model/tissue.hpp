@@ -23,14 +23,13 @@
 namespace membrane {
 
 /// Springs and elements of one membrane, an `ElasticNetwork`; masses, viscosities and pins are the springs'. Cost: that
-/// of its kinds of elements. Without elements a `MassSpringNetwork` alone is faster: several of its vertices are
-/// updated at once, and non-stiffening springs need no line search.
+/// of its kinds of elements. Without elements a `MassSpringNetwork` alone is faster: non-stiffening springs need no
+/// line search.
 template <class Springs, class... Kinds>
 class Tissue {
   public:
-    using Scalar = typename Springs::Scalar;                    ///< that of the springs
-    static constexpr bool never_stiffens = false;               ///< elements may stiffen: updates need a line search
-    static constexpr bool in_lanes = (Kinds::in_lanes && ...);  ///< whether all elements can be evaluated in lanes
+    using Scalar = typename Springs::Scalar;       ///< that of the springs
+    static constexpr bool never_stiffens = false;  ///< elements may stiffen: updates need a line search
     static constexpr bool bounds_energy =
         Springs::never_stiffens;  ///< `majoriser` bounds the energy as far as its remainder is known
 

@@ -52,7 +52,7 @@ class ActiveVertices {
     /// Number of the first `vertices` that are in the queue.
     [[nodiscard]] std::size_t from_queue() const noexcept { return from_queue_; }
 
-    /// Ends in `vertices` of the groups outside the queue, if they are updated in groups.
+    /// Ends in `vertices` of the groups outside the queue, and of the layers that it has grown by.
     [[nodiscard]] std::span<const std::size_t> colour_ends() const noexcept { return colouring_.ends(); }
 
     /// Whether the queue has changed since the last call.
@@ -96,7 +96,8 @@ class ActiveVertices {
     static void visit_state(Self& self, const Visit& visit) noexcept {
         if constexpr (Visit::restores) self.clear();
         visit(self.queue_, self.seeds_, self.awake_, self.dropped_, self.activated_, self.layers_, self.layers_before_,
-              self.order_, self.as_needed_, self.has_frontier_, self.queue_fits_, self.is_open_, self.has_changed_);
+              self.breadth_first_, self.together_, self.as_needed_, self.has_frontier_, self.queue_fits_, self.is_open_,
+              self.has_changed_);
         if constexpr (Visit::restores) self.has_new_queue_ = true;  // what was packed is of another queue
     }
 
@@ -130,7 +131,7 @@ class ActiveVertices {
     Index capacity_ = 0;  // for active vertices
     std::size_t from_queue_ = 0;
     Index layers_ = 0, layers_before_ = 0;
-    UpdateOrder order_ = UpdateOrder::breadth_first;
+    bool breadth_first_ = false, together_ = false;
     bool as_needed_ = false, has_frontier_ = false;
     bool has_new_queue_ = false;
     bool queue_fits_ = true, truncated_ = false;
@@ -154,11 +155,10 @@ template <class Network, class Options>
 void ActiveVertices::begin_step(const Network& network, std::span<const Index> seeds, const Options& options) noexcept {
     if (std::exchange(is_open_, true)) undo_step(network);
     as_needed_ = options.adaptive_layers;
-    order_ = as_needed_ ? UpdateOrder::breadth_first : options.order;
-    if (order_ == UpdateOrder::colour_all && options.max_vertex_updates != unlimited)
-        order_ = UpdateOrder::colour_layers;  // so that the farthest vertices are left out
-    layers_before_ =
-        order_ == UpdateOrder::colour_all ? std::exchange(layers_, options.layers) : queue_.layer_count() - 1;
+    breadth_first_ = options.order == UpdateOrder::breadth_first;
+    // Under a limit the layers stay apart, so that the farthest vertices are left out.
+    together_ = options.order != UpdateOrder::colour_layers && options.max_vertex_updates == unlimited;
+    layers_before_ = together_ ? std::exchange(layers_, options.layers) : queue_.layer_count() - 1;
     next_seeds_.clear();
     for (const Index v : seeds) next_seeds_.insert(v);
     dropped_.clear();
@@ -182,7 +182,7 @@ void ActiveVertices::begin_step(const Network& network, std::span<const Index> s
     activate(awake_.items(), capacity_);
     activate(dropped_.items(), capacity_);
     colouring_.clear();
-    if (order_ != UpdateOrder::breadth_first) colouring_.add(network, active_, from_queue_, vertices().size());
+    colouring_.add(network, active_, from_queue_, vertices().size(), breadth_first_);
     extend(network, options);
 }
 
@@ -221,13 +221,15 @@ inline void ActiveVertices::activate(std::span<const Index> vertices, Index capa
 template <class Network>
 void ActiveVertices::build_queue(const Network& network, std::span<const Index> seeds, Index layers) noexcept {
     queue_.build(network, seeds, layers);
-    if (order_ != UpdateOrder::breadth_first) queue_.group(network, order_ == UpdateOrder::colour_all);
+    queue_.group(network, together_, breadth_first_);
     has_new_queue_ = true;
 }
 
 template <class Network, class Options>
 void ActiveVertices::grow(const Network& network, const Options& options) noexcept {
+    const std::size_t before = vertices().size();
     for (const Index v : frontier()) active_.insert(v);
+    colouring_.add(network, active_, before, vertices().size(), breadth_first_);
     extend(network, options);
 }
 

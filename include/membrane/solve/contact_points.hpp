@@ -354,8 +354,8 @@ MEMBRANE_INLINE Lanes<Scalar> solve(StepState<Scalar>& state, const typename Lan
     // The response leaves out that a rocking triangle shifts the force between supports: it may be too small. If the
     // changes alternate, they are halved.
     if (pack.on_fixed) change = select<Wide>(change * pack.change < 0, change / 2, change);
-    // At equilibrium the contact force balances the other forces at the corners, now or once the gap is closed. If it is
-    // much larger, a tool has jumped to the wrong side of some points, and they press against one another.
+    // At equilibrium the contact force balances the other forces at the corners, now or once the gap is closed. If it
+    // is much larger, a tool has jumped to the wrong side of some points, and they press against one another.
     const Wide limit = 2 * (response.balanced_force + abs(gap) * response.internal_stiffness);
     const auto too_hard = moves & (pack.load.force + change > limit);
     change = select<Wide>(too_hard, -pack.load.force, change);

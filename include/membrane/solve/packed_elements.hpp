@@ -31,6 +31,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The elements at the vertices of each pack, an element of each vertex in a slot, by kind and place of the vertex. A
 /// lane without an element has one whose constants are zero, with all corners at the vertex: its force is zero.
+/// Elements of a kind that does not take `Lanes` stay in the network, and are evaluated one after the other.
 template <Real Scalar>
 class PackedElements {
   public:
@@ -71,6 +72,12 @@ class PackedElements {
         std::array<Begins, E::corner_count - 1> others;  // the corners but for the vertex
     };
     template <class E>
+        requires(!ElementInLanes<E, Scalar>)
+    struct alignas(32) Slot<E> {
+        Begins vertex;  // that has an element in this slot, or `no_index`
+        std::array<Begins, E::corner_count - 1> others;
+    };
+    template <class E>
     static constexpr std::size_t blocks = sizeof(Slot<E>) / sizeof(Block);
 
     // Calls `act(elements, place, group)` for each kind and each place of a vertex in it; place and group are
@@ -79,6 +86,17 @@ class PackedElements {
     static void for_each_group(const Network& network, const Act& act) noexcept;
     template <class E>
     static void fill_lane(Slot<E>& slot, std::size_t lane, std::size_t place, const ElementInstance<E>& at) noexcept;
+    // Number `n` of the elements at the vertex of each lane.
+    template <class E>
+    [[nodiscard]] static LaneByLane<E, Scalar> one_by_one(const Elements<Scalar, E>& elements, const Slot<E>& slot,
+                                                          std::size_t place, Index n) noexcept {
+        LaneByLane<E, Scalar> all;
+        for (std::size_t lane = 0; lane < Wide::count; ++lane) {
+            const Index v = slot.vertex[lane];
+            if (v != no_index) all.of_lane[lane] = &elements.at(v, place)[static_cast<std::size_t>(n)].instance.element;
+        }
+        return all;
+    }
     template <class E>
     [[nodiscard]] Slot<E>& slot_at(std::size_t block) noexcept {
         return *std::launder(reinterpret_cast<Slot<E>*>(&blocks_[block]));
@@ -155,7 +173,9 @@ bool PackedElements<Scalar>::append(std::span<const Index> vertices, const Begin
         fits = fits && first + count * blocks<E> <= blocks_.size();
         if (!fits) return;
         for (; block_count_ < first + count * blocks<E>; block_count_ += blocks<E>) {
-            (new (&blocks_[block_count_]) Slot<E>())->others.fill(own);
+            auto* slot = new (&blocks_[block_count_]) Slot<E>();
+            slot->others.fill(own);
+            if constexpr (!ElementInLanes<E, Scalar>) slot->vertex.fill(no_index);
         }
         counts_[pack * group_count_ + group] = static_cast<Index>(count);
         for (std::size_t lane = 0; lane < vertices.size(); ++lane) {
@@ -174,7 +194,11 @@ template <Real Scalar>
 template <class E>
 MEMBRANE_INLINE void PackedElements<Scalar>::fill_lane(Slot<E>& slot, std::size_t lane, std::size_t place,
                                                        const ElementInstance<E>& at) noexcept {
-    membrane::set_lane(slot.element, lane, at.element);
+    if constexpr (ElementInLanes<E, Scalar>) {
+        set_lane(slot.element, lane, at.element);
+    } else {
+        slot.vertex[lane] = at.corners[place];
+    }
     for (std::size_t k = 0; k < E::corner_count; ++k) {
         if (k != place) slot.others[k - (k > place)][lane] = numbers_in_point * at.corners[k];
     }
@@ -187,18 +211,22 @@ MEMBRANE_INLINE void PackedElements<Scalar>::for_each(std::size_t p, const Vecto
                                                       const Act& act) const noexcept {
     if constexpr (!HasElements<Network>) return;
     std::size_t block = begins_[p];
-    for_each_group(network,
-                   [&]<class E>(const Elements<Scalar, E>&, auto place, std::size_t group) MEMBRANE_INLINE_LAMBDA {
-                       for (Index n = counts_[p * group_count_ + group]; n > 0; --n) {
-                           const Slot<E>& slot = slot_at<E>(block);
-                           Corners<Wide, E::corner_count> x;
-                           for (std::size_t k = 0; k < E::corner_count; ++k) {
-                               x[k] = k == place ? here : gather(rows, slot.others[k - (k > place)].data());
-                           }
-                           act(slot.element, x, place);
-                           block += blocks<E>;
-                       }
-                   });
+    for_each_group(network, [&]<class E>(const Elements<Scalar, E>& elements, auto place,
+                                         std::size_t group) MEMBRANE_INLINE_LAMBDA {
+        for (Index n = 0; n < counts_[p * group_count_ + group]; ++n) {
+            const Slot<E>& slot = slot_at<E>(block);
+            Corners<Wide, E::corner_count> x;
+            for (std::size_t k = 0; k < E::corner_count; ++k) {
+                x[k] = k == place ? here : gather(rows, slot.others[k - (k > place)].data());
+            }
+            if constexpr (ElementInLanes<E, Scalar>) {
+                act(slot.element, x, place);
+            } else {
+                act(one_by_one(elements, slot, place, n), x, place);
+            }
+            block += blocks<E>;
+        }
+    });
 }
 
 }  // namespace membrane

@@ -29,35 +29,13 @@
 ///     }
 namespace membrane {
 
-namespace detail {
-
-template <class Rule, class Network>
-[[nodiscard]] consteval bool energy_allows_lanes() noexcept {
-    if constexpr (HasElements<Network>) {
-        return has_energy_bound<Rule, Network> && Network::in_lanes;
-    } else {
-        return !needs_line_search<Rule, Network>;
-    }
-}
-
-}  // namespace detail
-
-/// Whether `Rule` can update vertices in lanes. The law of the springs, all elements and the rule accept `Lanes`. The
-/// foundation is `NoFoundation` or has `spring`. Springs need no line search.
-template <class Scalar, class Rule, class Network, class Volume>
-concept UpdatesInLanes = detail::energy_allows_lanes<Rule, Network>() &&
-    requires(const Rule& rule, const Network& network, const SpringState<Lanes<Scalar>>& spring,
-             const VertexState<Lanes<Scalar>>& vertex) {
-    network.law()(spring);
-    rule.compliance(vertex);
-} &&(std::same_as<Volume, NoFoundation> || SpringsInLanes<Volume, Scalar>);
-
 inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The vertices of a queue, and then others, in packs of one vertex for each lane. A pack stores for each vertex its
 /// springs, its volume spring and whether it is free. The vertices are in groups, colour classes: no spring joins two
 /// vertices of a group, and all vertices of a pack are of one group. Positions are in `StepState`. From the first
-/// vertex beyond the capacity on, vertices are left out, and the solver updates them one by one.
+/// vertex beyond the capacity on, vertices are left out. A law, rule, element or foundation that does not take `Lanes`
+/// is asked for one vertex after the other: the results are equal to the bit.
 template <Real Scalar>
 class PackedVertices {
   public:
@@ -110,42 +88,46 @@ class PackedVertices {
     /// The packed vertices and their neighbours, each once.
     [[nodiscard]] std::span<const Index> needed() const noexcept { return needed_.items(); }
 
-    /// Copies the step's volume springs, masses and fixed vertices into the packs.
+    /// As `append`, behind all. Online. Cost: their springs.
+    template <class Network>
+    void extend(std::span<const Index> vertices, std::size_t begin, std::span<const std::size_t> ends,
+                const Network& network) noexcept {
+        fits_ = fits_ && pack(vertices, begin, ends, network);
+    }
+
+    /// Copies the step's volume springs, masses and fixed vertices into the packs from number `first` on.
     /// @pre `StepState` has loaded the positions of `needed`
     template <class Scene>
-    void begin_step(const Scene& scene) noexcept;
+    void begin_step(const Scene& scene, std::size_t first = 0) noexcept;
 
     /// Number of free vertices of pack `p`.
     [[nodiscard]] Index free_count(std::size_t p) const noexcept { return terms_[p].free_count; }
 
     /// What an update did to a pack.
     enum class Outcome : unsigned char {
-        at_rest,  ///< no force was above the tolerance
-        moved,    ///< at least one vertex moved
-        too_far,  ///< a displacement may be unstable: nothing moved
+        at_rest,   ///< no force was above the tolerance
+        moved,     ///< at least one vertex moved
+        unstable,  ///< updates of a vertex diverge: nothing moved
     };
 
     /// Updates the vertices of packs `begin` to `end`, the end excluded, all of one group, by `rule`. With
-    /// `in_contact`, adds the forces of constraints and stores the compliance of each vertex. If a displacement may be
-    /// unstable, the outcome of its pack is `too_far` and the pack is unchanged. The packs are divided among threads; a
-    /// thread interleaves two packs, which hides the latency of roots and divisions.
+    /// `in_contact`, adds the forces of constraints and stores the compliance of each vertex; if `forced`, adds these
+    /// forces in any case. The packs are divided among threads; a thread interleaves two packs, which hides the latency
+    /// of roots and divisions.
     template <bool in_contact, class Scene, class Rule, Executor E>
-    void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule, const E& executor) noexcept {
+    void update(std::size_t begin, std::size_t end, const Scene& scene, const Rule& rule, bool forced,
+                const E& executor) noexcept {
         constexpr std::size_t packs_in_task = 32;
         parallel_for(executor, end - begin, packs_in_task, [&](std::size_t first, std::size_t last) {
             std::size_t p = begin + first;
             if constexpr (!HasElements<NetworkOf<Scene>>) {
-                for (; p + 1 < begin + last; p += 2) update_two<in_contact>(p, scene, rule);
+                for (; p + 1 < begin + last; p += 2) update_two<in_contact>(p, scene, rule, forced);
             }
-            for (; p < begin + last; ++p) outcomes_[p] = update_pack<in_contact>(p, scene, rule);
+            for (; p < begin + last; ++p) outcomes_[p] = update_pack<in_contact>(p, scene, rule, forced);
         });
     }
     /// Outcome of the last `update` for pack `p`.
     [[nodiscard]] Outcome outcome(std::size_t p) const noexcept { return outcomes_[p]; }
-
-    /// Updates one pack; if `allowed`, a displacement that may be unstable is made.
-    template <bool in_contact, class Scene, class Rule>
-    Outcome update_pack(std::size_t p, const Scene& scene, const Rule& rule, bool allowed = false) noexcept;
 
     /// Writes the forces on the vertices of pack `p` to the rows of residual forces.
     template <class Scene>
@@ -210,24 +192,26 @@ class PackedVertices {
         VertexForce<Wide> others;
     };
     template <bool in_contact, class Rule, class Scene>
-    [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene) const noexcept;
+    [[nodiscard]] PackState evaluate(std::size_t p, const Scene& scene, bool forced) const noexcept;
     template <bool in_contact, class Scene, class Rule>
-    void update_two(std::size_t p, const Scene& scene, const Rule& rule) noexcept;
+    Outcome update_pack(std::size_t p, const Scene& scene, const Rule& rule, bool forced) noexcept;
     template <bool in_contact, class Scene, class Rule>
-    Outcome move(std::size_t p, const PackState& at, const Scene& scene, const Rule& rule, bool allowed) noexcept;
+    void update_two(std::size_t p, const Scene& scene, const Rule& rule, bool forced) noexcept;
+    template <bool in_contact, class Scene, class Rule>
+    Outcome move(std::size_t p, const PackState& at, const Scene& scene, const Rule& rule) noexcept;
     template <class Rule, class Scene>
     [[nodiscard]] VertexState<Wide> spring_state(std::size_t p, const Vector3<Wide>& here,
                                                  const Scene& scene) const noexcept;
-    template <class Scene>
+    template <class Rule, class Scene>
     [[nodiscard]] Vector3<Wide> backtracked(std::size_t p, const PackState& at, Vector3<Wide> displacement,
                                             const typename Wide::Mask& moves, const Scene& scene) const noexcept;
     template <class Scene>
     [[nodiscard]] EnergyChange<Wide> energy_change(std::size_t p, const Vector3<Wide>& here,
                                                    const Vector3<Wide>& displacement,
                                                    const Scene& scene) const noexcept;
-    template <bool in_contact, class Scene>
-    void add_others(std::size_t p, const Vector3<Wide>& here, const Scene& scene,
-                    VertexForce<Wide>& others) const noexcept;
+    template <class Scene>
+    [[nodiscard]] VertexForce<Wide> foundation_on(std::size_t p, const Vector3<Wide>& here,
+                                                  const Scene& scene) const noexcept;
 
     void keep_response(std::size_t p, const PackState& at, const Symmetric3<Wide>& block,
                        StepState<Scalar>& rows) const noexcept;
@@ -249,7 +233,7 @@ class PackedVertices {
     std::vector<unsigned char> is_needed_;
     Extent assigned_;
     std::size_t given_ = 0;
-    bool is_whole_ = true;  // all assigned vertices fit
+    bool is_whole_ = true, fits_ = true;  // all assigned vertices fit; and all after them
 };
 
 }  // namespace MEMBRANE_INSTRUCTION_SET
@@ -280,7 +264,7 @@ void PackedVertices<Scalar>::assign(std::span<const Index> vertices, std::span<c
                                     const Network& network) noexcept {
     truncate({});
     given_ = vertices.size();
-    is_whole_ = pack(vertices, 0, ends, network);
+    is_whole_ = fits_ = pack(vertices, 0, ends, network);
     assigned_ = {members_.size(), packs_.size(), slot_count_, needed_.size()};
 }
 
@@ -289,7 +273,7 @@ template <class Network>
 void PackedVertices<Scalar>::append(std::span<const Index> vertices, std::size_t begin,
                                     std::span<const std::size_t> ends, const Network& network) noexcept {
     truncate(assigned_);
-    if (is_whole_) static_cast<void>(pack(vertices, begin, ends, network));
+    fits_ = is_whole_ && pack(vertices, begin, ends, network);
 }
 
 // False if vertices, packs or slots exceed the capacity.
@@ -320,7 +304,7 @@ void PackedVertices<Scalar>::truncate(const Extent& extent) noexcept {
 }
 
 // False if vertices, packs or slots exceed the capacity. Unused lanes and slots have a spring of stiffness zero from
-// the vertex to itself.
+// the vertex to itself; a law may divide by its rest length.
 template <Real Scalar>
 template <class Network>
 bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const Network& network) noexcept {
@@ -332,7 +316,7 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
     for (std::size_t i = 0; i < vertices.size(); ++i) pack.own[i] = numbers_in_point * vertices[i];
     if (!elements_.append(vertices, pack.own, network) || !packs_.try_push_back(pack)) return false;
     const auto own_slots = std::span(slots_).subspan(slot_count_, springs);
-    for (Slot& slot : own_slots) slot = {Scalar(0), Scalar(0), pack.own};
+    for (Slot& slot : own_slots) slot = {Scalar(0), Scalar(1), pack.own};
     for (std::size_t i = 0; i < vertices.size(); ++i) {
         members_.try_push_back(vertices[i]);
         need(vertices[i]);
@@ -351,10 +335,10 @@ bool PackedVertices<Scalar>::append_pack(std::span<const Index> vertices, const 
 
 template <Real Scalar>
 template <class Scene>
-void PackedVertices<Scalar>::begin_step(const Scene& scene) noexcept {
-    for (std::size_t p = 0; p < count(); ++p) {
+void PackedVertices<Scalar>::begin_step(const Scene& scene, std::size_t first) noexcept {
+    for (std::size_t p = first; p < count(); ++p) {
         Terms& terms = terms_[p] = {};
-        if constexpr (HasSprings<VolumeOf<Scene>, Scalar>) {
+        if constexpr (SpringsInLanes<VolumeOf<Scene>, Scalar>) {
             new (&terms.spring) InLanes<SpringOf<VolumeOf<Scene>, Scalar>>();
         }
         const auto members = vertices(p);
@@ -365,7 +349,7 @@ void PackedVertices<Scalar>::begin_step(const Scene& scene) noexcept {
                 ++terms.free_count;
             }
             if (scene.network.has_masses()) terms.mass.set(i, scene.network.mass(v));
-            if constexpr (HasSprings<VolumeOf<Scene>, Scalar>) {
+            if constexpr (SpringsInLanes<VolumeOf<Scene>, Scalar>) {
                 const auto spring = scene.volume.spring(v, point(scene.start, v), scene.dt);
                 terms.damps = terms.damps || spring.damps();
                 set_lane(spring_of<Scene>(terms), i, spring);
@@ -411,17 +395,22 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::spring_state(std::size_t p, const V
     return vertex;
 }
 
-// Adds the volume springs to `others`, which has the forces of constraints.
+// The force of the foundation.
 template <Real Scalar>
-template <bool in_contact, class Scene>
-MEMBRANE_INLINE void PackedVertices<Scalar>::add_others(std::size_t p, const Vector3<Wide>& here,
-                                                        [[maybe_unused]] const Scene& scene,
-                                                        VertexForce<Wide>& others) const noexcept {
-    if constexpr (HasSprings<VolumeOf<Scene>, Scalar>) {
+template <class Scene>
+MEMBRANE_INLINE auto PackedVertices<Scalar>::foundation_on(std::size_t p, const Vector3<Wide>& here,
+                                                           const Scene& scene) const noexcept -> VertexForce<Wide> {
+    if constexpr (SpringsInLanes<VolumeOf<Scene>, Scalar>) {
         const auto& spring = spring_of<Scene>(terms_[p]);
-        const auto foundation = terms_[p].damps ? spring.force_on(here) : spring.elastic_force(here);
-        others.force = in_contact ? Vector3<Wide>(foundation.force + others.force) : foundation.force;
-        others.stiffness = in_contact ? Wide(foundation.stiffness + others.stiffness) : foundation.stiffness;
+        return terms_[p].damps ? spring.force_on(here) : spring.elastic_force(here);
+    } else {
+        VertexForce<Wide> all;
+        for (std::size_t i = 0; i < packs_[p].size; ++i) {
+            const Index v = vertices(p)[i];
+            const auto at = lane_of<Vector3<Scalar>>(here, i);
+            set_lane(all, i, VertexForce<Scalar>(scene.volume.force_on(v, at, point(scene.start, v), scene.dt)));
+        }
+        return all;
     }
 }
 
@@ -445,7 +434,8 @@ MEMBRANE_INLINE void PackedVertices<Scalar>::keep_response(std::size_t p, const 
 // Evaluates the forces on the vertices of a pack.
 template <Real Scalar>
 template <bool in_contact, class Rule, class Scene>
-MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene) const noexcept -> PackState {
+MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene& scene, bool forced) const noexcept
+    -> PackState {
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     PackState at;
@@ -458,16 +448,20 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
                                MEMBRANE_INLINE_LAMBDA { elements += element.force_on(x, i); });
         add(static_cast<EnergyMajoriser<Wide>&>(at.vertex), elements);
     }
-    if constexpr (in_contact) {
+    if constexpr (!std::same_as<VolumeOf<Scene>, NoFoundation>) at.others = foundation_on(p, at.here, scene);
+    if (in_contact || forced) {
         const auto of_constraints = gather_padded(rows.force.data(), own.data());
+        const Wide contact_stiffness = larger<Wide>(of_constraints.extra, 0);
         at.constraint_force = of_constraints.point;
-        at.vertex.contact_stiffness = larger<Wide>(of_constraints.extra, 0);
-        at.vertex.contact_normal = direction_or_zero<Wide>(at.constraint_force);
         at.added_stiffness = Wide::of(
             [&](std::size_t i) { return rows.added_stiffness[static_cast<std::size_t>(own[i] / numbers_in_point)]; });
-        at.others = {at.constraint_force, at.vertex.contact_stiffness + at.added_stiffness};
+        at.others.force += at.constraint_force;
+        at.others.stiffness += contact_stiffness + at.added_stiffness;
+        if constexpr (in_contact) {
+            at.vertex.contact_stiffness = contact_stiffness;
+            at.vertex.contact_normal = direction_or_zero<Wide>(at.constraint_force);
+        }
     }
-    add_others<in_contact>(p, at.here, scene, at.others);
     at.vertex.force += at.others.force;
     at.vertex.stiffness += at.others.stiffness;
     at.vertex.mass = terms_[p].mass;
@@ -479,24 +473,25 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::evaluate(std::size_t p, const Scene
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
 MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState& at, const Scene& scene,
-                                                  const Rule& rule, [[maybe_unused]] bool allowed) noexcept -> Outcome {
+                                                  const Rule& rule) noexcept -> Outcome {
     StepState<Scalar>& rows = scene.state;
     const auto& own = packs_[p].own;
     const auto may_move = terms_[p].free != 0;
     const bool in_queue = in_contact || p < assigned_.packs;
     const auto move = move_of(rule, at.vertex, in_queue ? rows.force_tolerance : rows.outside_tolerance());
     if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
-        if (!allowed && any(move.may_overshoot & may_move)) {
-            const auto springs = springs_on<CurvedSum<Wide>>(p, at.here, scene).total();
-            const Wide bound = stiffness_bound_of(springs) + at.others.stiffness;
-            if (any((move.compliance * bound >= 2) & may_move)) return Outcome::too_far;
+        if (any(move.may_overshoot & may_move)) {
+            const Wide suspect = select<Wide>(move.may_overshoot & may_move, 1, 0);
+            for (std::size_t i = 0; i < packs_[p].size; ++i) {
+                if (suspect[i] != 0 && diverges(scene, vertices(p)[i], move.compliance[i])) return Outcome::unstable;
+            }
         }
     }
     if constexpr (in_contact) keep_response(p, at, as_block<Wide>(move.compliance), rows);
     const auto moves = move.moves & may_move;
     Vector3<Wide> displacement = move.displacement;
     if constexpr (needs_line_search<Rule, NetworkOf<Scene>>) {
-        displacement = backtracked(p, at, displacement, moves, scene);
+        displacement = backtracked<Rule>(p, at, displacement, moves, scene);
     }
     PaddedLanes<Scalar> there{at.here + displacement, select<Wide>(may_move, move.least, 0)};
     for (Eigen::Index k = 0; k < 3; ++k) there.point[k] = select(moves, there.point[k], at.here[k]);
@@ -504,13 +499,17 @@ MEMBRANE_INLINE auto PackedVertices<Scalar>::move(std::size_t p, const PackState
     return any(moves) ? Outcome::moved : Outcome::at_rest;
 }
 
-// As the function of the same name for one vertex, in the lanes of `moves`.
+// Backtracking line search in the lanes of `moves`: halves the displacement until the energy does not rise, up to
+// rounding.
 template <Real Scalar>
-template <class Scene>
+template <class Rule, class Scene>
 auto PackedVertices<Scalar>::backtracked(std::size_t p, const PackState& at, Vector3<Wide> displacement,
                                          const typename Wide::Mask& moves, const Scene& scene) const noexcept
     -> Vector3<Wide> {
-    auto rises = moves & !surely_descends(at.vertex, displacement);
+    auto rises = moves;
+    if constexpr (has_energy_bound<Rule, NetworkOf<Scene>>) {
+        rises = rises & !surely_descends(at.vertex, displacement);
+    }
     for (int i = 0; i < std::numeric_limits<Scalar>::digits && any(rises); ++i) {
         const Wide work =
             dot<Wide>(at.others.force, displacement) - at.others.stiffness * squared_norm(displacement) / 2;
@@ -543,18 +542,19 @@ auto PackedVertices<Scalar>::energy_change(std::size_t p, const Vector3<Wide>& h
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
 MEMBRANE_FLATTEN auto PackedVertices<Scalar>::update_pack(std::size_t p, const Scene& scene, const Rule& rule,
-                                                          bool allowed) noexcept -> Outcome {
-    const auto state = evaluate<in_contact, Rule>(p, scene);
-    return move<in_contact>(p, state, scene, rule, allowed);
+                                                          bool forced) noexcept -> Outcome {
+    return move<in_contact>(p, evaluate<in_contact, Rule>(p, scene, forced), scene, rule);
 }
 
 // Pack `p` and the next one of its group.
 template <Real Scalar>
 template <bool in_contact, class Scene, class Rule>
-MEMBRANE_FLATTEN void PackedVertices<Scalar>::update_two(std::size_t p, const Scene& scene, const Rule& rule) noexcept {
-    const auto state = evaluate<in_contact, Rule>(p, scene), next = evaluate<in_contact, Rule>(p + 1, scene);
-    outcomes_[p] = move<in_contact>(p, state, scene, rule, false);
-    outcomes_[p + 1] = move<in_contact>(p + 1, next, scene, rule, false);
+MEMBRANE_FLATTEN void PackedVertices<Scalar>::update_two(std::size_t p, const Scene& scene, const Rule& rule,
+                                                         bool forced) noexcept {
+    const auto state = evaluate<in_contact, Rule>(p, scene, forced);
+    const auto next = evaluate<in_contact, Rule>(p + 1, scene, forced);
+    outcomes_[p] = move<in_contact>(p, state, scene, rule);
+    outcomes_[p + 1] = move<in_contact>(p + 1, next, scene, rule);
 }
 
 template <Real Scalar>
@@ -567,12 +567,17 @@ MEMBRANE_FLATTEN void PackedVertices<Scalar>::evaluate_residual(std::size_t p, c
     elements_.for_each(p, here, rows.position.data(), scene.network,
                        [&](const auto& element, const auto& x, std::size_t i)
                            MEMBRANE_INLINE_LAMBDA { springs.force += element.force_on(x, i).force; });
-    VertexForce<Wide> others{gather(rows.force.data(), own.data()), 0};
-    add_others<true>(p, here, scene, others);
-    const Vector3<Wide> force = springs.force + others.force;
+    VertexForce<Wide> others;
+    if constexpr (!std::same_as<VolumeOf<Scene>, NoFoundation>) others = foundation_on(p, here, scene);
+    const Vector3<Wide> force = springs.force + (others.force + gather(rows.force.data(), own.data()));
     Vector3<Wide> undamped = force;
-    if constexpr (HasSprings<VolumeOf<Scene>, Scalar>) {
+    if constexpr (SpringsInLanes<VolumeOf<Scene>, Scalar>) {
         if (terms_[p].damps) undamped -= spring_of<Scene>(terms_[p]).damping_force(here);
+    } else if constexpr (!std::same_as<VolumeOf<Scene>, NoFoundation>) {
+        for (std::size_t i = 0; i < packs_[p].size; ++i) {
+            const auto one = lane_of<Vector3<Scalar>>(force, i);
+            set_lane(undamped, i, undamped_force(scene, vertices(p)[i], one));
+        }
     }
     scatter_padded<Scalar>({force, norm(undamped)}, rows.residual.data(), own.data());
 }

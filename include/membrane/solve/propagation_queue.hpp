@@ -35,10 +35,11 @@ class PropagationQueue {
     bool grow(const Network& network) noexcept;
 
     /// Orders every layer in groups; no spring joins two vertices of a group. If `together`, all layers beyond layer 0
-    /// are merged into one, with fewer and larger groups.
+    /// are merged into one, with fewer and larger groups. With `same_results` updates have the results of the
+    /// breadth-first order, see `VertexColouring`.
     /// Online. Cost: the springs of the vertices in the queue.
     template <class Network>
-    void group(const Network& network, bool together = false) noexcept;
+    void group(const Network& network, bool together = false, bool same_results = false) noexcept;
 
     /// Ends of the groups in `vertices`; empty before `group` is called.
     [[nodiscard]] std::span<const std::size_t> colour_ends() const& noexcept { return colouring_.ends(); }
@@ -123,14 +124,16 @@ bool PropagationQueue::grow(const Network& network) noexcept {
 }
 
 template <class Network>
-void PropagationQueue::group(const Network& network, bool together) noexcept {
+void PropagationQueue::group(const Network& network, bool together, bool same_results) noexcept {
     colouring_.clear();
     if (together && layer_count() > 1) {
         layer_ends_.truncate(1);
         layer_ends_.try_push_back(vertices().size());
     }
     const auto ends = layer_ends_.items();
-    for (std::size_t k = 0; k < ends.size(); ++k) colouring_.add(network, reached_, k > 0 ? ends[k - 1] : 0, ends[k]);
+    for (std::size_t k = 0; k < ends.size(); ++k) {
+        colouring_.add(network, reached_, k > 0 ? ends[k - 1] : 0, ends[k], same_results);
+    }
 }
 
 }  // namespace membrane

@@ -177,7 +177,7 @@ class QuasiStaticSolver {
     SolverOptions<Scalar> options_;
     AnyExecutor executor_;
     ActiveVertices active_;
-    PackedVertices<Scalar> packed_;
+    PackedVertices<Scalar> packed_, spare_;  // spare: beyond the capacity of the other
     StepState<Scalar> state_;
     IndexSet last_prescribed_;
     IndexSet woken_;                     // since the last step
@@ -206,15 +206,6 @@ QuasiStaticSolver(const Network&, const SolverOptions<typename Network::Scalar>&
 }  // namespace MEMBRANE_INSTRUCTION_SET
 
 namespace detail {
-
-// Capacity for packed vertices: 0 if no foundation model, or the options, allow no updates in lanes.
-template <class Scalar, class Rule, class Network>
-[[nodiscard]] Index max_in_lanes(const SolverOptions<Scalar>& options) noexcept {
-    constexpr bool possible = UpdatesInLanes<Scalar, Rule, Network, NoFoundation>;
-    return possible && options.order != UpdateOrder::breadth_first && !options.adaptive_layers
-               ? options.max_packed_vertices
-               : 0;
-}
 
 // The force below which a vertex is in equilibrium [N]: of the options, or above rounding.
 template <class Scalar, class Network, class Volume>
@@ -248,7 +239,8 @@ QuasiStaticSolver<Scalar, Rule>::QuasiStaticSolver(const Network& network, const
       options_((options.validate(), options)),
       executor_(std::move(executor)),
       active_(network.vertex_count()),
-      packed_(network, detail::max_in_lanes<Scalar, Rule, Network>(options)),
+      packed_(network, options.max_packed_vertices),
+      spare_(network, options.max_packed_vertices < network.vertex_count() ? static_cast<Index>(updates_in_batch) : 0),
       state_(network.vertex_count(), options.max_contact_points),
       last_prescribed_(network.vertex_count()),
       woken_(last_prescribed_),
@@ -295,8 +287,8 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
     seed_beside_moved_pins(network, context, body_moved);
     select(network, context);
-    Sweeps<Scalar, Rule, Network, Volume> sweeps{scene,   rule_,  options_, executor_, active_,
-                                                 packed_, acting, report_,  budget,    resume_};
+    Sweeps<Scalar, Rule, Network, Volume> sweeps{scene,  rule_,  options_, executor_, active_, packed_,
+                                                 spare_, acting, report_,  budget,    resume_};
     sweeps.load_and_pack();
     sweeps.run();
     if (report_.status == StepStatus::advanced && !sweeps.evaluate_residuals()) {

@@ -15,7 +15,7 @@ namespace membrane {
 
 /// Order of the vertex updates: the layers from the contact outward, and in each layer
 enum class UpdateOrder {
-    breadth_first,  ///< in the order of the breadth-first search, [Liu07] 2.2
+    breadth_first,  ///< as one by one in the order of the breadth-first search, [Liu07] 2.2
     colour_layers,  ///< in groups that no spring joins: several vertices are updated at once (SIMD)
     colour_all,  ///< groups across all layers: few and large, for several threads; changes spread more slowly. With a
                  ///< limit of vertex updates: as `colour_layers`
@@ -39,7 +39,8 @@ struct SolverOptions {
     Scalar relative_tolerance = 0;
     Scalar rigid_stiffness = 0;  ///< of a fixed vertex against constraints [N/m]; 0: 4 times the stiffest beside it
     Index max_contact_points = 4096;     ///< capacity in contact points; it determines the memory, not the time
-    Index max_packed_vertices = 32'768;  ///< capacity in vertices updated by SIMD: 260 bytes each, 460 in double
+    Index max_packed_vertices = 32'768;  ///< that stay packed during a step, others are packed for each update: memory
+                                         ///< of 260 bytes each, 460 in double
 
     /// @throws InvalidInput for an option out of its range
     void validate() const;

@@ -6,9 +6,11 @@
 #include <concepts>
 #include <limits>
 #include <string_view>
+#include <type_traits>
 #include <utility>
 
 #include <membrane/core/check.hpp>
+#include <membrane/core/in_lanes.hpp>
 #include <membrane/core/lanes.hpp>
 #include <membrane/model/elastic_network.hpp>
 
@@ -67,6 +69,34 @@ concept CheckedStepRule = detail::check_step_rule<Rule, Scalar>();
 template <class Rule, class Scalar>
 inline constexpr bool moves_along_force =
     std::same_as<Scalar, decltype(std::declval<const Rule&>().compliance(std::declval<const VertexState<Scalar>&>()))>;
+
+/// The compliance of one vertex, or of several: a rule that does not take `Lanes` is asked for one vertex after the
+/// other.
+template <Number N, class Rule>
+[[nodiscard]] MEMBRANE_INLINE auto compliance_of(const Rule& rule, const VertexState<N>& vertex) noexcept {
+    if constexpr (requires { rule.compliance(vertex); }) {
+        return rule.compliance(vertex);
+    } else {
+        using Scalar = Each<N>;
+        using One = std::remove_cvref_t<decltype(rule.compliance(VertexState<Scalar>()))>;
+        std::conditional_t<std::same_as<One, Scalar>, N, Symmetric3<N>> all{};
+        for (std::size_t i = 0; i < N::count; ++i) {
+            VertexState<Scalar> one;
+            static_cast<EnergyMajoriser<Scalar>&>(one) = lane_of<EnergyMajoriser<Scalar>>(vertex, i);
+            one.contact_stiffness = vertex.contact_stiffness[i];
+            one.contact_normal = lane_of<Vector3<Scalar>>(vertex.contact_normal, i);
+            one.mass = vertex.mass[i];
+            one.dt = vertex.dt;
+            one.constrained = vertex.constrained;
+            if constexpr (std::same_as<One, Scalar>) {
+                all.set(i, rule.compliance(one));
+            } else {
+                set_lane(all, i, rule.compliance(one));
+            }
+        }
+        return all;
+    }
+}
 
 /// Whether `Rule` sets `guarantees_descent`: its updates need no check for divergence.
 template <class Rule>
@@ -164,7 +194,7 @@ inline void SafeStep::validate() const { detail::check_omega("SafeStep", omega);
 inline void BlockStep::validate() const { detail::check_omega("BlockStep", omega); }
 
 template <Number Scalar>
-Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) const noexcept {
+MEMBRANE_INLINE Symmetric3<Scalar> BlockStep::compliance(const VertexState<Scalar>& vertex) const noexcept {
     using Limits = std::numeric_limits<Each<Scalar>>;
     const Scalar all_round = vertex.stiffness - vertex.contact_stiffness;
     const auto resists = all_round > 0;

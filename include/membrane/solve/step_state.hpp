@@ -40,7 +40,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 /// written at the end of the step: until then they are the start positions.
 ///
 /// A row is up to date if its vertex has been loaded in this step. `compliance` is that of the vertex's last update in
-/// any step, `compliance_block` that of its last update in layer 0 or alone.
+/// any step, `compliance_block` that of its last update in layer 0.
 template <Real Scalar>
 struct StepState {
     /// The largest number of constraints of one step.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -21,7 +22,7 @@ inline namespace MEMBRANE_INSTRUCTION_SET {
 
 /// The sweeps of one step over its active vertices: in each sweep contact iterations, which update layer 0 and then
 /// enforce the constraints, and then an update of each vertex beyond. The first vertices, up to the capacity, are
-/// updated in packs, the others one by one; the results are equal to the bit.
+/// packed once in a step, the others for each update.
 ///
 ///     sweeps.load_and_pack();
 ///     sweeps.run();
@@ -35,7 +36,7 @@ struct Sweeps {
     const SolverOptions<Scalar>& options;
     const AnyExecutor& executor;
     ActiveVertices& active;
-    PackedVertices<Scalar>& packed;
+    PackedVertices<Scalar>&packed, &spare;
     const ConstraintList<Scalar>& constraints;
     StepReport<Scalar>& report;
     TimeBudget budget;
@@ -45,21 +46,25 @@ struct Sweeps {
 
     std::size_t in_packs = 0;          ///< number of active vertices in packs
     std::size_t forces_seen = 0;       ///< number of vertices with a force of a constraint so far
+    bool forced_beyond = false;        ///< a constraint adds a force beyond layer 0
     Scalar queue_residual = 0;         ///< largest residual force in the queue [N]
     bool constraints_hold = false;     ///< the last enforcement found no violation, and nothing has moved since
     bool constraints_changed = false;  ///< by the final enforcement, or there was no time for it
     bool stopped = false;              ///< time ran out beyond layer 0
 
-    /// Whether vertices may be updated in packs.
-    static constexpr bool can_use_lanes = UpdatesInLanes<Scalar, Rule, Network, Volume>;
-
     /// Loads the positions of the active vertices and their neighbours.
     void load_and_pack() noexcept {
-        if constexpr (can_use_lanes) pack();
-        const auto one_by_one = active.vertices().subspan(in_packs);
-        for (const auto vertices : {one_by_one, active.frontier(), scene.state.prescribed.items()}) {
+        const auto from_queue = active.vertices().first(active.from_queue());
+        if (active.take_new_queue() || packed.assigned() != from_queue.size()) {
+            packed.assign(from_queue, active.queue().colour_ends(), scene.network);
+        }
+        packed.append(active.vertices(), from_queue.size(), active.colour_ends(), scene.network);
+        load_packs(0);
+        for (const auto vertices :
+             {active.vertices().subspan(in_packs), active.frontier(), scene.state.prescribed.items()}) {
             for (const Index v : vertices) load_neighbours(v);
         }
+        find_forces_beyond();
         budget.begin(active.vertices().size() + active.frontier().size(), beyond());
     }
 
@@ -108,12 +113,10 @@ struct Sweeps {
             count(v);
         };
         const auto& prescribed = scene.state.prescribed;
-        if constexpr (can_use_lanes) {
-            for (std::size_t p = 0, end = packed.pack_from(in_packs); p < end; ++p) {
-                packed.evaluate_residual(p, scene);
-                for (const Index v : packed.vertices(p)) {
-                    if (!prescribed.contains(v)) count(v);
-                }
+        for (std::size_t p = 0; p < packed.count(); ++p) {
+            packed.evaluate_residual(p, scene);
+            for (const Index v : packed.vertices(p)) {
+                if (!prescribed.contains(v)) count(v);
             }
         }
         for (const auto vertices : {active.vertices().subspan(in_packs), active.frontier()}) {
@@ -133,24 +136,18 @@ struct Sweeps {
         return scene.state.loaded.items().size() - active.vertices().size();
     }
 
-    // Packs vertices if no constraint adds a force beyond layer 0.
-    void pack() noexcept {
-        const auto from_queue = active.vertices().first(active.from_queue());
-        if (active.take_new_queue() || packed.assigned() != from_queue.size()) {
-            packed.assign(from_queue, active.queue().colour_ends(), scene.network);
-        }
-        if (forces_beyond_contact()) return;
-        packed.append(active.vertices(), from_queue.size(), active.colour_ends(), scene.network);
+    void load_packs(std::size_t first) noexcept {
         for (const Index v : packed.needed()) scene.state.load(v, scene.start, scene.network);
-        packed.begin_step(scene);
+        packed.begin_step(scene, first);
         in_packs = packed.size();
     }
 
-    // Whether a constraint adds a force to a further vertex, which is beyond layer 0.
-    [[nodiscard]] bool forces_beyond_contact() noexcept {
+    // Whether a constraint adds a force beyond layer 0: only then the forces there are read.
+    void find_forces_beyond() noexcept {
         const auto forced = scene.state.forced.items();
         const auto unseen = forced.subspan(std::exchange(forces_seen, forced.size()));
-        return std::any_of(unseen.begin(), unseen.end(), [&](Index v) { return !scene.state.seeds.contains(v); });
+        forced_beyond |=
+            std::any_of(unseen.begin(), unseen.end(), [&](Index v) { return !scene.state.seeds.contains(v); });
     }
 
     void load_neighbours(Index v) noexcept {
@@ -167,8 +164,11 @@ struct Sweeps {
                 break;
             }
             const std::size_t packed_count = (std::min)(layer.size(), in_packs);
-            changed |= update_packs<true>(0, packed.pack_from(packed_count));
-            for (const Index v : layer.subspan(packed_count)) changed |= update(v, true);
+            changed |= update_packs<true>(packed, 0, packed.pack_from(packed_count));
+            for (std::size_t i = packed_count, next; i < layer.size(); i = next) {
+                next = pack_spare(i, layer.size());
+                changed |= update_packs<true>(spare, 0, spare.count());
+            }
             budget.updated(layer.size());
             if (!advances()) break;
             if (!enforce()) break;
@@ -177,11 +177,10 @@ struct Sweeps {
         return changed;
     }
 
-    // Packs beyond layer 0 have no force of a constraint: if one is added, their vertices are updated one by one.
     bool enforce() noexcept {
         constraints_hold = !constraints.enforce();
         budget.enforced();
-        if (forces_beyond_contact()) in_packs = (std::min)(in_packs, active.contact_layer().size());
+        find_forces_beyond();
         return !constraints_hold;
     }
 
@@ -211,6 +210,10 @@ struct Sweeps {
         if (!needed) return false;
         const std::size_t before = active.vertices().size();
         active.grow(scene.network, options);
+        const std::size_t first = packed.count();
+        packed.extend(active.vertices(), before, active.colour_ends(), scene.network);
+        load_packs(first);
+        for (const Index v : active.vertices().subspan(in_packs)) load_neighbours(v);
         for (const Index v : active.frontier()) load_neighbours(v);
         budget.set_residual_count(active.vertices().size() + active.frontier().size(), beyond());
         update_until_time_is_up(before, active.vertices().size());
@@ -219,28 +222,38 @@ struct Sweeps {
 
     // Updates the active vertices number `begin` to `end`.
     bool update_until_time_is_up(std::size_t begin, std::size_t end) noexcept {
-        const std::size_t packed_end = std::clamp(in_packs, begin, end);
-        bool changed = update_packs_until_time_is_up(packed.pack_from(begin), packed.pack_from(packed_end));
-        for (std::size_t i = packed_end; i < end && goes_on(i);) {
-            const std::size_t count = (std::min)(updates_in_batch, end - i);
-            for (const std::size_t batch_end = i + count; i < batch_end; ++i)
-                changed |= update(active.vertices()[i], i < active.from_queue());
-            budget.updated(count);
+        const std::size_t packed_end = std::clamp(in_packs, begin, end), last = packed.pack_from(packed_end);
+        bool changed = false;
+        for (std::size_t p = packed.pack_from(begin), next; p < last && goes_on(packed.first_of(p)); p = next) {
+            next = budget.limited() ? (std::min)(p + updates_in_batch / Lanes<Scalar>::count, last) : last;
+            changed |= update_batch(packed, p, next);
+        }
+        for (std::size_t i = packed_end, next; i < end && goes_on(i); i = next) {
+            next = pack_spare(i, end);
+            changed |= update_batch(spare, 0, spare.count());
         }
         return changed;
     }
 
-    bool update_packs_until_time_is_up(std::size_t p, std::size_t end) noexcept {
-        bool changed = false;
-        while (p < end && goes_on(packed.first_of(p))) {
-            const Index before = report.vertex_updates;
-            const std::size_t batch = budget.limited() ? updates_in_batch / Lanes<Scalar>::count : end - p;
-            const std::size_t next = (std::min)(p + batch, end);
-            changed |= update_packs<false>(p, next);
-            budget.updated(static_cast<std::size_t>(report.vertex_updates - before));
-            p = next;
-        }
+    bool update_batch(PackedVertices<Scalar>& packs, std::size_t p, std::size_t end) noexcept {
+        const Index before = report.vertex_updates;
+        const bool changed = update_packs<false>(packs, p, end);
+        budget.updated(static_cast<std::size_t>(report.vertex_updates - before));
         return changed;
+    }
+
+    // Packs a batch of one group of the active vertices number `begin` to `end`. Returns its end.
+    std::size_t pack_spare(std::size_t begin, std::size_t end) noexcept {
+        const bool of_queue = begin < active.from_queue();
+        const auto ends = of_queue ? active.queue().colour_ends() : active.colour_ends();
+        const std::size_t group_end = *std::upper_bound(ends.begin(), ends.end(), begin);
+        end = (std::min)({end, group_end, begin + updates_in_batch, of_queue ? active.from_queue() : end});
+        const auto vertices = active.vertices().subspan(begin, end - begin);
+        const std::array<std::size_t, 1> one_group{vertices.size()};
+        spare.assign(of_queue ? vertices : std::span<const Index>(), one_group, scene.network);
+        if (!of_queue) spare.append(vertices, 0, one_group, scene.network);
+        spare.begin_step(scene);
+        return end;
     }
 
     // Whether there is time for a batch that begins with active vertex number `i`.
@@ -255,61 +268,21 @@ struct Sweeps {
     // No spring joins the packs of a group: threads may share them. Under a deadline batches are too small to
     // distribute.
     template <bool in_contact>
-    bool update_packs(std::size_t p, [[maybe_unused]] std::size_t end) noexcept {
+    bool update_packs(PackedVertices<Scalar>& packs, std::size_t p, std::size_t end) noexcept {
         bool changed = false;
-        if constexpr (can_use_lanes) {
-            const AnyExecutor calling_thread;
-            const AnyExecutor& distributor = budget.limited() ? calling_thread : executor;
-            while (p < end && advances()) {
-                const std::size_t group_end = packed.end_of_group(p, end);
-                packed.template update<in_contact>(p, group_end, scene, rule, distributor);
-                for (; p < group_end && advances(); ++p) changed |= finish_update<in_contact>(p);
+        const AnyExecutor calling_thread;
+        const AnyExecutor& distributor = budget.limited() ? calling_thread : executor;
+        while (p < end && advances()) {
+            const std::size_t group_end = packs.end_of_group(p, end);
+            packs.template update<in_contact>(p, group_end, scene, rule, forced_beyond, distributor);
+            for (; p < group_end && advances(); ++p) {
+                using Outcome = typename PackedVertices<Scalar>::Outcome;
+                report.vertex_updates += packs.free_count(p);
+                if (packs.outcome(p) == Outcome::unstable) report.status = StepStatus::unstable;
+                changed |= packs.outcome(p) == Outcome::moved;
             }
         }
         return changed;
-    }
-
-    // If the stiffness bound does not prove that an update is stable, the largest eigenvalue of the block decides.
-    template <bool in_contact>
-    bool finish_update(std::size_t p) noexcept {
-        using Outcome = typename PackedVertices<Scalar>::Outcome;
-        Outcome outcome = packed.outcome(p);
-        report.vertex_updates += packed.free_count(p);
-        if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
-            if (outcome == Outcome::too_far) {
-                for (const Index v : packed.vertices(p)) {
-                    if (scene.state.is_fixed(v) || !diverges(scene, v, rule.compliance(state_of<Rule>(scene, v))))
-                        continue;
-                    report.status = StepStatus::unstable;
-                    return false;
-                }
-                outcome = packed.template update_pack<in_contact>(p, scene, rule, true);
-            }
-        }
-        return outcome == Outcome::moved;
-    }
-
-    bool update(Index v, bool in_queue) noexcept {
-        auto& state = scene.state;
-        if (state.is_fixed(v) || !advances()) return false;
-        ++report.vertex_updates;
-        const auto vertex = state_of<Rule>(scene, v);
-        const auto move = move_of(rule, vertex, in_queue ? state.force_tolerance : state.outside_tolerance());
-        if constexpr (moves_along_force<Rule, Scalar> && !is_descent_rule<Rule>) {
-            if (move.may_overshoot && diverges(scene, v, move.compliance)) {
-                report.status = StepStatus::unstable;
-                return false;
-            }
-        }
-        state.set_compliance(v, as_block<Scalar>(move.compliance), move.least);
-        if (vertex.constrained) {
-            state.set_internal(
-                v, norm<Scalar>(vertex.force - state.constraint_force(v)),
-                vertex.stiffness - vertex.contact_stiffness - state.added_stiffness[static_cast<std::size_t>(v)]);
-        }
-        if (!move.moves) return false;
-        state.set_position(v, point(scene.x, v) + backtracked<Rule>(scene, v, vertex, move.displacement));
-        return true;
     }
 };
 

@@ -61,10 +61,10 @@ template <Number N>
 template <class Rule, Number N>
 [[nodiscard]] MEMBRANE_INLINE auto move_of(const Rule& rule, const VertexState<N>& vertex,
                                            Each<N> force_tolerance) noexcept {
-    const auto compliance = rule.compliance(vertex);
+    const auto compliance = compliance_of(rule, vertex);
     VertexMove<N, std::remove_cvref_t<decltype(compliance)>> move;
     move.compliance = compliance;
-    if constexpr (moves_along_force<Rule, N>) {
+    if constexpr (moves_along_force<Rule, Each<N>>) {
         move.least = compliance;
         move.may_overshoot = is_descent_rule<Rule> ? N(0) > N(0) : compliance * vertex.stiffness >= 2;
     } else {
@@ -111,30 +111,6 @@ template <class Scalar, class Network, class Volume>
     }
 }
 
-/// The input of `Rule`.
-template <class Rule, class Scalar, class Network, class Volume>
-[[nodiscard]] VertexState<Scalar> state_of(const StepInput<Scalar, Network, Volume>& scene, Index v) noexcept {
-    VertexState<Scalar> state;
-    if constexpr (requires { requires Rule::needs_majoriser; }) {
-        static_cast<EnergyMajoriser<Scalar>&>(state) = scene.network.majoriser(v, scene.x);
-    } else {
-        const auto springs = scene.network.force_on(v, scene.x);
-        state.force = springs.force;
-        state.stiffness = springs.stiffness;
-    }
-    const auto others = non_network_force(scene, v);
-    state.force += others.force;
-    state.stiffness += others.stiffness;
-    state.mass = scene.network.has_masses() ? scene.network.mass(v) : Scalar(0);
-    state.dt = scene.dt;
-    state.constrained = scene.state.seeds.contains(v);
-    if (state.constrained) {
-        state.contact_stiffness = scene.state.contact_stiffness(v);
-        state.contact_normal = direction_or_zero(scene.state.constraint_force(v));
-    }
-    return state;
-}
-
 /// Whether updates of a vertex by `compliance` times its force diverge: each overshoots by more than the last.
 template <class Scalar, class Network, class Volume>
 [[nodiscard]] bool diverges(const StepInput<Scalar, Network, Volume>& scene, Index v, Scalar compliance) noexcept {
@@ -162,27 +138,6 @@ template <Number N>
     const N reduction = part * dot<N>(displacement, vertex.stiffness_reduction * displacement);
     const N quadratic = larger<N>((vertex.stiffness * square - reduction) / 2, 0);
     return vertex.remainder.at(square, quadratic) <= dot<N>(vertex.force, displacement) - quadratic;
-}
-
-/// Backtracking line search, where an update needs one: halves the displacement until the energy does not rise, up to
-/// rounding.
-template <class Rule, class Scalar, class Network, class Volume>
-[[nodiscard]] Vector3<Scalar> backtracked(const StepInput<Scalar, Network, Volume>& scene, Index v,
-                                          const VertexState<Scalar>& vertex,
-                                          std::type_identity_t<Vector3<Scalar>> displacement) noexcept {
-    if constexpr (needs_line_search<Rule, Network>) {
-        if constexpr (has_energy_bound<Rule, Network>) {
-            if (surely_descends(vertex, displacement)) return displacement;
-        }
-        const auto others = non_network_force(scene, v);
-        for (int i = 0; i < std::numeric_limits<Scalar>::digits; ++i, displacement /= 2) {
-            const Scalar work = dot(others.force, displacement) - others.stiffness * squared_norm(displacement) / 2;
-            const auto energy = scene.network.energy_change(v, displacement, scene.x);
-            if (energy.change <= work + 16 * std::numeric_limits<Scalar>::epsilon() * energy.size) return displacement;
-        }
-        return Vector3<Scalar>::Zero();
-    }
-    return displacement;
 }
 
 }  // namespace membrane
