@@ -15,7 +15,7 @@ using test::same_bits;
 
 namespace {
 
-/// A foundation that keeps its springs to itself: its vertices are updated one by one.
+/// A foundation that does not take lanes: it is asked for one vertex after the other.
 template <Real S>
 struct Opaque {
     VirtualVolumeSprings<S> volume;

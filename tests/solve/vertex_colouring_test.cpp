@@ -17,15 +17,31 @@
 using namespace membrane;
 using test::Random;
 
+namespace {
+
+/// Vertices of a network in any order, some of them, and the same as a list.
+struct SomeVertices {
+    MassSpringNetwork<double, LinearSpring> network;
+    IndexSet set;
+    std::vector<Index> before;
+};
+SomeVertices some_vertices(Random& random) {
+    const auto mesh = test::random_surface<double>(random).mesh();
+    IndexSet set(mesh.vertex_count());
+    for (Index i = random.index(2 * mesh.vertex_count()); i > 0; --i) set.insert(random.index(mesh.vertex_count()));
+    return {{mesh, {}, {.stiffness = 1.0}}, set, {set.items().begin(), set.items().end()}};
+}
+
+}  // namespace
+
 TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[vertex_colouring]") {
     for (int seed = 1; seed <= cases(500); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        const auto mesh = test::random_surface<double>(random).mesh();
-        const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 1.0});
-        IndexSet set(mesh.vertex_count());
-        for (Index i = random.index(2 * mesh.vertex_count()); i > 0; --i) set.insert(random.index(mesh.vertex_count()));
-        const std::vector<Index> before(set.items().begin(), set.items().end());
+        auto some = some_vertices(random);
+        auto& set = some.set;
+        const auto& network = some.network;
+        const auto& before = some.before;
         // In two parts, after a first that stays as it is.
         const auto somewhere = [&] { return static_cast<std::size_t>(random.index(set.count() + 1)); };
         const auto [begin, middle] = std::minmax({somewhere(), somewhere()});
@@ -53,7 +69,7 @@ TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[v
         order(begin, middle);
         order(middle, before.size());
 
-        VertexColouring groups(mesh.vertex_count());
+        VertexColouring groups(network.vertex_count());
         for (int again = 0; again < 2; ++again) {
             for (std::size_t i = 0; i < before.size(); ++i) set.reorder(i, {&before[i], 1});
             groups.clear();
@@ -72,12 +88,11 @@ TEST_CASE("groups with the same results hold a vertex after all neighbours befor
     for (int seed = 1; seed <= cases(500); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
-        const auto mesh = test::random_surface<double>(random).mesh();
-        const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 1.0});
-        IndexSet set(mesh.vertex_count());
-        for (Index i = random.index(2 * mesh.vertex_count()); i > 0; --i) set.insert(random.index(mesh.vertex_count()));
-        const std::vector<Index> before(set.items().begin(), set.items().end());
-        VertexColouring groups(mesh.vertex_count());
+        auto some = some_vertices(random);
+        auto& set = some.set;
+        const auto& network = some.network;
+        const auto& before = some.before;
+        VertexColouring groups(network.vertex_count());
         groups.add(network, set, 0, before.size(), true);
         REQUIRE(std::ranges::is_permutation(set.items(), before));
         const auto group_of = [&](Index v) {
