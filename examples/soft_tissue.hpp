@@ -161,10 +161,11 @@ inline void SoftTissue::run() noexcept {
 }
 
 inline void SoftTissue::tick() noexcept {
-    last_tool_ = tool_.read().value;  // a haptic device would be read here, and get the force below
-    const auto contact = tracker_.update(tree_, x_, last_tool_);
+    const Tool tool = tool_.read().value;  // a haptic device would be read here, and get the force below
+    const auto contact = tracker_.update(tree_, x_, tool);
     const auto report = solver_.step(x_, std::chrono::duration<float>(tick_length).count(), network_, foundation_,
-                                     press(last_tool_, contact));
+                                     press(tool, contact));
+    if (report.status == membrane::StepStatus::advanced) last_tool_ = tool;
     tree_.refit(x_, report.moved);
     moved_.publish(report.moved, x_, now());
     force_.publish(report.total_reaction(), now());  // zero if the step was refused

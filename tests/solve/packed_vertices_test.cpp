@@ -329,7 +329,7 @@ TEMPLATE_TEST_CASE("elements that do not take lanes end in the same bits", "[pac
     check_same_tissue<TestType>(BlockStep{.omega = 1.7});
 }
 
-TEMPLATE_TEST_CASE("an update of a pack is that of each of its vertices alone, to the bit", "[packed]", float, double) {
+TEMPLATE_TEST_CASE("an update of a pack is that of each of its vertices alone, to the bit", "[packed]", TEST_SCALARS) {
     SECTION("linear springs, block") { check_alone<TestType>(LinearSpring{}, BlockStep{.omega = 1.3}); }
     SECTION("linear springs, safe") { check_alone<TestType>(LinearSpring{}, SafeStep{}); }
     SECTION("springs that stiffen, block") { check_alone<TestType>(test::CubicSpring{}, BlockStep{}); }
@@ -377,7 +377,7 @@ TEMPLATE_TEST_CASE(
 }
 
 TEMPLATE_TEST_CASE("it is all the same in what order an executor does its tasks, or in how many threads", "[packed]",
-                   float, double) {
+                   TEST_SCALARS) {
     SECTION("block") { check_same_shared_out<TestType>(BlockStep{}); }
     SECTION("safe") { check_same_shared_out<TestType>(SafeStep{}); }
     SECTION("as published") { check_same_shared_out<TestType>(MassStep{}); }

@@ -279,8 +279,8 @@ struct VertexAttachment {
     ///@}
 };
 
-/// Fixes vertices at their positions. No force enters there: they seed no queue. The reaction is the sum over the
-/// vertices.
+/// Fixes vertices at their positions, which are the caller's to move: a force enters the membrane beside those that
+/// have moved since the last step. Otherwise they seed no queue. The reaction is the sum over the vertices.
 struct PinnedVertices {
     std::span<const Index> vertices;  ///< owned by the caller
 

@@ -159,7 +159,8 @@ class QuasiStaticSolver {
     template <class Volume>
     void extrapolate(const ConstraintList<Scalar>& acting, ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
-    void seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context, bool with_body) noexcept;
+    void seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context, bool with_body,
+                                bool last_advanced) noexcept;
     template <class Network>
     void select(const Network& network, const ConstraintContext<Scalar>& context) noexcept;
     template <class Network>
@@ -267,6 +268,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
                                                             const Network& network, const Volume& volume,
                                                             Constraints constraints) noexcept {
     detail::require_made<QuasiStaticSolver>();
+    const bool last_advanced = report_.status == StepStatus::advanced;
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {.reactions = {reactions_.data(), constraints.size()}};
     const Index count = state_.vertex_count();
@@ -280,12 +282,12 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     const ConstPointsRef<Scalar> start = x, now = state_.positions();
     ConstraintContext<Scalar> context(start, state_, network);
     const ConstraintList<Scalar> acting(context, constraints);
+    seed_beside_moved_pins(network, context, body_moved, last_advanced);
     const StepStatus begun = begin_constraints(acting, context, network, volume);
     if (begun != StepStatus::advanced) return refuse_step(begun);
 
     const StepInput<Scalar, Network, Volume> scene{start, now, dt, network, volume, state_};
     set_supports(scene, options_.rigid_stiffness, state_.seeds.items());
-    seed_beside_moved_pins(network, context, body_moved);
     select(network, context);
     Sweeps<Scalar, Rule, Network, Volume> sweeps{scene,  rule_,  options_, executor_, active_, packed_,
                                                  spare_, acting, report_,  budget,    resume_};
@@ -375,21 +377,29 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
     }
 }
 
-// A force enters the membrane beside pinned vertices that the caller has moved. With its body it moves without a force.
+// A force enters the membrane beside vertices that the caller has moved: pinned by the network, or prescribed in the
+// last step. With its body it moves without a force. Until the constraints begin, positions are those of the last
+// step.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context,
-                                                             bool with_body) noexcept {
+                                                             bool with_body, bool last_advanced) noexcept {
     const bool known = std::exchange(pins_known_, true) && !with_body;
+    const auto seed_beside = [&](Index v) {
+        for (const auto& end : network.neighbours(v)) {
+            if (!network.pinned(end.other) && !last_prescribed_.contains(end.other)) context.seed(end.other);
+        }
+    };
+    const bool has_rows = known && last_advanced;
+    for (const Index v : has_rows ? last_prescribed_.items() : std::span<const Index>()) {
+        if (state_.position_of(v) != context.start(v)) seed_beside(v);
+    }
     for (std::size_t i = 0; i < pins_.size(); ++i) {
         const Index v = pins_[i], at = static_cast<Index>(i);
         const Vector3<Scalar> here = context.start(v);
         if (here == point(pinned_at_, at)) continue;
         pinned_at_.col(at) = here;
-        if (!known || !network.pinned(v)) continue;
-        for (const auto& end : network.neighbours(v)) {
-            if (!network.pinned(end.other)) context.seed(end.other);
-        }
+        if (known && network.pinned(v)) seed_beside(v);
     }
 }
 

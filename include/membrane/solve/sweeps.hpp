@@ -165,8 +165,8 @@ struct Sweeps {
             }
             const std::size_t packed_count = (std::min)(layer.size(), in_packs);
             changed |= update_packs<true>(packed, 0, packed.pack_from(packed_count));
-            for (std::size_t i = packed_count, next; i < layer.size(); i = next) {
-                next = pack_spare(i, layer.size());
+            for (std::size_t begin = packed_count, end; begin < layer.size(); begin = end) {
+                end = pack_spare(begin, layer.size());
                 changed |= update_packs<true>(spare, 0, spare.count());
             }
             budget.updated(layer.size());
