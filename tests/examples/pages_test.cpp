@@ -460,7 +460,7 @@ TEST_CASE_METHOD(Touched, "pages: forces in balance") {
         const auto second_contact = second_tracker.update(tree, x, second);
         tool.position.z() += 2e-6;
         // [balance]
-        const auto start = x;  // the foundation's damping is for the motion since here; on a moving body after `move_to`
+        const auto start = x;  // damping is for the motion since here; on a moving body after `move_to`
         const auto report = solver.step(x, dt, network, foundation, press(tool, contact, grasp), pull(tool, grasp),
                                         press(second, second_contact), membrane::pin(rim));
         auto unbalanced = report.total_reaction();  // on tools and pins [N]
