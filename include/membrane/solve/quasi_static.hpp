@@ -172,6 +172,7 @@ class QuasiStaticSolver {
         const auto moved = moved_.items();
         return std::find(moved.begin(), moved.end(), v) != moved.end();
     }
+    [[nodiscard]] bool begin_report(std::size_t constraints) noexcept;
     [[nodiscard]] StepReport<Scalar> refuse_step(StepStatus status) noexcept;
 
     [[no_unique_address]] Rule rule_;
@@ -268,9 +269,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
                                                             const Network& network, const Volume& volume,
                                                             Constraints constraints) noexcept {
     detail::require_made<QuasiStaticSolver>();
-    const bool last_advanced = report_.status == StepStatus::advanced;
-    reactions_.fill(Vector3<Scalar>::Zero());
-    report_ = {.reactions = {reactions_.data(), constraints.size()}};
+    const bool last_advanced = begin_report(constraints.size());
     const Index count = state_.vertex_count();
     if (x.cols() != count || network.vertex_count() != count || !has_vertices(volume, count))
         return refuse_step(StepStatus::wrong_vertex_count);
@@ -307,6 +306,15 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
     measure_beyond(scene);
     sweeps.budget.end();
     return report_;
+}
+
+// Returns whether the last step advanced: then the state has the positions after it.
+template <Real Scalar, CheckedStepRule<Scalar> Rule>
+bool QuasiStaticSolver<Scalar, Rule>::begin_report(std::size_t constraints) noexcept {
+    const bool last_advanced = report_.status == StepStatus::advanced;
+    reactions_.fill(Vector3<Scalar>::Zero());
+    report_ = {.reactions = {reactions_.data(), constraints}};
+    return last_advanced;
 }
 
 // Extrapolates, and begins the constraints. Returns why the step is refused: an input is invalid, a part has missed a
