@@ -116,8 +116,8 @@ class QuasiStaticSolver {
     template <class Self, class Visit>
     static void visit_state(Self& self, const Visit& visit) noexcept {
         visit(self.active_, self.state_, self.predictor_, self.last_prescribed_, self.woken_, self.placed_, self.moved_,
-              self.last_displacements_, self.pins_, self.pinned_at_, self.pins_known_, self.complete_, self.pose_,
-              self.deformations_, self.resume_, self.costs_);
+              self.last_displacements_, self.pins_, self.pinned_at_, self.pins_known_, self.last_advanced_,
+              self.complete_, self.pose_, self.deformations_, self.resume_, self.costs_);
         if constexpr (Visit::restores) self.report_ = {};
     }
 
@@ -189,6 +189,7 @@ class QuasiStaticSolver {
     FixedVector<Index> pins_;            // the pinned vertices
     Points<Scalar> pinned_at_;           // positions of `pins_` in the last step [m]
     bool pins_known_ = false;            // whether there was a last step
+    bool last_advanced_ = false;         // whether it advanced
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
@@ -311,7 +312,7 @@ StepReport<Scalar> QuasiStaticSolver<Scalar, Rule>::step_in(TimeBudget budget, P
 // Returns whether the last step advanced: then the state has the positions after it.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 bool QuasiStaticSolver<Scalar, Rule>::begin_report(std::size_t constraints) noexcept {
-    const bool last_advanced = report_.status == StepStatus::advanced;
+    const bool last_advanced = std::exchange(last_advanced_, false);
     reactions_.fill(Vector3<Scalar>::Zero());
     report_ = {.reactions = {reactions_.data(), constraints}};
     return last_advanced;
@@ -471,6 +472,7 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     }
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
+    last_advanced_ = true;
     state_.end_step();
 }
 
@@ -543,7 +545,7 @@ void QuasiStaticSolver<Scalar, Rule>::reset() noexcept {
     active_.clear();
     state_.reset();
     predictor_.reset();
-    complete_ = pins_known_ = false;
+    complete_ = pins_known_ = last_advanced_ = false;
     last_prescribed_.clear();
     woken_.clear();
     placed_.clear();
