@@ -224,7 +224,7 @@ SolverOptions<S> random_options(Random& random) {
 template <Real S, class Law, class Rule>
 void check_same(const Law& law, const Rule& rule) {
     int advanced = 0, refused = 0;
-    for (int seed = 1; seed <= cases(60); ++seed) {
+    for (int seed = 1; seed <= cases(150); ++seed) {
         CAPTURE(seed);
         Random random(static_cast<std::uint64_t>(seed));
         const Membrane<S> membrane(random);
@@ -252,7 +252,7 @@ void check_same(const Law& law, const Rule& rule) {
         for (std::size_t i = 0; i < in_lanes.size(); i += 5) ++(in_lanes[i] == 0 ? advanced : refused);
     }
     CHECK(advanced > refused);
-    if constexpr (std::same_as<Rule, MassStep>) CHECK((refused > 0 || cases(60) < 60));
+    if constexpr (std::same_as<Rule, MassStep>) CHECK((refused > 0 || cases(150) < 150));
 }
 
 /// A tissue that is pulled so far that some updates need the line search, on a foundation with two stiffnesses.

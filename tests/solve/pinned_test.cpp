@@ -108,7 +108,8 @@ TEST_CASE("a rim that its user moves takes the membrane along", "[pinned]") {
     const MassSpringNetwork network(cap, LinearSpring{}, {.stiffness = 40.0, .pinned = rim});
     const MassSpringNetwork free(cap, LinearSpring{}, {.stiffness = 40.0});
     const VirtualVolumeSprings soft(cap, {.stiffness = 1.0});
-    const auto is_woken = [&](const SolverOptions<double>& options, bool wakes, bool by_network = true) {
+    const auto is_woken = [&](const SolverOptions<double>& options, bool wakes, bool by_network = true,
+                              bool refuses = false) {
         QuasiStaticSolver solver(network, options);
         Points<double> x = cap.positions();
         StepReport<double> report;
@@ -117,7 +118,15 @@ TEST_CASE("a rim that its user moves takes the membrane along", "[pinned]") {
                 for (const Index v : rim) x.col(v) += 5e-5 * Vector3<double>(1, 0.5, 0.2);
             }
             if (wakes) solver.wake_all();
-            report = by_network ? solver.step(x, 1e-3, network, soft) : solver.step(x, 1e-3, free, soft, pin(rim));
+            const auto step = [&](const auto&... loads) {
+                return by_network ? solver.step(x, 1e-3, network, soft, loads...)
+                                  : solver.step(x, 1e-3, free, soft, pin(rim), loads...);
+            };
+            if (refuses && tick > 20 && tick <= 40) {  // it moves in steps that are refused
+                REQUIRE(step(load<double>({0, 1, 2}, {1, 0, 0}, {NAN, 0, 0})).status == StepStatus::invalid_input);
+                continue;
+            }
+            report = step();
             REQUIRE(report.status == StepStatus::advanced);
         }
         REQUIRE(report.converged);
@@ -131,6 +140,8 @@ TEST_CASE("a rim that its user moves takes the membrane along", "[pinned]") {
     CHECK((is_woken(as_needed, false) - y).cwiseAbs().maxCoeff() < 1e-10);
     CHECK((is_woken(all, false, false) - y).cwiseAbs().maxCoeff() < 1e-10);
     CHECK((is_woken(as_needed, false, false) - y).cwiseAbs().maxCoeff() < 1e-10);
+    CHECK((is_woken(all, false, true, true) - y).cwiseAbs().maxCoeff() < 1e-10);
+    CHECK((is_woken(all, false, false, true) - y).cwiseAbs().maxCoeff() < 1e-10);
 }
 
 TEST_CASE("a rim at rest wakes nothing", "[pinned]") {

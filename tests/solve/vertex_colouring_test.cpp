@@ -19,29 +19,24 @@ using test::Random;
 
 namespace {
 
-/// Vertices of a network in any order, some of them, and the same as a list.
-struct SomeVertices {
-    MassSpringNetwork<double, LinearSpring> network;
-    IndexSet set;
-    std::vector<Index> before;
-};
-SomeVertices some_vertices(Random& random) {
-    const auto mesh = test::random_surface<double>(random).mesh();
-    IndexSet set(mesh.vertex_count());
-    for (Index i = random.index(2 * mesh.vertex_count()); i > 0; --i) set.insert(random.index(mesh.vertex_count()));
-    return {{mesh, {}, {.stiffness = 1.0}}, set, {set.items().begin(), set.items().end()}};
+/// Calls `check(random, network, set, list)` with vertices of a network in any order, in a set and in a list.
+template <class Check>
+void for_random_vertices(const Check& check) {
+    for (int seed = 1; seed <= cases(500); ++seed) {
+        CAPTURE(seed);
+        Random random(static_cast<std::uint64_t>(seed));
+        const auto mesh = test::random_surface<double>(random).mesh();
+        const MassSpringNetwork<double, LinearSpring> network(mesh, {}, {.stiffness = 1.0});
+        IndexSet set(mesh.vertex_count());
+        for (Index i = random.index(2 * mesh.vertex_count()); i > 0; --i) set.insert(random.index(mesh.vertex_count()));
+        check(random, network, set, std::vector<Index>(set.items().begin(), set.items().end()));
+    }
 }
 
 }  // namespace
 
 TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[vertex_colouring]") {
-    for (int seed = 1; seed <= cases(500); ++seed) {
-        CAPTURE(seed);
-        Random random(static_cast<std::uint64_t>(seed));
-        auto some = some_vertices(random);
-        auto& set = some.set;
-        const auto& network = some.network;
-        const auto& before = some.before;
+    for_random_vertices([&](Random& random, const auto& network, IndexSet& set, const std::vector<Index>& before) {
         // In two parts, after a first that stays as it is.
         const auto somewhere = [&] { return static_cast<std::size_t>(random.index(set.count() + 1)); };
         const auto [begin, middle] = std::minmax({somewhere(), somewhere()});
@@ -79,19 +74,13 @@ TEST_CASE("each vertex is in the first group that holds no neighbour of it", "[v
             REQUIRE(std::ranges::equal(set.items(), expected));
             REQUIRE(std::ranges::equal(groups.ends(), ends));
         }
-    }
+    });
 }
 
 // So that each vertex is updated where its neighbours are as in the given order.
 TEST_CASE("groups with the same results hold a vertex after all neighbours before it, and before all after it",
           "[vertex_colouring]") {
-    for (int seed = 1; seed <= cases(500); ++seed) {
-        CAPTURE(seed);
-        Random random(static_cast<std::uint64_t>(seed));
-        auto some = some_vertices(random);
-        auto& set = some.set;
-        const auto& network = some.network;
-        const auto& before = some.before;
+    for_random_vertices([&](Random&, const auto& network, IndexSet& set, const std::vector<Index>& before) {
         VertexColouring groups(network.vertex_count());
         groups.add(network, set, 0, before.size(), true);
         REQUIRE(std::ranges::is_permutation(set.items(), before));
@@ -105,7 +94,7 @@ TEST_CASE("groups with the same results hold a vertex after all neighbours befor
                 if (j < i) REQUIRE(group_of(before[j]) < group_of(before[i]));
             }
         }
-    }
+    });
 }
 
 TEST_CASE("a snapshot holds the groups", "[vertex_colouring]") {

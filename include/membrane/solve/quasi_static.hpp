@@ -187,9 +187,9 @@ class QuasiStaticSolver {
     FixedVector<Index> moved_;           // in the last step that advanced
     Points<Scalar> last_displacements_;  // of `moved_` [m]
     FixedVector<Index> pins_;            // the pinned vertices
-    Points<Scalar> pinned_at_;           // positions of `pins_` in the last step [m]
-    bool pins_known_ = false;            // whether there was a last step
-    bool last_advanced_ = false;         // whether it advanced
+    Points<Scalar> pinned_at_;           // positions of `pins_` in the last step that advanced [m]
+    bool pins_known_ = false;            // whether there was one
+    bool last_advanced_ = false;         // whether it was the last step
     Predictor<Scalar, StepState<Scalar>::max_constraints> predictor_;
     std::array<Vector3<Scalar>, StepState<Scalar>::max_constraints> reactions_{};
     StepReport<Scalar> report_;
@@ -387,28 +387,25 @@ void QuasiStaticSolver<Scalar, Rule>::extrapolate(const ConstraintList<Scalar>& 
 }
 
 // A force enters the membrane beside vertices that the caller has moved: pinned by the network, or prescribed in the
-// last step. With its body it moves without a force. Until the constraints begin, positions are those of the last
-// step.
+// last step. With its body it moves without a force. Until the constraints begin, positions are those of the last step,
+// if that advanced; if not, the prescribed vertices may have moved since.
 template <Real Scalar, CheckedStepRule<Scalar> Rule>
 template <class Network>
 void QuasiStaticSolver<Scalar, Rule>::seed_beside_moved_pins(const Network& network, ConstraintContext<Scalar>& context,
                                                              bool with_body, bool last_advanced) noexcept {
-    const bool known = std::exchange(pins_known_, true) && !with_body;
+    if (!pins_known_ || with_body) return;
     const auto seed_beside = [&](Index v) {
         for (const auto& end : network.neighbours(v)) {
             if (!network.pinned(end.other) && !last_prescribed_.contains(end.other)) context.seed(end.other);
         }
     };
-    const bool has_rows = known && last_advanced;
-    for (const Index v : has_rows ? last_prescribed_.items() : std::span<const Index>()) {
-        if (state_.position_of(v) != context.start(v)) seed_beside(v);
+    for (const Index v : last_prescribed_.items()) {
+        if (!last_advanced || state_.position_of(v) != context.start(v)) seed_beside(v);
     }
     for (std::size_t i = 0; i < pins_.size(); ++i) {
-        const Index v = pins_[i], at = static_cast<Index>(i);
-        const Vector3<Scalar> here = context.start(v);
-        if (here == point(pinned_at_, at)) continue;
-        pinned_at_.col(at) = here;
-        if (known && network.pinned(v)) seed_beside(v);
+        const Index v = pins_[i];
+        const bool moved = context.start(v) != point(pinned_at_, static_cast<Index>(i));
+        if (moved && network.pinned(v)) seed_beside(v);
     }
 }
 
@@ -472,7 +469,8 @@ void QuasiStaticSolver<Scalar, Rule>::write_back(PointsRef<Scalar>& x, const Net
     }
     complete_ = !report_.out_of_time && !active_.truncated();
     std::swap(last_prescribed_, state_.prescribed);
-    last_advanced_ = true;
+    for (std::size_t i = 0; i < pins_.size(); ++i) pinned_at_.col(static_cast<Index>(i)) = point(x, pins_[i]);
+    pins_known_ = last_advanced_ = true;
     state_.end_step();
 }
 
